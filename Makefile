@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-# The front door. `make demo` and `make test` need a Debian or Ubuntu machine with Python >= 3.10, and nothing else.
+# All commands of the project. `make demo` and `make test` need only a Debian or Ubuntu machine with Python >= 3.10.
 #
 #   make demo         identify, verify and render the sample scene; pictures in demo/
 #   make test         build, C++ tests, Python tests, lint                        (minutes)
 #   make control      build palpate-control, the real-time program: build/control/palpate-control
-#   make test-full    the same tests with long counts, under the sanitizers, and as installed  (an hour)
+#   make test-full    the same tests with long counts, with sanitizers, and of the installed package  (an hour)
 #   make bench        all studies, JSON and figures in build/bench/
 #   make figures      the same studies, figures and generated pages in docs/
 #   make lint | format | stubs | output | clean
@@ -18,15 +18,16 @@ SHELL := /bin/bash
 
 PYTHON ?= python3
 
-# How many random cases a test draws: 1 for every change, 100 for the long run. How long a benchmark runs: 1 for
-# numbers that are published, 0.01 to see that all run and that their answers are right. Both can be set from outside.
-# The sanitizers slow a program ten times and get a tenth of the cases.
+# PALPATE_TEST_SCALE multiplies the random cases of a test: 1 for every change, 100 for the long run.
+# PALPATE_BENCH_SCALE multiplies the duration of a benchmark: 1 for published numbers, 0.01 to test that all run and
+# give correct results. The environment can set both. The sanitizers make a program ten times slower and get a tenth
+# of the cases.
 test test-cpp test-python: export PALPATE_TEST_SCALE ?= 1
 test-full test-full-native: export PALPATE_TEST_SCALE ?= 100
 bench figures: export PALPATE_BENCH_SCALE ?= 1
 
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
-# Nothing outside this folder is touched: no download cache and no font cache in the home directory.
+# Writes only below this folder: no download cache and no font cache in the home directory.
 export PIP_NO_CACHE_DIR ?= 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := tools/constraints.txt
@@ -36,7 +37,7 @@ python := .venv/bin/python
 stamps := .venv/stamps
 
 core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
-# A virtual environment and a build tree hold absolute paths: in a folder that was moved, start again.
+# A virtual environment and a build tree contain absolute paths: they are created again after the folder was moved.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
 .PHONY: help demo control test test-full test-full-native test-cpp test-python bench figures lint lint-python lint-cpp lint-stubs format stubs output \
@@ -55,12 +56,12 @@ $(stamps)/build: pyproject.toml tools/constraints.txt tools/system_packages.sh $
 	mkdir -p $(stamps) && pwd -P > .venv/folder
 	touch $@
 
-# The compiled module, and the package in place: Python sources are live, C++ sources bring us here again.
+# The compiled module and the editable package: a change of a C++ source builds the module again.
 $(stamps)/core: $(stamps)/build $(core_sources)
 	$(python) -m pip install --quiet --no-build-isolation -C cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON --editable .
 	touch $@
 
-# After core, because two pips must not work in one environment at the same time.
+# After core, because two runs of pip must not change one environment at the same time.
 $(stamps)/develop: $(stamps)/build | $(stamps)/core
 	tools/system_packages.sh "$(PYTHON)" test
 	$(python) -m pip install --quiet --group test --group lint
@@ -73,16 +74,16 @@ setup: $(stamps)/core $(stamps)/develop
 demo: $(stamps)/core
 	.venv/bin/palpate demo
 
-# Python's summary stands last, where it is looked for.
+# The Python tests run last, so that their summary is at the end of the output.
 test: lint test-cpp | setup
 	$(MAKE) --no-print-directory test-python
 
-# One process more than there are processors, since many tests wait for a clock; files in their order, since the
-# longest ones hold few tests and would begin last.
+# One process more than the number of processors, because many tests wait for a clock. Files keep their order, because
+# the longest ones contain few tests and would start last.
 test-python: setup control
 	$(python) -m pytest --numprocesses "$$(($(CMAKE_BUILD_PARALLEL_LEVEL) + 1))" --dist loadfile --no-loadscope-reorder
 
-# The real-time program; the build tool knows what is up to date.
+# The real-time program; the build tool detects changed sources.
 control: $(stamps)/develop
 	cmake --preset control >/dev/null
 	cmake --build --preset control
@@ -93,7 +94,7 @@ test-cpp: setup
 test-full: test-full-native
 	$(MAKE) --no-print-directory test-python
 
-# What `make test` does not do at any size: sanitizers, the package as installed, a USB device below a kernel.
+# Tests that `make test` never runs: sanitizers, the installed package, a USB device below a kernel.
 test-full-native: setup control
 	tools/cpp_tests.sh release
 	for preset in asan tsan; do tools/cpp_tests.sh $$preset; done

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Libraries of real devices: libusb (Debian: libusb-1.0-0-dev) for USB; Boost.Beast (libboost-dev) and nlohmann-json for
-# an Inverse3. Without a library its device is refused. The target palpate_devices holds what was found.
+# an Inverse3. Without a library its device is refused. The target palpate_devices links the libraries that were found.
 
 include_guard()
 

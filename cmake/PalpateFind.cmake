@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# A package from the system if it is there, else from a pinned release archive.
+# Uses a package of the system, or downloads its pinned release archive.
 
 include_guard()
 
@@ -7,7 +7,7 @@ if(POLICY CMP0135) # since CMake 3.24: extracted files are as old as the downloa
   cmake_policy(SET CMP0135 NEW)
 endif()
 
-# palpate_find_or_fetch(NAME URL SHA256 [VERSION]): VERSION is the oldest that will do.
+# palpate_find_or_fetch(NAME URL SHA256 [VERSION]): VERSION is the oldest that is accepted.
 function(palpate_find_or_fetch name url sha256)
   find_package(${name} ${ARGN} QUIET)
   if(NOT ${name}_FOUND)

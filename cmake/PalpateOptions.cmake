@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What every binary of our own is compiled with. It never reaches somebody who links palpate::palpate.
+# Compiler options of all programs and modules of this project. Users of palpate::palpate do not receive them.
 
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 

@@ -22,23 +22,23 @@
 namespace {
 
 /// Returns the largest drop of a force below its previous maximum, which is felt as a click.
-double largest_fall(const std::vector<double>& force) {
-    double highest = -std::numeric_limits<double>::infinity();
-    double fall = 0.0;
+double largest_drop(const std::vector<double>& force) {
+    double maximum = -std::numeric_limits<double>::infinity();
+    double drop = 0.0;
     for (const double value : force) {
-        highest = std::max(highest, value);
-        fall = std::max(fall, highest - value);
+        maximum = std::max(maximum, value);
+        drop = std::max(drop, maximum - value);
     }
-    return fall;
+    return drop;
 }
 
 }  // namespace
 
-int main(int count, char** words) {
+int main(int count, char** arguments) {
     using namespace palpate;
 
     // 1. Load the object. Its press force drops suddenly; its release force rises again at another position.
-    const ForceModel click = load_model_file(count > 1 ? words[1] : "examples/02_click.json").model;
+    const ForceModel click = load_model_file(count > 1 ? arguments[1] : "examples/02_click.json").model;
     const double lower = click.domain().lower[0];
     const double upper = click.domain().upper[0];
     std::vector<double> press;
@@ -48,8 +48,8 @@ int main(int count, char** words) {
         press.push_back(click.hysteresis()->sliding(position, +1).force);
         release.push_back(click.hysteresis()->sliding(position, -1).force);
     }
-    std::printf("switch: press force drops by %.3f N*m, release force by %.3f N*m\n", largest_fall(press),
-                largest_fall(release));
+    std::printf("switch: press force drops by %.3f N*m, release force by %.3f N*m\n", largest_drop(press),
+                largest_drop(release));
 
     // 2. Simulate a knob that is scaled to the model, and a hand that presses for a second.
     const TestRig rig = rig_for(click, true, DeviceProfile{}.period_s);
@@ -60,12 +60,12 @@ int main(int count, char** words) {
         SchemeChoices chosen;
         chosen.structure = structure;
         const Scheme scheme = rig.scheme(click, chosen);
-        const Trace felt = simulate(click, scheme, rig.device, rig.hand, 1000, 20, lower);
-        const auto turn = std::max_element(felt.position.begin(), felt.position.end());
-        const std::vector<double> pressed(felt.applied.begin(),
-                                          felt.applied.begin() + (turn - felt.position.begin()) + 1);
+        const Trace rendered = simulate(click, scheme, rig.device, rig.hand, 1000, 20, lower);
+        const auto deepest = std::max_element(rendered.position.begin(), rendered.position.end());
+        const std::vector<double> pressed(
+            rendered.applied.begin(), rendered.applied.begin() + (deepest - rendered.position.begin()) + 1);
         std::printf("%s: press force drops by %.3f N*m\n",
                     std::string(structure_names[static_cast<std::size_t>(structure)]).c_str(),
-                    largest_fall(pressed));
+                    largest_drop(pressed));
     }
 }

@@ -18,21 +18,21 @@ import palpate
 from palpate.planning import rig_for
 
 
-def largest_fall(force: Iterable[float]) -> float:
+def largest_drop(force: Iterable[float]) -> float:
     """Returns the largest drop of a force below its previous maximum, which is felt as a click."""
-    highest, fall = -np.inf, 0.0
+    maximum, drop = -np.inf, 0.0
     for value in force:
-        highest = max(highest, value)
-        fall = max(fall, highest - value)
-    return fall
+        maximum = max(maximum, value)
+        drop = max(drop, maximum - value)
+    return drop
 
 
 # 1. Load the object. Its press force drops suddenly; its release force rises again at another position.
 switch = palpate.load_model(Path(__file__).with_suffix(".json"))
 position = np.linspace(switch.lower[0], switch.upper[0], 1001)
-press, release = (switch.force(position, direction=way) for way in (+1, -1))
-falls = largest_fall(press), largest_fall(release)
-print(f"switch: press force drops by {falls[0]:.3f} N*m, release force by {falls[1]:.3f} N*m")
+press, release = (switch.force(position, direction=sign) for sign in (+1, -1))
+drops = largest_drop(press), largest_drop(release)
+print(f"switch: press force drops by {drops[0]:.3f} N*m, release force by {drops[1]:.3f} N*m")
 
 # 2. Simulate a knob that is scaled to the model, and a hand that presses for a second.
 rig = rig_for(switch)
@@ -40,6 +40,6 @@ rig = rig_for(switch)
 # 3. Measure the drop of the rendered force. A mass behind the coupling oscillates.
 for structure in ("direct", "massless", "implicit"):
     plan = palpate.Plan(switch, rig.scheme(switch, structure=structure))
-    felt = palpate.simulate(plan, rig.device, rig.hand, 1.0)
-    pressed = felt.force[: np.argmax(felt.position) + 1]
-    print(f"{structure}: press force drops by {largest_fall(pressed):.3f} N*m")
+    rendered = palpate.simulate(plan, rig.device, rig.hand, 1.0)
+    pressed = rendered.force[: np.argmax(rendered.position) + 1]
+    print(f"{structure}: press force drops by {largest_drop(pressed):.3f} N*m")

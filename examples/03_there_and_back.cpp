@@ -56,15 +56,15 @@ double force_of(const ForceModel& model, double position, double direction) {
 }
 
 /// Prints the largest difference between two models along a stroke, over the common part of their domains.
-void compare(const char* name, const ForceModel& real, const ForceModel& again, double direction) {
-    const double lower = std::max(real.domain().lower[0], again.domain().lower[0]);
-    const double upper = std::min(real.domain().upper[0], again.domain().upper[0]);
+void compare(const char* name, const ForceModel& real, const ForceModel& second, double direction) {
+    const double lower = std::max(real.domain().lower[0], second.domain().lower[0]);
+    const double upper = std::min(real.domain().upper[0], second.domain().upper[0]);
     double difference = 0.0;
     double largest = 0.0;
     for (int k = 0; k <= 2000; ++k) {
         const double position = lower + (upper - lower) * k / 2000;
         const double force = force_of(real, position, direction);
-        difference = std::max(difference, std::abs(force_of(again, position, direction) - force));
+        difference = std::max(difference, std::abs(force_of(second, position, direction) - force));
         largest = std::max(largest, std::abs(force));
     }
     std::printf("%s: largest difference %.3f N*m of %.2f N*m\n", name, difference, largest);
@@ -72,12 +72,12 @@ void compare(const char* name, const ForceModel& real, const ForceModel& again, 
 
 }  // namespace
 
-int main(int count, char** words) {
-    std::string made = (fs::temp_directory_path() / "palpate-XXXXXX").string();
-    const fs::path folder = mkdtemp(made.data());
+int main(int count, char** arguments) {
+    std::string name = (fs::temp_directory_path() / "palpate-XXXXXX").string();
+    const fs::path folder = mkdtemp(name.data());
 
     // 1. Record the switch of example 2: press and release it four times, slowly, with a 16-bit encoder.
-    const ForceModel click = load_model_file(count > 1 ? words[1] : "examples/02_click.json").model;
+    const ForceModel click = load_model_file(count > 1 ? arguments[1] : "examples/02_click.json").model;
     const double period_s = DeviceProfile{}.period_s;
     TestRig rig = rig_for(click, true, period_s);
     const double lower = click.domain().lower[0];
@@ -87,12 +87,12 @@ int main(int count, char** words) {
     direct.structure = StructureKind::Direct;
     std::vector<double> position;
     for (int k = 0; k < 8000; ++k) {
-        const double pressed = lower + travel * (0.5 - 0.5 * std::cos(std::numbers::pi * k * period_s));
-        position.push_back(step * std::floor(pressed / step + 0.5));
+        const double motion = lower + travel * (0.5 - 0.5 * std::cos(std::numbers::pi * k * period_s));
+        position.push_back(step * std::floor(motion / step + 0.5));
     }
     std::vector<double> force;
-    for (const Rendered& felt : motion_driven(click, rig.scheme(click, direct), position, period_s)) {
-        force.push_back(felt.force);
+    for (const Rendered& row : motion_driven(click, rig.scheme(click, direct), position, period_s)) {
+        force.push_back(row.force);
     }
     write(folder / "real.csv", position, force, period_s);
 
@@ -108,8 +108,8 @@ int main(int count, char** words) {
     write(folder / "rendered.csv", rendered.position, rendered.applied, period_s);
 
     // 4. Identify the recording of the rendered force. 5. Compare the forces of each stroke.
-    const ForceModel again = identify(folder / "rendered.csv");
-    compare("press", real, again, +1);
-    compare("release", real, again, -1);
+    const ForceModel second = identify(folder / "rendered.csv");
+    compare("press", real, second, +1);
+    compare("release", real, second, -1);
     fs::remove_all(folder);
 }

@@ -30,10 +30,10 @@ switch = palpate.load_model(Path(__file__).with_name("02_click.json"))
 rig = rig_for(switch)
 time = np.arange(8000) * rig.device.period_s
 travel, step = switch.upper[0] - switch.lower[0], rig.device.encoder_step
-pressed = switch.lower[0] + travel * (0.5 - 0.5 * np.cos(np.pi * time))
-position = step * np.floor(pressed / step + 0.5)
-exact = palpate.Plan(switch, rig.scheme(switch, structure="direct"))
-force = np.round(force_at(exact, position), 4)  # the transducer reads steps of 0.1 mN*m
+motion = switch.lower[0] + travel * (0.5 - 0.5 * np.cos(np.pi * time))
+position = step * np.floor(motion / step + 0.5)
+direct_plan = palpate.Plan(switch, rig.scheme(switch, structure="direct"))
+force = np.round(force_at(direct_plan, position), 4)  # the transducer reads steps of 0.1 mN*m
 palpate.Recording.from_arrays(position, force, time, units={"position": "rad", "force": "N*m"}).write(
     real_csv
 )
@@ -49,10 +49,10 @@ rendered = palpate.simulate(palpate.Plan(real, rig.scheme(real)), rig.device, ri
 replace(rendered, force=np.round(rendered.force, 4)).write(rendered_csv)
 
 # 4. Identify the recording of the rendered force.
-again = palpate.identify(palpate.read_recording(rendered_csv))
+second = palpate.identify(palpate.read_recording(rendered_csv))
 
 # 5. Compare the real and the rendered force of each stroke.
-for stroke in compare(real, again):
+for stroke in compare(real, second):
     difference, largest = np.max(np.abs(stroke.second - stroke.first)), np.max(np.abs(stroke.first))
     print(f"{stroke.name or 'both strokes'}: largest difference {difference:.3f} N*m of {largest:.2f} N*m")
 folder.cleanup()

@@ -32,17 +32,17 @@ def output_of(command: str, folder: str) -> str:
     programs = Path(sysconfig.get_path("scripts"))
     text = ""
     for part in command.split(" && "):
-        words = shlex.split(part)
-        answer = subprocess.run(
-            [programs / words[0], *words[1:]], cwd=folder, capture_output=True, text=True, check=False
+        arguments = shlex.split(part)
+        completed = subprocess.run(
+            [programs / arguments[0], *arguments[1:]], cwd=folder, capture_output=True, text=True, check=False
         )
-        if answer.returncode != 0:
-            raise SystemExit(f"{part}: {answer.stdout}{answer.stderr}")
-        text = answer.stdout
+        if completed.returncode != 0:
+            raise SystemExit(f"{part}: {completed.stdout}{completed.stderr}")
+        text = completed.stdout
     return text
 
 
-def alike(written: str, printed: str) -> bool:
+def agree(written: str, printed: str) -> bool:
     """Returns true if the words are equal and the numbers agree within 5 %."""
     written, printed = (DURATION.sub("T s", text) for text in (written, printed))
     if NUMBER.sub("0", written) != NUMBER.sub("0", printed):
@@ -55,21 +55,21 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true", help="change no file, fail if a block differs")
     check = parser.parse_args().check
-    stale = 0
+    n_different = 0
     for page in PAGES:
         content = page.read_text(encoding="utf-8")
         with tempfile.TemporaryDirectory() as folder:
             for block in BLOCK.finditer(content):
                 printed = output_of(block["command"], folder)
-                if alike(block["text"], printed):
+                if agree(block["text"], printed):
                     continue
-                stale += 1
+                n_different += 1
                 content = content.replace(block[0], block[1] + printed)
                 verb = "differs from" if check else "now has"
                 print(f"{page.relative_to(ROOT)}: {verb} the output of: {block['command']}", file=sys.stderr)
         if not check:
             page.write_text(content, encoding="utf-8")
-    return 1 if check and stale else 0
+    return 1 if check and n_different else 0
 
 
 if __name__ == "__main__":

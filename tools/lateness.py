@@ -22,24 +22,24 @@ PRIORITY = 80
 RATE_HZ = 1000
 
 
-def ours(program: Path, model: Path, seconds: float, cpu: int) -> dict[str, float]:
+def lateness_of_palpate(program: Path, model: Path, seconds: float, cpu: int) -> dict[str, float]:
     command = [program, model, "--json", "--duration-s", f"{seconds}", "--rate-hz", f"{RATE_HZ}"]
     command += ["--priority", f"{PRIORITY}", "--cpu", f"{cpu}", "--lowest-rate-share", "0"]
-    answer = subprocess.run(command, capture_output=True, text=True, check=True)
-    summary = json.loads(answer.stdout)
+    completed = subprocess.run(command, capture_output=True, text=True, check=True)
+    summary = json.loads(completed.stdout)
     if summary["without"]:
         sys.exit(f"not comparable without privileges: {summary['without'][0]}")
     return {key: summary["lateness"][key] for key in ("p99_us", "p999_us")}
 
 
-def theirs(seconds: float, cpu: int) -> dict[str, float]:
+def lateness_of_cyclictest(seconds: float, cpu: int) -> dict[str, float]:
     # verbose, because the histogram ends at 1 ms and a virtual machine can wake up later
     command = ["cyclictest", "-v", "-m", "-N", "-t", "1", "-a", f"{cpu}", "-p", f"{PRIORITY}"]
     command += ["-i", f"{10**6 // RATE_HZ}", "-l", f"{round(seconds * RATE_HZ)}"]
-    answer = subprocess.run(command, capture_output=True, text=True, check=True)
-    lines = re.findall(r"^ *0: *\d+: *(\d+)$", answer.stdout, re.MULTILINE)
-    late_us = sorted(1e-3 * int(lateness_ns) for lateness_ns in lines)
-    return {"p99_us": quantile(late_us, 0.99), "p999_us": quantile(late_us, 0.999)}
+    completed = subprocess.run(command, capture_output=True, text=True, check=True)
+    lines = re.findall(r"^ *0: *\d+: *(\d+)$", completed.stdout, re.MULTILINE)
+    lateness_us = sorted(1e-3 * int(latency_ns) for latency_ns in lines)
+    return {"p99_us": quantile(lateness_us, 0.99), "p999_us": quantile(lateness_us, 0.999)}
 
 
 def quantile(ascending: list[float], share: float) -> float:
@@ -61,31 +61,35 @@ def main() -> int:
     parser.add_argument(
         "--blocks", type=int, default=10, help="number for each program and state of the machine"
     )
-    given = parser.parse_args()
+    options = parser.parse_args()
     cpu = max(os.sched_getaffinity(0))
     result: dict[str, object] = {"machine": platform.platform(), "priority": PRIORITY, "rate_hz": RATE_HZ}
-    result |= {"seconds": given.seconds, "blocks": given.blocks}
+    result |= {"seconds": options.seconds, "blocks": options.blocks}
     print(
-        f"{'':8}{'':8}{'palpate':>10}{'cyclictest':>12}{'ratio':>8}   (us, median of {given.blocks} blocks)"
+        f"{'':8}{'':8}{'palpate':>10}{'cyclictest':>12}{'ratio':>8}   (us, median of {options.blocks} blocks)"
     )
     for state in ("idle", "loaded"):
         busy = load() if state == "loaded" else []
         blocks: dict[str, list[dict[str, float]]] = {"palpate-control": [], "cyclictest": []}
         try:
-            for _ in range(given.blocks):
-                blocks["palpate-control"].append(ours(given.program, given.model, given.seconds, cpu))
-                blocks["cyclictest"].append(theirs(given.seconds, cpu))
+            for _ in range(options.blocks):
+                blocks["palpate-control"].append(
+                    lateness_of_palpate(options.program, options.model, options.seconds, cpu)
+                )
+                blocks["cyclictest"].append(lateness_of_cyclictest(options.seconds, cpu))
         finally:
             for process in busy:
                 process.kill()
                 process.wait()
         result[state] = blocks
         for key, name in (("p99_us", "p99"), ("p999_us", "p99.9")):
-            mine, other = (statistics.median(block[key] for block in blocks[who]) for who in blocks)
-            result[f"{state}_{name}_ratio"] = mine / other
-            print(f"{state:8}{name:8}{mine:10.2f}{other:12.2f}{mine / other:8.2f}")
-    given.output.parent.mkdir(parents=True, exist_ok=True)
-    given.output.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+            palpate, other = (
+                statistics.median(block[key] for block in blocks[program]) for program in blocks
+            )
+            result[f"{state}_{name}_ratio"] = palpate / other
+            print(f"{state:8}{name:8}{palpate:10.2f}{other:12.2f}{palpate / other:8.2f}")
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options.output.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     return 0
 
 

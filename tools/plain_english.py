@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks the language of everything that people read: plain_english.py [--count] [FILE ...].
 
-Reads comments, docstrings, messages and test names of Python and C++ sources, and the paragraphs of Markdown
-pages. Reports each word or opening that CONTRIBUTING.md ("Language") forbids, each sentence of more than
-MOST_WORDS words, and a mean sentence length above MEAN_WORDS for each kind of text.
+Reads comments, docstrings, messages and names of Python and C++ sources, comments of scripts and settings,
+and paragraphs of Markdown pages. Reports each word or opening that CONTRIBUTING.md ("Language") forbids, each
+sentence of more than MOST_WORDS words, and a mean sentence length above MEAN_WORDS for each kind of text.
 """
 
 import argparse
 import ast
 import io
+import os
 import re
 import subprocess
 import sys
@@ -77,12 +78,33 @@ OPENINGS = {
     r"to be\b": "a verb in the third person",
     r"as (?:\w+ ){1,3}as\b": "a number",
 }
-"""Pattern at the start of a text, and what stands there instead"""
+"""Pattern at the start of a text, and the beginning to write"""
+
+NAMES = {
+    "tell tells told telling say says said": "report, state, message, output",
+    "ask asks asked asking": "request, call, require",
+    "believe believed hope hoped wish wishes": "accept, assume, request",
+    "story stories": "record, example",
+    "room rooms": "module, free space",
+    "rung rungs ladder ladders": "model class, candidate structure",
+    "outlet outlets": "record sink",
+    "buzz buzzing softened": "limit cycle, limit-cycle scaled",
+    "drained": "energy-limited",
+    "beside anew alike alive amiss": "other, again, equal, active, wrong",
+    "somebody nobody whoever whatever wherever": "user, hand, any, none",
+    "felt sinful luck lucky die": "rendered, wrong, random, exit",
+}
+"""Forbidden words of names, and the plain ones"""
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z'\u2019-]*")
+_NAME_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+_FORBIDDEN_NAMES = {word: instead for words, instead in NAMES.items() for word in words.split()}
 _FORBIDDEN = [(re.compile(rf"\b(?:{pattern})\b", re.I), instead) for pattern, instead in INSTEAD.items()]
 _OPENINGS = [(re.compile(pattern, re.I), instead) for pattern, instead in OPENINGS.items()]
 _SENTENCE_END = re.compile(r"(?<=[.!?;:])\s+(?=[\"'`(]?[A-Z0-9`])|\n\s*\n|\n\s*[-*|]\s|\n\s*\d+\.\s")
+_LIST = re.compile(r"\w+(?: \([^()]*\))?(?:, (?:and )?\w+(?: \([^()]*\))?){4,}")
+_SCRIPT = re.compile(r"\s*#!|^\s*(?:set -\w+|sleep [\d.]+|cd \S+)$", re.M)
+_PARAMETER = re.compile(r"^\s*[\w*, .]+ : .*$", re.M)
 _SECTION = re.compile(r"^ *(Parameters|Returns|Raises|Notes|Examples|Attributes|Yields)\s*\n\s*-{4,}", re.M)
 
 
@@ -92,12 +114,12 @@ class Text(NamedTuple):
     file: Path
     line: int
     kind: str
-    """comment, docstring, message, page or test name"""
+    """comment, docstring, message, page, test name or name"""
     words: str
 
 
 def python_texts(file: Path) -> Iterator[Text]:
-    """Yields comments, docstrings, messages and test names of a Python file."""
+    """Yields comments, docstrings, messages and names of a Python file."""
     source = file.read_text(encoding="utf-8")
     lines: list[tuple[int, str]] = []
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
@@ -106,15 +128,17 @@ def python_texts(file: Path) -> Iterator[Text]:
     yield from _joined(file, lines)
     tree = ast.parse(source)
     documentation: set[int] = set()
+    names: dict[str, int] = {}
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         for each in body if isinstance(body, list) else []:
             value = each.value if isinstance(each, ast.Expr) else None
             if isinstance(value, ast.Constant) and isinstance(value.value, str):
                 documentation.add(id(value))
-                yield Text(file, each.lineno, "docstring", _prose(value.value))
-        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
-            yield Text(file, node.lineno, "test name", node.name.removeprefix("test_").replace("_", " "))
+                yield Text(file, each.lineno, "docstring", _prose(_PARAMETER.sub("\n", value.value)))
+        for name in _defined(node):
+            names.setdefault(name, node.lineno)
+    yield from _names(file, names)
     inside: set[int] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
@@ -126,14 +150,40 @@ def python_texts(file: Path) -> Iterator[Text]:
             words = node.value
         else:
             continue
-        if id(node) not in documentation | inside and len(_WORD.findall(words)) >= LEAST_MESSAGE_WORDS:
-            yield Text(file, node.lineno, "message", _prose(words))
+        if id(node) not in documentation | inside:
+            yield from _message(file, node.lineno, words)
+
+
+def _defined(node: ast.AST) -> list[str]:
+    """Returns the names that a node of a Python program defines."""
+    if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+        return [node.name]
+    if isinstance(node, (ast.Name, ast.Attribute)) and isinstance(node.ctx, ast.Store):
+        return [node.id if isinstance(node, ast.Name) else node.attr]
+    return [node.arg] if isinstance(node, ast.arg) else []
+
+
+def _names(file: Path, names: dict[str, int]) -> Iterator[Text]:
+    """Yields each name once, a test name as a sentence."""
+    for name, line in names.items():
+        if name.startswith("test_"):
+            yield Text(file, line, "test name", " ".join(_NAME_WORD.findall(name)[1:]).lower())
+        else:
+            yield Text(file, line, "name", name)
+
+
+def _message(file: Path, line: int, words: str) -> Iterator[Text]:
+    """Yields a string of a program if it has enough words and is not a shell script."""
+    is_script = "\n" in words and _SCRIPT.search(words)
+    if not is_script and len(_WORD.findall(words)) >= LEAST_MESSAGE_WORDS:
+        yield Text(file, line, "message", _prose(words))
 
 
 def cpp_texts(file: Path) -> Iterator[Text]:
-    """Yields comments, messages and test names of a C++ file."""
+    """Yields comments, messages and names of a C++ file."""
     source = file.read_text(encoding="utf-8")
     lines: list[tuple[int, str]] = []
+    names: dict[str, int] = {}
     message, started, line = "", 0, 1
     for kind, value in CppLexer().get_tokens(source):
         if kind in Token.Comment.Single and "SPDX" not in value:
@@ -144,15 +194,24 @@ def cpp_texts(file: Path) -> Iterator[Text]:
         if kind in Token.Literal.String:
             started, message = started or line, message + value
         elif message and value.strip():
-            words = message.replace('"', "").replace("\\n", "\n")
-            if len(_WORD.findall(words)) >= LEAST_MESSAGE_WORDS and "#include" not in words:
-                yield Text(file, started, "message", _prose(words))
+            if "#include" not in message:
+                yield from _message(file, started, message.replace('"', "").replace("\\n", "\n"))
             message, started = "", 0
+        if kind in Token.Name:
+            names.setdefault(value, line)
         line += value.count("\n")
     yield from _joined(file, lines)
-    for found in re.finditer(r"^(?:TYPED_)?TEST(?:_[FP])?\(\s*(\w+),\s*(\w+)\)", source, re.M):
-        words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", found[2]).lower()
-        yield Text(file, source.count("\n", 0, found.start()) + 1, "test name", words)
+    for found in re.finditer(r"^(?:TYPED_)?TEST(?:_[FP])?\(\s*\w+,\s*(\w+)\)", source, re.M):
+        line = names.pop(found[1], source.count("\n", 0, found.start()) + 1)
+        yield from _names(file, {f"test_{found[1]}": line})
+    yield from _names(file, names)
+
+
+def script_texts(file: Path) -> Iterator[Text]:
+    """Yields the comments of a Makefile, a script or settings; an indented line is a new sentence."""
+    lines = enumerate(file.read_text(encoding="utf-8").splitlines(), 1)
+    comments = [(line, re.match(r"\s*#(?!!| SPDX)(.*)", text)) for line, text in lines]
+    yield from _joined(file, [(line, re.sub("^  +", "\n\n", found[1])) for line, found in comments if found])
 
 
 def page_texts(file: Path) -> Iterator[Text]:
@@ -183,22 +242,33 @@ def _joined(file: Path, lines: list[tuple[int, str]]) -> Iterator[Text]:
 
 
 def _prose(words: str) -> str:
-    """The text without code, formulas in backquotes, options and addresses."""
+    """The text without code, quoted words, options, addresses and lines of a file of accounts."""
     words = re.sub(r"(?:^|\n)\s*(?:>>>|\.\.\.) .*", "\n", words)
-    words = re.sub(r"``.*?``|`[^`\n]*`|:\w+:`.*?`", "N", words)
+    words = re.sub(r"``.*?``|`[^`\n]*`|:\w+:`.*?`|(?<!\w)(['\"])[\w-]+\1", "N", words)
+    words = re.sub(r"^[ \t]*(?=--[a-z])|^\w+:x:\d.*$", "\n\n", words, flags=re.M)
     return re.sub(r"https?://\S+|\]\([^)]*\)|--[a-z][\w-]*", "", words).strip()
 
 
 def sentences(text: Text) -> list[str]:
-    """The sentences of a text; a list item, a parameter and a paragraph end one."""
-    words = _SECTION.sub("\n\n", text.words)
-    if text.kind == "docstring":
-        words = re.sub(r"\n\s*[\w*, .]+ : .*\n", "\n\n", words)
+    """The sentences of a text; a list item, an option and a paragraph end one, in a message also a semicolon.
+
+    A list of five or more names counts as one word.
+    """
+    if text.kind == "name":
+        return []
+    words = _LIST.sub("N", _SECTION.sub("\n\n", text.words))
+    if text.kind == "message":
+        words = words.replace("; ", "\n\n")
     return [each for each in _SENTENCE_END.split(words) if len(_WORD.findall(each)) > 1]
 
 
 def findings(text: Text) -> Iterator[tuple[str, str]]:
     """Yields the kind and the sentence of each finding: forbidden words and openings, and long sentences."""
+    if text.kind == "name":
+        for word in map(str.lower, _NAME_WORD.findall(text.words)):
+            if word in _FORBIDDEN_NAMES:
+                yield f'"{word}"', f'"{word}" in {text.words} is forbidden; write: {_FORBIDDEN_NAMES[word]}'
+        return
     for pattern, instead in _FORBIDDEN:
         for found in pattern.finditer(text.words):
             word = " ".join(found[0].lower().split())
@@ -214,6 +284,19 @@ def findings(text: Text) -> Iterator[tuple[str, str]]:
 
 
 READERS = {".py": python_texts, ".cpp": cpp_texts, ".hpp": cpp_texts, ".md": page_texts}
+SCRIPTS = (
+    ".sh",
+    ".cmake",
+    ".toml",
+    ".yml",
+    "run",
+    "Makefile",
+    "CMakeLists.txt",
+    ".clang-tidy",
+    ".clang-format",
+)
+READERS |= dict.fromkeys(SCRIPTS, script_texts)
+"""Reader for each suffix or name of a file"""
 
 
 def main() -> int:
@@ -226,9 +309,10 @@ def main() -> int:
     counts: Counter[str] = Counter()
     lengths: dict[str, list[int]] = defaultdict(list)
     for file in files:
-        if file.suffix not in READERS or file.name == Path(__file__).name or not file.exists():
+        reader = READERS.get(file.suffix) or READERS.get(file.name)
+        if reader is None or file.stem.removeprefix("test_") == Path(__file__).stem or not file.exists():
             continue
-        for text in READERS[file.suffix](file):
+        for text in reader(file):
             lengths[text.kind] += [len(_WORD.findall(each)) for each in sentences(text)]
             for kind, finding in findings(text):
                 counts[f"{text.kind}: {kind}"] += 1
@@ -238,8 +322,8 @@ def main() -> int:
         for name, number in counts.most_common():
             print(f"{number:6} {name}")
     too_long = False
-    for kind, words in sorted(lengths.items()):
-        mean = sum(words) / max(len(words), 1)
+    for kind, words in sorted((kind, words) for kind, words in lengths.items() if words):
+        mean = sum(words) / len(words)
         too_long |= mean > MEAN_WORDS
         print(f"{kind}: {len(words)} sentences, {mean:.1f} words on average (at most {MEAN_WORDS:g})")
     print(f"{sum(counts.values())} findings")
@@ -247,4 +331,10 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        status = main()
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader of the output has ended
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 1
+    sys.exit(status)

@@ -16,13 +16,13 @@ from pathlib import Path
 
 MODULE = "palpate._core"
 PACKAGE = Path(__file__).parents[1] / "python" / "palpate"
-ALLOWED = Path(__file__).with_name("stubtest_allowlist.txt")
+ALLOW_LIST = Path(__file__).with_name("stubtest_allowlist.txt")
 SCHEMA = "model/model.schema.json"
 STRUCTURES = re.compile(r'(?<="Structure": {"enum": )\[.*?\]')
 LICENCE = "# SPDX-License-Identifier: Apache-2.0\n"
 
 
-def generated() -> dict[str, str]:
+def generated_files() -> dict[str, str]:
     """Returns stub files and schema of the compiled module: name below the package -> text."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pybind11_stubgen", MODULE, "--exit-code", "-o", folder]
@@ -42,8 +42,8 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="change no file, fail if the tree differs")
     check = parser.parse_args().check
 
-    files = generated()
-    stale = 0
+    files = generated_files()
+    n_different = 0
     for name, text in files.items():
         path = PACKAGE / name
         present = path.read_text(encoding="utf-8") if path.exists() else ""
@@ -51,7 +51,7 @@ def main() -> int:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
         elif present != text:
-            stale += 1
+            n_different += 1
             lines = difflib.unified_diff(
                 present.splitlines(),
                 text.splitlines(),
@@ -60,12 +60,12 @@ def main() -> int:
                 lineterm="",
             )
             print("\n".join(lines))
-    if stale:
+    if n_different:
         print("Stubs or schema do not describe the compiled module: run `make stubs`.", file=sys.stderr)
         return 1
     # The stubs of NumPy, which these stubs use, are complete from Python 3.11.
     if check and sys.version_info >= (3, 11):
-        command = [sys.executable, "-m", "mypy.stubtest", MODULE, "--allowlist", str(ALLOWED)]
+        command = [sys.executable, "-m", "mypy.stubtest", MODULE, "--allowlist", str(ALLOW_LIST)]
         return subprocess.run(command, check=False).returncode
     return 0
 

@@ -41,7 +41,7 @@ namespace palpate::bench {
 
 /// Returns true if one of several objects behind a coupling gives energy in the steady state. Each object responds like
 /// a spring with a share of the coupling stiffness, or for a negative share like a mass.
-[[nodiscard]] inline bool coupling_loses_balance(VirtualCoupling coupling, const DeviceProfile& device) {
+[[nodiscard]] inline bool coupling_generates_energy(VirtualCoupling coupling, const DeviceProfile& device) {
     constexpr double reach = 0.01;  // [rad]
     const double period = device.period_s;
     for (const int pace : {1, 2, 3, 4, 6, 10}) {
@@ -79,7 +79,7 @@ inline constexpr double coupling_time = 0.2e-3;
     return {
         "coupling", "device damping b [N*m*s/rad]", "coupling stiffness K_c [N*m/rad]",
         lines_over_damping(points, 3.0, coupling_limit, [](const DeviceProfile& device, double stiffness) {
-            return coupling_loses_balance({stiffness, coupling_time * stiffness}, device);
+            return coupling_generates_energy({stiffness, coupling_time * stiffness}, device);
         })};
 }
 
@@ -210,13 +210,13 @@ template <Structure S>
             "direct, delay " + std::to_string(delay), periods,
             [&](double period) { return direct_limit(device(period, delay)); },
             [&](double period, double stiffness) {
-                return spring_swings_up(device(period, delay), stiffness);
+                return spring_oscillates(device(period, delay), stiffness);
             }));
     }
     map.lines.push_back(failure_line(
         "coupling, delay 0", periods, [&](double period) { return coupling_limit(device(period, 0)); },
         [&](double period, double stiffness) {
-            return coupling_loses_balance({stiffness, coupling_time * stiffness}, device(period, 0));
+            return coupling_generates_energy({stiffness, coupling_time * stiffness}, device(period, 0));
         },
         3.0));
     map.lines.push_back(failure_line(
@@ -251,7 +251,7 @@ template <Structure S>
             knob.encoder_step = step;
             knob.coulomb_friction = friction;
             for (const int pace : {1, 2, 4}) {
-                for (const double reach : ways_over_an_edge(knob)) {
+                for (const double reach : motions_over_an_edge(knob)) {
                     const PacedWork work =
                         work_of_pacing(Massless{LinearObject{spring}, coupling, knob.period_s}, knob,
                                        {reach, pace, 1e6, knob.period_s}, 0.5 * step - 0.5 * reach, 100);

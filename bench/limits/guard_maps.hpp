@@ -45,7 +45,7 @@ namespace palpate::bench {
                                   {{0.0}, {0.1}, Continuation::Linear, Continuation::Linear, std::nullopt}};
             GuardSettings settings;
             settings.energy_tank = tank;
-            settings.buzz_force = detector ? settings.buzz_force : 0.0;
+            settings.limit_cycle_force = detector ? settings.limit_cycle_force : 0.0;
             settings.device_damping = device.viscous_damping;
             settings.encoder_step = device.encoder_step;
             double squares = 0.0;
@@ -171,11 +171,11 @@ template <SimulatedHand H>
 
     const std::vector<double> plain = guarded_run(click, sweeping, unguarded).force;
     std::vector<GuardEffect> effects;
-    const auto add = [&](const char* name, auto take, const GuardedScene& scene, const auto& hand,
+    const auto add = [&](const char* name, auto set_guard, const GuardedScene& scene, const auto& hand,
                          const char* wrong, auto measure) {
         const auto only = [&](const ForceModel& model) {
             Guards guards = unguarded;
-            take(guards, of_model(model));
+            set_guard(guards, of_model(model));
             return guards;
         };
         std::vector<double> changed = guarded_run(click, sweeping, only(click.model)).force;
@@ -213,8 +213,9 @@ template <SimulatedHand H>
         "energy tank", [](Guards& guards, const Guards& all) { guards.tank = all.tank; }, oscillating,
         pressing, "a wall of 5 times its bound: speed after 2 s [rad/s]", late_speed);
     add(
-        "limit-cycle detector", [](Guards& guards, const Guards& all) { guards.buzz = all.buzz; },
-        oscillating, pressing, "the same", late_speed);
+        "limit-cycle detector",
+        [](Guards& guards, const Guards& all) { guards.limit_cycle = all.limit_cycle; }, oscillating,
+        pressing, "the same", late_speed);
     add(
         "all of them", [](Guards& guards, const Guards& all) { guards = all; }, oscillating, pressing,
         "the same", late_speed);

@@ -61,21 +61,21 @@ struct GreedyHand {
 /// A turn is a reversal. With 1 tick between turns the hand moves at the Nyquist frequency. Several turns in `ticks`
 /// give frequencies between those of whole ticks.
 struct PacingHand {
-    double reach = 0.0;      ///< Distance between two turns [m or rad].
-    int ticks = 1;           ///< Number of ticks of `turns` turns, at least 1.
-    double firmness = 1e6;   ///< Far above every damping of device and object [N*s/m or N*m*s/rad].
-    double period_s = 1e-3;  ///< Of the tick [s].
-    int rests = 1;           ///< Ticks before the first motion, while the object is placed at the handle.
-    int turns = 1;           ///< From 1 to ticks.
+    double reach = 0.0;         ///< Distance between two turns [m or rad].
+    int ticks = 1;              ///< Number of ticks of `turns` turns, at least 1.
+    double grip_damping = 1e6;  ///< Far above every damping of device and object [N*s/m or N*m*s/rad].
+    double period_s = 1e-3;     ///< Of the tick [s].
+    int rests = 1;              ///< Ticks before the first motion, while the object is placed at the handle.
+    int turns = 1;              ///< From 1 to ticks.
 
     [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
         const double tick = std::round(time / period_s) - rests;
         if (tick < 0.0) {
-            return {0.0, firmness, 0.0, 0.0, 0.0};
+            return {0.0, grip_damping, 0.0, 0.0, 0.0};
         }
         const double angle = std::numbers::pi * turns / ticks;
-        const double way = std::cos(angle * tick) - std::cos(angle * (tick + 1.0));
-        return {0.0, firmness, 0.0, firmness * 0.5 * reach * way / period_s, 0.0};
+        const double step = std::cos(angle * tick) - std::cos(angle * (tick + 1.0));
+        return {0.0, grip_damping, 0.0, grip_damping * 0.5 * reach * step / period_s, 0.0};
     }
 };
 

@@ -27,7 +27,7 @@ namespace palpate::bench {
 
 /// Returns true if a directly rendered spring oscillates with growing amplitude with a heavy hand. The phase advances
 /// by 0.03 rad during the mean delay of the force, (1/2 + n_d) T. The spring fails just above the bound.
-[[nodiscard]] inline bool spring_swings_up(const DeviceProfile& device, double stiffness) {
+[[nodiscard]] inline bool spring_oscillates(const DeviceProfile& device, double stiffness) {
     constexpr double late_phase = 0.03;  // [rad]
     constexpr double radians = 1000.0;   // of the simulated oscillation
     const double late = (0.5 + device.delay_s / device.period_s) * device.period_s;
@@ -67,12 +67,12 @@ template <class Limit, class Fails>
 /// Stiffness of a directly rendered spring over the damping of the device.
 [[nodiscard]] inline FailureMap damping_map(int points) {
     return {"damping", "device damping b [N*m*s/rad]", "stiffness K [N*m/rad]",
-            lines_over_damping(points, 10.0, direct_limit, spring_swings_up)};
+            lines_over_damping(points, 10.0, direct_limit, spring_oscillates)};
 }
 
 /// Returns lengths of a motion over the edge between two encoder counts. Friction, damping or the encoder dominates.
 /// Most are far below a count.
-[[nodiscard]] inline std::vector<double> ways_over_an_edge(const DeviceProfile& device) {
+[[nodiscard]] inline std::vector<double> motions_over_an_edge(const DeviceProfile& device) {
     const double balance = device.coulomb_friction * device.period_s / device.viscous_damping;
     const double step = device.encoder_step;
     return logarithmic(std::min(1e-3 * balance, 1e-2 * step), std::max(1e3 * balance, 1e3 * step), 24);
@@ -90,7 +90,7 @@ template <class Limit, class Fails>
         };
         const auto fails = [&](double step, double stiffness) {
             const DeviceProfile knob = device(step);
-            for (const double reach : ways_over_an_edge(knob)) {
+            for (const double reach : motions_over_an_edge(knob)) {
                 const PacedWork work =
                     work_of_pacing(Direct{LinearObject{stiffness}}, knob, {reach, 1, 1e6, knob.period_s},
                                    0.5 * step - 0.5 * reach, 100);
@@ -119,8 +119,8 @@ template <class Limit, class Fails>
             "delay " + std::to_string(delay), logarithmic(1e-4, 1e-2, points),
             [&](double radius) { return radius * (direct_limit(device) - spring); },
             [&](double radius, double hysteresis) {
-                const EvenHysteresis object{{spring, 0.0}, {0.0, hysteresis}, radius};
-                return loses_balance([&] { return Direct{object}; }, device, 0.5 * radius);
+                const ConstantHysteresis object{{spring, 0.0}, {0.0, hysteresis}, radius};
+                return generates_energy([&] { return Direct{object}; }, device, 0.5 * radius);
             }));
     }
     return map;
@@ -138,7 +138,7 @@ template <class Limit, class Fails>
     for (int turns = 1; turns <= frequencies; ++turns) {
         const PacingHand hand{.reach = 0.1,
                               .ticks = frequencies,
-                              .firmness = 1e6 * device.viscous_damping,
+                              .grip_damping = 1e6 * device.viscous_damping,
                               .period_s = device.period_s,
                               .turns = turns};
         if (work_of_pacing(PredictedDirect{LinearObject{stiffness}, predict}, device, hand, 0.0, 0)

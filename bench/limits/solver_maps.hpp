@@ -74,29 +74,29 @@ namespace palpate::bench {
     const double beta = coupling.damping / period;
     FailureMap map{"pole", "stiffness K [N*m/rad]", "ratio of the displacements of two ticks", {}};
     map.linear = true;
-    const auto left = [](auto structure) {
+    const auto ratio_of_displacements = [](auto structure) {
         structure.reset(0.0);
         (void)structure.step(0.01);
         const double before = structure.step(0.0).environment_position;
         return structure.step(0.0).environment_position / before;
     };
     const std::vector<double> stiffness = logarithmic(1.0, 1e5, points);
-    FailureLine alone{"energy-consistent without its switch", stiffness, {}, {}};
+    FailureLine unswitched{"energy-consistent without its switch", stiffness, {}, {}};
     FailureLine switched{"energy-consistent with its switch", stiffness, {}, {}};
     FailureLine backward{"backward Euler", stiffness, {}, {}};
     for (const double k : stiffness) {
         const Inertia none{0.0, 0.0};
         const double euler = beta / (coupling.stiffness + beta + k);
-        alone.measured.push_back(
-            left(EnergyConsistent{LinearObject{k}, none, coupling, period, 1e-7, false}));
-        alone.theory.push_back((beta - 0.5 * k) / (coupling.stiffness + beta + 0.5 * k));
+        unswitched.measured.push_back(
+            ratio_of_displacements(EnergyConsistent{LinearObject{k}, none, coupling, period, 1e-7, false}));
+        unswitched.theory.push_back((beta - 0.5 * k) / (coupling.stiffness + beta + 0.5 * k));
         switched.measured.push_back(
-            left(EnergyConsistent{LinearObject{k}, none, coupling, period, 1e-7, true}));
+            ratio_of_displacements(EnergyConsistent{LinearObject{k}, none, coupling, period, 1e-7, true}));
         switched.theory.push_back(std::numeric_limits<double>::quiet_NaN());
-        backward.measured.push_back(left(Massless{LinearObject{k}, coupling, period}));
+        backward.measured.push_back(ratio_of_displacements(Massless{LinearObject{k}, coupling, period}));
         backward.theory.push_back(euler);
     }
-    map.lines = {alone, switched, backward};
+    map.lines = {unswitched, switched, backward};
     return map;
 }
 

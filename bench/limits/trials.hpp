@@ -57,9 +57,9 @@ struct StraightCurve {
 };
 
 /// f = g x + s h: a spring with constant hysteresis.
-using EvenHysteresis = HysteresisPair<StraightCurve>;
+using ConstantHysteresis = HysteresisPair<StraightCurve>;
 
-static_assert(Environment<LinearObject> && Environment<EvenHysteresis> && Environment<SnappingObject>);
+static_assert(Environment<LinearObject> && Environment<ConstantHysteresis> && Environment<SnappingObject>);
 
 inline constexpr double not_finite = std::numeric_limits<double>::infinity();
 
@@ -73,21 +73,21 @@ class Growth {
         const std::size_t quarter = std::min<std::size_t>(3, 4 * tick_ / ticks_);
         ++tick_;
         if (!std::isfinite(quantity)) {
-            broke_ = true;
+            diverged_ = true;
             return false;
         }
         largest_[quarter] = std::max(largest_[quarter], std::abs(quantity));
-        broke_ = quarter > 0 && largest_[quarter] > 1e6 * largest_[0];
-        return !broke_;
+        diverged_ = quarter > 0 && largest_[quarter] > 1e6 * largest_[0];
+        return !diverged_;
     }
 
-    [[nodiscard]] bool grows() const noexcept { return broke_ || largest_[3] > largest_[1]; }
+    [[nodiscard]] bool grows() const noexcept { return diverged_ || largest_[3] > largest_[1]; }
 
   private:
     std::size_t ticks_;
     std::size_t tick_ = 0;
     std::array<double, 4> largest_{};
-    bool broke_ = false;
+    bool diverged_ = false;
 };
 
 /// Returns true if a structure that is driven by a force oscillates with growing amplitude after a push.
@@ -144,7 +144,7 @@ template <Structure S>
     std::size_t tick = 0;
     (void)closed_loop(std::move(structure), device, hand, ticks, {2, start, 0.0, unguarded},
                       [&](const Tick& /*now*/, const Motion& /*handle*/, const EnergyAccount& account) {
-                          work.whole = account.motor + account.loss;
+                          work.whole = account.motor + account.dissipated;
                           work.rounding = 1e-9 * account.throughput;
                           if (++tick == ticks / 2) {
                               work.half = work.whole;
@@ -159,10 +159,11 @@ inline constexpr std::array<int, 9> paces{1, 2, 3, 4, 6, 10, 20, 60, 500};
 
 /// Returns true if a hand takes out energy in the steady state at one of the paces.
 template <class Build>
-[[nodiscard]] bool loses_balance(Build build, const DeviceProfile& device, double reach) {
+[[nodiscard]] bool generates_energy(Build build, const DeviceProfile& device, double reach) {
     return std::any_of(paces.begin(), paces.end(), [&](int pace) {
-        const double firmness = 1e6 * (device.viscous_damping + 1e-6);
-        const PacedWork work = work_of_pacing(build(), device, {reach, pace, firmness, device.period_s}, 0.0);
+        const double grip_damping = 1e6 * (device.viscous_damping + 1e-6);
+        const PacedWork work =
+            work_of_pacing(build(), device, {reach, pace, grip_damping, device.period_s}, 0.0);
         return work.negative();
     });
 }

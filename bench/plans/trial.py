@@ -175,7 +175,9 @@ def candidates(model: Model, device: DeviceProfile, radius: float, grid: int) ->
             ("implicit", "energy-consistent", "explicit"), (0.02, 2.0), (0.0, 0.5)
         ):
             mass = reserve * (held + stiffness) * device.period_s**2
-            yield Scheme(structure=structure, mass=mass, damping=ratio * mass / device.period_s, **coupling)
+            yield Scheme(
+                structure=structure, mass=mass, object_damping=ratio * mass / device.period_s, **coupling
+            )
 
 
 def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, float]:

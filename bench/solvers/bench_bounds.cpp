@@ -38,10 +38,11 @@ NetworkParameters random_network(std::size_t size, std::size_t dimension, double
 }
 
 /// Fails if the bound is violated or its excess over the largest slope is above `allowed`.
-void assert_tight(benchmark::State& state, Interval proved, Interval seen, double allowed) {
-    const double excess = std::max(proved.upper - seen.upper, seen.lower - proved.lower) / seen.largest();
+void assert_tight(benchmark::State& state, Interval proved, Interval sampled, double allowed) {
+    const double excess =
+        std::max(proved.upper - sampled.upper, sampled.lower - proved.lower) / sampled.largest();
     state.counters["excess"] = excess;
-    if (!(proved.upper >= seen.upper && proved.lower <= seen.lower)) {
+    if (!(proved.upper >= sampled.upper && proved.lower <= sampled.lower)) {
         state.SkipWithError("violated");
     } else if (!(excess <= allowed)) {
         state.SkipWithError(("too wide by " + std::to_string(excess)).c_str());
@@ -52,13 +53,13 @@ void bound(benchmark::State& state, const NetworkParameters& network) {
     for (auto _ : state) {
         benchmark::DoNotOptimize(palpate::slope_bounds(network, 0.0, 1.0));
     }
-    Interval seen{INFINITY, -INFINITY};
+    Interval sampled{INFINITY, -INFINITY};
     const palpate::NetworkCurve curve{network, {}};
     for (int k = 0; k <= 100'000; ++k) {
         const double slope = curve.inside(k / 100'000.0).slope;
-        seen = seen.with({slope, slope});
+        sampled = sampled.with({slope, slope});
     }
-    assert_tight(state, palpate::slope_bounds(network, 0.0, 1.0), seen, 0.0101);
+    assert_tight(state, palpate::slope_bounds(network, 0.0, 1.0), sampled, 0.0101);
 }
 
 void slope_bound(benchmark::State& state) {
@@ -90,17 +91,17 @@ void gradient_bound(benchmark::State& state, const NetworkParameters& parameters
         benchmark::DoNotOptimize(palpate::radial_bounds(parameters, lower, upper));
     }
     const palpate::RadialSum network{parameters, lower, upper};
-    Interval seen{INFINITY, -INFINITY};
+    Interval sampled{INFINITY, -INFINITY};
     for (int i = 0; i <= 400; ++i) {
         for (int j = 0; j <= 400; ++j) {
             const std::vector<double> x{i / 400.0, j / 400.0};
             double value = 0.0;
             std::vector<double> gradient = parameters.linear;
             network.add(x.data(), value, gradient.data());
-            seen = seen.with({gradient[0], gradient[0]});
+            sampled = sampled.with({gradient[0], gradient[0]});
         }
     }
-    assert_tight(state, palpate::radial_bounds(parameters, lower, upper).gradient[0], seen, 0.012);
+    assert_tight(state, palpate::radial_bounds(parameters, lower, upper).gradient[0], sampled, 0.012);
 }
 
 void gradient_bound_two_inputs(benchmark::State& state) {

@@ -24,7 +24,7 @@ struct Answer {
 
 /// The plain loop.
 struct ExpLoop {
-    static constexpr double promised = 1e-12;  ///< largest error of the value
+    static constexpr double largest_error = 1e-12;  ///< largest error of the value
     NetworkParameters p;
 
     explicit ExpLoop(const palpate::WaveletNetwork& network) : p{network.parameters()} {}
@@ -42,7 +42,7 @@ struct ExpLoop {
 };
 
 struct Network {
-    static constexpr double promised = 1e-12;  ///< largest error of the value
+    static constexpr double largest_error = 1e-12;  ///< largest error of the value
     palpate::WaveletNetwork network;
 
     explicit Network(const palpate::WaveletNetwork& given) : network{given} {}
@@ -54,7 +54,7 @@ struct Network {
 };
 
 struct Compiled {
-    static constexpr double promised = 1e-11;  ///< largest error of the value
+    static constexpr double largest_error = 1e-11;  ///< largest error of the value
     palpate::CompiledNetwork network;
 
     explicit Compiled(const palpate::WaveletNetwork& given) : network{given} {}
@@ -81,7 +81,7 @@ struct Nodes {
 };
 
 struct Table : Nodes {
-    static constexpr double promised = 1e-4;  ///< largest error of the value
+    static constexpr double largest_error = 1e-4;  ///< largest error of the value
     using Nodes::Nodes;
 
     Answer operator()(double x) const {
@@ -93,7 +93,7 @@ struct Table : Nodes {
 };
 
 struct CubicSpline : Nodes {
-    static constexpr double promised = 1e-8;  ///< largest error of the value
+    static constexpr double largest_error = 1e-8;  ///< largest error of the value
     using Nodes::Nodes;
 
     Answer operator()(double x) const {
@@ -119,7 +119,7 @@ void assert_answer(benchmark::State& state, const palpate::WaveletNetwork& netwo
         error = std::max(error, std::abs(method(x).value - exact(x).value));
     }
     state.counters["max_error"] = error;
-    if (!(error <= Method::promised)) {
+    if (!(error <= Method::largest_error)) {
         state.SkipWithError(("wrong by " + std::to_string(error)).c_str());
     }
 }

@@ -62,7 +62,7 @@ double implicit_slope(palpate::Inertia inertia) {
 }
 
 /// Force and motion of a structure in the closed loop.
-struct Felt {
+struct LoopResult {
     palpate::ForceError error;
     double force = 0.0;  ///< RMS of f along the motion
     double evaluations = 0.0;
@@ -71,12 +71,12 @@ struct Felt {
 };
 
 template <class S>
-Felt closed_loop(S structure) {
+LoopResult closed_loop(S structure) {
     palpate::SimulatedDevice device{palpate::DeviceProfile{}};
     (void)device.open();
     palpate::Controller controller{device, std::move(structure), palpate::ForceLimit{}};
     (void)controller.start();
-    Felt felt;
+    LoopResult result;
     std::vector<double> start;
     std::vector<double> middle;
     std::vector<double> end;
@@ -84,57 +84,57 @@ Felt closed_loop(S structure) {
     for (std::size_t k = 0; k < ticks; ++k) {
         const palpate::Motion before = device.handle();
         const palpate::Tick tick = controller.tick();
-        felt.status = tick.status == palpate::Status::Ok ? felt.status : tick.status;
+        result.status = tick.status == palpate::Status::Ok ? result.status : tick.status;
         const palpate::Motion after = device.handle();
         start.push_back(before.position);
         middle.push_back(0.5 * (before.position + after.position) +
                          0.125 * period * (before.velocity - after.velocity));
         end.push_back(after.position);
         applied.push_back(tick.command.force);
-        felt.force += std::pow(sum().at(after.position, {}).force, 2);
-        felt.evaluations += tick.rendered.evaluations;
-        felt.motion.push_back(tick.reading.position);
+        result.force += std::pow(sum().at(after.position, {}).force, 2);
+        result.evaluations += tick.rendered.evaluations;
+        result.motion.push_back(tick.reading.position);
     }
     constexpr auto count = static_cast<double>(ticks);
-    felt.force = std::sqrt(felt.force / count);
-    felt.error = palpate::force_error({start, middle, end, applied, applied}, period,
-                                      [](std::span<const double> motion, double /*step_s*/) {
-                                          std::vector<double> force;
-                                          for (const double x : motion) {
-                                              force.push_back(sum().at(x, {}).force);
-                                          }
-                                          return force;
-                                      });
-    felt.evaluations /= count;
-    return felt;
+    result.force = std::sqrt(result.force / count);
+    result.error = palpate::force_error({start, middle, end, applied, applied}, period,
+                                        [](std::span<const double> motion, double /*step_s*/) {
+                                            std::vector<double> force;
+                                            for (const double x : motion) {
+                                                force.push_back(sum().at(x, {}).force);
+                                            }
+                                            return force;
+                                        });
+    result.evaluations /= count;
+    return result;
 }
 
 /// `expected` is the error of the structure at the end of a tick [N*m], equal for every solver.
 template <class S>
 void tick(benchmark::State& state, const S& initial, double expected) {
-    const Felt felt = closed_loop(initial);
-    if (felt.status != palpate::Status::Ok || !(std::abs(felt.error.end - expected) <= 0.05 * expected)) {
+    const LoopResult result = closed_loop(initial);
+    if (result.status != palpate::Status::Ok || !(std::abs(result.error.end - expected) <= 0.05 * expected)) {
         state.SkipWithError(
-            ("force error " + std::to_string(felt.error.end) + " N*m, " + palpate::text(felt.status).word)
+            ("force error " + std::to_string(result.error.end) + " N*m, " + palpate::text(result.status).word)
                 .c_str());
         return;
     }
     S structure = initial;
-    structure.reset(felt.motion.front());
+    structure.reset(result.motion.front());
     std::size_t k = 0;
     for (auto _ : state) {
-        benchmark::DoNotOptimize(structure.step(felt.motion[k]));
-        if (++k == felt.motion.size()) {
+        benchmark::DoNotOptimize(structure.step(result.motion[k]));
+        if (++k == result.motion.size()) {
             k = 0;
-            structure.reset(felt.motion.front());
+            structure.reset(result.motion.front());
         }
     }
-    state.counters["force_error_end_Nm"] = felt.error.end;
-    state.counters["force_error_instant_Nm"] = felt.error.instant;
-    state.counters["force_error_mean_Nm"] = felt.error.mean;
-    state.counters["force_error_below_50_Hz_Nm"] = felt.error.band;
-    state.counters["force_rms_Nm"] = felt.force;
-    state.counters["evaluations"] = felt.evaluations;
+    state.counters["force_error_end_Nm"] = result.error.end;
+    state.counters["force_error_instant_Nm"] = result.error.instant;
+    state.counters["force_error_mean_Nm"] = result.error.mean;
+    state.counters["force_error_below_50_Hz_Nm"] = result.error.band;
+    state.counters["force_rms_Nm"] = result.force;
+    state.counters["evaluations"] = result.evaluations;
 }
 
 // Force errors of the structures for this object.

@@ -67,7 +67,7 @@ void step(benchmark::State& state, const WaveletNetwork& object, const S& initia
     reference.reset(motion.front());
     double squares = 0.0;
     double evaluations = 0.0;
-    double strayed = 0.0;
+    double largest_difference = 0.0;
     for (const double x : motion) {
         const palpate::Rendered rendered = structure.step(x);
         const palpate::Rendered expected = reference.step(x);
@@ -77,14 +77,14 @@ void step(benchmark::State& state, const WaveletNetwork& object, const S& initia
         }
         squares += std::pow(rendered.force - object.at(x, {}).force, 2);
         evaluations += rendered.evaluations;
-        strayed =
-            std::max(strayed, std::abs(rendered.environment_position - expected.environment_position) / 0.6);
+        largest_difference =
+            std::max(largest_difference, std::abs(rendered.environment_position - expected.environment_position) / 0.6);
     }
     state.counters["force_error_rms"] = std::sqrt(squares / static_cast<double>(motion.size()));
     state.counters["evaluations"] = evaluations / static_cast<double>(motion.size());
-    state.counters["position_error"] = strayed;
-    if (!(strayed <= allowed_error)) {
-        state.SkipWithError(("strayed by " + std::to_string(strayed) + " of the travel").c_str());
+    state.counters["position_error"] = largest_difference;
+    if (!(largest_difference <= allowed_error)) {
+        state.SkipWithError(("differs by " + std::to_string(largest_difference) + " of the travel").c_str());
     }
 }
 

@@ -53,7 +53,7 @@ Motion hand(double time) {
 }
 
 /// y at every multiple of the shortest period.
-const std::vector<double>& truth() {
+const std::vector<double>& reference_positions() {
     static const std::vector<double> solution = [] {
         const auto acceleration = [](double time, double y, double v) {
             const Motion device = hand(time);
@@ -91,10 +91,10 @@ double motion_error(S structure, std::int64_t period_ns) {
     structure.reset(hand(0.0).position);
     double squares = 0.0;
     std::size_t counted = 0;
-    for (std::size_t k = stride; k < truth().size(); k += stride) {
+    for (std::size_t k = stride; k < reference_positions().size(); k += stride) {
         const double time = 1e-9 * shortest_ns * static_cast<double>(k);
         const palpate::Rendered rendered = structure.step(hand(time).position);
-        const double error = rendered.environment_position - truth()[k];
+        const double error = rendered.environment_position - reference_positions()[k];
         if (rendered.status != palpate::Status::Ok || !(std::abs(error) < 1.0)) {
             return std::numeric_limits<double>::infinity();
         }

@@ -31,9 +31,9 @@ struct OneNewtonStep {
             return {y, at, step, 1, Status::NonFinite};
         }
         memory = WarmStart{y + step};
-        EnvironmentSample there = at;
-        there.force = at.force + at.slope * step;
-        return {memory.position, there, 0.0, 1, slope > 0.0 ? Status::Ok : Status::NotUnique};
+        EnvironmentSample linearised = at;
+        linearised.force = at.force + at.slope * step;
+        return {memory.position, linearised, 0.0, 1, slope > 0.0 ? Status::Ok : Status::NotUnique};
     }
 };
 
@@ -108,8 +108,8 @@ class Trapezoidal {
         device_ = position;
         position_ = position;
         velocity_ = 0.0;
-        own_ = -environment_.at(position, state_).force;
-        force_ = -own_;
+        object_force_ = -environment_.at(position, state_).force;
+        force_ = -object_force_;
     }
 
     /// Renders behind the coupling: takes the measured position of the device, returns the force of the coupling.
@@ -133,14 +133,14 @@ class Trapezoidal {
     }
 
   private:
-    /// `push` is the force of the coupling on an environment at rest at 0, `before` its force in the last tick.
-    [[nodiscard]] Rendered advance(VirtualCoupling coupling, double push, double before) noexcept {
+    /// `coupling_force` is the force of the coupling on an environment at rest at 0, `before` its force in the last tick.
+    [[nodiscard]] Rendered advance(VirtualCoupling coupling, double coupling_force, double before) noexcept {
         const double inertia = 4.0 * inertia_.mass / (period_ * period_);
         const double damping = coupling.damping + inertia_.damping;
         const double memory = inertia + 2.0 * damping / period_;
         const LoadLine line{memory + coupling.stiffness,
                             memory * position_ + (4.0 * inertia_.mass / period_ + damping) * velocity_ +
-                                push + before + own_};
+                                coupling_force + before + object_force_};
         const Solution solution = solver_.solve(environment_, state_, line, memory_);
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);
@@ -148,7 +148,7 @@ class Trapezoidal {
         const double position = solution.position;
         velocity_ = 2.0 * (position - position_) / period_ - velocity_;
         position_ = position;
-        own_ = -inertia_.damping * velocity_ - solution.environment.force;
+        object_force_ = -inertia_.damping * velocity_ - solution.environment.force;
         environment_.advance(position, state_);
         return {0.0, position, solution.evaluations, solution.status, solution.environment.extrapolated};
     }
@@ -160,11 +160,11 @@ class Trapezoidal {
     Solver solver_;
     typename E::State state_;
     typename Solver::Memory memory_;
-    double device_ = 0.0;    ///< x_{k-1}
-    double position_ = 0.0;  ///< y_{k-1}
-    double velocity_ = 0.0;  ///< v_{k-1}
-    double own_ = 0.0;       ///< -f(y_{k-1}) - B_o v_{k-1}
-    double force_ = 0.0;     ///< F_{k-1}
+    double device_ = 0.0;        ///< x_{k-1}
+    double position_ = 0.0;      ///< y_{k-1}
+    double velocity_ = 0.0;      ///< v_{k-1}
+    double object_force_ = 0.0;  ///< -f(y_{k-1}) - B_o v_{k-1}
+    double force_ = 0.0;         ///< F_{k-1}
 };
 
 }  // namespace palpate::bench

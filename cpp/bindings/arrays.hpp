@@ -74,27 +74,27 @@ inline void require_vector(const Array& array, const char* name) {
     }
     if (py::hasattr(value, "mask") &&
         py::module_::import("numpy").attr("ma").attr("is_masked")(value).cast<bool>()) {
-        refuse("holds masked values");
+        refuse("contains masked values");
     }
     const py::array given = py::array::ensure(value);
     if (!given) {
         PyErr_Clear();
-        refuse("is no array");
+        refuse("is not an array");
     }
     const char kind = given.dtype().kind();
     if (kind == 'O') {
         for (const py::handle each : given.attr("ravel")()) {
             if (each.is_none()) {
-                refuse("holds None");
+                refuse("contains None");
             }
         }
     } else if (kind != 'f' && kind != 'i' && kind != 'u' && kind != 'b') {
-        refuse("holds " + py::str(given.dtype()).cast<std::string>());
+        refuse("contains " + py::str(given.dtype()).cast<std::string>());
     }
     const Array array = Array::ensure(given);
     if (!array) {
         PyErr_Clear();
-        refuse("holds " + py::str(given.dtype()).cast<std::string>());
+        refuse("contains " + py::str(given.dtype()).cast<std::string>());
     }
     return array;
 }
@@ -134,7 +134,7 @@ template <class T>
 }
 
 inline void require_period(double period_s) {
-    require_field(obeys(period_s, Rule::Positive), "period_s", period_s, text(Rule::Positive));
+    require_field(satisfies(period_s, Rule::Positive), "period_s", period_s, text(Rule::Positive));
 }
 
 }  // namespace palpate::bindings

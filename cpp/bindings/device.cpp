@@ -10,12 +10,12 @@ namespace py = pybind11;
 void bind_device(py::module_& module) {
     py::class_<DeviceProfile> type(
         module, "DeviceProfile",
-        "What is known of a haptic device of one degree of freedom; SI units, rotary or linear.");
+        "Properties of a haptic device of one degree of freedom; SI units, rotary or linear.");
     bind_fields(type, true, [](const DeviceProfile& made) { validate(made); });
     type.def_property_readonly("late_samples", &DeviceProfile::late_samples,
                                "Smallest number of whole samples that is not shorter than the delay.")
         .def_property_readonly("longest_period_s", &DeviceProfile::longest_period_s,
-                               "period_s + jitter_s: what a certificate has to hold for [s].");
+                               "period_s + jitter_s, the longest time between two samples [s].");
 }
 
 }  // namespace palpate::bindings

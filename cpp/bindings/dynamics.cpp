@@ -18,9 +18,9 @@ void bind_dynamics(py::module_& module) {
         .def(py::init<std::array<double, 3>, std::array<double, 3>>(), "numerator"_a, "denominator"_a)
         .def_property_readonly("numerator", &TransferFunction::numerator)
         .def_property_readonly("denominator", &TransferFunction::denominator)
-        .def("step", &TransferFunction::step, "input"_a, "The next output sample.")
-        .def("reset", &TransferFunction::reset, "Back to rest.")
-        .def("at", &TransferFunction::at, "z"_a, "H(z), for instance at z = exp(1j * omega * T).")
+        .def("step", &TransferFunction::step, "input"_a, "Returns the next output sample.")
+        .def("reset", &TransferFunction::reset, "Sets the state to zero.")
+        .def("at", &TransferFunction::at, "z"_a, "Returns H(z), for instance at z = exp(1j * omega * T).")
         .def("poles", &TransferFunction::poles)
         .def(
             "filter",
@@ -32,7 +32,8 @@ void bind_dynamics(py::module_& module) {
                 }
                 return output;
             },
-            "input"_a, "The response to a signal (n,) from this state; the state itself is left as it is.");
+            "input"_a,
+            "Returns the response to a signal (n,) from this state, and does not change the state.");
 
     py::class_<EnvironmentFilters>(
         module, "EnvironmentFilters",
@@ -49,7 +50,7 @@ void bind_dynamics(py::module_& module) {
                                        named<FilterDesign>(design, "design"));
         },
         "pair"_a, "design"_a = "paper",
-        "The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low "
+        "Returns the paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low "
         "frequency.");
 }
 

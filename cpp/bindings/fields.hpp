@@ -94,7 +94,7 @@ void bind_fields(
             });
             return values;
         },
-        "The fields that are written to a file, by name; without optional ones that are not given.");
+        "Returns the fields that are written to a file, by name, without optional ones that are not set.");
     type.def("__reduce__", [](const py::object& self) {
         const py::object rebuild = py::module_::import("functools").attr("partial");
         return py::make_tuple(rebuild(py::type::of(self), **dict_of(self.cast<const T&>())), py::tuple());

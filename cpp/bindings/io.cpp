@@ -94,7 +94,7 @@ Json to_json(const py::handle& value, int depth = 0) {
         }
         return items;
     }
-    throw std::invalid_argument("the file cannot hold a value of type " +
+    throw std::invalid_argument("the file cannot contain a value of type " +
                                 py::str(py::type::of(value).attr("__name__")).cast<std::string>());
 }
 
@@ -103,11 +103,13 @@ Json to_json(const py::handle& value, int depth = 0) {
 void bind_io(py::module_& module) {
     module.def(
         "read_json", [](const std::string& path) { return to_python(read_json(path)); }, "path"_a,
-        "Content of a JSON file. ValueError: one sentence that begins with the name of the file.");
+        "Returns the content of a JSON file. ValueError has one sentence that begins with the name of the "
+        "file.");
     module.def(
         "check_model", [](const py::object& content) { (void)parse_model(to_json(content)); }, "content"_a,
-        "Checks the content of a model file; a certificate is computed again. ValueError: the path of the\n"
-        "first wrong field, its value, what would be right.");
+        "Checks the content of a model file and recomputes its certificate. ValueError names the path of "
+        "the\n"
+        "first wrong field, its value and the correct ones.");
     module.def(
         "profile_of",
         [](const py::object& content) {
@@ -121,7 +123,7 @@ void bind_io(py::module_& module) {
         "value and the correct ones.");
     module.def(
         "scheme_of", [](const py::object& plan) { return *detail::read_plan({to_json(plan), "plan"}); },
-        "plan"_a, "Scheme of the plan of a model file.");
+        "plan"_a, "Returns the scheme of the plan of a model file.");
     module.def(
         "checked_certificate",
         [](const ForceModel& model, const py::object& plan, const py::object& certificate) {
@@ -131,9 +133,8 @@ void bind_io(py::module_& module) {
                                              model, "");
         },
         "model"_a, "plan"_a, "certificate"_a,
-        "Certificate of a model file, computed again from the rendered model and found the same. "
-        "ValueError:\n"
-        "the field that differs, its value, what would be right.");
+        "Returns the certificate of a model file after recomputing it from the rendered model. ValueError\n"
+        "names the field that differs, its value and the correct one.");
 }
 
 }  // namespace palpate::bindings

@@ -65,9 +65,8 @@ void require_inputs(const ForceModel& model, bool direction, bool play) {
     if (!model.hysteresis()) {
         return;
     }
-    detail::require(
-        direction || play,
-        "the model differs between press and release: give direction= (+1 pressing, -1 releasing) or play=");
+    detail::require(direction || play,
+                    "the model has hysteresis: give direction= (+1 pressing, -1 releasing) or play=");
     detail::require(
         direction || model.play_radius().has_value(),
         "play= is given, but the model has no play radius: give direction= (+1 pressing, -1 releasing)");
@@ -290,7 +289,7 @@ void bind_model(py::module_& module) {
         module, "ForceModel",
         "A force identified over d inputs, with its domain and continuations.\n\n"
         "f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4); with hysteresis\n"
-        "f(x, s) = g(x) + s h(x), h with weights of its own on the same wavelets.");
+        "f(x, s) = g(x) + s h(x), where h has separate weights for the same wavelets.");
     type.def(py::init(&make_model), py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a,
              "weight_hysteresis"_a = py::none(), "linear_hysteresis"_a = py::none(),
              "bias_hysteresis"_a = py::none(), "lower"_a, "upper"_a, "below"_a = "linear",
@@ -298,28 +297,31 @@ void bind_model(py::module_& module) {
              "of_velocity"_a = false,
              "alpha, beta (N, d); weight (N,); linear, lower, upper (d,). of_velocity: the second of two "
              "inputs is the "
-             "velocity. ValueError names the field that is wrong.");
+             "velocity. ValueError names the wrong field.");
 
     bind_quantity<&EnvironmentSample::force>(
         type, "force",
-        "Force of the object against the tool [N or N*m]; a number in, "
-        "a number out, an array in, an array out.\n\n"
-        "A hysteresis model needs direction (+1 pressing, -1 releasing) "
-        "or, where it has a play radius, play, the\n"
-        "state of the play operator. Inputs that the model does not use "
-        "are ignored; ValueError names one it misses.\n"
-        "A position that is not finite gives NaN, in a number as in an array.");
-    bind_quantity<&EnvironmentSample::slope>(type, "slope", "Local stiffness df/dx; arguments as for force.");
-    bind_quantity<&EnvironmentSample::energy>(type, "energy",
-                                              "Stored energy [J] up to a constant; arguments as for force.");
-    type.def(
-        "predict", &predict, "X"_a,
-        "Force at X (n, d), (n,); a hysteresis model takes the direction as one more column. A row with a\n"
-        "value that is not finite gives NaN.");
+        "Returns the force of the object against the tool [N or N*m]: a number for a number, an array for "
+        "an\n"
+        "array.\n\n"
+        "A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius, "
+        "`play`,\n"
+        "the state of the play operator. Inputs that the model does not use are ignored; ValueError names a\n"
+        "missing one.\n"
+        "A position that is not finite gives NaN.");
+    bind_quantity<&EnvironmentSample::slope>(type, "slope",
+                                             "Returns the local stiffness df/dx; arguments as for force.");
+    bind_quantity<&EnvironmentSample::energy>(
+        type, "energy", "Returns the stored energy [J] up to a constant; arguments as for force.");
+    type.def("predict", &predict, "X"_a,
+             "Returns the force (n,) at X (n, d). A hysteresis model takes the direction as one more column. "
+             "A row\n"
+             "with a value that is not finite gives NaN.");
     type.def("extrapolated", &extrapolated, "position"_a,
-             "Whether a position lies outside the identified domain.");
-    type.def("play", &model_play_states, "position"_a, "start"_a = py::none(),
-             "State of the play operator along a motion (n,), started at rest unless told otherwise.");
+             "Returns True if a position lies outside the identified domain.");
+    type.def(
+        "play", &model_play_states, "position"_a, "start"_a = py::none(),
+        "Returns the state of the play operator along a motion (n,). Without `start` it begins at rest.");
     type.def(
         "slope_range",
         [](const ForceModel& model, std::optional<double> radius) {
@@ -328,9 +330,10 @@ void bind_model(py::module_& module) {
             return pair_of(model.slope_bounds(radius));
         },
         "play_radius"_a = py::none(),
-        "Proved (smallest, largest) slope inside the domain, sliding either way, within 1 % of the "
-        "steepest.\n"
-        "With a play radius also while a hysteresis model sticks, where h / r adds to it.");
+        "Returns the proved (smallest, largest) slope inside the domain while sliding in either direction,\n"
+        "within 1 % of the steepest. With a play radius it also holds while a hysteresis model sticks, "
+        "which\n"
+        "adds h / r.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
     type.def_property_readonly("n_wavelets",
@@ -345,15 +348,18 @@ void bind_model(py::module_& module) {
     type.def_property_readonly("hysteretic", [](const ForceModel& m) { return m.hysteresis() != nullptr; });
     type.def_property_readonly(
         "of_velocity", [](const ForceModel& m) { return m.velocity() != nullptr; },
-        "Whether the second of two inputs is the velocity.");
+        "True if the second of two inputs is the velocity.");
     type.def_property_readonly("weight_hysteresis", [](const ForceModel& m) -> std::optional<Array> {
-        return m.hysteresis() ? std::optional(row(m.hysteresis()->loss().parameters().weight)) : std::nullopt;
+        return m.hysteresis() ? std::optional(row(m.hysteresis()->hysteresis_force().parameters().weight))
+                              : std::nullopt;
     });
     type.def_property_readonly("linear_hysteresis", [](const ForceModel& m) -> std::optional<Array> {
-        return m.hysteresis() ? std::optional(row(m.hysteresis()->loss().parameters().linear)) : std::nullopt;
+        return m.hysteresis() ? std::optional(row(m.hysteresis()->hysteresis_force().parameters().linear))
+                              : std::nullopt;
     });
     type.def_property_readonly("bias_hysteresis", [](const ForceModel& m) -> std::optional<double> {
-        return m.hysteresis() ? std::optional(m.hysteresis()->loss().parameters().bias) : std::nullopt;
+        return m.hysteresis() ? std::optional(m.hysteresis()->hysteresis_force().parameters().bias)
+                              : std::nullopt;
     });
     type.def_property_readonly("lower", [](const ForceModel& m) { return row(m.domain().lower); });
     type.def_property_readonly("upper", [](const ForceModel& m) { return row(m.domain().upper); });
@@ -364,23 +370,22 @@ void bind_model(py::module_& module) {
     type.def_property_readonly("period", [](const ForceModel& m) { return m.domain().period; });
     type.def_property_readonly("play_radius", &ForceModel::play_radius);
 
-    module.def(
-        "play", &play_states, "position"_a, "radius"_a, "start"_a = py::none(),
-        "State (n,) of the play operator of a radius along a motion (n,), started at rest unless told\n"
-        "otherwise: play_k = min(x_k + r, max(x_k - r, play_{k-1})).");
+    module.def("play", &play_states, "position"_a, "radius"_a, "start"_a = py::none(),
+               "Returns the state (n,) of the play operator of a radius along a motion (n,):\n"
+               "play_k = min(x_k + r, max(x_k - r, play_{k-1})). Without `start` it begins at rest.");
 
-    module.def(
-        "slope_bounds", &network_slope_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a,
-        "bias"_a, "lower"_a, "upper"_a, "relative"_a = 0.01,
-        "Proved (smallest, largest) slope of a network of one input over [lower, upper], at most `relative`\n"
-        "times max|f'| wider than the true range.");
+    module.def("slope_bounds", &network_slope_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a,
+               "linear"_a, "bias"_a, "lower"_a, "upper"_a, "relative"_a = 0.01,
+               "Returns the proved (smallest, largest) slope of a network of one input over [lower, upper], "
+               "at most\n"
+               "`relative` times max|f'| wider than the true range.");
     module.def(
         "derivative_bounds", &cell_derivative_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a,
         "linear"_a, "bias"_a, "lower"_a, "upper"_a, "order"_a,
-        "Proved bounds (k,) of |f^(order)| of a network of one input, up to the ninth, over the cells\n"
-        "[lower, upper], each (k,).");
+        "Returns proved bounds (k,) of |f^(order)| of a network of one input, for orders up to 9, over the\n"
+        "cells [lower, upper], each (k,).");
     module.def("fingerprint", &fingerprint, "model"_a,
-               "16 hexadecimal digits that change with every number of which the model's force is made.");
+               "Returns 16 hexadecimal digits that change with every number of the model's force.");
 }
 
 }  // namespace palpate::bindings

@@ -31,12 +31,12 @@ PYBIND11_MODULE(_core, module) {
         pybind11::module_::import("sys").attr("modules")[made.attr("__name__")] = made;
         (bind(made), ...);
     };
-    submodule("status", "Why a step ended as it did.", bind_status);
+    submodule("status", "Results of steps.", bind_status);
     submodule("model", "Force laws and their proved bounds.", bind_wavelet, bind_model);
     submodule("dynamics", "Transfer functions and the filters of the paper.", bind_dynamics);
     submodule("device", "Profiles of devices, and the packets of USB devices.", bind_device, bind_wire);
     submodule("rendering", "Structures between a model and a device.", bind_rendering);
-    submodule("stability", "Certificates and the inequalities they consist of.", bind_stability);
+    submodule("stability", "Certificates and their inequalities.", bind_stability);
     submodule("io", "Model files.", bind_io);
     submodule("simulation", "Rendering in virtual time on a simulated device.", bind_simulation);
     submodule("run", "Rendering and measuring in real time.", bind_run);

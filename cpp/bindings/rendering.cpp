@@ -23,11 +23,11 @@ void bind_rendering(py::module_& module) {
     module.attr("most_prediction_taps") = most_prediction_taps;
     module.attr("compensated_share") = compensated_share;
     py::class_<Scheme> type(module, "Scheme",
-                            "How a model is rendered: the structure and its numbers, SI units.");
+                            "Structure that renders a model, with its numbers in SI units.");
     bind_fields(type);
     type.def_property_readonly(
             "has_coupling", [](const Scheme& s) { return has_coupling(s.structure); },
-            "True if the object stands behind a virtual coupling.")
+            "True if the object is behind a virtual coupling.")
         .def_property_readonly(
             "has_mass", [](const Scheme& s) { return has_mass(s.structure); },
             "True if the object has mass and damping.")
@@ -37,15 +37,15 @@ void bind_rendering(py::module_& module) {
                 period_s ? validate(s, model, *period_s) : validate(s, model);
             },
             "model"_a, "period_s"_a = py::none(),
-            "ValueError names the field, its value and what would be right for this model; with a period "
+            "Raises ValueError with the field, its value and the bound for this model. With a period it "
             "also\n"
-            "what is sure to diverge at it.")
+            "refuses a scheme that diverges at this period.")
         .def(
             "steepest_slope",
             [](const Scheme& s, const ForceModel& model) { return steepest_slope(s, model); }, "model"_a,
-            "Largest slope of the model that the structure meets, never below 0; h / r is part of it while "
-            "a\n"
-            "hysteresis model sticks.");
+            "Returns the largest slope of the model in the structure, at least 0. It includes h / r, the "
+            "slope\n"
+            "that a hysteresis model adds while it sticks.");
 
     module.def(
         "explicit_slope_limit",
@@ -55,11 +55,11 @@ void bind_rendering(py::module_& module) {
                                         period_s);
         },
         "scheme"_a, "period_s"_a, py::kw_only(), "coupled"_a = true,
-        "Slope of the model below which the explicit structure is stable at a held device, or (not coupled)\n"
-        "driven by a force.");
+        "Returns the slope of the model below which the explicit structure is stable at a held device, or,\n"
+        "with coupled=False, driven by a force.");
 
     module.def("default_play_radius", &default_play_radius, "model"_a, "encoder_step"_a,
-               "Play radius of a model that leaves it to the rendering, else 0.");
+               "Returns the default play radius of a model that does not define one; otherwise 0.");
     module.attr("fewest_encoder_steps_in_play") = fewest_encoder_steps_in_play;
 
     module.def(
@@ -70,9 +70,9 @@ void bind_rendering(py::module_& module) {
             return name ? std::optional<std::string>{*name} : std::nullopt;
         },
         "model"_a, "scheme"_a, "period_s"_a,
-        "How the load line is solved: 'table' where certified tables answer, at least in part, else "
-        "'newton';\n"
-        "None where a structure has no load line.");
+        "Returns the method that solves the load line: 'table' if certified tables are used at least in "
+        "part,\n"
+        "otherwise 'newton'; None for a structure without a load line.");
 }
 
 }  // namespace palpate::bindings

@@ -139,7 +139,7 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
     const PlannedModel planned{model_name, model, position_unit, force_unit, plan, limited, certificate};
     const auto device = open_device(options, planned);
     RecordSinks sinks;
-    const RenderJob job = settle(options, planned, *device, sinks);
+    const RenderJob job = prepare_rendering(options, planned, *device, sinks);
     Watcher watcher{progress, &LoopProgress::force};
     const auto summary = [&] {
         const py::gil_scoped_release unlocked;
@@ -202,30 +202,32 @@ void bind_run(py::module_& module) {
         "limited"_a = py::none(), "certificate"_a = py::none(), "position_unit"_a = "rad",
         "force_unit"_a = "N*m", "model_name"_a = "", "progress"_a = py::none(),
         "Renders a model in real time on a device: the loop of palpate-control.\n\n"
-        "`plan`, `limited` and `certificate` are those of the model; without a plan the scheme is the "
-        "default\n"
-        "one. Options by keyword, None for the default: device (simulated, usb[:SERIAL] or\n"
-        "inverse3[:AXIS[@PORT]]), uncertified, wait_s, rate_hz, duration_s (inf: until Ctrl-C), record,\n"
-        "force, telemetry_port, telemetry_hz, priority, cpu, lowest_rate_share, force_limit, faults, and "
-        "the\n"
-        "fields of a scheme. `record` names the recording, which grows as record.part; an existing one is\n"
-        "refused, or replaced with `force`. Calls progress(ticks, position, force, lost) ten times a "
-        "second.\n\n"
-        "Returns the summary by name, its lines for a person under `lines`. InputError where it is refused\n"
-        "before anything moves.");
+        "`plan`, `limited` and `certificate` are those of the model. Without a plan the default scheme is\n"
+        "used. Options are keywords, None for the default:\n\n"
+        "- device (simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]), wait_s, uncertified, faults.\n"
+        "- rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.\n"
+        "- force_limit and the fields of a scheme.\n"
+        "- record, force, telemetry_port, telemetry_hz.\n\n"
+        "`record` names the recording, which grows as record.part. An existing one is refused, or replaced "
+        "with\n"
+        "`force`. Calls progress(ticks, position, force, lost) ten times a second.\n\n"
+        "Returns the summary by name, and its text under `lines`. Raises InputError if it is refused before\n"
+        "anything moves.");
     module.def(
         "measure", &measure_in_python, py::kw_only(), "object"_a = py::none(), "position_unit"_a = "rad",
         "force_unit"_a = "N*m", "progress"_a = py::none(),
         "Measures a real object in real time; on the simulated device the model `object` is mounted.\n\n"
-        "A hand moves the handle; with `probe` the device moves it slowly between `lower` and `upper`; with\n"
-        "`push` it gives short pushes of that force to either side. Options by keyword, None for the\n"
-        "default: device (simulated or usb[:SERIAL]), wait_s, rate_hz, duration_s (inf: until Ctrl-C),\n"
-        "record, force, priority, cpu, lowest_rate_share, probe, lower, upper, speed, stiffness, "
-        "force_limit,\n"
-        "push, keep, transducer, friction_share (Coulomb friction of the simulated device over its force\n"
-        "limit). Calls progress(ticks, position, force, lost) ten times a second.\n\n"
-        "Returns the summary by name; with `keep` it holds the ticks. InputError where it is refused before\n"
-        "anything moves.");
+        "A hand moves the handle. With `probe` the device moves it slowly between `lower` and `upper`. With\n"
+        "`push` the device gives short pushes of that force to either side. Options are keywords, None for\n"
+        "the default:\n\n"
+        "- device (simulated or usb[:SERIAL]), wait_s.\n"
+        "- rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.\n"
+        "- probe, lower, upper, speed, stiffness, force_limit, push.\n"
+        "- record, force, keep.\n"
+        "- transducer, friction_share (Coulomb friction of the simulated device / its force limit).\n\n"
+        "Calls progress(ticks, position, force, lost) ten times a second.\n\n"
+        "Returns the summary by name; with `keep` it contains the ticks. Raises InputError if it is refused\n"
+        "before anything moves.");
 }
 
 }  // namespace palpate::bindings

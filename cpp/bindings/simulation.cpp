@@ -88,7 +88,7 @@ py::dict rendered_along(const Array& samples, const char* name, double period_s,
 void bind_simulation(py::module_& module) {
     py::class_<Hand> hand(
         module, "Hand",
-        "A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.");
+        "Simulated hand: a spring to a target that moves between lower and upper, and a damper to ground.");
     bind_fields(hand);
 
     py::class_<TestRig> rig(module, "TestRig", "Simulated device and hand scaled to a model.");
@@ -101,29 +101,27 @@ void bind_simulation(py::module_& module) {
             return self.scheme(model, chosen);
         },
         "model"_a,
-        "Returns the scheme with the given fields of Scheme, in the model's units. None: the default at "
-        "the "
-        "model's "
-        "scale.");
+        "Returns the scheme with the given fields of Scheme, in the model's units. None: the default at the\n"
+        "model's scale.");
     module.def(
         "rig_for", &rig_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
         "Returns the test rig for a model of position, or of position and velocity. An angle is rendered on\n"
-        "the default knob; for any other unit its lengths and forces are scaled to the travel and the "
+        "the default knob. For any other unit its lengths and forces are scaled to the travel and the "
         "largest\n"
         "force of the model.");
 
-    module.def("simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
-               "substeps"_a = usual_substeps, "start_position"_a = 0.0, "progress"_a = py::none(),
-               "The model rendered on a simulated device held by a simulated hand, in virtual time.\n"
-               "The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. "
-               "Ctrl-C\n"
-               "ends it as in Python; ValueError for more than 3 600 000 ticks.\n\n"
-               "Arrays (n,) by name: time_s, position (measured), velocity, handle_start, handle_middle and\n"
-               "handle_end (the true handle when sampled, and in the middle and at the end of the tick that "
-               "holds the\n"
-               "force), environment_position, force (commanded), applied (at the end of the tick), "
-               "mean_applied (over\n"
-               "the tick), evaluations, status, extrapolated.");
+    module.def(
+        "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
+        "substeps"_a = usual_substeps, "start_position"_a = 0.0, "progress"_a = py::none(),
+        "Renders a model on a simulated device with a simulated hand, in virtual time.\n\n"
+        "The handle starts at rest at start_position. Calls progress(ticks) about ten times a second.\n"
+        "Ctrl-C raises KeyboardInterrupt. Raises ValueError for more than 3 600 000 ticks.\n\n"
+        "Returns arrays (n,) by name:\n\n"
+        "- time_s, position (measured), velocity, environment_position.\n"
+        "- handle_start, handle_middle, handle_end: true positions of the handle when it is sampled, and in\n"
+        "  the middle and at the end of the tick that holds the force.\n"
+        "- force (commanded), applied (at the end of the tick), mean_applied (over the tick).\n"
+        "- evaluations, status, extrapolated.");
     module.def(
         "force_error",
         [](const ForceModel& model, double play_radius, const Array& start, const Array& middle,
@@ -146,10 +144,11 @@ void bind_simulation(py::module_& module) {
         },
         "model"_a, "play_radius"_a, py::kw_only(), "start"_a, "middle"_a, "end"_a, "applied"_a,
         "mean_applied"_a, "period_s"_a,
-        "RMS errors [N or N*m] of a simulated rendering against a model: at the end of the tick, at its\n"
-        "sampling instant, of its mean over the tick, and of that below 50 Hz; and the work of the error "
-        "[J].\n"
-        "Arrays (n,) from simulate; play_radius 0 is the model's own.");
+        "Returns errors of a simulated rendering against a model, by name. RMS [N or N*m]: at the end of "
+        "the\n"
+        "tick, at its sampling instant, of the mean over the tick, and of the mean below 50 Hz. Also the "
+        "work\n"
+        "of the error [J]. Takes arrays (n,) from simulate; play_radius 0 is that of the model.");
     module.def(
         "motion_driven",
         [](const ForceModel& model, const Scheme& s, const Array& position, double period_s) {
@@ -158,7 +157,7 @@ void bind_simulation(py::module_& module) {
             });
         },
         "model"_a, "scheme"_a, "position"_a, "period_s"_a,
-        "The force that would have been rendered while a recorded motion (n,) moves the device.\n"
+        "Returns the force that is rendered while a recorded motion (n,) moves the device.\n"
         "Arrays (n,) by name: force, environment_position, evaluations, status.");
     module.def(
         "force_driven",
@@ -169,7 +168,7 @@ void bind_simulation(py::module_& module) {
             });
         },
         "model"_a, "scheme"_a, "force"_a, "period_s"_a, "start_position"_a = 0.0,
-        "The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).\n"
+        "Returns the motion of the environment alone under a recorded force (n,) (paper figures 12 and 14).\n"
         "Arrays (n,) by name: force, environment_position, evaluations, status.");
 }
 

@@ -8,8 +8,7 @@ namespace palpate::bindings {
 namespace py = pybind11;
 
 void bind_status(py::module_& module) {
-    py::enum_<Status> status(module, "Status",
-                             "Why a step ended as it did; the same words in C++ and in records.");
+    py::enum_<Status> status(module, "Status", "Result of a step; the same words in C++ and in records.");
     py::dict meanings;
     for (std::size_t k = 0; k < status_texts.size(); ++k) {
         status.value(status_texts[k].word, static_cast<Status>(k), status_texts[k].meaning);

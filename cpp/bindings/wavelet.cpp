@@ -83,7 +83,7 @@ struct Frame {
     template <class Visitor>
     void radial(std::size_t i, Visitor visit) const {
         // exp(-80) is 2e-35. Products of smaller numbers are denormal, which makes linear algebra ten times as slow.
-        constexpr double nothing_is_left = 160.0;
+        constexpr double negligible_square = 160.0;
         constexpr double most = detail::hat_reach * detail::hat_reach;
         Hats hats;
         hats.inputs = static_cast<double>(dimension);
@@ -105,12 +105,12 @@ struct Frame {
                 hats.square[k] = square > most ? most : square;
                 nearest = square < nearest ? square : nearest;
             }
-            if (nearest < nothing_is_left) {
+            if (nearest < negligible_square) {
                 detail::hat_kernel().gaussians(hats.square.data(), hats.size, hats.gaussian.data());
             }
             for (std::size_t k = 0; k < hats.size; ++k) {
                 const double gaussian = hats.gaussian[k];
-                hats.gaussian[k] = hats.square[k] < nothing_is_left ? gaussian : 0.0;
+                hats.gaussian[k] = hats.square[k] < negligible_square ? gaussian : 0.0;
             }
             visit(std::as_const(hats));
         }
@@ -235,7 +235,7 @@ std::vector<Columns> wavelet_curvature_columns(const Array& x, const Array& alph
 Columns wavelet_slope_columns(const Array& x, const Array& alpha, const Array& beta) {
     const Frame frame(x, alpha, beta);
     if (frame.dimension != 1) {
-        throw std::invalid_argument("x has shape " + shape_of(x) + ", must be (n,): this is for one input");
+        throw std::invalid_argument("x has shape " + shape_of(x) + ", must be (n,), one input");
     }
     return filled(frame, [&](const Hats& hats, std::size_t i, std::size_t k) {
         return frame.alpha[i] * (hats.at(k).gradient_over_u * frame.clamped(i, hats.first + k, 0));
@@ -245,20 +245,22 @@ Columns wavelet_slope_columns(const Array& x, const Array& alpha, const Array& b
 }  // namespace
 
 void bind_wavelet(py::module_& module) {
-    module.def(
-        "wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a,
-        "psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in memory.\n\n"
-        "x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.");
+    module.def("wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a,
+               "Returns psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in "
+               "memory.\n\n"
+               "x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.");
     module.def("wavelet_jacobian", &wavelet_jacobian, "x"_a, "alpha"_a, "beta"_a,
-               "The wavelet columns and their derivatives by the dilations and the translations:\n"
+               "Returns the wavelet columns and their derivatives by the dilations and the translations:\n"
                "(value, by_alpha, by_beta), value (n, N), the others lists of d arrays (n, N).");
     module.def("wavelet_steps", &wavelet_steps, "x"_a, "alpha"_a, "beta"_a,
-               "Derivatives of the wavelet columns by steps without a unit, d log(alpha) and alpha d(beta):\n"
+               "Returns the derivatives of the wavelet columns by steps without a unit, d log(alpha) and "
+               "alpha d(beta):\n"
                "(n, 2 d N), ordered (quantity, input, wavelet), column by column in memory.");
-    module.def("wavelet_curvature_columns", &wavelet_curvature_columns, "x"_a, "alpha"_a, "beta"_a,
-               "Second derivatives of the wavelet columns along each input: a list of d arrays (n, N).");
+    module.def(
+        "wavelet_curvature_columns", &wavelet_curvature_columns, "x"_a, "alpha"_a, "beta"_a,
+        "Returns the second derivatives of the wavelet columns along each input: a list of d arrays (n, N).");
     module.def("wavelet_slope_columns", &wavelet_slope_columns, "x"_a, "alpha"_a, "beta"_a,
-               "d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).");
+               "Returns d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).");
 }
 
 }  // namespace palpate::bindings

@@ -32,12 +32,13 @@ py::dict decode_info(const py::bytes& data) {
 }  // namespace
 
 void bind_wire(py::module_& module) {
-    module.def("decode_info", &decode_info, "data"_a,
-               "Identity of a USB device from its answer to GET_INFO. InputError names the wrong field.\n\n"
-               "firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms, "
-               "transducer,\nmeasures_velocity, uid.");
+    module.def(
+        "decode_info", &decode_info, "data"_a,
+        "Returns the properties in a USB device's answer to GET_INFO. InputError names the wrong field.\n\n"
+        "firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms, "
+        "transducer,\nmeasures_velocity, uid.");
     module.def("usb_cause", &wire::usb_cause, "code"_a,
-               "Cause and cure for an error code of libusb; empty for a code that states no cause.");
+               "Returns cause and cure for an error code of libusb; empty for a code without a known cause.");
     py::enum_<wire::Request>(module, "UsbRequest", "bRequest of a control transfer.")
         .value("GetInfo", wire::Request::GetInfo)
         .value("Enable", wire::Request::Enable)

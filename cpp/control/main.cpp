@@ -85,7 +85,7 @@ int run(const Options& options) {
     const PlannedModel model = read_model(options.model);
     const auto device = open_device(options.render, model);
     RecordSinks sinks;
-    const RenderJob job = settle(options.render, model, *device, sinks);
+    const RenderJob job = prepare_rendering(options.render, model, *device, sinks);
     const LoopSettings& loop = job.session.loop;
     std::cerr << model.name << ": " << job.model.parameters().weight.size() << " wavelets, "
               << describe(job.scheme) << "; " << device->title << " at " << readable(loop.rate_hz) << " Hz "
@@ -108,12 +108,12 @@ int run(const Options& options) {
 
 }  // namespace palpate::control
 
-int main(int count, char** words) {
+int main(int count, char** arguments) {
     using namespace palpate::control;
     occupy_closed_streams();
     Options options;
     try {
-        const auto code = read_options(count, words, options);
+        const auto code = read_options(count, arguments, options);
         return exit_code_after_output(code ? *code : run(options));
     } catch (const std::exception& error) {
         std::cerr << "error: " << error.what() << "\n";

@@ -21,10 +21,10 @@ namespace palpate::control {
 namespace {
 
 constexpr const char* epilogue =
-    "Ctrl-C ends a run in an orderly way. Exit code: 0 ran its time, or Ctrl-C;\n"
+    "Ctrl-C ends a run normally. Exit code: 0 the duration ended, or Ctrl-C;\n"
     "1 stopped by a guard, a fault or a rate too low;\n"
     "2 refused before anything moved.\n\n"
-    "\"scaled\": the numbers of a knob, in proportion to the model's travel and force.\n\n"
+    "\"scaled\": the value for the default knob, scaled to the model's travel and force.\n\n"
     "Example: palpate-control press.json --duration-s 10 --record felt.csv";
 
 constexpr double least_positive = std::numeric_limits<double>::min();
@@ -75,10 +75,10 @@ class Help : public CLI::Formatter {
     }
 
     std::string make_option_desc(const CLI::Option* option) const override {
-        std::istringstream words{option->get_description()};
+        std::istringstream arguments{option->get_description()};
         std::string text;
         std::size_t line = 0;
-        for (std::string word; words >> word;) {
+        for (std::string word; arguments >> word;) {
             const bool fits = line + 1 + word.size() <= 80 - options_width;
             text += (text.empty() ? "" : fits ? " " : "\n") + word;
             line = fits ? line + 1 + word.size() : word.size();
@@ -106,7 +106,8 @@ void add_rendering(CLI::App& app, RenderOptions& options) {
         ->check(structure_word())
         ->type_name("NAME")
         ->default_str(std::string(name_of(Scheme{}.structure)));
-    group(app.add_flag("--compensated", scheme.compensated, "Take the coupling's spring out of the model"));
+    group(app.add_flag("--compensated", scheme.compensated,
+                       "Subtract the compliance of the coupling's spring from the model"));
     group(app.add_option("--coupling-stiffness", scheme.coupling_stiffness,
                          "K_c, force per position" + scaled(usual.coupling.stiffness, "N*m/rad")))
         ->check(positive());
@@ -114,11 +115,11 @@ void add_rendering(CLI::App& app, RenderOptions& options) {
                          "B_c, force per velocity" + scaled(usual.coupling.damping, "N*m*s/rad")))
         ->check(not_negative());
     group(app.add_option("--mass", scheme.mass,
-                         "Mass of the object, where it has mass" + scaled(usual.inertia.mass, "kg*m^2")))
+                         "Object mass, for structures with mass" + scaled(usual.inertia.mass, "kg*m^2")))
         ->check(positive());
     group(app.add_option(
-              "--damping", scheme.damping,
-              "Damping of the object, where it has mass" + scaled(usual.inertia.damping, "N*m*s/rad")))
+              "--object-damping", scheme.object_damping,
+              "Object damping, for structures with mass" + scaled(usual.inertia.damping, "N*m*s/rad")))
         ->check(not_negative());
     group(app.add_option("--play-radius", scheme.play_radius,
                          "r of a model with hysteresis [the model's, or 1 % of its travel]"))
@@ -133,32 +134,32 @@ void add_rendering(CLI::App& app, RenderOptions& options) {
 void add_guards(CLI::App& app, RenderOptions& options) {
     const auto group = [](CLI::Option* option) { return option->group("Guards"); };
     group(app.add_option("--force-limit", options.force_limit,
-                         "In the model's unit [the device's: " + readable(DeviceProfile{}.force_limit) +
-                             " N*m, scaled]"))
+                         "Largest force, in the model's unit [the device's: " +
+                             readable(DeviceProfile{}.force_limit) + " N*m, scaled]"))
         ->check(positive());
-    group(app.add_option("--slew-s", options.slew_s, "Least time from no force to the limit, 0 = any"))
+    group(app.add_option("--slew-s", options.slew_s,
+                         "Least time from zero force to the limit, 0 = no slew limit"))
         ->check(not_negative())
         ->default_str(readable(GuardSettings{}.slew_s));
-    group(app.add_option("--ramp-s", options.ramp_s, "From no force to all of it at the start"))
+    group(app.add_option("--ramp-s", options.ramp_s, "Time from zero to full force at the start"))
         ->check(not_negative())
         ->capture_default_str();
     group(app.add_option("--largest-speed", options.largest_speed,
-                         "Faster than this the encoder jumped [" + readable(GuardSettings{}.largest_speed) +
-                             " rad/s, scaled]"))
+                         "Largest speed; a faster motion is an encoder fault [" +
+                             readable(GuardSettings{}.largest_speed) + " rad/s, scaled]"))
         ->check(positive());
-    group(app.add_option(
-              "--frozen-s", options.frozen_s,
-              "A position that stands this long out of full motion is an encoder that died, 0 = never"))
+    group(app.add_option("--frozen-s", options.frozen_s,
+                         "Longest rest after a sudden stop; a longer one is an encoder fault, 0 = no check"))
         ->check(not_negative())
         ->capture_default_str();
     group(app.add_flag("!--no-energy-tank", options.energy_tank,
-                       "Let the rendering give more energy than the model can hold"));
+                       "Do not limit the energy that the rendering gives"));
     group(app.add_option("--tolerated-samples", options.tolerated,
-                         "Ticks in a row without a sound sample before the run ends"))
+                         "Consecutive ticks without a valid sample that are tolerated"))
         ->check(number_between(0, 1e6))
         ->default_str(std::to_string(LoopSettings{}.tolerated));
     group(app.add_option("--lowest-rate-share", options.loop.lowest_rate_share,
-                         "Of the rate: less for half a second ends the run, 0 = never"))
+                         "Least share of the rate; less for half a second ends the run, 0 = no limit"))
         ->check(number_between(0.0, 1.0))
         ->capture_default_str();
 }
@@ -176,7 +177,7 @@ void add_running(CLI::App& app, RenderOptions& options) {
     app.add_option("--rate-hz", options.loop.rate_hz, "Ticks a second")
         ->check(number_between(lowest_rate_hz, highest_rate_hz))
         ->capture_default_str();
-    app.add_option("--duration-s", options.loop.duration_s, "How long, or inf")
+    app.add_option("--duration-s", options.loop.duration_s, "Duration, or inf")
         ->check(positive())
         ->capture_default_str();
     app.add_option("--record", options.record, "Write every tick to this CSV file; it grows as OUT.csv.part")
@@ -188,15 +189,14 @@ void add_running(CLI::App& app, RenderOptions& options) {
     app.add_option("--telemetry-hz", options.telemetry_hz, "Lines a second")
         ->check(number_between(0.1, highest_rate_hz))
         ->capture_default_str();
-    app.add_flag(
-        "--uncertified", options.uncertified,
-        "Render without the certificate's limits, on a USB device without any: nothing proves that it "
-        "stays stable");
+    app.add_flag("--uncertified", options.uncertified,
+                 "Render without a valid certificate; stability is not proved");
     app.add_option_function<double>(
            "--wait-ms", [&options](double wait_ms) { options.wait_s = 1e-3 * wait_ms; },
-           "How long to wait for a device [5 for a packet of USB, 20 for an Inverse3's answer]")
+           "Longest wait for the device [5 for a USB packet, 20 for an answer of an Inverse3]")
         ->check(number_between(0.1, 10'000.0));
-    app.add_option("--priority", options.real_time.priority, "Of SCHED_FIFO, 0 = ordinary scheduling")
+    app.add_option("--priority", options.real_time.priority,
+                   "Priority of SCHED_FIFO, 0 = ordinary scheduling")
         ->check(number_between(0, 99))
         ->capture_default_str();
     app.add_option("--cpu", options.real_time.cpu, "Core of the loop, -1 = the last allowed, -2 = any")
@@ -211,32 +211,32 @@ void add_running(CLI::App& app, RenderOptions& options) {
 
 /// Returns the message of a parser error, in the style of the other messages.
 std::string sentence_of(const CLI::ParseError& error) {
-    const std::string said = error.what();
+    const std::string message = error.what();
     if (error.get_name() == "ArgumentMismatch") {
-        return said.substr(0, said.find(':')) + " needs a value";
+        return message.substr(0, message.find(':')) + " needs a value";
     }
     if (error.get_name() == "ConversionError") {  // "Could not convert: --cpu = 0.5"
-        const std::size_t name = said.find("--");
-        const std::size_t value = said.find(" = ", name);
+        const std::size_t name = message.find("--");
+        const std::size_t value = message.find(" = ", name);
         if (value != std::string::npos) {
-            return said.substr(name, value - name) + ": must be a whole number, not " +
-                   said.substr(value + 3);
+            return message.substr(name, value - name) + ": must be a whole number, not " +
+                   message.substr(value + 3);
         }
     }
-    return said;
+    return message;
 }
 
 }  // namespace
 
-std::optional<int> read_options(int count, char** words, Options& options) {
+std::optional<int> read_options(int count, char** arguments, Options& options) {
     CLI::App app{
         "Render a model on a haptic device, tick by tick.\n\n"
-        "What is rendered can be recorded, and identified and verified like any recording.",
+        "A rendering can be recorded; its recording is identified and verified like any other.",
         "palpate-control"};
     app.formatter(std::make_shared<Help>());
     app.footer(epilogue);
     app.set_version_flag("--version", std::string("palpate-control ") + PALPATE_VERSION);
-    app.add_option("MODEL.json", options.model, "A model file, from palpate identify")
+    app.add_option("MODEL.json", options.model, "Model file, written by palpate identify")
         ->type_name("FILE")
         ->required();
     add_running(app, options.render);
@@ -248,7 +248,7 @@ std::optional<int> read_options(int count, char** words, Options& options) {
         return 2;
     }
     try {
-        app.parse(count, words);
+        app.parse(count, arguments);
         options.render.rate_given = app.count("--rate-hz") > 0;
         options.render.created_by = std::string("palpate-control ") + PALPATE_VERSION;
     } catch (const CLI::CallForHelp&) {

@@ -17,6 +17,6 @@ struct Options {
 
 /// Reads the command line. Returns the exit code if the program must end at once (help, version, a wrong option); the
 /// text is then already printed.
-[[nodiscard]] std::optional<int> read_options(int count, char** words, Options& options);
+[[nodiscard]] std::optional<int> read_options(int count, char** arguments, Options& options);
 
 }  // namespace palpate::control

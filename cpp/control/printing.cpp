@@ -105,14 +105,16 @@ void LiveView::show(const SessionView& view) {
         }
     }
     if (view.disk_error != 0 && !std::exchange(warned_of_disk_, true)) {
-        warn("the recording stopped, the loop goes on: " + std::generic_category().message(view.disk_error));
+        warn("the recording stopped, the loop continues: " +
+             std::generic_category().message(view.disk_error));
     }
     const double rate = view.progress.rate.rate_hz();
-    const bool is_short = rate > 0.0 && rate < held_rate_share * settings_.rate_hz;
-    if (is_short && !short_of_rate_) {
-        warn("the loop runs at " + readable(rate) + " Hz, asked for " + readable(settings_.rate_hz) + " Hz");
+    const bool is_slow = rate > 0.0 && rate < held_rate_share * settings_.rate_hz;
+    if (is_slow && !is_slow_) {
+        warn("the loop runs at " + readable(rate) + " Hz, must run at " + readable(settings_.rate_hz) +
+             " Hz");
     }
-    short_of_rate_ = is_short;
+    is_slow_ = is_slow;
     if (terminal_ && ++calls_ % calls_a_line == 0) {
         const auto ticks = view.progress.ticks.load(std::memory_order_relaxed);
         const auto missed = view.progress.missed.load(std::memory_order_relaxed);

@@ -25,7 +25,7 @@ class LiveView {
     bool terminal_;
     bool warned_of_privileges_ = false;
     bool warned_of_disk_ = false;
-    bool short_of_rate_ = false;
+    bool is_slow_ = false;
     bool line_is_open_ = false;
     int calls_ = 0;
 };

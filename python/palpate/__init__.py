@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from .verdict import Finding, Verdict
     from .verification import Verification, verify
 
-_HOME = {
-    name: home
-    for home, names in {
+_MODULE_OF = {
+    name: module
+    for module, names in {
         "_core": ("__version__",),
         "errors": ("InputError",),
         "verdict": ("Finding", "Verdict"),
@@ -73,17 +73,17 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'palpate' has no attribute {name!r}")
     try:
-        home = import_module(f".{_HOME[name]}", __name__)
+        module = import_module(f".{_MODULE_OF[name]}", __name__)
     except ModuleNotFoundError as missing:
         if missing.name == "palpate._core":
             raise ImportError(
                 "palpate._core is not built: run `pip install .` or `make test` first"
             ) from missing
         raise
-    return getattr(home, name)
+    return getattr(module, name)
 
 
 def _has_scikit_learn() -> bool:

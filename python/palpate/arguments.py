@@ -14,7 +14,7 @@ import numpy as np
 from ._typing import Float1D
 from .errors import InputError
 
-LONGEST = 60
+LONGEST_VALUE = 60
 """Largest length of a value in a message [characters]."""
 
 
@@ -23,7 +23,7 @@ def shown(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"an array of {value.dtype} of shape {value.shape}"
     text = " ".join(repr(value).split())
-    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+    return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 3] + "..."
 
 
 def path_of(name: str, value: object) -> Path:
@@ -112,7 +112,7 @@ def vector_of(name: str, values: object) -> Float1D:
 def named_arguments(kind: Any) -> None:
     """Makes the constructor of a compiled class name an argument of a wrong type in an InputError."""
     construct = kind.__init__
-    known = re.findall(r"(\w+): ", (construct.__doc__ or "").partition("*, ")[2])
+    allowed = re.findall(r"(\w+): ", (construct.__doc__ or "").partition("*, ")[2])
 
     def named(self: Any, *args: Any, **fields: Any) -> None:
         try:
@@ -122,13 +122,13 @@ def named_arguments(kind: Any) -> None:
 
     def wrong_argument(args: tuple[Any, ...], fields: dict[str, Any]) -> str:
         if args:
-            return f"{kind.__name__} takes its values by name, such as {known[0]}=, not {shown(args[0])}"
+            return f"{kind.__name__} takes its values by name, such as {allowed[0]}=, not {shown(args[0])}"
         example = kind.__new__(kind)
         construct(example)
         words = {bool: "True or False", int: "a whole number", float: "a number", str: "text"}
         for name, value in fields.items():
-            if name not in known:
-                return f"{kind.__name__} has no argument {name!r}; it has {', '.join(known)}"
+            if name not in allowed:
+                return f"{kind.__name__} has no argument {name!r}; it has {', '.join(allowed)}"
             try:
                 construct(kind.__new__(kind), **{name: value})
             except TypeError:

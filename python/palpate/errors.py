@@ -12,7 +12,7 @@ LONGEST_TEXT = 60
 MOST_NAMES = 20
 """Largest number of names in a message."""
 
-_UNSEEN = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
+_CONTROL_CATEGORIES = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
 """Categories of characters that control a terminal or break a line."""
 
 
@@ -20,26 +20,26 @@ class InputError(ValueError):
     """Bad input: one sentence that names the file, line or field, the value, and the cure."""
 
 
-def visible(text: str) -> str:
-    """Returns the text with its control and format characters escaped to protect the terminal."""
+def escaped(text: str) -> str:
+    """Returns the text with its control and format characters escaped, to protect the terminal."""
     if text.isascii() and text.isprintable():
         return text
     return "".join(
         character.encode("unicode_escape").decode()
-        if unicodedata.category(character) in _UNSEEN and character != "\t"
+        if unicodedata.category(character) in _CONTROL_CATEGORIES and character != "\t"
         else character
         for character in text
     )
 
 
 def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
-    """Returns the visible text; the end of a long text is cut."""
-    shown = visible(text)
+    """Returns the escaped text; the end of a long text is cut."""
+    shown = escaped(text)
     return shown if len(shown) <= longest else f"{shown[:longest]}..."
 
 
 def listed(names: Iterable[str]) -> str:
     """Returns names joined by commas, up to a limit."""
-    every = list(names)
-    shown = ", ".join(map(shortened, every[:MOST_NAMES]))
-    return shown if len(every) <= MOST_NAMES else f"{shown} and {len(every) - MOST_NAMES} more"
+    all_names = list(names)
+    shown = ", ".join(map(shortened, all_names[:MOST_NAMES]))
+    return shown if len(all_names) <= MOST_NAMES else f"{shown} and {len(all_names) - MOST_NAMES} more"

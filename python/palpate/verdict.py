@@ -17,7 +17,7 @@ LEVELS: tuple[Level, ...] = get_args(Level)
 
 @dataclass(frozen=True)
 class Finding:
-    """A reservation about a result: its level, and a sentence with value, likely cause and cure."""
+    """A defect of a result: its level, and a sentence with value, likely cause and cure."""
 
     level: Level
     sentence: str
@@ -88,8 +88,8 @@ FORCE_FLOOR = 0.01
 """Least just noticeable difference, as a share of the largest |force| of the recording.
 
 Near zero force, a share of the local force would be less than a sensor or finger resolves. The floor is
-relative to the recording, because recordings range from nanonewtons to kilograms and are scaled before they
-are felt.
+relative to the recording, because recordings range from nanonewtons to kilogram-forces and are scaled before
+they are rendered.
 """
 
 

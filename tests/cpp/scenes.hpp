@@ -53,16 +53,16 @@ inline ForceModel random_model(Random& random, bool hysteresis) {
     if (!hysteresis) {
         return {network, domain};
     }
-    LossParameters loss;
+    HysteresisParameters hysteresis_part;
     NetworkParameters h = network;
     h.linear = {0.0};
     h.bias = 0.0;
     for (double& weight : h.weight) {
         weight *= uniform(random, -0.3, 0.3);
     }
-    loss.weight = h.weight;
-    loss.bias = 0.01 - value_bounds(h, 0.0, 1.0, 1e-4).lower + uniform(random, 0.0, 0.1);
-    return {network, loss, domain, uniform(random, 0.005, 0.05)};
+    hysteresis_part.weight = h.weight;
+    hysteresis_part.bias = 0.01 - value_bounds(h, 0.0, 1.0, 1e-4).lower + uniform(random, 0.0, 0.1);
+    return {network, hysteresis_part, domain, uniform(random, 0.005, 0.05)};
 }
 
 /// Returns the position of the largest slope.
@@ -92,13 +92,13 @@ inline double energy_at(const ForceModel& model, const Scheme& scheme, double x)
                                          : model.network()->at(x, {}).energy;
 }
 
-/// Returns the device with the damping and friction that the certificate requires, times `room`; nothing if the scene
+/// Returns the device with the damping and friction that the certificate requires, times `factor`; nothing if the scene
 /// cannot be certified.
-inline std::optional<DeviceProfile> just_enough(const ForceModel& model, const Scheme& scheme,
-                                                DeviceProfile device, double room) {
-    constexpr double any_damping = 12345.0;
+inline std::optional<DeviceProfile> device_at_its_bound(const ForceModel& model, const Scheme& scheme,
+                                                DeviceProfile device, double factor) {
+    constexpr double placeholder_damping = 12345.0;
     constexpr double any_friction = 54321.0;
-    device.viscous_damping = any_damping;
+    device.viscous_damping = placeholder_damping;
     device.coulomb_friction = any_friction;
     const Certificate generous = certify(model, scheme, device);
     if (!generous.certified()) {
@@ -106,17 +106,17 @@ inline std::optional<DeviceProfile> just_enough(const ForceModel& model, const S
     }
     device.viscous_damping = device.coulomb_friction = 0.0;
     for (const Inequality& line : generous.inequalities) {
-        if (line.left == any_damping) {
-            device.viscous_damping = std::max(device.viscous_damping, line.right * room);
+        if (line.left == placeholder_damping) {
+            device.viscous_damping = std::max(device.viscous_damping, line.right * factor);
         } else if (line.left == any_friction) {
-            device.coulomb_friction = std::max(device.coulomb_friction, line.right * room);
+            device.coulomb_friction = std::max(device.coulomb_friction, line.right * factor);
         }
     }
     return device;
 }
 
-/// Returns a random certified scene, with a margin of `room` - 1 in damping and friction.
-inline Scene random_certified_scene(Random& random, double room) {
+/// Returns a random certified scene, with a margin of `factor` - 1 in damping and friction.
+inline Scene random_certified_scene(Random& random, double factor) {
     for (;;) {
         constexpr std::array kinds{StructureKind::Direct, StructureKind::Massless, StructureKind::Implicit,
                                    StructureKind::EnergyConsistent};
@@ -143,7 +143,7 @@ inline Scene random_certified_scene(Random& random, double room) {
         const bool steps = random() % 2 == 0 && !has_mass(scheme.structure);
         device.encoder_step = steps ? std::exp(uniform(random, -11.0, -5.0)) : 0.0;
         device.force_step = random() % 3 == 0 ? uniform(random, 0.0, 0.02) : 0.0;
-        const std::optional<DeviceProfile> enough = just_enough(model, scheme, device, room);
+        const std::optional<DeviceProfile> enough = device_at_its_bound(model, scheme, device, factor);
         if (!enough) {
             continue;
         }

@@ -32,7 +32,7 @@ double generated(const Scene& scene, const ClosedLoopEnd& end) {
 }
 
 template <class Check>
-void with_a_random_hand(test::Random& random, const Scene& scene, Check check) {
+void check_with_random_hand(test::Random& random, const Scene& scene, Check check) {
     const double scale = std::max(1.0, scene.model.slope_bounds().largest());
     const double log_scale = test::uniform(random, -3.0, 3.0);
     const double stiffness = scale * std::exp(log_scale);
@@ -63,12 +63,12 @@ void with_a_random_hand(test::Random& random, const Scene& scene, Check check) {
 }
 
 // spec section 7, "energy account": E_port(t) + S(0) - S_min + m v(0)^2 / 2 >= -rounding at every substep
-TEST(CertifiedScenes, NeverGiveMoreThanTheObjectHeld) {
+TEST(CertifiedScenes, NeverGiveMoreEnergyThanTheObjectStored) {
     test::Random random{20};
     std::map<std::string, int> tried;
     for (int k = 0; k < test::cases(1000); ++k) {
         const Scene scene = test::random_certified_scene(random, 1.0 + 1e-9);
-        with_a_random_hand(random, scene, [&](auto hand, const char* name) {
+        check_with_random_hand(random, scene, [&](auto hand, const char* name) {
             const ClosedLoopEnd end = test::run(scene, hand, ticks, substeps, to_the_end);
             EXPECT_LE(generated(scene, end), 1.0)
                 << "scene " << k << ", " << name << " hand; " << scene << "; least " << end.energy.least
@@ -86,7 +86,7 @@ TEST(CertifiedScenes, NeverGiveMoreThanTheObjectHeld) {
 }
 
 // "No growing oscillation follows for passive hands only": kinetic energy never exceeds the energy stored at the start.
-TEST(CertifiedScenes, DoNotSwingUpWithPassiveHands) {
+TEST(CertifiedScenes, DoNotOscillateWithPassiveHands) {
     test::Random random{21};
     for (int k = 0; k < test::cases(300); ++k) {
         const Scene scene = test::random_certified_scene(random, 1.0 + 1e-9);
@@ -141,7 +141,7 @@ double resting_energy(const VelocityNetwork& force, double x) {
 }
 
 // spec section 7, velocity models: b >= T M/2 + t_d L + B_v, f_c >= L_x Delta/2 + B_v Delta/T
-TEST(CertifiedScenes, KeepTheirEnergyWithForcesOfVelocity) {
+TEST(CertifiedScenes, NeverGiveEnergyWithForcesOfVelocity) {
     constexpr double quadrature = 1e-6;  // [J]; the objects hold tenths
     test::Random random{22};
     for (int k = 0; k < test::cases(200); ++k) {
@@ -153,7 +153,7 @@ TEST(CertifiedScenes, KeepTheirEnergyWithForcesOfVelocity) {
         device.delay_s = static_cast<double>(random() % 3) * device.period_s;
         device.encoder_step = random() % 2 == 0 ? 0.0 : std::exp(test::uniform(random, -11.0, -6.0));
         device.force_limit = 1e9;
-        const auto enough = test::just_enough(scene.model, scene.scheme, device, 1.0 + 1e-9);
+        const auto enough = test::device_at_its_bound(scene.model, scene.scheme, device, 1.0 + 1e-9);
         ASSERT_TRUE(enough.has_value());
         scene.device = *enough;
         scene.steepest = test::steepest_place(scene.model);
@@ -161,7 +161,7 @@ TEST(CertifiedScenes, KeepTheirEnergyWithForcesOfVelocity) {
         const EnergyRange range = energy_range(force, 1e9);
         scene.held = resting_energy(force, scene.start) - range.least + quadrature;
         scene.largest = std::max(std::abs(range.least), std::abs(range.largest));
-        with_a_random_hand(random, scene, [&](auto hand, const char* name) {
+        check_with_random_hand(random, scene, [&](auto hand, const char* name) {
             const ClosedLoopEnd end = test::run(scene, hand, ticks, substeps, to_the_end);
             EXPECT_LE(generated(scene, end), 1.0) << "scene " << k << ", " << name << " hand; " << scene
                                                   << "; generated " << -(end.energy.least + scene.held);

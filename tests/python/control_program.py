@@ -20,17 +20,22 @@ MODEL = ROOT / "tests" / "models" / "good" / "position.json"
 needs_program = pytest.mark.skipif(not PROGRAM.exists(), reason="needs palpate-control, run make control")
 
 # The test machine may be busy: only the test of the rate checks it.
-PATIENT = ["--lowest-rate-share", "0"]
+ANY_RATE = ["--lowest-rate-share", "0"]
 
 
-def control(*words: Any, timeout: float = 60.0, **others: Any) -> subprocess.CompletedProcess[str]:
+def control(*arguments: Any, timeout: float = 60.0, **options: Any) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [PROGRAM, *map(str, words)], capture_output=True, text=True, check=False, timeout=timeout, **others
+        [PROGRAM, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=timeout,
+        **options,
     )
 
 
-def started(*words: Any) -> subprocess.Popen[str]:
-    command = [str(PROGRAM), *map(str, words)]
+def start_control(*arguments: Any) -> subprocess.Popen[str]:
+    command = [str(PROGRAM), *map(str, arguments)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 SEED = 20261122
 
-WORSE = 1.2
+LARGEST_ERROR_RATIO = 1.2
 """Ratio of the true to the reported NRMSE above which a warning is required."""
 
 DATA = measured_data() or Path("without measured data")
@@ -212,27 +212,27 @@ def _repeats(random: Generator, rows: Rows, case: Case) -> list[Rows]:
 def _held(random: Generator, rows: Rows, case: Case) -> list[Rows]:
     times = int(random.integers(2, 16))
     rows_held = times * (np.arange(len(rows)) // times)
-    what = str(random.choice(["both", "force", "position"]))
-    case.strength.append(f"{what} held for {times} rows")
-    x = rows.x[rows_held] if what != "force" else rows.x
-    f = rows.f[rows_held] if what != "position" else rows.f
+    target = str(random.choice(["both", "force", "position"]))
+    case.strength.append(f"{target} held for {times} rows")
+    x = rows.x[rows_held] if target != "force" else rows.x
+    f = rows.f[rows_held] if target != "position" else rows.f
     return [replace(rows, x=x, f=f)]
 
 
 def _thinning(random: Generator, rows: Rows, case: Case) -> list[Rows]:
-    left = int(12 * (200 / 12) ** random.random())
-    case.strength.append(f"{left} of {len(rows)} rows left")
+    kept_rows = int(12 * (200 / 12) ** random.random())
+    case.strength.append(f"{kept_rows} of {len(rows)} rows left")
     if random.random() < 0.5:
-        return [rows.take(np.unique(np.linspace(0, len(rows) - 1, left).astype(int)))]
-    return [rows.take(np.sort(random.choice(len(rows), left, replace=False)))]
+        return [rows.take(np.unique(np.linspace(0, len(rows) - 1, kept_rows).astype(int)))]
+    return [rows.take(np.sort(random.choice(len(rows), kept_rows, replace=False)))]
 
 
 def _reversed(random: Generator, rows: Rows, case: Case) -> list[Rows]:
-    what = str(random.choice(["force", "position"] + ["direction"] * (rows.d is not None)))
-    case.strength.append(f"{what} reversed")
-    if what == "force":
+    target = str(random.choice(["force", "position"] + ["direction"] * (rows.d is not None)))
+    case.strength.append(f"{target} reversed")
+    if target == "force":
         return [replace(rows, f=-rows.f)]
-    if what == "position":
+    if target == "position":
         return [replace(rows, x=-rows.x)]
     assert rows.d is not None
     return [replace(rows, d=-rows.d)]
@@ -259,22 +259,22 @@ def _unit(random: Generator, rows: Rows, case: Case) -> list[Rows]:
 
 
 def _merged(random: Generator, rows: Rows, case: Case) -> list[Rows]:
-    how = str(random.choice(["stiffer", "offset", "shifted", "again"]))
+    kind = str(random.choice(["stiffer", "offset", "shifted", "again"]))
     part = random.uniform(0.3, 1.0)
     factor = float(10.0 ** (random.choice([-1.0, 1.0]) * random.uniform(0.15, 0.7)))
     second = (
         rows.take(np.arange(len(rows)) < part * len(rows))
-        if how != "again" and random.random() < 0.3
+        if kind != "again" and random.random() < 0.3
         else rows
     )
-    if how == "stiffer":
+    if kind == "stiffer":
         second = replace(second, f=factor * second.f)
         case.strength.append(f"another object appended, {factor:.3g} times as stiff, {len(second)} rows")
-    elif how == "offset":
+    elif kind == "offset":
         share = random.uniform(0.1, 1.0) * random.choice([-1, 1])
         second = replace(second, f=second.f + share * np.ptp(rows.f))
         case.strength.append(f"appended with a force offset of {share:.2f} ranges, {len(second)} rows")
-    elif how == "shifted":
+    elif kind == "shifted":
         share = random.uniform(0.05, 0.4) * random.choice([-1, 1])
         second = replace(second, x=second.x + share * np.ptp(rows.x))
         case.strength.append(f"appended with the position shifted by {share:.2f} travels, {len(second)} rows")
@@ -282,9 +282,9 @@ def _merged(random: Generator, rows: Rows, case: Case) -> list[Rows]:
         case.strength.append("appended to itself")
     t = None
     if rows.t is not None:
-        goes_on = random.random() < 0.8
-        after = rows.t[-1] + float(np.median(np.diff(rows.t))) if goes_on else 0.0
-        case.strength[-1] += "" if goes_on else ", time restarts"
+        time_continues = random.random() < 0.8
+        after = rows.t[-1] + float(np.median(np.diff(rows.t))) if time_continues else 0.0
+        case.strength[-1] += "" if time_continues else ", time restarts"
         t = np.r_[rows.t, _restarted(second, after).t]
     d = None if rows.d is None else np.r_[rows.d, second.d]
     return [replace(rows, x=np.r_[rows.x, second.x], f=np.r_[rows.f, second.f], t=t, d=d)]
@@ -307,16 +307,16 @@ def _gaps(random: Generator, rows: Rows, case: Case) -> list[Rows]:
 
 
 def _saturation(random: Generator, rows: Rows, case: Case) -> list[Rows]:
-    what = str(random.choice(["force", "force", "both", "position", "stuck"]))
+    target = str(random.choice(["force", "force", "both", "position", "stuck"]))
     share = random.uniform(0.6, 0.97)
     low, reach = rows.f.min(), np.ptp(rows.f)
-    if what == "force":
+    if target == "force":
         case.strength.append(f"force clipped at {share:.0%} of its range")
         return [replace(rows, f=np.minimum(rows.f, low + share * reach))]
-    if what == "both":
+    if target == "both":
         case.strength.append(f"force clipped at {1 - share:.0%} and {share:.0%} of its range")
         return [replace(rows, f=np.clip(rows.f, low + (1 - share) * reach, low + share * reach))]
-    if what == "position":
+    if target == "position":
         case.strength.append(f"position clipped at {share:.0%} of its travel")
         return [replace(rows, x=np.minimum(rows.x, rows.x.min() + share * np.ptp(rows.x)))]
     x = rows.x.copy()
@@ -347,7 +347,7 @@ CAUSES = {
     "wrong unit": r"unit|scale|factor|differ|spike|stretch",
     "merged files": r"merge|two objects|part|recordings|drift|apart|restart|repeat|time",
     "gaps": r"gap|without rows|no rows|interval|interpolat",
-    "saturation": r"satur|clip|range of the sensor|stuck|stands still|limit",
+    "saturation": r"satur|clip|range of the sensor|stuck|is constant|limit",
 }
 """Words of a sentence that names a plausible cause."""
 
@@ -389,9 +389,9 @@ class Outcome:
     seconds: float = 0.0
 
     @property
-    def honest(self) -> bool:
+    def correct_error(self) -> bool:
         """True if the reported error is not far below the true one."""
-        return bool(self.reported >= self.true / WORSE)
+        return bool(self.reported >= self.true / LARGEST_ERROR_RATIO)
 
     @property
     def warned(self) -> bool:
@@ -405,9 +405,9 @@ class Outcome:
         return any(re.search(CAUSES[kind], text, re.IGNORECASE) for kind in self.case.kinds)
 
     @property
-    def silent(self) -> bool:
+    def unreported(self) -> bool:
         """True for a wrong result without a warning that names a plausible cause."""
-        return bool(self.crashed) or not (self.honest or (self.warned and self.names_cause))
+        return bool(self.crashed) or not (self.correct_error or (self.warned and self.names_cause))
 
 
 def true_nrmse(model: palpate.Model, clean: Sequence[Rows]) -> float:
@@ -452,7 +452,7 @@ def outcome_of(case: Case) -> Outcome:
     return found
 
 
-def told(found: Outcome) -> str:
+def described(found: Outcome) -> str:
     """Returns one case in one line."""
     if found.refused:
         return f"{found.case}: refused: {found.refused}"
@@ -465,13 +465,13 @@ def told(found: Outcome) -> str:
 
 def table(outcomes: Sequence[Outcome]) -> str:
     """Returns counts by kind; a case of two kinds counts for its first."""
-    lines = [f"{'kind':16}{'cases':>7}{'honest':>8}{'warned':>8}{'cause named':>13}{'silent':>8}"]
+    lines = [f"{'kind':16}{'cases':>7}{'correct':>8}{'warned':>8}{'cause named':>13}{'unreported':>12}"]
     for kind in (*KINDS, "all"):
         group = [each for each in outcomes if kind in ("all", each.case.kinds[0])]
         warned = [each for each in group if each.warned]
         lines.append(
-            f"{kind:16}{len(group):7d}{sum(each.honest for each in group):8d}{len(warned):8d}"
-            f"{sum(each.names_cause for each in warned):13d}{sum(each.silent for each in group):8d}"
+            f"{kind:16}{len(group):7d}{sum(each.correct_error for each in group):8d}{len(warned):8d}"
+            f"{sum(each.names_cause for each in warned):13d}{sum(each.unreported for each in group):12d}"
         )
     return "\n".join(lines)
 
@@ -494,15 +494,18 @@ def main() -> None:
     if not options.no_clean:
         print("clean recordings:")
         for name in base_names():
-            print("   ", told(clean_outcome(name)), flush=True)
+            print("   ", described(clean_outcome(name)), flush=True)
     seeds = options.seeds or range(options.first, options.first + options.count)
     outcomes = []
     for seed in seeds:
         found = outcome_of(case_of(seed, options.kind))
         outcomes.append(found)
-        if options.each or found.silent or found.seconds > 20:
+        if options.each or found.unreported or found.seconds > 20:
             print(
-                "SILENT " if found.silent else "       ", told(found), f"({found.seconds:.1f} s)", flush=True
+                "UNREPORTED " if found.unreported else "           ",
+                described(found),
+                f"({found.seconds:.1f} s)",
+                flush=True,
             )
     print(table(outcomes))
     print(Counter(each.level or "refused" for each in outcomes))

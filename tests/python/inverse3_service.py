@@ -45,7 +45,9 @@ class Service:
 
     def answer(self, connection: ServerConnection) -> None:
         position, velocity = self.start, 0.0
-        connection.send(json.dumps({"session_id": 7, **self.told(position, velocity, {}, whole=True)}))
+        connection.send(
+            json.dumps({"session_id": 7, **self.state_message(position, velocity, {}, with_config=True)})
+        )
         try:
             for number, text in enumerate(connection):
                 message = json.loads(text)
@@ -67,41 +69,43 @@ class Service:
                 if self.garbage_after == number:
                     connection.send("{")
                     continue
-                gone = self.unplug_after is not None and number >= self.unplug_after
-                connection.send(json.dumps(self.told(position, velocity, force, gone=gone)))
+                unplugged = self.unplug_after is not None and number >= self.unplug_after
+                connection.send(
+                    json.dumps(self.state_message(position, velocity, force, unplugged=unplugged))
+                )
         except websockets.ConnectionClosed:
             pass
         finally:
             self.closed = True
 
-    def told(
+    def state_message(
         self,
         position: float,
         velocity: float,
         force: dict[str, float],
         *,
-        whole: bool = False,
-        gone: bool = False,
+        with_config: bool = False,
+        unplugged: bool = False,
     ) -> dict[str, Any]:
-        nothing = {"x": 0.0, "y": 0.0, "z": 0.0}
+        zero_force = {"x": 0.0, "y": 0.0, "z": 0.0}
         device: dict[str, Any] = {
             "device_id": "049D",
             "state": {
                 "cursor_position": {"x": 0.01, "y": -0.12, "z": position},
                 "cursor_velocity": {"x": 0.0, "y": 0.0, "z": velocity},
-                "current_cursor_force": {**nothing, **force},
+                "current_cursor_force": {**zero_force, **force},
                 "control_domain": "cartesian",
                 "control_mode": "force" if force else "idle",
             },
             "status": {"calibrated": self.calibrated},
         }
-        if whole:
+        if with_config:
             device["config"] = {
                 "type": "inverse3",
                 "device_info": {"major_version": 7, "minor_version": 4, "id": "049D"},
                 "filters": {"force_gate": {"gain": 0.3}, "damping": {"scalar": 0.5}},
             }
-        return {"inverse3": [] if gone else [device] * self.devices}
+        return {"inverse3": [] if unplugged else [device] * self.devices}
 
 
 @contextmanager

@@ -18,7 +18,7 @@ def rows(n: int = 12) -> list[str]:
     return [f"{0.5 * k},{10 * k},press" for k in range(n)]
 
 
-def timed(n: int = 12) -> list[str]:
+def timed_rows(n: int = 12) -> list[str]:
     return [f"{10 * k},{0.5 * k},{2 * k}" for k in range(n)]
 
 
@@ -41,9 +41,9 @@ def options_in(sentence: str, given: dict[str, object] | None = None) -> dict[st
     for option, value in zip(words[::2], words[1::2], strict=True):
         if option == "--units":
             column, _, symbol = value.rpartition("=")
-            known = options.get("units", {})
-            assert isinstance(known, dict)
-            options["units"] = {**known, column: symbol}
+            units = options.get("units", {})
+            assert isinstance(units, dict)
+            options["units"] = {**units, column: symbol}
         else:
             options[option.removeprefix("--")] = value
     return options

@@ -40,7 +40,7 @@ MODEL = identify(RECORDING)
 DEVICE = DeviceProfile()
 PLAN = plan(MODEL, DEVICE)
 
-WRONG: dict[str, Any] = {
+WRONG_VALUES: dict[str, Any] = {
     "none": None,
     "int": 3,
     "nan": float("nan"),
@@ -66,17 +66,17 @@ REFUSED_AS_TYPE = {"object", "function", "none", "dict"}
 """Wrong values for which scikit-learn requires a TypeError."""
 
 
-def rebuilt(**changes: Any) -> Model:
+def model_with(**changes: Any) -> Model:
     """Returns a manual copy of the model with some arguments changed."""
     names = ("kind", "inputs", "units", "alpha", "beta", "weight", "linear", "bias", "lower", "upper")
-    same = {name: getattr(MODEL, name) for name in (*names, "fit", "data")}
-    return Model(**{**same, **changes})
+    arguments = {name: getattr(MODEL, name) for name in (*names, "fit", "data")}
+    return Model(**{**arguments, **changes})
 
 
 Call = Callable[[Any], object]
 
 # Arguments for which some of the wrong values are right.
-TAKES: dict[str, tuple[Call, str, set[str]]] = {
+CALLS: dict[str, tuple[Call, str, set[str]]] = {
     # name: (call, argument that the message names, values that are right there)
     "identify": (identify, "recording|frame", set()),
     "identify in a list": (lambda v: identify([RECORDING, v]), "recording|frame", set()),
@@ -134,14 +134,14 @@ TAKES: dict[str, tuple[Call, str, set[str]]] = {
     "Finding level": (lambda v: Finding(v, "sentence"), "level", set()),
     "Finding sentence": (lambda v: Finding("usable", v), "sentence", {"str"}),
     "Verdict": (Verdict, "findings", set()),
-    "Model alpha": (lambda v: rebuilt(alpha=v), "alpha", {"empty_list", "empty_array"}),
-    "Model bias": (lambda v: rebuilt(bias=v), "bias", {"int"}),
-    "Model period": (lambda v: rebuilt(period=v), "period", {"none", "int"}),
-    "Model fit": (lambda v: rebuilt(fit=v), "fit", set()),
-    "Model data": (lambda v: rebuilt(data=v), "data", set()),
-    "Model units": (lambda v: rebuilt(units=v), "units|position", set()),
-    "Model kind": (lambda v: rebuilt(kind=v), "kind", set()),
-    "Model inputs": (lambda v: rebuilt(inputs=v), "inputs", set()),
+    "Model alpha": (lambda v: model_with(alpha=v), "alpha", {"empty_list", "empty_array"}),
+    "Model bias": (lambda v: model_with(bias=v), "bias", {"int"}),
+    "Model period": (lambda v: model_with(period=v), "period", {"none", "int"}),
+    "Model fit": (lambda v: model_with(fit=v), "fit", set()),
+    "Model data": (lambda v: model_with(data=v), "data", set()),
+    "Model units": (lambda v: model_with(units=v), "units|position", set()),
+    "Model kind": (lambda v: model_with(kind=v), "kind", set()),
+    "Model inputs": (lambda v: model_with(inputs=v), "inputs", set()),
     "Model": (lambda v: Model.from_dict(v), "", set()),
     "force position": (
         MODEL.force,
@@ -181,38 +181,38 @@ OPTIONS: dict[str, set[str]] = {
 OPTIONAL = ("search", "slope_bounds", "fixed_force", "coupling_stiffness", "period")
 
 
-@pytest.mark.parametrize("wrong", WRONG)
-@pytest.mark.parametrize("call", TAKES)
+@pytest.mark.parametrize("wrong_value", WRONG_VALUES)
+@pytest.mark.parametrize("call", CALLS)
 def test_a_wrong_type_is_an_input_error_that_names_the_argument(
-    call: str, wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    call: str, wrong_value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    function, names, right = TAKES[call]
-    if wrong in right:
+    function, names, accepted = CALLS[call]
+    if wrong_value in accepted:
         return
     with pytest.raises(InputError) as error:
-        function(WRONG[wrong])
-    told = str(error.value)
-    assert any(name in told for name in names.split("|")), told
-    assert "\n" not in told
-    assert len(told) < 500
+        function(WRONG_VALUES[wrong_value])
+    message = str(error.value)
+    assert any(name in message for name in names.split("|")), message
+    assert "\n" not in message
+    assert len(message) < 500
 
 
-@pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.parametrize("wrong_value", WRONG_VALUES)
 @pytest.mark.parametrize("field", OPTIONS)
-def test_an_option_of_a_wrong_type_is_refused_by_its_name(field: str, wrong: str) -> None:
-    right = OPTIONS[field] | ({"none", "int"} if field in OPTIONAL[3:] else set())
-    right |= {"none"} if field in OPTIONAL else set()
-    if wrong in right:
+def test_an_option_of_a_wrong_type_is_refused_by_its_name(field: str, wrong_value: str) -> None:
+    accepted = OPTIONS[field] | ({"none", "int"} if field in OPTIONAL[3:] else set())
+    accepted |= {"none"} if field in OPTIONAL else set()
+    if wrong_value in accepted:
         return
     with pytest.raises(InputError, match=field):
-        IdentifyOptions(**{field: WRONG[wrong]})
+        IdentifyOptions(**{field: WRONG_VALUES[wrong_value]})
 
 
 def test_every_public_callable_is_in_the_table() -> None:
     """Verification and InputError are results, which users do not construct."""
-    elsewhere = {"Verification", "InputError", "Recording", "IdentifyOptions", "SearchOptions"}
-    called = {name.split()[0].split(".")[0] for name in TAKES}
+    tested_in_other_files = {"Verification", "InputError", "Recording", "IdentifyOptions", "SearchOptions"}
+    tested = {name.split()[0].split(".")[0] for name in CALLS}
     public = {name for name in palpate.__all__ if callable(getattr(palpate, name))}
-    missing = public - called - elsewhere
-    assert missing == {"WaveletNetworkRegressor"}, "it stands in the table as regressor"
+    missing = public - tested - tested_in_other_files
+    assert missing == {"WaveletNetworkRegressor"}, "its entries are named regressor"

@@ -16,10 +16,10 @@ HEADERS = ROOT / "cpp" / "include" / "palpate"
 COMMON = {"errors", "arguments", "verdict", "_typing", "_core"}
 
 # A module may import the modules before it.
-ROOMS = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
+MODULE_ORDER = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
 
 # These modules may import any module except cli; only cli imports them.
-LEAVES = {"plotting", "baselines"}
+SIDE_MODULES = {"plotting", "baselines"}
 
 # Folder of the headers -> the folders that it may include, besides itself, status.hpp and fields.
 INCLUDES = {
@@ -48,7 +48,7 @@ INCLUDES = {
 }
 
 # Headers that need a library besides the standard one. Only these include each other; palpate.hpp does not.
-LEAF_HEADERS = {
+OPTIONAL_HEADERS = {
     "device/detail/usb_connection.hpp",
     "device/detail/usb_text.hpp",
     "device/detail/usb_transfers.hpp",
@@ -82,45 +82,45 @@ NOT_IN_REAL_TIME = {
     "future",
     "regex",
 }
-MAY_TALK = {"io", "realtime"}
+MAY_USE_FILES = {"io", "realtime"}
 
 
-def room_of(path: Path) -> str:
+def module_of(path: Path) -> str:
     """Returns the module of a path: `recording` for recording/rows.py, `errors` for errors.py."""
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
-def imported_rooms(path: Path) -> set[str]:
+def imported_modules(path: Path) -> set[str]:
     """Returns the modules of the package that a file imports, imports within functions included.
 
     The package itself, which exports names of all modules, is ".".
     """
-    place = ("palpate", *path.relative_to(PACKAGE).parts[:-1])
+    package_parts = ("palpate", *path.relative_to(PACKAGE).parts[:-1])
     found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         targets: list[tuple[str, ...]] = []
         if isinstance(node, ast.Import):
             targets = [tuple(alias.name.split(".")) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            base = place[: len(place) - node.level + 1] if node.level else ()
-            module = (*base, *(node.module.split(".") if node.module else ()))
-            targets = [(*module, alias.name) for alias in node.names]
+            parent = package_parts[: len(package_parts) - node.level + 1] if node.level else ()
+            parts = (*parent, *(node.module.split(".") if node.module else ()))
+            targets = [(*parts, alias.name) for alias in node.names]
         for target in targets:
             if target[0] == "palpate":
-                known = len(target) > 1 and target[1] in {*COMMON, *ROOMS, *LEAVES}
-                found.add(target[1] if known else ".")
+                is_module = len(target) > 1 and target[1] in {*COMMON, *MODULE_ORDER, *SIDE_MODULES}
+                found.add(target[1] if is_module else ".")
     return found
 
 
-def may_import(room: str) -> set[str]:
-    if room in ("__init__", "__main__"):
-        return {*COMMON, *ROOMS} if room == "__main__" else {*COMMON, *ROOMS} - {"cli"}
-    if room in LEAVES:
-        return {*COMMON, room, *ROOMS} - {"cli"}
-    if room == "cli":
-        return {*COMMON, *ROOMS, *LEAVES, "."}
-    if room in ROOMS:
-        return {*COMMON, *ROOMS[: ROOMS.index(room) + 1]}
+def may_import(module: str) -> set[str]:
+    if module in ("__init__", "__main__"):
+        return {*COMMON, *MODULE_ORDER} if module == "__main__" else {*COMMON, *MODULE_ORDER} - {"cli"}
+    if module in SIDE_MODULES:
+        return {*COMMON, module, *MODULE_ORDER} - {"cli"}
+    if module == "cli":
+        return {*COMMON, *MODULE_ORDER, *SIDE_MODULES, "."}
+    if module in MODULE_ORDER:
+        return {*COMMON, *MODULE_ORDER[: MODULE_ORDER.index(module) + 1]}
     return COMMON
 
 
@@ -129,61 +129,67 @@ HEADER_FILES = sorted(HEADERS.rglob("*.hpp"))
 
 
 @pytest.mark.parametrize("path", PYTHON_FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_python_imports_point_one_way(path: Path) -> None:
-    room = room_of(path)
-    wrong = imported_rooms(path) - may_import(room)
-    assert not wrong, f"{path.relative_to(ROOT)} imports {sorted(wrong)}"
+def test_python_modules_import_only_modules_before_them(path: Path) -> None:
+    module = module_of(path)
+    forbidden = imported_modules(path) - may_import(module)
+    assert not forbidden, f"{path.relative_to(ROOT)} imports {sorted(forbidden)}"
 
 
-def test_every_python_room_is_drawn() -> None:
+def test_every_python_folder_has_a_dependency_rule() -> None:
     folders = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()}
-    assert folders <= {*ROOMS, *LEAVES}
+    assert folders <= {*MODULE_ORDER, *SIDE_MODULES}
 
 
-def included(path: Path) -> list[str]:
+def includes_of(path: Path) -> list[str]:
     return re.findall(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', path.read_text(encoding="utf-8"), re.MULTILINE)
 
 
 @pytest.mark.parametrize("path", HEADER_FILES, ids=lambda path: str(path.relative_to(HEADERS)))
-def test_headers_include_only_what_stands_below_them(path: Path) -> None:
+def test_headers_include_only_the_folders_allowed_for_them(path: Path) -> None:
     name = path.relative_to(HEADERS)
-    here = name.parts[0].removesuffix(".hpp")
+    folder = name.parts[0].removesuffix(".hpp")
     if len(name.parts) == 1:
         assert name.name in {"palpate.hpp", "status.hpp"}
-    ours = [include.removeprefix("palpate/") for include in included(path) if include.startswith("palpate/")]
-    if name.as_posix() not in LEAF_HEADERS:
-        assert not LEAF_HEADERS & set(ours), "a header that needs a third-party library is included by nobody"
-    if here in ("palpate", "status"):
+    own_includes = [
+        include.removeprefix("palpate/") for include in includes_of(path) if include.startswith("palpate/")
+    ]
+    if name.as_posix() not in OPTIONAL_HEADERS:
+        assert not OPTIONAL_HEADERS & set(own_includes), f"{name} includes an optional header"
+    if folder in ("palpate", "status"):
         return
-    rooms = {include.split("/")[0].removesuffix(".hpp") for include in ours}
-    assert here in INCLUDES, f"{here} is not drawn"
-    assert rooms <= {here, "status", "fields", *INCLUDES[here]}, f"{name} includes {sorted(rooms)}"
+    folders = {include.split("/")[0].removesuffix(".hpp") for include in own_includes}
+    assert folder in INCLUDES, f"{folder} has no dependency rule: add it to INCLUDES"
+    assert folders <= {folder, "status", "fields", *INCLUDES[folder]}, f"{name} includes {sorted(folders)}"
 
 
 @pytest.mark.parametrize("path", HEADER_FILES, ids=lambda path: str(path.relative_to(HEADERS)))
-def test_headers_need_the_standard_library_only_and_cannot_talk(path: Path) -> None:
+def test_headers_include_only_the_standard_library_and_no_output_header(path: Path) -> None:
     name = path.relative_to(HEADERS)
-    others = {include for include in included(path) if not include.startswith("palpate/")}
-    if str(name) not in LEAF_HEADERS:
+    foreign_includes = {include for include in includes_of(path) if not include.startswith("palpate/")}
+    if str(name) not in OPTIONAL_HEADERS:
         system = SYSTEM_HEADERS.get(name.parts[0], set())
-        foreign = {include for include in others if "/" in include or include.endswith((".h", ".hpp"))}
-        foreign -= system
-        assert not foreign, f"{name} includes {sorted(foreign)}"
-    if name.parts[0] not in MAY_TALK:
-        assert not others & NOT_IN_REAL_TIME
+        third_party = {
+            include for include in foreign_includes if "/" in include or include.endswith((".h", ".hpp"))
+        }
+        third_party -= system
+        assert not third_party, f"{name} includes {sorted(third_party)}"
+    if name.parts[0] not in MAY_USE_FILES:
+        assert not foreign_includes & NOT_IN_REAL_TIME
 
 
-def test_the_umbrella_header_holds_every_header_but_the_leaves() -> None:
-    held = set(included(HEADERS / "palpate.hpp"))
+def test_palpate_hpp_includes_every_header_except_the_optional_ones() -> None:
+    included_directly = set(includes_of(HEADERS / "palpate.hpp"))
     headers = {f"palpate/{path.relative_to(HEADERS).as_posix()}" for path in HEADER_FILES}
-    leaves = {f"palpate/{leaf}" for leaf in LEAF_HEADERS}
-    reached = set(held)
+    optional_headers = {f"palpate/{optional}" for optional in OPTIONAL_HEADERS}
+    reached = set(included_directly)
     while (
-        more := {i for h in reached for i in included(HEADERS.parent / h) if i.startswith("palpate/")}
+        new_headers := {
+            i for h in reached for i in includes_of(HEADERS.parent / h) if i.startswith("palpate/")
+        }
         - reached
     ):
-        reached |= more
-    assert headers - leaves - {"palpate/palpate.hpp"} == reached
+        reached |= new_headers
+    assert headers - optional_headers - {"palpate/palpate.hpp"} == reached
 
 
 def test_a_cpp_test_is_named_after_a_header_of_its_folder() -> None:
@@ -197,13 +203,13 @@ def test_a_cpp_test_is_named_after_a_header_of_its_folder() -> None:
 
 def test_bindings_include_pybind11_and_our_headers_only() -> None:
     for path in sorted((ROOT / "cpp" / "bindings").glob("*.?pp")):
-        foreign = {
+        third_party = {
             include
-            for include in included(path)
+            for include in includes_of(path)
             if ("/" in include or include.endswith(".h"))
             and not include.startswith(("palpate/", "pybind11/"))
         }
-        assert not foreign, f"{path.name} includes {sorted(foreign)}"
+        assert not third_party, f"{path.name} includes {sorted(third_party)}"
 
 
 def sources() -> list[Path]:
@@ -221,10 +227,10 @@ def sources() -> list[Path]:
 
 
 def test_every_source_file_begins_with_its_licence() -> None:
-    bare = []
+    without_licence = []
     for path in sources():
         lines = path.read_text(encoding="utf-8").splitlines()
         first = next((line for line in lines if not line.startswith("#!")), "")
         if not re.fullmatch(r"(#|//) SPDX-License-Identifier: Apache-2\.0", first):
-            bare.append(str(path.relative_to(ROOT)))
-    assert not bare
+            without_licence.append(str(path.relative_to(ROOT)))
+    assert not without_licence

@@ -17,17 +17,19 @@ import palpate
 from palpate import IdentifyOptions, InputError, Model, Recording, identify, load_model, verify
 
 X = np.concatenate([np.linspace(0.0, 4.0, 300), np.linspace(4.0, 0.0, 300)])
-SIDE = np.repeat([1.0, -1.0], 300)
+DIRECTION = np.repeat([1.0, -1.0], 300)
 
 
 def force(seed: int = 0) -> np.ndarray:
     noise = np.random.default_rng(seed).normal(0.0, 0.01, len(X))
-    return np.asarray(X + np.sin(2.0 * X) + 0.2 * SIDE + noise)
+    return np.asarray(X + np.sin(2.0 * X) + 0.2 * DIRECTION + noise)
 
 
 def frame(seed: int = 0) -> pd.DataFrame:
-    words = np.where(SIDE > 0, "press", "release")
-    return pd.DataFrame({"depth_mm": X, "force_mN": 1e3 * force(seed), "direction": words, "operator": "A"})
+    direction_words = np.where(DIRECTION > 0, "press", "release")
+    return pd.DataFrame(
+        {"depth_mm": X, "force_mN": 1e3 * force(seed), "direction": direction_words, "operator": "A"}
+    )
 
 
 @pytest.fixture
@@ -39,17 +41,17 @@ def press(tmp_path: Path) -> Path:
 def test_a_frame_a_file_and_arrays_give_the_same_model(press: Path) -> None:
     model = identify(palpate.read_recording(press))
     assert model.kind == "hysteresis"
-    for found in (
+    for result in (
         identify(press),
         identify(str(press)),
         identify([press]),
         identify(frame()),
-        identify(1e-3 * X, 1e-3 * (1e3 * force()), direction=SIDE),
-        identify(list(1e-3 * X), pd.Series(1e-3 * (1e3 * force())), direction=list(SIDE)),
+        identify(1e-3 * X, 1e-3 * (1e3 * force()), direction=DIRECTION),
+        identify(list(1e-3 * X), pd.Series(1e-3 * (1e3 * force())), direction=list(DIRECTION)),
     ):
-        assert np.array_equal(found.alpha, model.alpha)
-        assert np.array_equal(found.weight, model.weight)
-        assert found.fit.nrmse == model.fit.nrmse
+        assert np.array_equal(result.alpha, model.alpha)
+        assert np.array_equal(result.weight, model.weight)
+        assert result.fit.nrmse == model.fit.nrmse
     assert identify(frame()).units == model.units == {"position": "m", "force": "N"}
 
 
@@ -64,36 +66,40 @@ def test_verify_takes_files_frames_and_arrays(press: Path) -> None:
     fresh = verify(model, frame(1))
     assert fresh.fresh
     assert fresh.nrmse == pytest.approx(model.fit.nrmse, rel=0.3)
-    arrays = verify(model, 1e-3 * X, 1e-3 * (1e3 * force(1)), direction=SIDE)
+    arrays = verify(model, 1e-3 * X, 1e-3 * (1e3 * force(1)), direction=DIRECTION)
     assert arrays.nrmse == fresh.nrmse
-    same = verify(model, press)
-    assert not same.fresh
-    assert same.nrmse == verify(model, str(press)).nrmse
+    on_training_file = verify(model, press)
+    assert not on_training_file.fresh
+    assert on_training_file.nrmse == verify(model, str(press)).nrmse
     assert not verify(identify(frame()), frame()).fresh
 
 
 def test_inputs_named_as_columns_are_read_from_files_and_frames(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
-    depth, place = random.uniform(0, 3, 300), random.uniform(0, 40, 300)
+    depth, lateral = random.uniform(0, 3, 300), random.uniform(0, 40, 300)
     table = pd.DataFrame(
-        {"depth_mm": depth, "place_mm": place, "force_N": depth * (1 + np.exp(-((place - 20) ** 2) / 40))}
+        {
+            "depth_mm": depth,
+            "lateral_mm": lateral,
+            "force_N": depth * (1 + np.exp(-((lateral - 20) ** 2) / 40)),
+        }
     )
-    table.columns = pd.Index(["depth_mm", "place_mm", "force_N"])
+    table.columns = pd.Index(["depth_mm", "lateral_mm", "force_N"])
     table.to_csv(tmp_path / "probe.csv", index=False)
-    read = palpate.read_recording(tmp_path / "probe.csv", position="depth_mm", inputs=["place_mm"])
-    assert read.input_names == ("place_m",)
-    framed = Recording.from_frame(table, position="depth_mm", inputs=["place_mm"])
-    assert np.array_equal(framed.inputs, read.inputs)
-    assert identify(framed).inputs == ("position", "place_m")
+    expected = palpate.read_recording(tmp_path / "probe.csv", position="depth_mm", inputs=["lateral_mm"])
+    assert expected.input_names == ("lateral_m",)
+    recording = Recording.from_frame(table, position="depth_mm", inputs=["lateral_mm"])
+    assert np.array_equal(recording.inputs, expected.inputs)
+    assert identify(recording).inputs == ("position", "lateral_m")
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         (lambda t: t.assign(force_mN=[np.nan, *t.force_mN[1:]]), r"row 0 \(index 0\).*force_mN holds 'nan'"),
         (lambda t: t.assign(force_mN=["x", *t.force_mN[1:]]), r'holds \'x\'.*invalid="drop"'),
         (lambda t: t.assign(force_mN=t.force_mN * 1j), "force_mN holds complex numbers"),
-        (lambda t: t.assign(direction="sideways"), "'sideways', which is no direction"),
+        (lambda t: t.assign(direction="sideways"), "'sideways', which is not a direction"),
         (lambda t: t.drop(columns="depth_mm"), r'no column name has a unit of position.*position="operator"'),
         (lambda t: t.rename(columns={"operator": "force_mN"}), "several columns called force_mN"),
         (lambda t: t.rename(columns={"operator": 7}), "a column called 7"),
@@ -101,24 +107,24 @@ def test_inputs_named_as_columns_are_read_from_files_and_frames(tmp_path: Path) 
     ],
     ids=["nan", "text", "complex", "direction", "no_position", "twice", "number", "no_rows"],
 )
-def test_a_frame_that_cannot_be_used_is_refused_by_column_and_row(
-    change: Callable[[pd.DataFrame], pd.DataFrame], told: str
+def test_an_unusable_frame_is_refused_with_its_column_and_row(
+    change: Callable[[pd.DataFrame], pd.DataFrame], message: str
 ) -> None:
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=message):
         identify(change(frame()))
 
 
-def test_the_cure_of_a_frame_works_literally() -> None:
+def test_the_cures_in_the_messages_about_frames_work() -> None:
     table = frame().assign(force_mN=[np.nan, *frame().force_mN[1:]])
-    found = Recording.from_frame(table, invalid="drop")
-    assert len(found) == len(table) - 1
-    assert any("dropped 1 row" in note for note in found.notes)
-    bare = frame().rename(columns={"depth_mm": "depth"})
-    read = Recording.from_frame(bare, position="depth", units={"depth": "mm"})
-    assert read.position.max() == pytest.approx(0.004)
+    result = Recording.from_frame(table, invalid="drop")
+    assert len(result) == len(table) - 1
+    assert any("dropped 1 row" in note for note in result.notes)
+    without_unit = frame().rename(columns={"depth_mm": "depth"})
+    expected = Recording.from_frame(without_unit, position="depth", units={"depth": "mm"})
+    assert expected.position.max() == pytest.approx(0.004)
 
 
-def test_frames_of_every_kind_of_column_are_read_alike() -> None:
+def test_frames_of_every_column_type_give_the_same_recording() -> None:
     reference = Recording.from_frame(frame())
     assert reference.columns["operator"][0] == "A"
     assert reference.source.columns["direction"] == "direction"
@@ -127,27 +133,27 @@ def test_frames_of_every_kind_of_column_are_read_alike() -> None:
         frame().convert_dtypes(),
         frame().astype({"direction": "category"}),
         frame().astype({"force_mN": object}),
-        frame().assign(direction=SIDE),
-        frame().assign(direction=SIDE.astype(int)),
+        frame().assign(direction=DIRECTION),
+        frame().assign(direction=DIRECTION.astype(int)),
         frame().iloc[::-1].iloc[::-1],
     ):
-        found = Recording.from_frame(table)
-        assert np.array_equal(found.position, reference.position)
-        assert np.array_equal(found.force, reference.force)
-        assert found.direction is not None
+        result = Recording.from_frame(table)
+        assert np.array_equal(result.position, reference.position)
+        assert np.array_equal(result.force, reference.force)
+        assert result.direction is not None
         assert reference.direction is not None
-        assert np.array_equal(found.direction, reference.direction)
+        assert np.array_equal(result.direction, reference.direction)
     assert Recording.from_frame(frame().assign(segment=1).drop(columns="direction")).direction is None
 
 
-def test_options_of_identify_stand_in_signature_and_help() -> None:
-    shown = inspect.signature(identify).parameters
+def test_options_of_identify_are_in_its_signature_and_help() -> None:
+    parameters = inspect.signature(identify).parameters
     for each in fields(IdentifyOptions):
-        assert shown[each.name].default == getattr(IdentifyOptions(), each.name)
+        assert parameters[each.name].default == getattr(IdentifyOptions(), each.name)
         assert f"\n{each.name} : " in (identify.__doc__ or "")
         assert f"\n{each.name} : " in (IdentifyOptions.__doc__ or "")
     assert "Largest network that is tried" in (identify.__doc__ or "")
-    assert list(shown)[:4] == ["recording", "force", "time", "direction"]
+    assert list(parameters)[:4] == ["recording", "force", "time", "direction"]
     with pytest.raises(InputError, match="identify has no option 'wavelets'"):
         identify(X, force(), wavelets=3)
 
@@ -178,31 +184,31 @@ import palpate
 
 
 def run_without_scikit_learn(code: str) -> str:
-    answer = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", WITHOUT_SCIKIT_LEARN + code], capture_output=True, text=True, check=False
     )
-    assert answer.returncode == 0, answer.stderr
-    return answer.stdout
+    assert completed.returncode == 0, completed.stderr
+    return completed.stdout
 
 
 def test_help_and_members_work_without_scikit_learn() -> None:
-    told = run_without_scikit_learn(
+    output = run_without_scikit_learn(
         "import inspect, pydoc\n"
         "print(len(inspect.getmembers(palpate)), pydoc.render_doc(palpate, renderer=pydoc.plaintext))\n"
         "from palpate import *\n"
         "try: palpate.WaveletNetworkRegressor\n"
         "except ImportError as error: print(error)\n"
     )
-    assert "identify(recording" in told
-    assert "WaveletNetworkRegressor needs scikit-learn" in told
+    assert "identify(recording" in output
+    assert "WaveletNetworkRegressor needs scikit-learn" in output
 
 
 def test_pydoc_shows_the_public_names() -> None:
-    answer = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-m", "pydoc", "palpate"], capture_output=True, text=True, check=True
     )
-    assert "class WaveletNetworkRegressor" in answer.stdout
-    assert "max_wavelets" in answer.stdout
+    assert "class WaveletNetworkRegressor" in completed.stdout
+    assert "max_wavelets" in completed.stdout
 
 
 def test_dir_lists_public_names_only() -> None:
@@ -216,32 +222,32 @@ def models() -> dict[str, Model]:
     x = 0.5 - 0.5 * np.cos(2.0 * np.pi * (0.5 * t + 0.1 * t**2))
     noise = np.random.default_rng(1).normal(0.0, 0.01, len(t))
     random = np.random.default_rng(0)
-    depth, place = random.uniform(0, 1, 200), random.uniform(0, 1, 200)
+    depth, lateral = random.uniform(0, 1, 200), random.uniform(0, 1, 200)
     return {
         "line": identify(X, 2.0 * X),
         "hysteresis": identify(frame()),
         "damping": identify(x, 2.0 * x + 0.3 * np.gradient(x, t) + noise, time=t),
-        "two_inputs": identify(Recording.from_arrays(depth, depth * place, inputs={"place": place})),
+        "two_inputs": identify(Recording.from_arrays(depth, depth * lateral, inputs={"lateral": lateral})),
     }
 
 
 def test_a_saved_and_reloaded_model_equals_the_original(tmp_path: Path) -> None:
-    found = models()
-    for name, model in found.items():
-        again = load_model(model.save(tmp_path / "model.json"))
-        assert again == model, name
-        assert hash(again) == hash(model)
+    models_by_name = models()
+    for name, model in models_by_name.items():
+        loaded = load_model(model.save(tmp_path / "model.json"))
+        assert loaded == model, name
+        assert hash(loaded) == hash(model)
         assert pickle.loads(pickle.dumps(model)) == model
         assert model != name
-        assert [other for other in found.values() if other == model] == [model]
+        assert [other for other in models_by_name.values() if other == model] == [model]
 
 
 def test_a_printed_model_states_its_verdict_first() -> None:
-    good = identify(X, 2.0 * X)
-    assert str(good).splitlines()[0] == "verdict: good"
-    order = np.argsort(X, kind="stable")
-    unsure = identify(X[order], force()[order])
-    lines = str(unsure).splitlines()
+    line_model = identify(X, 2.0 * X)
+    assert str(line_model).splitlines()[0] == "verdict: good"
+    ascending = np.argsort(X, kind="stable")
+    unsorted_model = identify(X[ascending], force()[ascending])
+    lines = str(unsorted_model).splitlines()
     assert lines[0] == "verdict: usable"
     assert lines[1].startswith("  hysteresis was not tested")
-    assert unsure.verdict.level == "usable"
+    assert unsorted_model.verdict.level == "usable"

@@ -29,7 +29,7 @@ def options_of(verb: str) -> dict[str, click.Parameter]:
 
 
 @pytest.mark.parametrize("verb", ["simulate", "render"])
-def test_a_verb_takes_the_structures_of_the_core(verb: str) -> None:
+def test_a_verb_accepts_the_structures_of_the_core(verb: str) -> None:
     kind = options_of(verb)["structure"].type
     assert isinstance(kind, click.Choice)
     assert tuple(kind.choices) == structure_names
@@ -53,26 +53,26 @@ def test_an_unknown_structure_is_refused_with_all_names() -> None:
     assert all(name in str(refused.value) for name in structure_names)
 
 
-def words_in(node: ast.AST) -> set[str]:
+def strings_in(node: ast.AST) -> set[str]:
     """Returns the words of a literal collection."""
     parts = node.keys if isinstance(node, ast.Dict) else getattr(node, "elts", [])
-    return {part.value for part in parts if isinstance(part, ast.Constant) and isinstance(part.value, str)}
+    return {item.value for item in parts if isinstance(item, ast.Constant) and isinstance(item.value, str)}
 
 
 @pytest.mark.parametrize(
-    ("names", "most"),
+    ("names", "largest_overlap"),
     [(structure_names, 3), (FIELDS, len(FIELDS) - 1)],
     ids=["structures", "fields of a profile"],
 )
-def test_no_other_file_lists_them(names: list[str], most: int) -> None:
-    listed = {
+def test_no_other_file_lists_structures_or_profile_fields(names: list[str], largest_overlap: int) -> None:
+    files_with_list = {
         path.relative_to(PACKAGE).as_posix()
         for path in PACKAGE.rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, (ast.Dict, ast.List, ast.Set, ast.Tuple))
-        and len(set(names) & words_in(node)) > most
+        and len(set(names) & strings_in(node)) > largest_overlap
     }
-    assert listed <= {"planning/candidates.py"}
+    assert files_with_list <= {"planning/candidates.py"}
 
 
 def test_no_line_of_the_pages_lists_all_structures() -> None:
@@ -93,14 +93,14 @@ def test_every_field_of_a_profile_is_in_schema_and_stub_with_its_unit() -> None:
 
 def test_a_profile_file_must_have_the_fields_that_the_schema_requires(tmp_path: Path) -> None:
     assert set(SCHEMA["Device"]["required"]) == set(DeviceProfile().to_dict())
-    given = {name: part["type"] for name, part in SCHEMA["Device"]["properties"].items()}
-    one = {name: 1e-3 for name, kind in given.items() if kind == "number"}
-    profile = DeviceProfile(**one)
+    types = {name: specification["type"] for name, specification in SCHEMA["Device"]["properties"].items()}
+    values = {name: 1e-3 for name, kind in types.items() if kind == "number"}
+    profile = DeviceProfile(**values)
     assert list(profile.to_dict()) == FIELDS
-    again = DeviceProfile.load(profile.save(tmp_path / "device.toml"))
-    assert again == profile
-    for name, value in one.items():
-        assert getattr(again, name) == value
+    loaded = DeviceProfile.load(profile.save(tmp_path / "device.toml"))
+    assert loaded == profile
+    for name, value in values.items():
+        assert getattr(loaded, name) == value
 
 
 def test_every_verb_is_one_file() -> None:

@@ -22,13 +22,13 @@ ROWS = [
 ]
 NAMES = [name for row in ROWS for name in re.findall(r"`([^`]+)`", row[-1])]
 HEADERS = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "cpp/include").rglob("*.hpp"))
-HOLDERS = {"Fit": Fit, "IdentifyOptions": IdentifyOptions, "Scheme": rendering.Scheme}
+OWNERS = {"Fit": Fit, "IdentifyOptions": IdentifyOptions, "Scheme": rendering.Scheme}
 """Classes that `palpate` does not export"""
 
 
-def has_member(holder: type, member: str) -> bool:
-    fields = {name for base in holder.__mro__ for name in getattr(base, "__annotations__", {})}
-    return member in fields or hasattr(holder, member)
+def has_member(owner: type, member: str) -> bool:
+    fields = {name for base in owner.__mro__ for name in getattr(base, "__annotations__", {})}
+    return member in fields or hasattr(owner, member)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -40,9 +40,9 @@ def test_a_name_of_the_glossary_exists(name: str) -> None:
         sources = [*Path(inspect.getfile(main)).parent.glob("*.py"), *(ROOT / "cpp/control").glob("*.cpp")]
         assert any(option in source.read_text(encoding="utf-8") for source in sources)
     else:
-        holder, _, member = name.partition(".")
-        found = HOLDERS.get(holder) or getattr(palpate, holder)
-        assert not member or has_member(found, member)
+        owner, _, member = name.partition(".")
+        owner_class = OWNERS.get(owner) or getattr(palpate, owner)
+        assert not member or has_member(owner_class, member)
 
 
 def test_a_term_has_one_entry_of_one_sentence() -> None:

@@ -10,8 +10,17 @@ PACKAGE = Path(__file__).parents[2] / "python" / "palpate"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Packages that are optional, or whose import takes longer than most verbs; plotting imports matplotlib.
-LATE = {"matplotlib", "palpate.plotting", "sklearn", "joblib", "distributed", "pyarrow", "openpyxl", "mcap"}
-LATE |= {"scipy.io", "usb"}
+IMPORTED_LATE = {
+    "matplotlib",
+    "palpate.plotting",
+    "sklearn",
+    "joblib",
+    "distributed",
+    "pyarrow",
+    "openpyxl",
+    "mcap",
+}
+IMPORTED_LATE |= {"scipy.io", "usb"}
 
 
 def module_of(path: Path) -> str:
@@ -30,13 +39,13 @@ def targets_of(path: Path, node: ast.Import | ast.ImportFrom) -> list[str]:
 
 
 def is_late(target: str) -> bool:
-    return any(f"{target}.".startswith(f"{each}.") for each in LATE)
+    return any(f"{target}.".startswith(f"{each}.") for each in IMPORTED_LATE)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_functions_import_only_optional_or_slow_packages(path: Path) -> None:
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    wrong = {
+    forbidden = {
         target
         for function in ast.walk(tree)
         if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
@@ -45,32 +54,32 @@ def test_functions_import_only_optional_or_slow_packages(path: Path) -> None:
         for target in targets_of(path, node)
         if not is_late(target)
     }
-    assert not wrong, f"{path.name} imports {sorted(wrong)} inside a function"
+    assert not forbidden, f"{path.name} imports {sorted(forbidden)} inside a function"
 
 
-def imported_modules(path: Path, known: set[str]) -> set[str]:
+def imported_modules(path: Path, all_modules: set[str]) -> set[str]:
     """Returns the modules of the package that a file imports when it is loaded, except for type checking."""
-    waiting: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
-    found = set()
-    while waiting:
-        node = waiting.pop()
+    pending: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    modules = set()
+    while pending:
+        node = pending.pop()
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
             continue
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             continue
         if isinstance(node, (ast.Import, ast.ImportFrom)):
             for target in targets_of(path, node):
-                names = {target, target.rpartition(".")[0]} & known
-                found |= {max(names, key=len)} if names else set()
-        waiting += ast.iter_child_nodes(node)
-    return found
+                names = {target, target.rpartition(".")[0]} & all_modules
+                modules |= {max(names, key=len)} if names else set()
+        pending += ast.iter_child_nodes(node)
+    return modules
 
 
-def test_no_module_imports_itself_through_others() -> None:
-    known = {module_of(path) for path in FILES}
-    imports = {module_of(path): imported_modules(path, known) for path in FILES}
-    while leaves := [name for name, others in imports.items() if not others & set(imports)]:
-        for name in leaves:
+def test_imports_have_no_cycle() -> None:
+    all_modules = {module_of(path) for path in FILES}
+    imports = {module_of(path): imported_modules(path, all_modules) for path in FILES}
+    while without_imports := [name for name, imported in imports.items() if not imported & set(imports)]:
+        for name in without_imports:
             del imports[name]
-    left = {name: sorted(others & set(imports)) for name, others in imports.items()}
-    assert not left, f"in or behind a cycle: {left}"
+    in_cycle = {name: sorted(imported & set(imports)) for name, imported in imports.items()}
+    assert not in_cycle, f"in or behind a cycle: {in_cycle}"

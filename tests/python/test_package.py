@@ -25,7 +25,7 @@ def version_of_the_build() -> str:
     return match[1]
 
 
-def test_one_version_is_told_everywhere() -> None:
+def test_package_core_citation_and_changelog_have_one_version() -> None:
     version = version_of_the_build()
     assert importlib.metadata.version("palpate") == version
     assert palpate.__version__ == _core.__version__ == version
@@ -33,14 +33,14 @@ def test_one_version_is_told_everywhere() -> None:
     assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
-def test_the_package_says_that_it_is_typed() -> None:
+def test_the_package_contains_its_type_information() -> None:
     files = importlib.resources.files("palpate")
     assert files.joinpath("py.typed").is_file()
     assert files.joinpath("_core.pyi").is_file() or files.joinpath("_core", "__init__.pyi").is_file()
 
 
 @pytest.mark.parametrize("name", palpate.__all__)
-def test_every_public_name_is_there(name: str) -> None:
+def test_every_public_name_can_be_imported(name: str) -> None:
     assert getattr(palpate, name) is not None
 
 
@@ -61,18 +61,18 @@ def command_lines() -> dict[str, list[str]]:
     }
 
 
-@pytest.mark.parametrize("way", command_lines())
+@pytest.mark.parametrize("program", command_lines())
 @pytest.mark.parametrize("verb", ["", "identify", "verify", "simulate", "render", "show", "demo"])
-def test_the_command_explains_itself(way: str, verb: str) -> None:
-    command = [*command_lines()[way], *([verb] if verb else []), "--help"]
-    answer = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert answer.returncode == 0, answer.stderr
-    assert answer.stdout.startswith("Usage:")
-    assert "xample" in answer.stdout
+def test_help_shows_usage_and_an_example(program: str, verb: str) -> None:
+    command = [*command_lines()[program], *([verb] if verb else []), "--help"]
+    completed = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert completed.returncode == 0, completed.stderr
+    assert completed.stdout.startswith("Usage:")
+    assert "xample" in completed.stdout
 
 
-def test_the_command_tells_its_version() -> None:
-    answer = subprocess.run(
+def test_the_command_prints_its_version() -> None:
+    completed = subprocess.run(
         [*command_lines()["installed"], "--version"], capture_output=True, text=True, check=True
     )
-    assert answer.stdout == f"palpate {version_of_the_build()}\n"
+    assert completed.stdout == f"palpate {version_of_the_build()}\n"

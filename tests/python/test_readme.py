@@ -26,7 +26,7 @@ def blocks(language: str, page: str = README) -> list[str]:
 
 def shell_commands() -> list[list[str]]:
     lines = [line for block in blocks("sh") for line in block.replace("\\\n", " ").splitlines()]
-    return [words for line in lines if (words := shlex.split(line, comments=True))]
+    return [arguments for line in lines if (arguments := shlex.split(line, comments=True))]
 
 
 @pytest.fixture(scope="module")
@@ -48,37 +48,39 @@ PROGRAMS = {
 
 
 @needs_program
-def test_all_commands_but_make_run_in_their_order(folder: Path) -> None:
-    commands = [words for words in shell_commands() if words[0] != "make"]
-    assert {words[0] for words in commands} == set(PROGRAMS)
-    for words in commands:
-        answer = subprocess.run(
-            [PROGRAMS[words[0]], *words[1:]],
+def test_all_commands_except_make_run_in_their_order(folder: Path) -> None:
+    commands = [arguments for arguments in shell_commands() if arguments[0] != "make"]
+    assert {arguments[0] for arguments in commands} == set(PROGRAMS)
+    for arguments in commands:
+        completed = subprocess.run(
+            [PROGRAMS[arguments[0]], *arguments[1:]],
             cwd=folder,
             capture_output=True,
             text=True,
             check=False,
             timeout=300,
         )
-        assert answer.returncode == 0, f"{shlex.join(words)}: {answer.stdout}{answer.stderr}"
+        assert completed.returncode == 0, f"{shlex.join(arguments)}: {completed.stdout}{completed.stderr}"
 
 
-def test_example_output_is_what_the_programs_print() -> None:
+def test_example_output_equals_the_output_of_the_programs() -> None:
     tool = ROOT / "tools" / "example_output.py"
-    answer = subprocess.run([sys.executable, tool, "--check"], capture_output=True, text=True, check=False)
-    assert answer.returncode == 0, answer.stderr
+    completed = subprocess.run([sys.executable, tool, "--check"], capture_output=True, text=True, check=False)
+    assert completed.returncode == 0, completed.stderr
 
 
 def test_every_target_of_make_exists() -> None:
     targets = set(
         re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
     )
-    made = {target for words in shell_commands() if words[0] == "make" for target in words[1:]}
-    assert made
-    assert made <= targets
+    used_targets = {
+        target for arguments in shell_commands() if arguments[0] == "make" for target in arguments[1:]
+    }
+    assert used_targets
+    assert used_targets <= targets
 
 
-def shown_commands() -> list[str]:
+def commands_not_run() -> list[str]:
     """Returns the commands that need hardware, and those inside a sentence."""
     lines = [line for block in blocks("text", RENDERING) for line in block.splitlines()]
     return [line for line in lines if line.startswith("palpate")] + re.findall(
@@ -86,17 +88,17 @@ def shown_commands() -> list[str]:
     )
 
 
-@pytest.mark.parametrize("line", [line for line in shown_commands() if line.startswith("palpate ")])
+@pytest.mark.parametrize("line", [line for line in commands_not_run() if line.startswith("palpate ")])
 def test_every_option_of_a_command_that_needs_hardware_exists(line: str) -> None:
-    verb, *words = shlex.split(line, comments=True)[1:]
+    verb, *arguments = shlex.split(line, comments=True)[1:]
     command = palpate.get_command(click.Context(palpate), verb)
     assert command is not None
     options = {name for parameter in command.params for name in parameter.opts}
-    assert {word for word in words if word.startswith("-")} <= options
+    assert {word for word in arguments if word.startswith("-")} <= options
 
 
 @needs_program
-@pytest.mark.parametrize("line", [line for line in shown_commands() if line.startswith("palpate-control ")])
+@pytest.mark.parametrize("line", [line for line in commands_not_run() if line.startswith("palpate-control ")])
 def test_every_option_of_palpate_control_exists(line: str) -> None:
     help_text = control("--help").stdout
     for word in shlex.split(line, comments=True):
@@ -109,7 +111,7 @@ def test_the_first_screen_shows_both_commands() -> None:
     assert "make test" in first_screen
 
 
-def test_the_table_of_statuses_is_that_of_the_source() -> None:
+def test_the_table_of_statuses_equals_the_statuses_of_the_core() -> None:
     rows = re.findall(r"^\| `(\w+)` \| (.*) \|$", RENDERING, re.MULTILINE)
     assert rows == list(_core.status.status_meanings.items())
 
@@ -118,7 +120,7 @@ def test_the_table_of_statuses_is_that_of_the_source() -> None:
     "name",
     ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "docs/rendering.md"],
 )
-def test_links_lead_to_files_that_exist(name: str) -> None:
+def test_linked_files_exist(name: str) -> None:
     text = (ROOT / name).read_text(encoding="utf-8")
     targets = re.findall(r"\]\((?!https?://|#)([^)#]+)", text)
     assert [target for target in targets if not ((ROOT / name).parent / target).exists()] == []

@@ -26,7 +26,7 @@ MISSING = next(
     ),
     "needs libumockdev-dev" if not Path("/usr/include/umockdev-1.0/umockdev.h").exists() else "",
 )
-needs_emulation = pytest.mark.skipif(bool(MISSING), reason=MISSING or "emulation at hand")
+needs_emulation = pytest.mark.skipif(bool(MISSING), reason=MISSING or "emulation available")
 
 
 def emulated(

@@ -11,7 +11,7 @@
 namespace emulator {
 
 /// Returns a device of the protocol; a seed draws everything that the protocol leaves to the firmware.
-[[nodiscard]] inline Identity chosen_by(std::uint32_t seed) {
+[[nodiscard]] inline Identity identity_of_seed(std::uint32_t seed) {
     std::mt19937 random{seed};
     const auto below = [&](std::uint64_t end) {
         return std::uniform_int_distribution<std::uint64_t>{0, end - 1}(random);
@@ -28,7 +28,7 @@ namespace emulator {
     device.watchdog_ms = one_of(std::uint16_t{15}, std::uint16_t{20}, std::uint16_t{1000});
     device.capabilities = static_cast<std::uint32_t>(below(4));
     device.uid = random();
-    device.tells_watchdog_that_is_set = yes();
+    device.reports_current_watchdog = yes();
 
     device.manufacturer = one_of(std::u16string{}, std::u16string{u"M\u00fcller & S\u00f6hne"});
     device.product =
@@ -58,10 +58,10 @@ namespace emulator {
     device.first_out_sequence = static_cast<std::uint16_t>(below(0x10000));
     device.first_out_age_us = one_of(std::uint16_t{0}, std::uint16_t{0xFFFF});
 
-    device.takes_out_first = yes();
-    device.tells_in_first = yes();
+    device.applies_out_first = yes();
+    device.ends_in_transfer_first = yes();
     device.held_packets = below(3);
-    device.hears_while_disabled = yes();
+    device.accepts_while_disabled = yes();
     device.refuses_by_stall = yes();
     device.stop_disables = yes();
     device.spare_status = static_cast<std::uint16_t>(below(0x200) << 7U);

@@ -29,10 +29,10 @@ namespace emulator {
 /// variable PALPATE_EMULATOR names the socket.
 class Orders {
   public:
-    explicit Orders(std::function<std::string(const std::string&)> obey)
+    explicit Orders(std::function<std::string(const std::string&)> execute_order)
         : path_{std::filesystem::temp_directory_path() / ("palpate-emulator-" + std::to_string(::getpid()))},
           socket_{::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)},
-          obey_{std::move(obey)} {
+          execute_{std::move(execute_order)} {
         sockaddr_un address{};
         address.sun_family = AF_UNIX;
         path_.string().copy(address.sun_path, sizeof address.sun_path - 1);
@@ -42,11 +42,11 @@ class Orders {
         }
         ::chmod(path_.c_str(), 0777);
         ::setenv("PALPATE_EMULATOR", path_.c_str(), 1);
-        obeying_ = std::thread{[this] { obey_all(); }};
+        executor_ = std::thread{[this] { execute_all(); }};
     }
     ~Orders() {
         ::shutdown(socket_, SHUT_RDWR);
-        obeying_.join();
+        executor_.join();
         ::close(socket_);
         ::unlink(path_.c_str());
     }
@@ -54,7 +54,7 @@ class Orders {
     Orders& operator=(const Orders&) = delete;
 
   private:
-    void obey_all() {
+    void execute_all() {
         std::array<char, 512> text{};
         sockaddr_un from{};
         while (true) {
@@ -66,7 +66,7 @@ class Orders {
             }
             std::string answer;
             try {
-                answer = obey_({text.data(), static_cast<std::size_t>(length)});
+                answer = execute_({text.data(), static_cast<std::size_t>(length)});
             } catch (const std::exception& error) {
                 answer = std::string("error: ") + error.what();
             }
@@ -77,8 +77,8 @@ class Orders {
 
     std::filesystem::path path_;
     int socket_;
-    std::function<std::string(const std::string&)> obey_;
-    std::thread obeying_;
+    std::function<std::string(const std::string&)> execute_;
+    std::thread executor_;
 };
 
 /// Runs the command as a child process. The child receives the signals that end a program and ends with this process.

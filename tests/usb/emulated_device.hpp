@@ -77,7 +77,7 @@ class EmulatedDevice {
         mute_ = faults_.used(FaultKind::Mute);
         slow_ = faults_.used(FaultKind::Slow);
         if (faults_.used(FaultKind::Reset)) {
-            start_anew();
+            restart();
         }
         for (const auto& [kind, bit] : {std::pair{FaultKind::Encoder, encoder_fault},
                                         {FaultKind::OverTemperature, over_temperature},
@@ -89,7 +89,7 @@ class EmulatedDevice {
         motor_.saturate(faults_.used(FaultKind::Saturate));
         const std::uint32_t skipped = faults_.used_up(FaultKind::Skip);
 
-        plant_.advance(1e-6 * motor_.applied_uNm() * (identity_.flipped ? -1.0 : 1.0), 1e-3);
+        plant_.advance(1e-6 * motor_.applied_uNm() * (identity_.reversed ? -1.0 : 1.0), 1e-3);
         ++frames_;
         clock_us_ += 1000;
         sequence_ = static_cast<std::uint16_t>(sequence_ + 1 + skipped);
@@ -152,7 +152,7 @@ class EmulatedDevice {
     [[nodiscard]] bool is_unplugged() const { return unplugged_; }
     /// Returns true while transfers are refused. Such frames last a real millisecond, because the timeouts of the host
     /// are in real time. A halted endpoint is different: the host receives the halt and clears it.
-    [[nodiscard]] bool takes_its_time() const { return naks_ || mute_; }
+    [[nodiscard]] bool withholds_packets() const { return naks_ || mute_; }
     [[nodiscard]] bool is_slow() const { return slow_; }
 
     // ----------------------------------------------------------------------------- values for the tests
@@ -160,7 +160,7 @@ class EmulatedDevice {
     [[nodiscard]] std::uint64_t frames() const { return frames_; }
     [[nodiscard]] std::uint16_t sequence() const { return sequence_; }
     /// Sequence number of the last packet that a host has read.
-    [[nodiscard]] std::uint16_t told() const {
+    [[nodiscard]] std::uint16_t last_read_sequence() const {
         return last_sent_.empty() ? 0 : get<std::uint16_t>(last_sent_, 2);
     }
     [[nodiscard]] const Motor& motor() const { return motor_; }
@@ -179,8 +179,8 @@ class EmulatedDevice {
     }
 
   private:
-    void start_anew() {
-        motor_.start_anew();
+    void restart() {
+        motor_.restart();
         halts_ = {};
         sequence_ = 0;
         clock_us_ = 0;
@@ -217,7 +217,7 @@ class EmulatedDevice {
         put(bytes, identity_.counts_per_rev);
         put(bytes, identity_.max_torque_uNm);
         put(bytes, identity_.rate_hz);
-        put(bytes, identity_.tells_watchdog_that_is_set ? motor_.watchdog_ms() : identity_.watchdog_ms);
+        put(bytes, identity_.reports_current_watchdog ? motor_.watchdog_ms() : identity_.watchdog_ms);
         put(bytes, identity_.capabilities);
         bytes.insert(bytes.end(), {32, 16, 1, 0});
         put(bytes, identity_.uid);

@@ -19,26 +19,26 @@
 namespace palpate::test {
 
 /// Sends an order to the emulator and returns its answer.
-inline std::string tell(const std::string& order) {
-    const int talk = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+inline std::string send_order(const std::string& order) {
+    const int connection = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     sockaddr_un own{};
     own.sun_family = AF_UNIX;
-    ::bind(talk, reinterpret_cast<const sockaddr*>(&own),
+    ::bind(connection, reinterpret_cast<const sockaddr*>(&own),
            sizeof own.sun_family);  // the kernel chooses a name
     sockaddr_un emulator{};
     emulator.sun_family = AF_UNIX;
     std::string{std::getenv("PALPATE_EMULATOR")}.copy(emulator.sun_path, sizeof emulator.sun_path - 1);
-    ::sendto(talk, order.data(), order.size(), 0, reinterpret_cast<const sockaddr*>(&emulator),
+    ::sendto(connection, order.data(), order.size(), 0, reinterpret_cast<const sockaddr*>(&emulator),
              sizeof emulator);
     std::array<char, 512> answer{};
-    const ssize_t length = ::recv(talk, answer.data(), answer.size(), 0);
-    ::close(talk);
+    const ssize_t length = ::recv(connection, answer.data(), answer.size(), 0);
+    ::close(connection);
     return {answer.data(), static_cast<std::size_t>(length)};
 }
 
 /// Returns one number of the device's state from the emulator.
 inline double state(const std::string& field) {
-    const std::string all = tell("state");
+    const std::string all = send_order("state");
     const std::string key = "\"" + field + "\": ";
     const std::string value = all.substr(all.find(key) + key.size());
     return value.rfind("true", 0) == 0 ? 1.0 : value.rfind("false", 0) == 0 ? 0.0 : std::stod(value);
@@ -61,7 +61,7 @@ inline Reading settled(UsbDevice& device, double force = 0.0) {
     }
     const auto is_settled = [&] {
         const bool newest =
-            static_cast<std::uint16_t>(reading.sequence) == static_cast<std::uint16_t>(state("told"));
+            static_cast<std::uint16_t>(reading.sequence) == static_cast<std::uint16_t>(state("last_read"));
         return reading.status != Status::Lost && device.in_flight() <= 2 && newest;
     };
     for (int k = 0; k < 1000 && reading.status != Status::Fault && !is_settled(); ++k) {

@@ -21,37 +21,36 @@ struct Settings {
     std::vector<Fault> script;
     bool lock_step = false;
     double rate_hz = 1000.0;
-    std::chrono::milliseconds patience{3000};  ///< longest wait of lock-step for the host
-    std::string trace;                         ///< CSV, one row for each frame
-    std::string preload_first;                 ///< a sanitizer's library
-    bool denied = false;                       ///< the node cannot be opened
+    std::chrono::milliseconds lock_step_timeout{3000};  ///< longest wait of lock-step for the host
+    std::string trace;                                  ///< CSV, one row for each frame
+    std::string preload_first;                          ///< a sanitizer's library
+    bool denied = false;                                ///< the node cannot be opened
     std::vector<std::string> command;
 };
 
 inline constexpr const char* options_text =
-    "  --lock-step            the host's transfers are the clock; otherwise frames begin every 1/rate\n"
-    "  --rate-hz RATE         frames a second [1000]\n"
-    "  --patience-ms MS       longest wait of lock-step for the host [3000]\n"
-    "  --serial SERIAL        one device of this serial number; repeatable [EMU-1]\n"
-    "  --no-device            no device is plugged in\n"
-    "  --chosen-by SEED       draws the choices of the firmware; must be before the options that change "
-    "them\n"
-    "  --says-rate-hz RATE    rate in GET_INFO [1000]\n"
-    "  --no-transducer        capabilities without bit 0\n"
-    "  --no-velocity          capabilities without bit 1\n"
-    "  --somebody-elses       another magic in GET_INFO\n"
-    "  --info-bytes SIZE      size of the answer to GET_INFO [32]\n"
-    "  --flipped              torque with the wrong sign\n"
-    "  --takes-out-first      OUT packets act before the encoder of their frame is latched\n"
-    "  --from-zero            counters begin at 0, not close to their ends\n"
-    "  --spring STIFFNESS     a real spring on the handle, N*m/rad [0]\n"
-    "  --friction TORQUE      Coulomb friction of the handle, N*m [0]\n"
-    "  --max-torque-uNm TORQUE  largest torque in GET_INFO [5000000]\n"
-    "  --no-hand              the handle is free\n"
-    "  --fault KIND@FRAME[xCOUNT]   repeatable; frames are counted from the first OUT packet\n"
-    "  --trace FILE.csv       true state of the device, one row for each frame\n"
-    "  --denied               the device cannot be opened\n"
-    "  --preload-first FILE   library of a sanitizer, which must be loaded before umockdev\n";
+    "  --lock-step            Frames begin when the host transfers, otherwise every 1/rate.\n"
+    "  --rate-hz RATE         Frames a second [1000].\n"
+    "  --lock-step-ms MS      Longest wait of lock-step for the host [3000].\n"
+    "  --serial SERIAL        One device with this serial number; repeatable [EMU-1].\n"
+    "  --no-device            No device is connected.\n"
+    "  --seed SEED            Draws the choices of the firmware; must be before options that change them.\n"
+    "  --reported-rate-hz RATE  Rate in GET_INFO [1000].\n"
+    "  --no-transducer        Capabilities without bit 0.\n"
+    "  --no-velocity          Capabilities without bit 1.\n"
+    "  --wrong-magic          Another magic in GET_INFO.\n"
+    "  --info-bytes SIZE      Size of the answer to GET_INFO [32].\n"
+    "  --reversed             Torque with the wrong sign.\n"
+    "  --out-first            OUT packets act before the encoder of their frame is latched.\n"
+    "  --from-zero            Counters begin at 0, not close to their ends.\n"
+    "  --spring STIFFNESS     A real spring on the handle, N*m/rad [0].\n"
+    "  --friction TORQUE      Coulomb friction of the handle, N*m [0].\n"
+    "  --max-torque-uNm TORQUE  Largest torque in GET_INFO [5000000].\n"
+    "  --no-hand              The handle is free.\n"
+    "  --fault KIND@FRAME[xCOUNT]  Repeatable; frames are counted from the first OUT packet.\n"
+    "  --trace FILE.csv       True state of the device, one row for each frame.\n"
+    "  --denied               The device cannot be opened.\n"
+    "  --preload-first FILE   Library of a sanitizer, which must be loaded before umockdev.\n";
 
 /// Reads the command line. Throws std::invalid_argument if an option is wrong.
 [[nodiscard]] inline Settings read_settings(int count, char** words) {
@@ -75,13 +74,13 @@ inline constexpr const char* options_text =
             settings.lock_step = true;
         } else if (word == "--rate-hz") {
             settings.rate_hz = std::stod(value());
-        } else if (word == "--patience-ms") {
-            settings.patience = std::chrono::milliseconds{std::stoi(value())};
+        } else if (word == "--lock-step-ms") {
+            settings.lock_step_timeout = std::chrono::milliseconds{std::stoi(value())};
         } else if (word == "--serial") {
             serials.push_back(value());
-        } else if (word == "--chosen-by") {
-            common = chosen_by(static_cast<std::uint32_t>(std::stoul(value())));
-        } else if (word == "--says-rate-hz") {
+        } else if (word == "--seed") {
+            common = identity_of_seed(static_cast<std::uint32_t>(std::stoul(value())));
+        } else if (word == "--reported-rate-hz") {
             common.rate_hz = static_cast<std::uint16_t>(std::stoi(value()));
         } else if (word == "--no-transducer") {
             common.capabilities &= ~1U;
@@ -89,14 +88,14 @@ inline constexpr const char* options_text =
             common.capabilities &= ~2U;
         } else if (word == "--no-device") {
             none = true;
-        } else if (word == "--somebody-elses") {
+        } else if (word == "--wrong-magic") {
             common.magic = 'X';
         } else if (word == "--info-bytes") {
             common.info_size = std::stoul(value());
-        } else if (word == "--flipped") {
-            common.flipped = true;
-        } else if (word == "--takes-out-first") {
-            common.takes_out_first = true;
+        } else if (word == "--reversed") {
+            common.reversed = true;
+        } else if (word == "--out-first") {
+            common.applies_out_first = true;
         } else if (word == "--from-zero") {
             common.first_sequence = 0;
             common.first_us = 0;
@@ -132,7 +131,7 @@ inline constexpr const char* options_text =
 }
 
 /// Executes an order of a test (fault KIND COUNT, state) and returns the answer.
-[[nodiscard]] inline std::string obey(Port& port, const std::string& order) {
+[[nodiscard]] inline std::string execute_order(Port& port, const std::string& order) {
     const std::size_t space = order.find(' ');
     const std::string verb = order.substr(0, space);
     if (verb == "fault") {
@@ -149,7 +148,7 @@ inline constexpr const char* options_text =
         };
         return "{" + field("frames", std::to_string(device.frames())) + ", " +
                field("sequence", std::to_string(device.sequence())) + ", " +
-               field("told", std::to_string(device.told())) + ", " +
+               field("last_read", std::to_string(device.last_read_sequence())) + ", " +
                field("outs", std::to_string(device.motor().outs())) + ", " +
                field("bad_outs", std::to_string(device.motor().bad_outs())) + ", " +
                field("enabled", device.motor().is_enabled() ? "true" : "false") + ", " +

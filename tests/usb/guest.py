@@ -29,35 +29,38 @@ NEEDED = {
     "dpkg": "dpkg",
     "ldd": "libc-bin",
 }
-LONGEST_S = 1800
+LONGEST_RUN_S = 1800
+"""Longest run of the guest [s]"""
+UNPRIVILEGED = "nobody"
+"""User without rights"""
 
 
 def missing() -> str:
     """Returns the missing packages as the reason of a skipped test; empty if the guest can run."""
     if platform.machine() != "x86_64":
         return f"needs a machine that is x86_64, not {platform.machine()}"
-    lacking = [package for tool, package in NEEDED.items() if shutil.which(tool) is None]
-    if lacking:
-        return f"needs {' '.join(sorted(lacking))}"
+    missing_packages = [package for tool, package in NEEDED.items() if shutil.which(tool) is None]
+    if missing_packages:
+        return f"needs {' '.join(sorted(missing_packages))}"
     return "" if kernel() else "needs the package linux-image-amd64 from Debian's archive"
 
 
 def kernel() -> Path | None:
-    """Returns the unpacked kernel package, which is fetched once and not installed."""
+    """Returns the unpacked kernel package, which is downloaded once and not installed."""
     place = CACHE / "kernel"
     if not place.exists():
         CACHE.mkdir(parents=True, exist_ok=True)
-        asked = subprocess.run(
+        listing = subprocess.run(
             ["apt-cache", "depends", "linux-image-amd64"], capture_output=True, text=True, check=False
         )
-        found = re.search(r"Depends: (linux-image-\S+)", asked.stdout)
+        found = re.search(r"Depends: (linux-image-\S+)", listing.stdout)
         if found is None:
             return None
-        fetched = subprocess.run(
+        download = subprocess.run(
             ["apt-get", "-qq", "download", found[1]], cwd=CACHE, capture_output=True, check=False
         )
         package = next(CACHE.glob("linux-image-*.deb"), None)
-        if fetched.returncode or package is None:
+        if download.returncode or package is None:
             return None
         subprocess.run(["dpkg", "-x", package, CACHE / "unpacking"], check=True)
         (CACHE / "unpacking").rename(place)
@@ -67,8 +70,8 @@ def kernel() -> Path | None:
 
 def libraries(program: Path) -> list[Path]:
     """Returns the paths of the shared libraries of a program."""
-    told = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
-    return [Path(path) for path in re.findall(r"(/\S+) \(0x", told)]
+    output = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
+    return [Path(path) for path in re.findall(r"(/\S+) \(0x", output)]
 
 
 def install_module(driver: Path, folder: Path) -> None:
@@ -79,7 +82,7 @@ def install_module(driver: Path, folder: Path) -> None:
 
 
 @dataclass
-class Left:
+class GuestOutput:
     """Results of a guest."""
 
     console: str
@@ -87,7 +90,7 @@ class Left:
     """Text of each file in its folder /out, by name"""
 
 
-def run(script: str, programs: dict[str, Path], files: dict[str, Path]) -> Left:
+def run(script: str, programs: dict[str, Path], files: dict[str, Path]) -> GuestOutput:
     """Boots the guest, runs a shell script in it and returns the files in /out.
 
     The `programs` are in /bin with their libraries, the `files` in /in. The script must write its results to
@@ -115,28 +118,29 @@ def run(script: str, programs: dict[str, Path], files: dict[str, Path]) -> Left:
     drivers = next((unpacked / "lib" / "modules").iterdir()) / "kernel" / "drivers" / "usb"
     for module in MODULES:
         install_module(drivers / f"{module}.ko", tree / "modules")
-    loading = "\n".join(f"insmod /modules/{Path(module).name}.ko" for module in MODULES)
-    (tree / "etc" / "passwd").write_text("root:x:0:0::/:/bin/sh\nnobody:x:65534:65534::/:/bin/sh\n")
+    load_modules = "\n".join(f"insmod /modules/{Path(module).name}.ko" for module in MODULES)
+    (tree / "etc" / "passwd").write_text(f"root:x:0:0::/:/bin/sh\n{UNPRIVILEGED}:x:65534:65534::/:/bin/sh\n")
     init = tree / "init"
-    init.write_text(
-        f"""#!/bin/busybox sh
-/bin/busybox --install -s /bin
-export PATH=/bin
-mount -t proc proc /proc
-mount -t sysfs sysfs /sys
-mount -t devtmpfs devtmpfs /dev
-{loading}
-mkdir -p /dev/bus/usb
-cd /out
-{script}
-dmesg > /out/dmesg
-stty raw -F /dev/ttyS1
-tar -c -C /out . | gzip > /dev/ttyS1
-poweroff -f
-"""
-    )
+    commands = [
+        "#!/bin/busybox sh",
+        "/bin/busybox --install -s /bin",
+        "export PATH=/bin",
+        "mount -t proc proc /proc",
+        "mount -t sysfs sysfs /sys",
+        "mount -t devtmpfs devtmpfs /dev",
+        load_modules,
+        "mkdir -p /dev/bus/usb",
+        "cd /out",
+        script,
+        "dmesg > /out/dmesg",
+        "stty raw -F /dev/ttyS1",
+        "tar -c -C /out . | gzip > /dev/ttyS1",
+        "poweroff -f",
+        "",
+    ]
+    init.write_text("\n".join(commands))
     init.chmod(0o755)
-    image, came_back = folder / "initramfs", folder / "out.tar.gz"
+    image, results = folder / "initramfs", folder / "out.tar.gz"
     with image.open("wb") as archive:
         names = subprocess.run(["find", "."], cwd=tree, capture_output=True, check=True).stdout
         subprocess.run(
@@ -144,24 +148,24 @@ poweroff -f
         )
     boot = next((unpacked / "boot").glob("vmlinuz-*"))
     machine = ["-accel", "tcg", "-smp", "1", "-icount", "shift=1,sleep=off,align=off", "-m", "256"]
-    shown = ["-nographic", "-no-reboot", "-monitor", "none"]
-    lines = ["-serial", "stdio", "-serial", f"file:{came_back}"]
-    started = ["-kernel", str(boot), "-initrd", str(image), "-append", "console=ttyS0 quiet panic=-1"]
-    ran = subprocess.run(
-        ["qemu-system-x86_64", *machine, *shown, *lines, *started],
+    display = ["-nographic", "-no-reboot", "-monitor", "none"]
+    lines = ["-serial", "stdio", "-serial", f"file:{results}"]
+    kernel_options = ["-kernel", str(boot), "-initrd", str(image), "-append", "console=ttyS0 quiet panic=-1"]
+    process = subprocess.run(
+        ["qemu-system-x86_64", *machine, *display, *lines, *kernel_options],
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
         check=True,
-        timeout=LONGEST_S,
+        timeout=LONGEST_RUN_S,
     )
-    left: dict[str, str] = {}
+    returned: dict[str, str] = {}
     try:
-        with tarfile.open(fileobj=io.BytesIO(came_back.read_bytes())) as archive:
+        with tarfile.open(fileobj=io.BytesIO(results.read_bytes())) as archive:
             for member in archive:
                 content = archive.extractfile(member)
                 if content is not None:
-                    left[member.name.removeprefix("./")] = content.read().decode(errors="replace")
+                    returned[member.name.removeprefix("./")] = content.read().decode(errors="replace")
     except tarfile.TarError:
         pass  # the guest ended too early; its console shows the reason
-    return Left(ran.stdout, left)
+    return GuestOutput(process.stdout, returned)

@@ -27,7 +27,7 @@ class Motor {
         : identity_{std::move(identity)}, out_sequence_{identity_.first_out_sequence} {}
 
     /// Restarts like after power-up; only the first values of the counters differ.
-    void start_anew() {
+    void restart() {
         const Identity identity = identity_;
         const std::uint64_t outs = outs_;
         const std::uint64_t bad_outs = bad_outs_;
@@ -81,13 +81,13 @@ class Motor {
             return;
         }
         bad_packet_ = tripped_ = false;
-        if (!enabled_ && !identity_.hears_while_disabled) {
+        if (!enabled_ && !identity_.accepts_while_disabled) {
             return;
         }
         out_sequence_ = get<std::uint16_t>(packet, 2);
         life_ms_ = get<std::uint16_t>(packet, 10);
-        heard_us_ = clock_us;
-        has_heard_ = true;
+        command_us_ = clock_us;
+        has_command_ = true;
         ++outs_;
         const auto wanted = get<std::int32_t>(packet, 4);
         torque_uNm_ = std::clamp(wanted, -identity_.max_torque_uNm, identity_.max_torque_uNm);
@@ -98,7 +98,7 @@ class Motor {
     }
     /// Runs the watchdog.
     void look(std::uint32_t clock_us) {
-        if (has_heard_ && clock_us - heard_us_ >= 1000U * std::min<std::uint32_t>(watchdog_ms_, life_ms_)) {
+        if (has_command_ && clock_us - command_us_ >= 1000U * std::min<std::uint32_t>(watchdog_ms_, life_ms_)) {
             tripped_ = true;
             torque_uNm_ = 0;
         }
@@ -121,8 +121,8 @@ class Motor {
     /// Returns the sequence number of the last accepted OUT packet.
     [[nodiscard]] std::uint16_t out_sequence() const { return out_sequence_; }
     [[nodiscard]] std::uint16_t out_age_us(std::uint32_t clock_us) const {
-        const std::uint32_t age = std::min<std::uint32_t>(clock_us - heard_us_, 0xFFFF);
-        return has_heard_ ? static_cast<std::uint16_t>(age) : identity_.first_out_age_us;
+        const std::uint32_t age = std::min<std::uint32_t>(clock_us - command_us_, 0xFFFF);
+        return has_command_ ? static_cast<std::uint16_t>(age) : identity_.first_out_age_us;
     }
     [[nodiscard]] std::uint64_t outs() const { return outs_; }
     [[nodiscard]] std::uint64_t bad_outs() const { return bad_outs_; }
@@ -139,8 +139,8 @@ class Motor {
     std::uint16_t life_ms_ = 0xFFFF;
     std::int32_t torque_uNm_ = 0;
     std::uint16_t out_sequence_ = 0;
-    std::uint32_t heard_us_ = 0;
-    bool has_heard_ = false;  ///< since the start
+    std::uint32_t command_us_ = 0;
+    bool has_command_ = false;  ///< since the start
     std::uint64_t outs_ = 0;
     std::uint64_t bad_outs_ = 0;
 };

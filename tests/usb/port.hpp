@@ -52,7 +52,7 @@ class Port {
         if (transfer.endpoint != 0x81 && transfer.endpoint != 0x01) {
             return -ENOENT;
         }
-        owes_answer_ = owes_answer_ && transfer.endpoint == 0x81;
+        host_must_answer_ = host_must_answer_ && transfer.endpoint == 0x81;
         (transfer.endpoint == 0x81 ? in_ : out_).push_back(std::move(transfer));
         reads_ahead_ = reads_ahead_ || in_.size() >= 2;
         return 0;
@@ -75,13 +75,13 @@ class Port {
     }
 
     /// Prepares for the next host after the device was closed.
-    void let_go() {
+    void reset_host() {
         reads_ahead_ = false;
-        owes_answer_ = true;
+        host_must_answer_ = true;
     }
 
     /// Removes the transfers of a client that has ended.
-    void forget(const void* owner) {
+    void remove_client(const void* owner) {
         for (std::deque<Transfer>* queue : {&in_, &out_, &done_}) {
             std::erase_if(*queue, [&](const Transfer& transfer) { return transfer.owner == owner; });
         }
@@ -90,8 +90,8 @@ class Port {
     void clear_halt(std::uint8_t endpoint) {
         device_.clear_halt(endpoint);
         (endpoint == 0x81 ? in_held_ : out_held_) = false;
-        owes_answer_ =
-            owes_answer_ && endpoint == 0x81;  // the answer was lost, even if the host does not know it
+        host_must_answer_ =
+            host_must_answer_ && endpoint == 0x81;  // the answer was lost, even if the host does not know it
     }
 
     /// Runs one frame of the bus.
@@ -99,7 +99,7 @@ class Port {
         if (device_.is_unplugged()) {
             return;
         }
-        if (device_.identity().takes_out_first) {
+        if (device_.identity().applies_out_first) {
             serve_out();
         }
         device_.frame();
@@ -115,25 +115,25 @@ class Port {
         }
         Bytes packet;
         const Handshake answer = polled(packet);
-        if (device_.identity().tells_in_first) {
+        if (device_.identity().ends_in_transfer_first) {
             serve_in(answer, packet);
         }
-        if (!device_.identity().takes_out_first) {
+        if (!device_.identity().applies_out_first) {
             serve_out();
         }
-        if (!device_.identity().tells_in_first) {
+        if (!device_.identity().ends_in_transfer_first) {
             serve_in(answer, packet);
         }
     }
 
     /// Returns true if the host has done its part of a frame: it reads, and has answered every packet that it could.
     [[nodiscard]] bool host_is_ready() const {
-        return !in_.empty() && (!out_.empty() || !owes_answer_) && !in_held_ && !out_held_;
+        return !in_.empty() && (!out_.empty() || !host_must_answer_) && !in_held_ && !out_held_;
     }
     /// Returns true if the host keeps reads queued; false if it reads and writes one after the other.
     [[nodiscard]] bool host_reads_ahead() const { return reads_ahead_; }
     /// Returns true if such a host has not queued the next read.
-    [[nodiscard]] bool lacks_reads() const { return reads_ahead_ && in_.empty(); }
+    [[nodiscard]] bool has_no_read() const { return reads_ahead_ && in_.empty(); }
     /// Returns true if an OUT packet has missed its frame.
     [[nodiscard]] bool is_behind() const { return out_refused_ && !out_.empty(); }
     [[nodiscard]] std::deque<Transfer>& done() { return done_; }
@@ -155,7 +155,7 @@ class Port {
             transfer.status = packet.size() > transfer.length ? -EOVERFLOW : 0;
             packet.resize(std::min(packet.size(), transfer.length));
             transfer.actual = packet.size();
-            owes_answer_ = owes_answer_ || EmulatedDevice::is_whole(packet);
+            host_must_answer_ = host_must_answer_ || EmulatedDevice::is_whole(packet);
             transfer.data = std::move(packet);
         }
         done_.push_back(std::move(transfer));
@@ -186,7 +186,7 @@ class Port {
     bool out_held_ = false;
     bool out_refused_ = false;
     bool reads_ahead_ = false;
-    bool owes_answer_ = true;  ///< the host has received a packet and has not sent one since
+    bool host_must_answer_ = true;  ///< the host has received a packet and has not sent one since
 };
 
 /// Decides when a frame begins.
@@ -194,35 +194,36 @@ class Port {
 /// Paced: every millisecond; up to three late frames follow at once. Lock-step: when the host has done its part, so
 /// that the result does not depend on the speed of the machine. Before the host's first command, and while the device
 /// refuses transfers, frames follow the clock in lock-step too, while the host reads. Otherwise a frame waits for the
-/// host; after `patience` the host misses one frame. For a host without two queued reads it waits a few milliseconds.
+/// host; after `lock_step_timeout` the host misses one frame. For a host without two queued reads it waits a few milliseconds.
 class FrameClock {
   public:
     using Clock = std::chrono::steady_clock;
 
-    FrameClock(bool lock_step, double rate_hz, std::chrono::milliseconds patience)
+    FrameClock(bool lock_step, double rate_hz, std::chrono::milliseconds lock_step_timeout)
         : lock_step_{lock_step},
           period_{std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_hz))},
-          patience_{patience} {}
+          lock_step_timeout_{lock_step_timeout} {}
 
     void host_wrote() {
-        if (!std::exchange(in_conversation_, true)) {
+        if (!std::exchange(host_is_connected_, true)) {
             first_ = Clock::now() + settling;
         }
     }
-    void host_left() { in_conversation_ = false; }
+    void host_left() { host_is_connected_ = false; }
 
     /// Returns true if a frame begins now; otherwise sets `until` to the latest time of the next call.
     [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {
         const EmulatedDevice& device = port.device();
-        const bool in_step = lock_step_ && !device.takes_its_time() && !device.is_slow() && !port.is_behind();
-        if (in_step && in_conversation_ && port.host_is_ready()) {
+        const bool in_step =
+            lock_step_ && !device.withholds_packets() && !device.is_slow() && !port.is_behind();
+        if (in_step && host_is_connected_ && port.host_is_ready()) {
             until = first_;
             last_ = now;
             return now >= until;
         }
-        const bool waits_for_host = in_step && (in_conversation_ || port.lacks_reads());
+        const bool waits_for_host = in_step && (host_is_connected_ || port.has_no_read());
         const Clock::duration waits = !waits_for_host           ? (device.is_slow() ? 3 : 1) * period_
-                                      : port.host_reads_ahead() ? patience_
+                                      : port.host_reads_ahead() ? lock_step_timeout_
                                                                 : 5 * period_;
         until = last_ + waits;
         if (now < until) {
@@ -238,10 +239,10 @@ class FrameClock {
 
     bool lock_step_;
     Clock::duration period_;
-    Clock::duration patience_;
+    Clock::duration lock_step_timeout_;
     Clock::time_point last_ = Clock::now();
     Clock::time_point first_ = last_;  ///< first frame in lock-step
-    bool in_conversation_ = false;
+    bool host_is_connected_ = false;
 };
 
 }  // namespace emulator

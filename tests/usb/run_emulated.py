@@ -18,7 +18,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-MISSING = 77
+MISSING_PACKAGE_EXIT = 77
 BUILDS = ("dev", "release", "asan", "tsan", "control")
 SOURCES = ROOT / "tests" / "usb"
 
@@ -36,18 +36,18 @@ def emulator() -> Path | str:
             return program
     if shutil.which("pkg-config") is None:
         return "needs pkg-config"
-    asked = subprocess.run(
+    compiler_flags = subprocess.run(
         ["pkg-config", "--cflags", "--libs", "umockdev-1.0"], capture_output=True, text=True, check=False
     )
-    if asked.returncode:
+    if compiler_flags.returncode:
         return "needs umockdev (Debian: umockdev libumockdev-dev)"
     program = programs[-1]
     program.parent.mkdir(exist_ok=True)
-    made = program.with_suffix(f".{os.getpid()}")
+    temporary = program.with_suffix(f".{os.getpid()}")
     compiler = os.environ.get("CXX", "g++")
-    compile_it = [compiler, "-std=c++20", "-O1", str(SOURCES / "umockdev_emulator.cpp"), "-o", str(made)]
-    subprocess.run([*compile_it, *asked.stdout.split(), "-lpthread"], check=True)
-    made.rename(program)
+    command = [compiler, "-std=c++20", "-O1", str(SOURCES / "umockdev_emulator.cpp"), "-o", str(temporary)]
+    subprocess.run([*command, *compiler_flags.stdout.split(), "-lpthread"], check=True)
+    temporary.rename(program)
     return program
 
 
@@ -55,5 +55,5 @@ if __name__ == "__main__":
     found = emulator()
     if isinstance(found, str):
         print(f"skipped: {found}", file=sys.stderr)
-        sys.exit(MISSING)
+        sys.exit(MISSING_PACKAGE_EXIT)
     os.execv(found, [str(found), *sys.argv[1:]])  # the emulator receives the signals and forwards them

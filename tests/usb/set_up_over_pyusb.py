@@ -25,10 +25,10 @@ STREAM_IN = 0x81
 
 def order(words: str) -> str:
     """Sends an order to the emulated device without the USB libraries and returns the answer."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asking:
-        asking.bind("")
-        asking.sendto(words.encode(), os.environ["PALPATE_EMULATOR"])
-        return asking.recv(4096).decode()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as orders:
+        orders.bind("")
+        orders.sendto(words.encode(), os.environ["PALPATE_EMULATOR"])
+        return orders.recv(4096).decode()
 
 
 def state() -> dict[str, Any]:
@@ -44,10 +44,10 @@ def refusal(action: Callable[[], Any]) -> str:
     return ""
 
 
-def wait_until(is_so: Callable[[], Any]) -> None:
-    until = time.monotonic() + 10.0
-    while not is_so():
-        assert time.monotonic() < until
+def wait_until(condition: Callable[[], Any]) -> None:
+    deadline = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < deadline
         time.sleep(0.005)
 
 

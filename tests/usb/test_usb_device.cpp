@@ -34,7 +34,7 @@ TEST(UsbDevice, ReportsItsNameAndProperties) {
     EXPECT_EQ(profile.id, "EMU-1");
     EXPECT_EQ(profile.period_s, 1e-3);
     EXPECT_EQ(profile.force_limit, 5.0);
-    EXPECT_EQ(guards_for({}, profile).device_damping, 0.0) << "nobody measured it";
+    EXPECT_EQ(guards_for({}, profile).device_damping, 0.0) << "it was not measured";
     EXPECT_NO_THROW(validate(profile));
 }
 

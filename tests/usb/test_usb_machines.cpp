@@ -17,11 +17,11 @@ namespace {
 using test::patient;
 using test::settled;
 using test::state;
-using test::tell;
+using test::send_order;
 
 TEST(UsbTwoDevices, AreDistinguishedBySerialNumber) {
     const std::string both = patient().open().reason;
-    EXPECT_NE(both.find("2 USB devices could be meant (LEFT, RIGHT): choose with usb:SERIAL"),
+    EXPECT_NE(both.find("2 suitable USB devices are connected (LEFT, RIGHT): choose one with usb:SERIAL"),
               std::string::npos)
         << both;
     UsbDevice left = patient("LEFT");
@@ -38,7 +38,7 @@ TEST(UsbTwoDevices, AreDistinguishedBySerialNumber) {
     }
     EXPECT_EQ(in_a_row, 20);
     const std::string neither = patient("MIDDLE").open().reason;
-    EXPECT_NE(neither.find("serial number MIDDLE; there is LEFT, RIGHT"), std::string::npos) << neither;
+    EXPECT_NE(neither.find("serial number MIDDLE; connected: LEFT, RIGHT"), std::string::npos) << neither;
 }
 
 TEST(UsbNoDevice, MessageNamesTheCommandThatListsTheDevice) {
@@ -47,7 +47,7 @@ TEST(UsbNoDevice, MessageNamesTheCommandThatListsTheDevice) {
 
 TEST(UsbForeignDevice, IsRefusedWithoutAnOutPacket) {
     const std::string reason = patient().open().reason;
-    EXPECT_NE(reason.find("is 1209:0001 but not of this protocol"), std::string::npos) << reason;
+    EXPECT_NE(reason.find("is 1209:0001 with another protocol"), std::string::npos) << reason;
     EXPECT_EQ(state("outs"), 0.0);
 }
 
@@ -114,7 +114,7 @@ TEST(UsbOtherFirmware, StateOfAnEarlierProgramIsNotAFault) {
     UsbDevice rendering = patient();
     ASSERT_EQ(rendering.open().reason, "");
     settled(rendering, 0.2);
-    tell("fault emergency-stop 1");
+    send_order("fault emergency-stop 1");
     Status status = Status::Ok;
     for (int k = 0; k < 3 && status == Status::Ok; ++k) {  // a packet or two may wait in the device
         status = rendering.exchange({0.2}).status;

@@ -51,7 +51,7 @@ class Emulation {
     Emulation& operator=(const Emulation&) = delete;
 
     int run() {
-        const Orders orders{[this](const std::string& order) { return obeyed(order); }};
+        const Orders orders{[this](const std::string& order) { return executed(order); }};
         Command command{settings_.command, [this] { prepare(); }};
         std::thread frames{[this] { run_frames(); }};
         const int code = command.wait();
@@ -71,12 +71,12 @@ class Emulation {
     struct Place {
         FrameClock clock;
         std::unique_ptr<UsbfsNode> node;
-        bool told_removal = false;
+        bool removal_announced = false;
     };
 
     void plug(const Identity& identity, const std::vector<Fault>& script) {
         auto place = std::make_unique<Place>(
-            Place{FrameClock{settings_.lock_step, settings_.rate_hz, settings_.patience}, nullptr});
+            Place{FrameClock{settings_.lock_step, settings_.rate_hz, settings_.lock_step_timeout}, nullptr});
         place->node = std::make_unique<UsbfsNode>(testbed_, EmulatedDevice{identity, settings_.plant, script},
                                                   next_address_++, mutex_, [this] {
                                                       if (begin_frames() < wakes_at_) {
@@ -143,14 +143,14 @@ class Emulation {
         std::unique_lock locked{mutex_};
         while (!over_) {
             for (const std::unique_ptr<Place>& place : places_) {
-                place->node->look_after_clients();
+                place->node->remove_closed_clients();
             }
             const FrameClock::Clock::time_point next = begin_frames();
             for (const std::unique_ptr<Place>& place : places_) {
                 if (place->node->port().device().is_unplugged() &&
-                    !std::exchange(place->told_removal, true)) {
+                    !std::exchange(place->removal_announced, true)) {
                     locked.unlock();
-                    place->node->tell_removal();
+                    place->node->announce_removal();
                     locked.lock();
                     break;
                 }
@@ -161,14 +161,14 @@ class Emulation {
         }
     }
 
-    std::string obeyed(const std::string& order) {
+    std::string executed(const std::string& order) {
         if (order == "plug") {
             plug(settings_.devices.front(), {});
-            places_.back()->node->tell_arrival();
+            places_.back()->node->announce_arrival();
             return "ok";
         }
         const std::lock_guard locked{mutex_};
-        return obey(places_.back()->node->port(), order);
+        return execute_order(places_.back()->node->port(), order);
     }
 
     Settings settings_;

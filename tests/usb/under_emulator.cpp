@@ -49,10 +49,10 @@ int run_under_emulator(const std::string& self, const Machine& machine, std::vec
 
 int main(int count, char** words) {
     const std::string self = std::filesystem::read_symlink("/proc/self/exe");
-    std::vector<std::string> asked(words + 1, words + count);
+    std::vector<std::string> arguments(words + 1, words + count);
     std::string filter;
     bool lists = false;
-    for (const std::string& word : asked) {
+    for (const std::string& word : arguments) {
         filter = word.rfind("--gtest_filter=", 0) == 0 ? word.substr(15) : filter;
         lists = lists || word == "--gtest_list_tests";
     }
@@ -63,18 +63,18 @@ int main(int count, char** words) {
     std::vector<Machine> machines{{"UsbDevice", {}},
                                   {"UsbTwoDevices", {"--serial", "LEFT", "--serial", "RIGHT"}},
                                   {"UsbNoDevice", {"--no-device"}},
-                                  {"UsbForeignDevice", {"--somebody-elses"}},
+                                  {"UsbForeignDevice", {"--wrong-magic"}},
                                   {"UsbDeniedDevice", {"--denied"}},
                                   {"UsbPlainDevice", {"--no-transducer", "--no-velocity"}},
                                   {"UsbText", {"--no-device"}}};
     for (int seed = 1; seed <= palpate::test::cases(10); ++seed) {
-        machines.push_back({"UsbOtherFirmware", {"--chosen-by", std::to_string(seed)}});
+        machines.push_back({"UsbOtherFirmware", {"--seed", std::to_string(seed)}});
     }
     int worst = 0;
     for (const Machine& machine : machines) {
         const std::string suite = machine.suite;
         if (filter.empty() || filter.rfind(suite + ".", 0) == 0) {
-            std::vector<std::string> given = asked;
+            std::vector<std::string> given = arguments;
             if (filter.empty()) {
                 given.push_back("--gtest_filter=" + suite + ".*");
             }

@@ -58,11 +58,11 @@ class UsbfsFiles {
         }
     }
 
-    void tell_removal() {
+    void announce_removal() {
         umockdev_testbed_uevent(testbed_, system_path_.c_str(), "remove");
         umockdev_testbed_remove_device(testbed_, system_path_.c_str());
     }
-    void tell_arrival() { umockdev_testbed_uevent(testbed_, system_path_.c_str(), "add"); }
+    void announce_arrival() { umockdev_testbed_uevent(testbed_, system_path_.c_str(), "add"); }
 
   private:
     static std::string three_digits(int number) { return std::to_string(1000 + number).substr(1); }

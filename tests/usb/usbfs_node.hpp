@@ -51,18 +51,18 @@ class UsbfsNode {
         show_readiness();
     }
     /// Removes the transfers of clients that ended without closing the device.
-    void look_after_clients() {
-        for (auto& [client, is_there] : clients_) {
-            if (is_there && umockdev_ioctl_client_get_connected(client) == FALSE) {
-                is_there = false;
-                forget(client);
+    void remove_closed_clients() {
+        for (auto& [client, is_connected] : clients_) {
+            if (is_connected && umockdev_ioctl_client_get_connected(client) == FALSE) {
+                is_connected = false;
+                remove_client(client);
             }
         }
     }
 
     /// Must be called without the mutex, because the testbed may be in an ioctl that waits for it.
-    void tell_removal() { files_->tell_removal(); }
-    void tell_arrival() { files_->tell_arrival(); }
+    void announce_removal() { files_->announce_removal(); }
+    void announce_arrival() { files_->announce_arrival(); }
 
   private:
     void show_readiness() { files_->show(!port_.done().empty()); }
@@ -87,19 +87,19 @@ class UsbfsNode {
         }
     }
 
-    void forget(const UMockdevIoctlClient* client) {
-        port_.forget(client);
+    void remove_client(const UMockdevIoctlClient* client) {
+        port_.remove_client(client);
         if (claimed_by_ == client) {
-            let_go();
+            reset_host();
         }
         // The data of these transfers ended with the client.
         std::erase_if(urbs_, [&](const auto& urb) { return urb.first.first == client; });
         show_readiness();
     }
 
-    void let_go() {
+    void reset_host() {
         claimed_by_ = nullptr;
-        port_.let_go();
+        port_.reset_host();
         clock_->host_left();
     }
 
@@ -129,7 +129,7 @@ class UsbfsNode {
         try {
             result = answer(client, request, data);
         } catch (const Gone&) {
-            forget(client);
+            remove_client(client);
         }
         if (data != nullptr) {
             g_object_unref(data);
@@ -173,7 +173,7 @@ class UsbfsNode {
                 if (claimed_by_ != client) {
                     return -EINVAL;
                 }
-                let_go();
+                reset_host();
                 return 0;
             case USBDEVFS_GETDRIVER:
             case USBDEVFS_IOCTL:

@@ -128,12 +128,12 @@ class UsbIp {
 
     bool read_all(std::uint8_t* bytes, std::size_t size) {
         while (size > 0) {
-            const ssize_t got = ::read(wire_, bytes, size);
-            if (got <= 0 && errno != EINTR) {
+            const ssize_t received = ::read(wire_, bytes, size);
+            if (received <= 0 && errno != EINTR) {
                 return false;
             }
-            bytes += got > 0 ? got : 0;
-            size -= static_cast<std::size_t>(got > 0 ? got : 0);
+            bytes += received > 0 ? received : 0;
+            size -= static_cast<std::size_t>(received > 0 ? received : 0);
         }
         return true;
     }
@@ -168,7 +168,7 @@ int run(Settings settings) {
     using namespace std::chrono_literals;
     const Identity identity = settings.devices.empty() ? Identity{} : settings.devices.front();
     Port port{EmulatedDevice{identity, settings.plant, settings.script}};
-    FrameClock clock{settings.lock_step, settings.rate_hz, settings.patience};
+    FrameClock clock{settings.lock_step, settings.rate_hz, settings.lock_step_timeout};
     std::ofstream trace;
     if (!settings.trace.empty()) {
         trace.open(settings.trace);
@@ -177,7 +177,7 @@ int run(Settings settings) {
     std::mutex mutex;
     const Orders orders{[&](const std::string& order) {
         const std::lock_guard locked{mutex};
-        return obey(port, order);
+        return execute_order(port, order);
     }};
     std::atomic<bool> over{false};
     std::thread bus{[&] {

@@ -21,8 +21,8 @@ enum class Status : std::uint8_t {
     Jump,
     Frozen,
     Ramp,
-    Drained,
-    Softened,
+    EnergyLimited,
+    LimitCycleScaled,
 };
 
 /// Word and meaning of a status.
@@ -35,17 +35,17 @@ struct StatusText {
 inline constexpr std::array<StatusText, 13> status_texts{{
     {"Ok", "the step is exact to its tolerance"},
     {"MaxIterations", "the solver used all its evaluations; the position is its best one"},
-    {"NotUnique", "the load line meets the environment where it falls faster than the line rises"},
+    {"NotUnique", "the force falls more steeply than the load line rises; another solution may exist"},
     {"NonFinite", "an input or the environment was not a finite number; the force sent is zero"},
     {"Timeout", "the device did not answer in time"},
-    {"Lost", "a sample of the device was lost or came twice"},
-    {"Fault", "the device reported a fault or is gone; the force sent is zero"},
+    {"Lost", "a sample of the device was lost or repeated"},
+    {"Fault", "the device reported a fault or was disconnected; the force sent is zero"},
     {"Limited", "the force was clipped to the limit of the host or of the device"},
     {"Jump", "the position moved farther in one sample than the device can; the force sent is zero"},
-    {"Frozen", "the position stood still at once out of full motion; the force sent is zero"},
-    {"Ramp", "the force is still on its way up from zero after the start"},
-    {"Drained", "the rendering had given all the energy it may; a force that gives more was scaled down"},
-    {"Softened", "the handle buzzed; all forces are scaled down from then on"},
+    {"Frozen", "the position stopped within one sample during fast motion; the force sent is zero"},
+    {"Ramp", "the force is scaled up from zero after the start"},
+    {"EnergyLimited", "the rendering had given all energy that it may give; the force was scaled down"},
+    {"LimitCycleScaled", "a limit cycle was detected; all forces are scaled down until the end of the run"},
 }};
 
 /// Returns word and meaning of a status.
@@ -56,8 +56,8 @@ inline constexpr std::array<StatusText, 13> status_texts{{
 /// Returns true if a tick of this status sends a force. The others send zero.
 [[nodiscard]] constexpr bool sends_force(Status status) noexcept {
     return status == Status::Ok || status == Status::MaxIterations || status == Status::NotUnique ||
-           status == Status::Limited || status == Status::Ramp || status == Status::Drained ||
-           status == Status::Softened;
+           status == Status::Limited || status == Status::Ramp || status == Status::EnergyLimited ||
+           status == Status::LimitCycleScaled;
 }
 
 /// Returns true if no tick can follow: the device or its readings are not reliable any more.

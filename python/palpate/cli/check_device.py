@@ -18,22 +18,26 @@ from ..planning import DeviceProfile
 from ..verdict import Verdict, no
 from .exit_status import end_with
 from .live import device_options, live_line
-from .printing import number, print_json, print_numbers, print_verdict, talk
-from .verb import PATH, json_option, require_writable, verb
+from .printing import number, print_details, print_json, print_numbers, print_verdict, talk
+from .verb import PATH, json_option, require_writable, verb, verbose_option
 
 _MARKS = {True: "ok", False: "WRONG", None: "-"}
 
 
 @verb("palpate check-device --device usb --push", ends_at_once=False, no_args_is_help=False)
 @device_options
-@click.option("--rate-hz", type=float, default=1000.0, help="Samples a second.")
-@click.option("--duration-s", type=float, default=10.0, help="Total duration.")
+@click.option("--rate-hz", type=float, default=1000.0, help="Sampling rate [Hz].")
+@click.option("--duration-s", type=float, default=10.0, help="Total duration [s].")
 @click.option(
-    "--push", is_flag=True, help="Also push the handle a little: sign of the force, delay, mechanics."
+    "--push", is_flag=True, help="Also push the handle a little, to measure sign, delay and mechanics."
 )
-@click.option("--profile", type=PATH, metavar="DEVICE.toml", help="Expected profile: does it hold?")
+@click.option("--profile", type=PATH, metavar="DEVICE.toml", help="Profile to compare with the device.")
 @click.option(
-    "--model", "model_file", type=PATH, metavar="MODEL.json", help="Model with a certificate: does it hold?"
+    "--model",
+    "model_file",
+    type=PATH,
+    metavar="MODEL.json",
+    help="Model whose certificate is compared with the device.",
 )
 @click.option(
     "--write-profile",
@@ -47,8 +51,9 @@ _MARKS = {True: "ok", False: "WRONG", None: "-"}
     metavar="F",
     help="Friction of the device in N or N*m, if the pushes cannot show it; at most the true one.",
 )
-@click.option("--yes", is_flag=True, help="Push without asking.")
+@click.option("--yes", is_flag=True, help="Push without a question.")
 @json_option
+@verbose_option
 def check_device(
     device: str,
     object_file: Path | None,
@@ -63,25 +68,30 @@ def check_device(
     coulomb_friction: float | None,
     yes: bool,
     as_json: bool,
+    verbose: bool,
 ) -> None:
     """Measure a device and judge if it can render force.
 
     The device stays disabled while its rate, period, lost samples and encoder are measured. Move the handle
     against an object to show the signs of its velocity and transducer. A reversed motor cannot be detected
-    while the drive is disabled: with --push, and only where the rest is right, the device is enabled for
-    pushes of half a percent of its force. Do not render before that. Exit code 1: not suitable.
+    while the drive is disabled. With --push, and only if everything else is right, the device is enabled for
+    pushes of half a percent of its force. Do not render before this check. Exit code 1: not suitable.
     """
     if write_profile is not None:
         if not push:
-            raise InputError("--write-profile needs --push: the mechanics show only in motion")
+            raise InputError("--write-profile needs --push, because the mechanics are measured in motion")
         require_writable(write_profile)
     mounted = None if object_file is None else load_model(object_file)
     expected = None if profile is None else DeviceProfile.load(profile)
     certified = None if model_file is None else load_model(model_file)
     if push and not yes and device != "simulated":
         if not sys.stdin.isatty():
-            raise InputError("--push moves the handle; at no terminal it needs --yes")
-        click.confirm("The handle will be pushed a little to either side. Is it free?", abort=True, err=True)
+            raise InputError("--push moves the handle; without a terminal it needs --yes")
+        click.confirm(
+            "The device will push the handle a little to both sides. Is the handle free?",
+            abort=True,
+            err=True,
+        )
     talk(f"checking {device} for {number(duration_s)} s; move the handle, and hold it still for a second")
     with live_line(rate_hz, ("rad", "Nm")) as line:
         found = check(
@@ -121,16 +131,17 @@ def check_device(
         print_verdict(verdict)
         print_numbers(
             {
-                "palpate": f"{__version__}, Python {platform.python_version()}, {platform.platform()}, "
-                f"{os.cpu_count()} cores",
                 "device": found.device,
                 **{
                     each.name: f"{_MARKS[each.right]:5} {each.text}"
-                    + (f" ({each.advice})" if each.right is None and each.advice else "")
                     for each in found.observations
+                    if verbose or not each.detail or each.right is False
                 },
             }
         )
+        if verbose:
+            python = f"palpate {__version__}, Python {platform.python_version()}"
+            print_details([f"{python}, {platform.platform()}, {os.cpu_count()} cores"])
     if written is not None:
         talk(f"wrote {written}")
     end_with(verdict)

@@ -42,7 +42,9 @@ RENDERED_S = 4.0
 
 
 @verb("palpate demo -o demo", no_args_is_help=False)
-@click.option("-o", "--output", type=PATH, metavar="FOLDER", default=Path("demo"), help="Where the files go.")
+@click.option(
+    "-o", "--output", type=PATH, metavar="FOLDER", default=Path("demo"), help="Folder of the results."
+)
 @json_option
 def demo(output: Path, as_json: bool) -> None:
     """Identify, verify and render a sample, without any input or device.
@@ -51,13 +53,13 @@ def demo(output: Path, as_json: bool) -> None:
     of them, verified on the other, and rendered on a simulated device with each structure.
     """
     _require_folder(output)
-    talk(f"everything in this demo is simulated, nothing was measured; its files go to {output}")
+    talk(f"all data of this demo is simulated; results: {output}")
     recording, fresh = (sample_recording(seed) for seed in (IDENTIFY_SEED, FRESH_SEED))
     talk(f"identifying from {len(recording)} simulated samples ...")
     start = time.perf_counter()
     model = identify(recording)
     seconds = time.perf_counter() - start
-    talk("verifying on a fresh simulated recording, and closing the loop both ways ...")
+    talk("verifying on a fresh simulated recording, also in closed loop ...")
     verification = verify(model, fresh)
     loops = close_loops(model, fresh)
     talk("rendering on a simulated device with each structure ...")
@@ -66,10 +68,10 @@ def demo(output: Path, as_json: bool) -> None:
     verdict = model.verdict + Verdict(tuple(error_findings(verification.nrmse, "the fresh recording")))
     files = {
         "sample-1.csv": "simulated recording that the model was identified from",
-        "sample-2.csv": "simulated recording that it was verified on",
+        "sample-2.csv": "simulated recording that the model was verified on",
         "model.json": "the model",
-        "force-over-position.png": "the model beside the fresh recording, residuals beneath",
-        "closed-loop.png": "recorded and rendered force over position, the loop closed both ways",
+        "force-over-position.png": "the model and the fresh recording, with residuals",
+        "closed-loop.png": "recorded and rendered force over position in closed loop",
         "structures.png": "force error of each rendering structure",
     }
     with finishing():
@@ -139,7 +141,9 @@ def _require_folder(folder: Path) -> None:
     if folder.is_dir():
         require_writable(folder / "model.json")
     elif folder.exists():
-        raise InputError(f"{folder} is a file, and the demo writes a folder; choose another with --output")
+        raise InputError(
+            f"{folder} is a file, but the demo writes a folder; choose another name with --output"
+        )
     else:
         require_writable(folder)
 

@@ -35,14 +35,14 @@ class WorkError(Exception):
 
 
 @dataclass(frozen=True)
-class Ending:
-    """Exit code and its message; empty without a reader or need for one."""
+class ExitStatus:
+    """Exit code and its message, which may be empty."""
 
     code: int
     sentence: str = ""
     help: str = ""
 
-    def tell(self, *, as_json: bool) -> None:
+    def report(self, *, as_json: bool) -> None:
         """Prints the sentence: as one object on standard output with --json, else on standard error.
 
         A stream that cannot be written does not change the exit code.
@@ -90,9 +90,9 @@ def interrupted_at_once() -> Iterator[None]:
                 for worker in multiprocessing.active_children():
                     worker.terminate()
                 end_line_on_terminal()
-                ending = ending_of(KeyboardInterrupt())
-                ending.tell(as_json=as_json)
-                os._exit(ending.code)
+                status = exit_status_of(KeyboardInterrupt())
+                status.report(as_json=as_json)
+                os._exit(status.code)
 
     watching = threading.Thread(target=watch, daemon=True)
     watching.start()
@@ -108,31 +108,31 @@ def interrupted_at_once() -> Iterator[None]:
         os.close(writer)
 
 
-def ending_of(error: BaseException) -> Ending:
-    """Returns the ending for an exception from a verb."""
+def exit_status_of(error: BaseException) -> ExitStatus:
+    """Returns the exit status for an exception from a verb."""
     if isinstance(error, click.exceptions.Exit):
-        return Ending(error.exit_code)
+        return ExitStatus(error.exit_code)
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
-        return Ending(BAD_INPUT, help=error.format_message())
+        return ExitStatus(BAD_INPUT, help=error.format_message())
     if isinstance(error, click.ClickException):
-        return Ending(BAD_INPUT, _usage_sentence(error))
+        return ExitStatus(BAD_INPUT, _usage_sentence(error))
     if isinstance(error, (KeyboardInterrupt, click.Abort)):
-        return Ending(INTERRUPTED, "interrupted; nothing was written")
+        return ExitStatus(INTERRUPTED, "interrupted; nothing was written")
     if isinstance(error, BrokenPipeError):
-        return Ending(FAILED)
+        return ExitStatus(FAILED)
     if isinstance(error, ValueError):
-        return Ending(BAD_INPUT, _one_line(str(error)))
+        return ExitStatus(BAD_INPUT, _one_line(str(error)))
     if isinstance(error, (WorkError, OutputError)):
-        return Ending(FAILED, _one_line(str(error)))
+        return ExitStatus(FAILED, _one_line(str(error)))
     if isinstance(error, MemoryError):
-        return Ending(FAILED, "there is not enough memory for this recording")
+        return ExitStatus(FAILED, "there is not enough memory for this recording")
     if isinstance(error, OSError):
         where = f" {error.filename}" if error.filename else ""
-        return Ending(FAILED, f"the operating system refuses{where}: {error.strerror or error}")
+        return ExitStatus(FAILED, f"the operating system refuses{where}: {error.strerror or error}")
     if isinstance(error, Exception):
         place = traceback.extract_tb(error.__traceback__)[-1]
-        what = f"{type(error).__name__}: {error} ({os.path.basename(place.filename)}, line {place.lineno})"
-        return Ending(FAILED, _one_line(f"this is a defect of palpate, please report it: {what}"))
+        fault = f"{type(error).__name__}: {error} ({os.path.basename(place.filename)}, line {place.lineno})"
+        return ExitStatus(FAILED, _one_line(f"this is a defect of palpate, please report it: {fault}"))
     raise error
 
 

@@ -95,7 +95,7 @@ def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:
     light = Scheme(
         structure="implicit",
         mass=_LIGHTER * paper.scheme.mass,
-        damping=_LIGHTER * paper.scheme.damping,
+        object_damping=_LIGHTER * paper.scheme.object_damping,
         play_radius=paper.scheme.play_radius,
     )
     return [motion_driven(model, recording), paper, force_driven(model, recording, light)]

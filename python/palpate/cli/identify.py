@@ -28,6 +28,7 @@ from .exit_status import end_with, finishing
 from .figures import picture_verification
 from .printing import (
     number,
+    print_details,
     print_json,
     print_line,
     print_numbers,
@@ -39,12 +40,14 @@ from .printing import (
 from .verb import (
     PATH,
     ReadingOptions,
+    expert_option,
     json_option,
     options,
     plot_option,
     reading_options,
     require_writable,
     verb,
+    verbose_option,
 )
 
 _READ_BY_PARTS = ("position", "force", "time", "direction", "units", "negate", "invalid")
@@ -59,23 +62,26 @@ def _text(value: Any) -> str:
 
 
 HELP = {
-    "inputs": "auto, or names joined by commas: position, then hysteresis, velocity or columns.",
-    "max_wavelets": "Largest network tried.",
+    "inputs": "auto, or position,hysteresis,velocity,COLUMN.",
+    "max_wavelets": "Largest number of wavelets.",
     "criterion": "When to stop adding wavelets.",
-    "loss": "Least squares, or rows far from the others weighed down.",
+    "loss": "squares: least squares; huber: outliers weigh less.",
     "hysteresis_nonnegative": "Impose that every loop loses energy.",
-    "slope_bounds": "Least and largest slope imposed, in force per position.",
-    "monotone": "Impose that the force never falls with position.",
-    "fixed_force": "Position and force that the model goes through.",
-    "coupling_stiffness": "Keep the slope below 0.9 of it, in force per position.",
-    "period": "Period of a periodic environment, in its position unit.",
-    "search": "Further setting of the search, repeatable: "
+    "slope_bounds": "Smallest and largest slope imposed [N/m or N*m/rad].",
+    "monotone": "The force never falls with position.",
+    "fixed_force": "Position and force that the model goes through [SI].",
+    "coupling_stiffness": "Impose a slope below 0.9 of this stiffness [N/m or N*m/rad].",
+    "period": "Period of a repeating force [m or rad].",
+    "search": "Setting of the search, repeatable: "
     + ", ".join(f"{each.name}={_text(each.default)}" for each in fields(SearchOptions))
     + ".",
 }
 
-_METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE"}
-"""Meaning of the numbers of an option."""
+_METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE", "inputs": "NAMES"}
+"""Name of the value of an option."""
+
+_GROUP = {"inputs": "Model", "monotone": "Constraints"}
+"""Groups of the options in the help; all others are for experts."""
 
 
 def _search(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> SearchOptions:
@@ -88,19 +94,19 @@ def _search(ctx: click.Context, param: click.Parameter, values: tuple[str, ...])
 
 def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
     flag = "--" + name.replace("_", "-")
-    text: dict[str, Any] = {"default": default, "help": HELP.get(name)}
+    text: dict[str, Any] = {"default": default, "help": HELP.get(name), "group": _GROUP.get(name, "Expert")}
     alternatives = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     kinds = [kind for kind in alternatives if kind is not NoneType]
     if kinds == [bool]:
-        return click.option(f"{flag}/--no-{flag[2:]}", name, **text)
+        return expert_option(f"{flag}/--no-{flag[2:]}", name, show_default=default, **text)
     if kinds == [SearchOptions]:
         text |= {"default": (), "metavar": "NAME=VALUE", "callback": _search}
-        return click.option(flag, name, multiple=True, **text)
+        return expert_option(flag, name, multiple=True, **text)
     if len(kinds) == 1 and get_args(kinds[0]):
         text |= {"nargs": len(get_args(kinds[0])), "metavar": _METAVAR.get(name)}
-        return click.option(flag, name, type=float, **text)
+        return expert_option(flag, name, type=float, **text)
     kind = click.Choice(CHOICES[name]) if name in CHOICES else kinds[0]
-    return click.option(flag, name, type=kind, **text)
+    return expert_option(flag, name, type=kind, metavar=_METAVAR.get(name), **text)
 
 
 _HINTS = get_type_hints(IdentifyOptions)
@@ -111,46 +117,46 @@ _IDENTIFY_OPTIONS = [
 
 @verb("palpate identify press.csv -o press.json --hold-out-every 5 --plot press.png")
 @click.argument("recording_files", metavar="RECORDING...", type=PATH, nargs=-1, required=True)
-@click.option(
-    "-o", "--output", type=PATH, metavar="MODEL.json", required=True, help="The model file to write."
-)
+@click.option("-o", "--output", type=PATH, metavar="MODEL.json", required=True, help="Model file to write.")
 @click.option(
     "--hold-out-every",
     type=click.IntRange(min=2),
     default=None,
     metavar="K",
-    help="Keep every K-th row out of the identification and report the error on these rows.",
+    help="Hold out every K-th row for the error.",
 )
-@click.option(
+@plot_option("force over position, and the residuals")
+@json_option
+@verbose_option
+@expert_option(
     "--baselines",
-    "beside",
+    "with_baselines",
     is_flag=True,
     help="Fit the usual methods to the same rows and compare; needs --hold-out-every.",
 )
-@click.option(
+@expert_option(
     "--out-of-core", is_flag=True, help="Read files larger than memory part by part, each row once."
 )
-@click.option(
+@expert_option(
     "--jobs",
     type=click.IntRange(min=1),
     default=1,
-    help="Processes that read the files; more than one implies --out-of-core.",
+    help="Processes that read the files; above 1 implies --out-of-core.",
 )
-@click.option(
+@expert_option(
     "--scheduler",
     metavar="ADDRESS",
     default=None,
     help="Dask scheduler whose workers read the files (tcp://host:8786); implies --out-of-core.",
 )
-@plot_option("measured and modelled force over position, residuals beneath")
-@json_option
 @reading_options
 @options(*_IDENTIFY_OPTIONS)
 def identify(
     recording_files: tuple[Path, ...],
     output: Path,
     hold_out_every: int | None,
-    beside: bool,
+    verbose: bool,
+    with_baselines: bool,
     out_of_core: bool,
     jobs: int,
     scheduler: str | None,
@@ -161,21 +167,19 @@ def identify(
 ) -> None:
     """Identify a model of force over position from recordings.
 
-    A recording is CSV, Parquet, Excel, NumPy (.npz), MATLAB (.mat) or MCAP. The name of a column states its
-    unit: position_rad, "Force [gf]", "Force (mN)", "Force / N". Columns are chosen by name and unit; the
-    first line printed says which. The model is as simple as the data allows: a constant, a line, a wavelet
-    network, and hysteresis where press and release differ.
+    RECORDING: CSV, Parquet, Excel, .npz, .mat or MCAP, with the unit in each column name: position_rad,
+    "Force [gf]", "Force / N". The simplest model that fits is taken.
     """
     require_writable(output, plot, inputs=recording_files)
     recordings: list[Recording] = []
     by_parts = out_of_core or jobs != 1 or scheduler is not None
     if by_parts:
         left = {name: value for name, value in reading.options.items() if name not in _READ_BY_PARTS}
-        _require_unused(hold_out_every=hold_out_every, baselines=beside, plot=plot, **left)
+        _require_unused(hold_out_every=hold_out_every, baselines=with_baselines, plot=plot, **left)
     else:
         columns = [name for name in settings["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
         recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
-    others = _fit_baselines(recordings, hold_out_every) if beside else []
+    others = _fit_baselines(recordings, hold_out_every) if with_baselines else []
     judged_on = recordings
     if hold_out_every is not None:
         parts = [recording.split(hold_out_every) for recording in recordings]
@@ -202,8 +206,6 @@ def identify(
         talk(f"read {model.data.rows} rows; {chosen_columns}")
     seconds = time.perf_counter() - start
     verified = [(recording, verify(model, recording)) for recording in judged_on]
-    for note in model.notes.get("identification", ()):
-        talk(f"  {note}")
     nrmse = model.fit.nrmse if hold_out_every is None else _pooled_nrmse(verified)
     verdict = model.verdict
     if hold_out_every is not None:
@@ -222,7 +224,7 @@ def identify(
     }
     if hold_out_every is not None:
         result["held_out_rows"] = sum(verification.n for _, verification in verified)
-    if beside:
+    if with_baselines:
         result["baselines"] = [asdict(each) for each in others]
     rows = sum(len(recording) for recording in judged_on)
     compared = sum(verification.n for _, verification in verified)
@@ -240,16 +242,18 @@ def identify(
             print_verdict(verdict)
             print_numbers(
                 {
-                    "model": str(output),
-                    "wavelets": str(model.n_wavelets),
-                    "parameters": str(model.n_parameters),
-                    "kind": f"{model.fit.model_class}, stopped by {model.stop_reason}",
-                    "nrmse": f"{number(nrmse)} on {judged}",
-                    "seconds": f"{seconds:.2f}",
+                    "model": f"{output}: {model.fit.model_class}, {model.n_wavelets} wavelets, "
+                    f"{model.n_parameters} parameters",
+                    "error": f"{_rms_text(verified)}NRMSE {number(nrmse)} on {judged}",
+                    **dict(_decision(note) for note in model.notes.get("model_selection", ())),
+                    "time": f"{seconds:.2f} s",
                 }
             )
-            if beside:
-                _print_beside(nrmse, model.n_parameters, seconds, others)
+            if with_baselines:
+                _print_baselines(nrmse, model.n_parameters, seconds, others)
+            if verbose:
+                notes = model.notes.get("identification", ())
+                print_details([f"growth of the network stopped by {model.stop_reason}", *notes])
     end_with(verdict)
 
 
@@ -261,6 +265,20 @@ def _require_unused(**others: Any) -> None:
                 f"--{name.replace('_', '-')} needs all rows at once, and these files are read part by part; "
                 "palpate verify compares the model with a recording"
             )
+
+
+def _rms_text(verified: Sequence[tuple[Recording, Verification]]) -> str:
+    """Returns the RMS error of all rows in the unit of the file, as "RMS 0.02 N*m, "."""
+    if not verified:
+        return ""
+    rms = float(np.sqrt(np.mean(np.concatenate([found.residual for _, found in verified]) ** 2)))
+    return f"RMS {verified[0][0].in_file_unit('force', rms)}, "
+
+
+def _decision(note: str) -> tuple[str, str]:
+    """Splits a decision of the model selection into the model class and the rest."""
+    model_class, _, decision = note.partition(": ")
+    return model_class, decision
 
 
 def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:
@@ -278,7 +296,7 @@ def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) 
     return compare(recordings, hold_out_every)
 
 
-def _print_beside(nrmse: float, n_parameters: int, seconds: float, others: Sequence[Compared]) -> None:
+def _print_baselines(nrmse: float, n_parameters: int, seconds: float, others: Sequence[Compared]) -> None:
     """Prints the model first, then the baselines."""
     rows = [("wavelet network", number(nrmse), str(n_parameters), f"{seconds:.2f}")]
     rows += [

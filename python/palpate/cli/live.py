@@ -30,7 +30,7 @@ device_options = options(
         "--wait-ms",
         type=click.FloatRange(0.1, 10000),
         show_default="5",
-        help="How long to wait for a packet of a USB device.",
+        help="Longest wait for a packet of a USB device [ms].",
     ),
     click.option(
         "--transducer/--no-transducer",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Entry point: finds the verb, runs it, converts every ending to an exit code and at most one sentence."""
+"""Entry point: finds the verb, runs it, returns an exit code and prints at most one sentence."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from importlib import import_module
 
 import click
 
-from .exit_status import INTERRUPTED, ending_of
+from .exit_status import INTERRUPTED, exit_status_of
 from .printing import Verbs, drop_what_cannot_be_written, prepare_streams, print_line
 
 _VERBS = {
     "identify": "Identify a model from recordings.",
     "verify": "Compare a model with a recording.",
-    "plan": "Choose and certify how a model is rendered on a device.",
+    "plan": "Choose and certify the rendering of a model on a device.",
     "simulate": "Render a model on a simulated device.",
     "render": "Render a model live, tick by tick.",
     "record": "Record a real object.",
     "devices": "List haptic devices.",
-    "check-device": "Measure for ten seconds whether a device is fit for it.",
-    "show": "Print a model for a person.",
+    "check-device": "Measure a device and judge if it can render force.",
+    "show": "Print a model.",
     "demo": "Identify, verify and render a simulated sample.",
 }
 """Every verb with its line in the help. Its file is imported only when it is used."""
@@ -69,7 +69,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, wanted: bool) -> 
     help="Print the version.",
 )
 def palpate() -> None:
-    """From a recorded force over position to a force that is rendered."""
+    """Identify, verify, plan and render the force of a recorded object."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -86,9 +86,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             palpate.invoke(context)
         sys.stdout.flush()
     except BaseException as error:
-        ending = ending_of(error)
-        ending.tell(as_json="--json" in given)
-        code = ending.code
+        status = exit_status_of(error)
+        status.report(as_json="--json" in given)
+        code = status.code
     drop_what_cannot_be_written()
     if code == INTERRUPTED and arguments is None:
         os._exit(code)  # unloading the libraries would take noticeably long

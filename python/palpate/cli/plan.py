@@ -12,7 +12,7 @@ import click
 from .._core.stability import Certificate
 from ..model import load_model
 from ..model.model_file import certificate_record
-from ..planning import DeviceProfile, Plan, example_profiles, profile_file
+from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, profile_file
 from ..planning.candidates import CANDIDATES
 from ..planning.search import plan as choose
 from .exit_status import end_with, finishing
@@ -20,6 +20,7 @@ from .figures import figure_file, source_name
 from .printing import (
     Verb,
     number,
+    print_details,
     print_json,
     print_line,
     print_numbers,
@@ -27,7 +28,7 @@ from .printing import (
     print_verdict,
     talk,
 )
-from .verb import PATH, json_option, plot_option, require_writable, verb
+from .verb import PATH, json_option, plot_option, require_writable, verb, verbose_option
 
 
 class Samples(click.ParamType[int | str]):
@@ -41,7 +42,7 @@ class Samples(click.ParamType[int | str]):
         try:
             return int(value)
         except ValueError:
-            self.fail(f"'{value}' is no number of samples: give 0 to 16, auto or off", param, ctx)
+            self.fail(f"'{value}' is not a number of samples: give 0 to 16, auto or off", param, ctx)
 
 
 class _PlanVerb(Verb):
@@ -56,14 +57,14 @@ class _PlanVerb(Verb):
 
 _HELP = """Choose the structure that renders a model on a device, and certify it.
 
-The first of these structures that is certified is taken:
+The first of these structures that is certified is chosen:
 
 \b
 {}
 
-Every refusal names the inequality that failed and by how much. The identified network stays in the file; a
-limited network stands under plan. Exit code 1: no structure holds, or the force error is larger than
-accepted. Nothing is written then.
+Each refusal names the inequality that fails and the missing amount. The file keeps the identified network; a
+limited network is stored with the plan. Exit code 1: no structure is certified, or the force error is larger
+than accepted. Then nothing is written.
 """.format("\n".join(f"  {name}: {candidate.use}" for name, candidate in CANDIDATES.items()))
 
 
@@ -72,7 +73,10 @@ def _list_examples(*, as_json: bool) -> None:
     examples = example_profiles()
     if as_json:
         print_json(
-            {name: {"file": str(file), "sources": list(told)} for name, (file, told) in examples.items()}
+            {
+                name: {"file": str(file), "sources": list(sources)}
+                for name, (file, sources) in examples.items()
+            }
         )
         return
     for name, (file, sources) in examples.items():
@@ -91,11 +95,33 @@ def _list_examples(*, as_json: bool) -> None:
 )
 @click.option("-o", "--output", type=PATH, metavar="OUT.json", default=None, help="Write model and plan.")
 @click.option("--coupling", is_flag=True, help="Render through a virtual coupling.")
-@click.option("--coupling-stiffness", type=float, default=None, help="K_c; chosen from the device.")
-@click.option("--coupling-damping", type=float, default=None, help="B_c; chosen from the device.")
-@click.option("--mass", type=float, default=None, help="Object mass; the model's own. 0 leaves it out.")
-@click.option("--damping", type=float, default=None, help="Object damping; the model's own. 0 leaves it out.")
-@click.option("--play-radius", type=float, default=None, help="r of a model with hysteresis.")
+@click.option(
+    "--coupling-stiffness",
+    type=float,
+    default=None,
+    help="K_c [N/m or N*m/rad]; default: chosen from the device.",
+)
+@click.option(
+    "--coupling-damping",
+    type=float,
+    default=None,
+    help="B_c [N*s/m or N*m*s/rad]; default: chosen from the device.",
+)
+@click.option(
+    "--mass",
+    type=float,
+    default=None,
+    help="Mass of the object [kg or kg*m^2]; default: that of the model; 0: none.",
+)
+@click.option(
+    "--object-damping",
+    type=float,
+    default=None,
+    help="Damping of the object; default: that of the model; 0: none.",
+)
+@click.option(
+    "--play-radius", type=float, default=None, help="Play radius r of a model with hysteresis [m or rad]."
+)
 @click.option(
     "--predict",
     type=Samples(),
@@ -109,18 +135,25 @@ def _list_examples(*, as_json: bool) -> None:
     metavar="SHARE",
     default=None,
     show_default="0.1",
-    help="Largest difference of felt and identified force to accept, over the range of the force.",
+    help="Largest accepted force error, as a share of the range of the force.",
 )
 @plot_option("the root locus of the explicit structure over its damping")
 @click.option(
     "--examples",
     is_flag=True,
     expose_value=False,
-    help="List the example profiles with their sources, and end.",
+    help="List the example profiles with their sources, then exit.",
 )
 @json_option
+@verbose_option
 def plan(
-    model_file: Path, device: str, output: Path | None, plot: Path | None, as_json: bool, **wishes: Any
+    model_file: Path,
+    device: str,
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool,
+    verbose: bool,
+    **given: Any,
 ) -> None:
     """Choose the structure that renders a model on a device, and certify it."""
     profile_path = profile_file(device)
@@ -130,7 +163,7 @@ def plan(
     model = load_model(model_file, with_plan=False)
     talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")
     began = time.perf_counter()
-    chosen = choose(model, profile, **{name: wish for name, wish in wishes.items() if wish is not None})
+    chosen = choose(model, profile, **{name: value for name, value in given.items() if value is not None})
     seconds = time.perf_counter() - began
     verdict, certificate = chosen.verdict, chosen.certificate
     assert certificate is not None
@@ -144,16 +177,19 @@ def plan(
         if as_json:
             print_json(_result(chosen, certificate, written, seconds))
         else:
-            _print(chosen, certificate, written, seconds)
+            print_verdict(verdict)
+            print_numbers(_summary(chosen, certificate, profile, written))
+            if verbose:
+                print_details([f"planned in {seconds:.1f} s", *_details(chosen, certificate)])
     end_with(verdict)
 
 
-_LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "rests_on", "source")
+_LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "basis", "source")
 
 
 def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
     error = plan.force_error
-    felt, steepest = plan.felt_slopes
+    felt, steepest = plan.slopes_behind_coupling
     return {
         "structure": plan.structure,
         "verdict": str(plan.verdict),
@@ -165,32 +201,46 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
         "plan": plan.record(),
         "certificate": certificate_record(certificate),
         "inequalities": [{name: getattr(line, name) for name in _LINE} for line in certificate.inequalities],
-        "why": certificate.why,
+        "reason": certificate.reason,
         "steepest_slope": steepest,
-        "felt_slope": felt,
+        "slope_behind_coupling": felt,
         "seconds": seconds,
     }
 
 
-def _print(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> None:
-    """Prints the verdict, the plan, the refused structures, and every inequality."""
-    print_verdict(plan.verdict)
-    file = "nothing; -o OUT.json writes model and plan" if written is None else str(written)
-    if plan.verdict.level == "no":
-        file = "nothing, because the verdict is no"
-    print_numbers({**plan.rows(), "planned in": f"{seconds:.1f} s", "written": file})
-    if plan.refused:
-        click.echo("\nrefused")
-        for sentence in plan.refused:
-            print_paragraph(sentence, indent="  ")
-    click.echo("\ninequalities")
+def _summary(
+    plan: Plan, certificate: Certificate, device: DeviceProfile, written: Path | None
+) -> dict[str, str]:
+    """Returns the plan, the device properties that it needs, and its certificate."""
+    rows = plan.summary()
+    _, damping, force = mechanical_units(device.position_unit)
+    units = {"b": ("device damping", damping), "f_c": ("device friction", force)}
+    lines = () if certificate.refused else certificate.inequalities
+    for line in sorted(lines, key=lambda each: -each.margin):  # of several, the tightest is shown
+        name, unit = units.get(line.formula.split(" ")[0], ("", ""))
+        if name:
+            sign, judged = (">=", "OK") if line.holds else ("<", "not enough")
+            rows[name] = f"{number(line.left)} {sign} needed {number(line.right)} {unit}: {judged}"
+    if written is not None:
+        rows["written"] = str(written)
+    elif plan.verdict.level == "no":
+        rows["written"] = "nothing, because the verdict is no"
+    else:
+        rows["written"] = "nothing; -o OUT.json writes model and plan"
+    return rows
+
+
+def _details(plan: Plan, certificate: Certificate) -> list[str]:
+    """Returns the settings of the structure, the refused structures and every inequality, in sentences."""
+    details = [f"{name}: {value}" for name, value in plan.settings().items()]
+    details += [f"refused: {sentence}" for sentence in plan.refused]
     for line in certificate.inequalities:
         word = "holds" if line.holds else "fails"
-        print_paragraph(f"{line.name}: {word}, {line.rests_on}", indent="  ")
-        print_paragraph(line.formula, indent="    ")
-        sides = f"{number(line.left)} against {number(line.right)}, margin {number(line.margin)}"
-        print_paragraph(sides, indent="    ")
-    print_paragraph(certificate.why)
+        details.append(
+            f"{line.name}: {word}, {line.basis}; {line.formula}; {number(line.left)} against "
+            f"{number(line.right)}, margin {number(line.margin)}"
+        )
+    return [*details, certificate.reason]
 
 
 def _picture(path: Path, plan: Plan, profile: DeviceProfile) -> None:

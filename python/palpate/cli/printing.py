@@ -186,6 +186,14 @@ def print_verdict(verdict: Verdict) -> None:
         print_paragraph(reason, indent="  ")
 
 
+def print_details(details: Iterable[str]) -> None:
+    """Prints the sentences that --verbose adds, under a heading."""
+    print_line()
+    print_line("details")
+    for sentence in details:
+        print_paragraph(sentence, indent="  ")
+
+
 def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Prints a table whose first column is text and whose others are numbers, aligned right.
 
@@ -290,10 +298,38 @@ class _Context(click.Context):
     formatter_class = _Formatter
 
 
+GROUPS = ("Input", "Model", "Constraints", "Output", "Expert")
+"""Groups of options in the order of the help."""
+
+
+class Option(click.Option):
+    """Option whose place in the help of a long verb is one of `GROUPS`."""
+
+    def __init__(self, *args: Any, group: str = "Output", **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self.group = group
+
+
 class Verb(click.Command):
     """Command with the help format of palpate."""
 
     context_class = _Context
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Writes the options of each group under its name, or all together if none is for experts."""
+        options = [
+            (getattr(each, "group", "Output"), each)
+            for each in self.get_params(ctx)
+            if isinstance(each, click.Option)
+        ]
+        if "Expert" not in dict(options):
+            super().format_options(ctx, formatter)
+            return
+        for group in GROUPS:
+            rows = [each.get_help_record(ctx) for name, each in options if name == group]
+            if shown := [row for row in rows if row is not None]:
+                with formatter.section(group):
+                    formatter.write_dl(shown)
 
 
 class Verbs(click.Group):

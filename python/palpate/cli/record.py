@@ -22,26 +22,34 @@ from .verb import PATH, json_option, require_writable, verb
 @click.argument("recording", metavar="OUT.csv", type=PATH)
 @device_options
 @click.option("--force", is_flag=True, help="Replace an existing recording.")
-@click.option("--rate-hz", type=float, default=1000.0, help="Samples a second.")
-@click.option("--duration-s", type=float, default=10.0, help="How long; inf: until Ctrl-C.")
-@click.option("--probe", is_flag=True, help="The device moves the handle by itself, slowly to and fro.")
-@click.option("--lower", type=float, help="Where the sweep turns round, in the device's position unit.")
-@click.option("--upper", type=float, help="Where it turns at the other end.")
-@click.option("--speed", type=float, show_default="0.2 rad/s, scaled", help="Of the sweep, a second.")
+@click.option("--rate-hz", type=float, default=1000.0, help="Sampling rate [Hz].")
+@click.option("--duration-s", type=float, default=10.0, help="Duration [s]; inf: until Ctrl-C.")
+@click.option("--probe", is_flag=True, help="The device moves the handle slowly forward and back.")
+@click.option("--lower", type=float, help="Lower end of the sweep, in the device's position unit.")
+@click.option("--upper", type=float, help="Upper end of the sweep.")
 @click.option(
-    "--stiffness", type=float, show_default="50 N*m/rad, scaled", help="That draws the handle along."
+    "--speed",
+    type=float,
+    show_default="0.2 rad/s, scaled",
+    help="Speed of the sweep, in position units per second.",
+)
+@click.option(
+    "--stiffness",
+    type=float,
+    show_default="50 N*m/rad, scaled",
+    help="Stiffness of the spring that moves the handle.",
 )
 @click.option(
     "--force-limit",
     type=float,
     show_default="the device's",
-    help="Where the object holds this, it turns round.",
+    help="The sweep reverses at this force.",
 )
 @click.option(
     "--lowest-rate-share",
     type=click.FloatRange(0, 1),
     show_default="the loop's",
-    help="Of the rate: less for half a second ends a probe, 0: never.",
+    help="Lower rates for half a second end a probe; as a share of the rate; 0: never.",
 )
 @json_option
 def record(
@@ -69,11 +77,11 @@ def record(
         require_absent(recording)
     given = [name for name, value in sweep.items() if value is not None]
     if given and not probe:
-        raise InputError(f"--{given[0].replace('_', '-')} is for --probe, which was not given")
+        raise InputError(f"--{given[0].replace('_', '-')} needs --probe")
     mounted = None if object_file is None else load_model(object_file)
     units = ("rad", "Nm") if mounted is None else (mounted.units["position"], mounted.units["force"])
-    who = "the device moves the handle" if probe else "move the handle over the whole object, slowly"
-    talk(f"{device}: recording to {recording} for {number(duration_s)} s; {who}; Ctrl-C ends it")
+    motion = "the device moves the handle" if probe else "move the handle over the whole object, slowly"
+    talk(f"{device}: recording to {recording} for {number(duration_s)} s; {motion}; Ctrl-C ends it")
     with live_line(rate_hz, units) as line:
         summary = record_object(
             recording,

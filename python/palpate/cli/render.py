@@ -32,16 +32,16 @@ _LOOP = LoopSettings()
 @click.option(
     "--uncertified",
     is_flag=True,
-    help="Render without the certificate's limits: nothing proves that a real device stays stable.",
+    help="Render without a valid certificate; a real device can become unstable.",
 )
 @click.option(
     "--wait-ms",
     type=click.FloatRange(0.1, 10000),
     show_default="5 for USB, 20 for an Inverse3",
-    help="How long to wait for an answer of the device.",
+    help="Longest wait for an answer of the device [ms].",
 )
-@click.option("--rate-hz", type=float, show_default=f"{_LOOP.rate_hz:g}", help="Ticks a second.")
-@click.option("--duration-s", type=float, default=_LOOP.duration_s, help="How long; inf: until Ctrl-C.")
+@click.option("--rate-hz", type=float, show_default=f"{_LOOP.rate_hz:g}", help="Rate of the loop [Hz].")
+@click.option("--duration-s", type=float, default=_LOOP.duration_s, help="Duration [s]; inf: until Ctrl-C.")
 @click.option(
     "--record",
     type=PATH,
@@ -57,13 +57,16 @@ _LOOP = LoopSettings()
     help="Send JSON lines over UDP to this port of this machine (PlotJuggler: 9870).",
 )
 @click.option(
-    "--telemetry-hz", type=click.FloatRange(0.1, 10000), default=usual_telemetry_hz, help="Lines a second."
+    "--telemetry-hz",
+    type=click.FloatRange(0.1, 10000),
+    default=usual_telemetry_hz,
+    help="Rate of the lines [Hz].",
 )
 @click.option(
     "--lowest-rate-share",
     type=click.FloatRange(0, 1),
     default=_LOOP.lowest_rate_share,
-    help="Of the rate: less for half a second ends the run, 0: never.",
+    help="Lower rates for half a second end the run; as a share of the rate; 0: never.",
 )
 @json_option
 @scheme_options

@@ -31,10 +31,12 @@ from .verb import PATH, json_option, plot_option, require_writable, scheme_optio
 @verb("palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv")
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @scheme_options
-@click.option("--duration-s", type=float, default=4.0, help="Simulated time.")
-@click.option("-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Write what was rendered.")
+@click.option("--duration-s", type=float, default=4.0, help="Simulated time [s].")
+@click.option(
+    "-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Recording of the rendering to write."
+)
 @click.option("--force", is_flag=True, help="Replace an existing recording.")
-@plot_option("rendered force beside the model's, differences beneath")
+@plot_option("rendered and modelled force, with their difference")
 @json_option
 def simulate(
     model_file: Path,
@@ -67,7 +69,7 @@ def simulate(
         )
     error = force_error(plan, rendered)
     verdict = judge(plan, rendered, error)
-    endings = Counter(rendered.columns["status"])
+    status_counts = Counter(rendered.columns["status"])
     span = force_range(plan)
     share = error.end / span if span > 0 else None
     extrapolated = float(rendered.columns["extrapolated"].mean())
@@ -83,10 +85,10 @@ def simulate(
         "force_error_work": error.work,
         "force_error_share": share,
         "extrapolated": extrapolated,
-        "status": dict(endings),
+        "status": dict(status_counts),
     }
     with finishing():
-        if output is not None and not endings["NonFinite"]:
+        if output is not None and not status_counts["NonFinite"]:
             rendered.write(output, replace=force)
         if plot is not None:
             picture_rendering(plot, plan, rendered)
@@ -107,7 +109,7 @@ def simulate(
                     "work of the force error": f"{number(error.work)}{' J' if unit else ''}"
                     + ("" if error.work >= 0.0 else ", given to the hand"),
                     "extrapolated": f"{100 * extrapolated:.3g} %",
-                    "ticks": ", ".join(f"{count} {word}" for word, count in endings.most_common()),
+                    "ticks": ", ".join(f"{count} {word}" for word, count in status_counts.most_common()),
                 }
             )
     end_with(verdict)
@@ -120,7 +122,7 @@ def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any]) -> Plan:
             return Plan.of(model)
         if not model.of_velocity:
             talk(
-                "no plan in the model: rendered behind the default coupling, which is felt; "
-                "'palpate plan' finds the simplest rendering that is not"
+                "the model has no plan: the default coupling makes it softer; "
+                "'palpate plan' finds a rendering without this error"
             )
     return Plan(model, rig.scheme(model, **scheme))

@@ -16,7 +16,7 @@ from .._core.rendering import Scheme, most_prediction_taps, structure_names
 from ..errors import InputError
 from ..recording import Recording, read_recording
 from .exit_status import interrupted_at_once
-from .printing import Verb, talk
+from .printing import Option, Verb, talk
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -112,47 +112,52 @@ class ReadingOptions:
         return recording
 
 
-_column = partial(click.option, metavar="COLUMN", default=None)
-_rows = partial(click.option, metavar="START:STOP", callback=_row_range, default=None)
+expert_option = partial(click.option, cls=Option, group="Expert")
+"""Option of a long verb, in the group "Expert" or another one."""
+
+_column = partial(expert_option, metavar="COLUMN", default=None)
+_rows = partial(expert_option, metavar="START:STOP", callback=_row_range, default=None)
 
 _READING = options(
-    _column("--position", help="Column of the position; else chosen by name and unit."),
-    _column("--force", help="Column of the force; else chosen by name and unit."),
-    _column("--time", help="Column of the time; else chosen by name and unit."),
-    _column("--direction", help="Column of the stroke's direction (press, release)."),
-    click.option(
+    _column("--position", group="Input", help="Column of the position; else chosen by unit."),
+    _column("--force", group="Input", help="Column of the force; else chosen by unit."),
+    expert_option(
         "--units",
+        group="Input",
         metavar="NAME=UNIT",
         callback=_names_and_units,
         multiple=True,
-        help="Unit of a column whose name has none. Repeat for several.",
+        help="Unit of a column whose name has none.",
     ),
-    click.option(
+    expert_option(
+        "--force-late-s",
+        metavar="SECONDS",
+        type=float,
+        default=0.0,
+        help="Delay of the recorded force [s]; needs time.",
+    ),
+    _column("--time", help="Column of the time; else chosen by unit."),
+    _column("--direction", help="Column of the stroke's direction (press, release)."),
+    expert_option(
         "--negate",
         metavar="COLUMN",
         multiple=True,
-        help="Turn the sign of position, force or a column. Repeat for several.",
+        help="Invert the sign of position, force or a column; repeatable.",
     ),
-    click.option(
+    expert_option(
         "--torque-constant-Nm-per-A",
         "torque_constant",
         type=float,
         default=None,
-        help="Turns a force column in A into N*m.",
+        help="Converts a force column from A to N*m.",
     ),
-    _rows("--rows", help="Use these rows only, counted from 0."),
-    _rows("--zero", help="Rows in which the tool touches nothing: their mean force is taken off."),
-    click.option(
-        "--force-late-s",
-        type=float,
-        default=0.0,
-        help="How long after its position each force was recorded [s]; needs time.",
-    ),
-    click.option(
+    _rows("--rows", help="Use only these rows, counted from 0."),
+    _rows("--zero", help="Rows without contact; their mean force is subtracted."),
+    expert_option(
         "--invalid",
         type=click.Choice(["refuse", "drop"]),
         default="refuse",
-        help="What to do with rows without a number.",
+        help="Refuse or drop rows without a number.",
     ),
 )
 
@@ -174,38 +179,38 @@ scheme_options = options(
         type=click.Choice(structure_names),
         default=None,
         show_default=f"the model's plan, else {_SCHEME.structure}",
-        help="How the force is computed.",
+        help="Structure that computes the force.",
     ),
-    click.option("--compensated", is_flag=True, help="Take the coupling's spring out of the model."),
+    click.option("--compensated", is_flag=True, help="Subtract the softness of the coupling from the model."),
     click.option(
         "--coupling-stiffness",
         type=float,
         show_default=f"{_SCHEME.coupling_stiffness:g} N*m/rad, scaled to the model",
-        help="K_c, in force per position of the model's units.",
+        help="Coupling stiffness K_c, in force per position of the model's units.",
     ),
     click.option(
         "--coupling-damping",
         type=float,
         show_default=f"{_SCHEME.coupling_damping:g} N*m*s/rad, scaled",
-        help="B_c, in force per velocity.",
+        help="Coupling damping B_c, in force per velocity.",
     ),
     click.option(
         "--mass",
         type=float,
         show_default=f"{_SCHEME.mass:g} kg*m^2, scaled",
-        help="Mass of the object, where it has mass, in force per acceleration.",
+        help="Mass of an object with mass, in force per acceleration.",
     ),
     click.option(
-        "--damping",
+        "--object-damping",
         type=float,
-        show_default=f"{_SCHEME.damping:g} N*m*s/rad, scaled",
-        help="Damping of the object, where it has mass, in force per velocity.",
+        show_default=f"{_SCHEME.object_damping:g} N*m*s/rad, scaled",
+        help="Damping of an object with mass, in force per velocity.",
     ),
     click.option(
         "--play-radius",
         type=float,
         show_default="the model's, or 1 % of its travel",
-        help="r of a model with hysteresis, in its position unit.",
+        help="Play radius r of a model with hysteresis, in its position unit.",
     ),
     click.option(
         "--predict",
@@ -218,12 +223,13 @@ scheme_options = options(
 """Options for the fields of `Scheme`. A missing one is None and follows the model."""
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+verbose_option = click.option("-v", "--verbose", is_flag=True, help="Print all details below the summary.")
 
 
 def _figure_name(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
     """Refuses, before the work, a name whose suffix is not a figure format."""
     if value is not None and value.suffix.lower() not in _FIGURES:
-        raise InputError(f"{value} is no figure file; its name must end in {', '.join(_FIGURES)}")
+        raise InputError(f"{value} is not a figure file: its name must end in {', '.join(_FIGURES)}")
     return value
 
 
@@ -251,13 +257,13 @@ def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = ()) 
             raise InputError(f"{target} cannot be written: it is a folder")
         for given in inputs:
             if given is not None and given.exists() and target.exists() and target.samefile(given):
-                raise InputError(f"{target} is an input as well; writing the result there would destroy it")
+                raise InputError(f"{target} is also an input; the result would overwrite it")
         try:
             with tempfile.TemporaryFile(dir=target.parent):
                 pass
         except OSError as error:
             raise InputError(
-                f"{target} cannot be written: its folder takes no new file ({error.strerror})"
+                f"{target} cannot be written: its folder accepts no new file ({error.strerror})"
             ) from None
         if [each.absolute() for each in wanted].count(target.absolute()) > 1:
-            raise InputError(f"two results would both be written to {target}")
+            raise InputError(f"two results have the same file name: {target}")

@@ -6,11 +6,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+import numpy as np
 
 from ..errors import InputError
 from ..model import load_model
-from ..verification import ClosedLoop, columns_of
+from ..recording import Recording
+from ..verdict import FORCE_JND
+from ..verification import ClosedLoop, Verification, columns_of
 from ..verification import verify as verify_model
+from ..verification.metrics import STIFFNESS_JND
 from .exit_status import end_with, finishing
 from .figures import (
     close_loops,
@@ -20,12 +24,24 @@ from .figures import (
 )
 from .printing import (
     number,
+    print_details,
     print_json,
+    print_line,
     print_numbers,
+    print_paragraph,
     print_verdict,
-    talk,
 )
-from .verb import PATH, ReadingOptions, json_option, plot_option, reading_options, require_writable, verb
+from .verb import (
+    PATH,
+    ReadingOptions,
+    expert_option,
+    json_option,
+    plot_option,
+    reading_options,
+    require_writable,
+    verb,
+    verbose_option,
+)
 
 
 @verb("palpate verify press.json fresh.csv --plot residuals.png")
@@ -33,23 +49,26 @@ from .verb import PATH, ReadingOptions, json_option, plot_option, reading_option
 @click.argument("recording_file", metavar="RECORDING", type=PATH)
 @plot_option("measured and modelled force over position, residuals beneath")
 @plot_option("recorded and rendered force over position, the loop closed both ways", "--plot-closed-loop")
-@click.option(
+@json_option
+@verbose_option
+@expert_option(
     "--play-radius",
+    group="Model",
     type=float,
     default=None,
     metavar="NUMBER",
-    help="r of a model with hysteresis: its play operator follows the positions, whatever the direction. "
-    "Without a direction: that of the flight record, the model or its plan, or 1 % of the travel.",
+    show_default="that of the flight record, the model or its plan, else 1 % of the travel",
+    help="Play radius r of a model with hysteresis. The play operator then ignores the recorded direction.",
 )
-@json_option
 @reading_options
 def verify(
     model_file: Path,
     recording_file: Path,
     plot: Path | None,
     plot_closed_loop: Path | None,
-    play_radius: float | None,
     as_json: bool,
+    verbose: bool,
+    play_radius: float | None,
     reading: ReadingOptions,
 ) -> None:
     """Compare a model with a recording, best one that it has not seen.
@@ -64,13 +83,9 @@ def verify(
     model = load_model(model_file)
     recording = reading.read(recording_file, columns_of(model))
     verification = verify_model(model, recording, play_radius=play_radius)
-    for note in verification.notes:
-        talk(f"  {note}")
     loops: list[ClosedLoop] = []
     if plot_closed_loop is not None:
         loops = close_loops(model, recording)
-        for note in dict.fromkeys(note for loop in loops for note in loop.notes):
-            talk(f"  {note}")
     with finishing():
         if plot is not None:
             picture_verification(plot, model, [(recording, verification)])
@@ -87,20 +102,42 @@ def verify(
             )  # fmt: skip
         else:
             print_verdict(verification.verdict)
-            unit = recording.units["force"]
-            print_numbers(
-                {
-                    "nrmse": number(verification.nrmse),
-                    "rmse": f"{number(verification.rmse)} {unit}",
-                    "r2": f"{verification.r2:.6f}",
-                    "worst": f"{number(verification.worst)} {unit}",
-                    "within what a hand can tell": f"{100 * verification.within_jnd:.3g} % of rows",
-                    "rows": f"{verification.n} of {len(recording)}",
-                    "fresh": "yes" if verification.fresh else "no: the model was identified on this data",
-                    "outside the model's domain": f"{verification.extrapolated} rows",
-                }
-            )
+            print_numbers(_summary(recording, verification))
             if loops:
-                click.echo()
+                print_line()
                 print_closed_loops(loops)
+                for note in dict.fromkeys(note for loop in loops for note in loop.notes):
+                    print_paragraph(note, indent="  ")
+            if verbose:
+                print_details([*_further_numbers(recording, verification), *verification.notes])
     end_with(verification.verdict)
+
+
+def _summary(recording: Recording, found: Verification) -> dict[str, str]:
+    """Returns the main numbers, in the units of the file."""
+    worst = int(np.argmax(np.abs(found.residual)))
+    position = recording.in_file_unit("position", float(recording.position[found.rows][worst]))
+    return {
+        "error": f"RMS {recording.in_file_unit('force', found.rmse)}, NRMSE {number(found.nrmse)}",
+        "largest": f"{recording.in_file_unit('force', found.worst)} at position {position}",
+        "not felt": f"{100 * found.within_jnd:.3g} % of the rows have an error that a hand does not feel",
+        "rows": f"{found.n} of {len(recording)} compared, {found.extrapolated} outside the model's domain",
+        "recording": "fresh" if found.fresh else "not fresh: the model was identified on it",
+    }
+
+
+def _further_numbers(recording: Recording, found: Verification) -> list[str]:
+    """Returns the other numbers of a verification, in sentences."""
+    numbers = [
+        f"r2 {found.r2:.6f}",
+        f"lag-1 autocorrelation of the residuals {found.whiteness:.3g} (0 is white), "
+        f"Durbin-Watson statistic {found.durbin_watson:.3g} (2 is white)",
+        "a hand does not feel a force error up to "
+        f"{FORCE_JND:.0%} of the force, or {recording.in_file_unit('force', found.jnd_floor)}",
+    ]
+    if found.stiffness_within_jnd is not None:
+        numbers.append(
+            f"stiffness within {STIFFNESS_JND:.0%} of the recorded one in {found.stiffness_within_jnd:.1%} "
+            "of the position cells"
+        )
+    return numbers

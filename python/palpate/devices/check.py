@@ -13,32 +13,36 @@ import numpy as np
 from .._core.device import DeviceProfile as CoreProfile
 from ..errors import InputError
 from ..model import Model
-from ..planning import DeviceProfile
+from ..planning import DeviceProfile, mechanical_units
 from ..verdict import Verdict
 from .measuring import Progress, measure
 from .observations import Observation, compare, observe_at_rest
 from .pushes import Mechanics, Push, push_response
 
-LISTENING_SHARE = 0.7
-"""Share of the check without force; the rest is for the pushes [-]"""
+NO_FORCE_SHARE = 0.7
+"""Share of the duration that is measured without force; the rest is for the pushes [-]"""
 
-PUSH_SHARE = 0.005
-"""Force of a push [share of the largest force of the device]"""
+PUSH_FORCE_SHARE = 0.005
+"""Force of a push [share of the largest force of the device]; too small to be felt"""
 
-_STATE_FRICTION = (
-    "let go of the handle and check for 10 s; if the friction is above the pushes, state it with "
+_FRICTION_ADVICE = (
+    "take the hand off the handle and check for 10 s; if the friction exceeds the pushes, give it with "
     "--coulomb-friction"
 )
-_NO_FRICTION = "without friction no certificate of direct rendering holds for an encoder with steps"
-_SHORTEST_S = 2.0
-_DELAY_MARGIN = 0.05
+_NO_FRICTION_ADVICE = (
+    "direct rendering needs friction above 0 for a certificate, because an encoder has steps"
+)
+_SHORTEST_DURATION_S = 2.0
+"""Shortest check [s]; the handle must move and rest in it"""
+_DELAY_MARGIN_PERIODS = 0.05
 """Added to the measured delay, because the clocks of host and device drift [periods]"""
-_SEEN_STEPS = 5.0
+_LEAST_SIGN_STEPS = 5.0
 """Least displacement for a reliable sign [encoder steps]"""
-_SURE = 3.0
+_LEAST_SIGN_ERRORS = 3.0
 """Least displacement for a reliable sign [standard errors]"""
-_SIGN = "sign of the force"
-_SIMULATED_FRICTION = 0.002
+_FORCE_SIGN = "sign of the force"
+"""Name of the observation"""
+_SIMULATED_FRICTION_SHARE = 0.002
 """Coulomb friction of the simulated device [share of its largest force]"""
 
 
@@ -81,14 +85,17 @@ class Check:
             The mechanics were not measured, or a sign is wrong.
         """
         if not self.may_push:
-            raise InputError("there is no profile of a device that must not make force")
+            raise InputError(
+                "this device has no profile, because a wrong result of its check forbids force; "
+                "correct it first"
+            )
         inertia, damping = self.numbers["inertia"], self.numbers["viscous_damping"]
         friction = self.numbers["coulomb_friction_at_least"]
         if inertia is None or damping is None or friction is None:
             raise InputError(
-                "a profile needs inertia, damping and friction: push a handle that nobody holds and nothing "
-                "is mounted on, for 10 s; if the friction is above the pushes, state it with "
-                "--coulomb-friction (in Python coulomb_friction)"
+                "a profile needs inertia, damping and friction: check a free handle without load "
+                "for 10 s with --push; if the friction exceeds the pushes, give it with --coulomb-friction "
+                "(in Python coulomb_friction)"
             )
         period, jitter, delay = self.numbers["period_s"], self.numbers["jitter_s"], self.numbers["delay_s"]
         assert period is not None
@@ -107,14 +114,15 @@ class Check:
     def profile_notes(self) -> tuple[str, ...]:
         """Origin of each number of the profile."""
         stated = self.coulomb_friction is not None
-        friction = "stated, not measured" if stated else "measured, less its uncertainty: a lower bound"
+        friction = "stated, not measured" if stated else "measured minus its uncertainty, a lower bound"
         delay = "measured" if self.numbers["delay_s"] is not None else "not measured; assumed to be 0"
         return (
             f"{self.device}, measured by palpate check-device.",
-            "inertia, viscous_damping: measured by pushes. period_s: said by the device. jitter_s: measured.",
+            "inertia, viscous_damping: measured by pushes. period_s: stated by the device. "
+            "jitter_s: measured.",
             f"coulomb_friction: {friction}.",
             f"delay_s: {delay}.",
-            "encoder_step, force_step, force_limit: said by the device, not measured.",
+            "encoder_step, force_step, force_limit: stated by the device, not measured.",
         )
 
 
@@ -169,8 +177,8 @@ def check_device(
     InputError
         The device cannot be used, or there is nothing to compare with. The message gives the reason.
     """
-    if duration_s < _SHORTEST_S:
-        raise InputError(f"duration_s is {duration_s:g}, must be at least {_SHORTEST_S:g} to see anything")
+    if duration_s < _SHORTEST_DURATION_S:
+        raise InputError(f"duration_s is {duration_s:g}, must be at least {_SHORTEST_DURATION_S:g}")
     if coulomb_friction is not None and not 0.0 <= coulomb_friction < math.inf:
         raise InputError(f"coulomb_friction is {coulomb_friction:g}, must be a finite number >= 0")
     expected = _expected(profile, model)
@@ -182,19 +190,21 @@ def check_device(
         "progress": progress,
         "keep": True,
         "lowest_rate_share": 0.0,  # a low rate is an observation and does not stop the check
-        "friction_share": _SIMULATED_FRICTION,
+        "friction_share": _SIMULATED_FRICTION_SHARE,
     }
-    listened = measure(device, duration_s=duration_s * (LISTENING_SHARE if push else 1.0), **common)
-    check = judge(listened)
+    summary = measure(device, duration_s=duration_s * (NO_FORCE_SHARE if push else 1.0), **common)
+    check = judge(summary)
     if not push:
-        check = _with(check, Observation(_SIGN, "not looked at", None, "let it push a free handle: --push"))
+        check = _with(
+            check, Observation(_FORCE_SIGN, "not measured", None, "check a free handle with --push")
+        )
     elif not check.may_push:
-        check = _with(check, Observation(_SIGN, "not looked at: what was heard forbids any force"))
+        check = _with(check, Observation(_FORCE_SIGN, "not measured: a wrong result forbids force"))
     else:
-        force = PUSH_SHARE * check.base.force_limit
-        pushed = measure(device, duration_s=duration_s * (1.0 - LISTENING_SHARE), push=force, **common)
-        push_seen = push_response(pushed["kept"], check.base.encoder_step, coulomb_friction)
-        check = with_pushes(replace(check, coulomb_friction=coulomb_friction), push_seen)
+        force = PUSH_FORCE_SHARE * check.base.force_limit
+        push_summary = measure(device, duration_s=duration_s * (1.0 - NO_FORCE_SHARE), push=force, **common)
+        push_result = push_response(push_summary["kept"], check.base.encoder_step, coulomb_friction)
+        check = with_pushes(replace(check, coulomb_friction=coulomb_friction), push_result)
     compared = tuple(compare(other, check.numbers, name=name) for name, other in expected.items())
     return _with(check, *compared)
 
@@ -203,24 +213,24 @@ def _with(check: Check, *added: Observation) -> Check:
     return replace(check, observations=(*check.observations, *added))
 
 
-def judge(listened: Mapping[str, Any]) -> Check:
+def judge(summary: Mapping[str, Any]) -> Check:
     """Judges a device from measurements without force.
 
     Parameters
     ----------
-    listened : mapping
+    summary : mapping
         A summary of :func:`measure`, with ticks in ``kept`` and the stated device in ``profile``.
     """
-    base = listened["profile"]
-    ticks = listened["kept"]
+    base = summary["profile"]
+    ticks = summary["kept"]
     steps = np.diff(ticks["device_time"])[np.diff(ticks["sequence"].astype(np.int64)) == 1]
     period = float(steps.mean()) if steps.size else base.period_s
     numbers: dict[str, float | None] = {
-        "rate_hz": listened["rate_hz"],
+        "rate_hz": summary["rate_hz"],
         "period_s": period,
         "jitter_s": float(steps.max()) - period if steps.size else 0.0,
-        "lost_samples": float(listened["lost_samples"]),
-        "repeated_samples": float(listened["repeated_samples"]),
+        "lost_samples": float(summary["lost_samples"]),
+        "repeated_samples": float(summary["repeated_samples"]),
         "encoder_step": base.encoder_step,
         "force_limit": base.force_limit,
         "delay_s": None,
@@ -228,74 +238,89 @@ def judge(listened: Mapping[str, Any]) -> Check:
         "viscous_damping": None,
         "coulomb_friction": None,
         "coulomb_friction_at_least": None,
-        **{f"period_{name}": value for name, value in listened["period"].items()},
+        **{f"period_{name}": value for name, value in summary["period"].items()},
     }
-    observations = observe_at_rest(listened)
-    if "round_trip" in listened:
-        delay_us = listened["delay"]
-        delay_s = 1e-6 * delay_us["p999_us"] + _DELAY_MARGIN * base.period_s
+    observations = observe_at_rest(summary)
+    if "round_trip" in summary:
+        delay_us = summary["delay"]
+        delay_s = 1e-6 * delay_us["p999_us"] + _DELAY_MARGIN_PERIODS * base.period_s
         numbers["delay_s"] = delay_s
         for each in ("round_trip", "delay"):
-            numbers.update({f"{each}_{name}": value for name, value in listened[each].items()})
+            numbers.update({f"{each}_{name}": value for name, value in summary[each].items()})
         observations.append(
             Observation(
                 "delay",
-                f"{1e6 * delay_s:.0f} us from a sample to its force: p50 "
-                f"{delay_us['p50_us']:.0f} us, p99.9 {delay_us['p999_us']:.0f} us",
+                f"{1e6 * delay_s:.0f} us from a position sample to its force (median "
+                f"{delay_us['p50_us']:.0f} us, 99.9 % below {delay_us['p999_us']:.0f} us)",
             )
         )
-    return Check(listened["device"], tuple(observations), numbers, base)
+    return Check(summary["device"], tuple(observations), numbers, base)
 
 
 def with_pushes(check: Check, push: Push) -> Check:
     """Adds the results of pushes to a check."""
-    observations = [*check.observations, _sign(push, check.base.encoder_step)]
+    observations = [*check.observations, _sign(push, check.base.encoder_step, check.base.position_unit)]
     numbers = dict(check.numbers)
     if push.delay_samples is not None and numbers["delay_s"] is None:
         numbers["delay_s"] = push.delay_samples * check.base.period_s
-        observations.append(Observation("delay", f"{push.delay_samples} samples from a sample to its force"))
+        observations.append(
+            Observation("delay", f"{push.delay_samples} samples from a position to its force")
+        )
     mechanics = push.mechanics
     if mechanics is None:
-        observations.append(Observation("friction", f"not measured: {push.unseen}", None, _STATE_FRICTION))
+        observations.append(
+            Observation("friction", f"not measured: {push.mechanics_problem}", None, _FRICTION_ADVICE)
+        )
     else:
         numbers["inertia"], numbers["viscous_damping"] = mechanics.inertia, mechanics.damping
         numbers["coulomb_friction"] = mechanics.friction
-        numbers["coulomb_friction_at_least"] = mechanics.friction_at_least
+        numbers["coulomb_friction_at_least"] = mechanics.friction_lower_bound
         observations += _mechanics(mechanics, check)
     return replace(check, observations=tuple(observations), numbers=numbers)
 
 
 def _mechanics(mechanics: Mechanics, check: Check) -> list[Observation]:
-    turns = check.base.position_unit == "rad"
-    units = ("kg*m^2", "N*m*s/rad", "N*m") if turns else ("kg", "N*s/m", "N")
-    least = mechanics.friction_at_least
+    units = mechanical_units(check.base.position_unit)
+    least = mechanics.friction_lower_bound
     if check.coulomb_friction is not None:
-        friction = Observation("friction", f"{least:.3g} {units[2]}, stated and not measured")
+        friction = Observation("friction", f"{least:.3g} {units[2]}, stated by the user and not measured")
     elif least > 0.0:
-        friction = Observation("friction", f"{mechanics.friction:.3g} {units[2]}, at least {least:.3g}")
+        friction = Observation(
+            "friction", f"{mechanics.friction:.3g} {units[2]}, at least {least:.3g} {units[2]}"
+        )
     else:
-        text = f"none was found, {3.0 * mechanics.friction_unsure:.1g} {units[2]} at most"
-        friction = Observation("friction", text, None, _NO_FRICTION)
+        text = f"not found; at most {3.0 * mechanics.friction_standard_error:.1g} {units[2]}"
+        friction = Observation("friction", text, None, _NO_FRICTION_ADVICE)
     text = f"inertia {mechanics.inertia:.3g} {units[0]}, damping {mechanics.damping:.3g} {units[1]}"
     return [Observation("mechanics", text), friction]
 
 
-def _sign(push: Push, step: float) -> Observation:
+def _sign(push: Push, step: float, unit: str) -> Observation:
     """Returns the observation that pushes moved the handle in the right or wrong direction."""
-    text = f"a push moved the handle by {push.moved:.3g}, {push.unsure:.1g} unsure"
-    if abs(push.moved) < max(_SEEN_STEPS * step, _SURE * push.unsure) or push.moved == 0.0:
-        return Observation(_SIGN, f"not seen: {text}", None, "let go of the handle")
-    if push.moved < 0.0:
-        text = f"flipped: {text} the wrong way"
-    elif not push.obeyed:
-        text = "flipped: the device says that it makes the opposite of what it is told to make"
+    text = (
+        f"a push moved the handle by {push.displacement:.3g} {unit} "
+        f"(standard error {push.standard_error:.1g} {unit})"
+    )
+    if (
+        abs(push.displacement) < max(_LEAST_SIGN_STEPS * step, _LEAST_SIGN_ERRORS * push.standard_error)
+        or push.displacement == 0.0
+    ):
+        advice = (
+            f"must be at least {_LEAST_SIGN_STEPS:g} encoder steps and {_LEAST_SIGN_ERRORS:g} "
+            "standard errors: take the hand off the handle"
+        )
+        return Observation(_FORCE_SIGN, f"not clear: {text}", None, advice)
+    if push.displacement < 0.0:
+        text = f"reversed: {text} in the wrong direction"
+    elif not push.reported_sign_agrees:
+        text = "reversed: the device reports a force of the opposite sign of the command"
     else:
-        text = f"right: {text}"
+        text = f"correct: {text}"
     return Observation(
-        _SIGN,
+        _FORCE_SIGN,
         text,
-        push.moved > 0.0 and push.obeyed,
-        "swap two wires of the motor or mirror its sign in the firmware; do not enable force",
+        push.displacement > 0.0 and push.reported_sign_agrees,
+        "exchange two wires of the motor, or reverse its sign in the firmware; do not enable force",
         True,
     )
 

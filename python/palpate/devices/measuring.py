@@ -39,15 +39,13 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     """
     if object is not None:
         if device != "simulated":
-            raise InputError(f"an object is mounted on the simulated device only; {device} has its own")
+            raise InputError(f"an object needs device simulated; {device} has a real one: leave out object")
         settings["position_unit"] = object.units["position"]
         settings["force_unit"] = object.units["force"]
         if object.units["force"] == "A":
-            raise InputError("the object's force is a motor current in A; mount a model whose force is one")
+            raise InputError("the object's force is a motor current in A; it must be in N or N*m")
         if object.dimension != 1:
-            raise InputError(
-                f"the object has {object.dimension} inputs: one of the position alone can be mounted"
-            )
+            raise InputError(f"the object has {object.dimension} inputs; it must have 1, the position")
     try:
         return measure_live(device=device, object=object, **settings)
     except InputError:

@@ -15,27 +15,33 @@ from .._typing import Float1D
 from ..verdict import Finding, no, usable
 
 _RATE_TOLERANCE = 0.01
+"""Largest error of the rate [share of the requested rate]"""
 _CLOCK_TOLERANCE = 0.005
-_LATEST_PERIOD = 2.0
+"""Largest error of the device's clock [share of the period]; a quartz clock is far better"""
+_LARGEST_PERIOD_RATIO = 2.0
 """Largest p99.9 of the period over the requested period."""
-_LOST_SHARE = 1e-3
-_QUIET_STEPS = 2.0
+_LARGEST_LOST_SHARE = 1e-3
+"""Largest share of lost and repeated samples."""
+_LARGEST_NOISE_STEPS = 2.0
 """Largest RMS of the encoder at rest [encoder steps]."""
-_REST_S = 0.1
+_REST_DURATION_S = 0.1
 """Length of a piece in which a handle may be at rest [s]."""
-_MOVED_STEPS = 50.0
+_LEAST_MOTION_STEPS = 50.0
 """Least motion of the handle that gives reliable signs [encoder steps]."""
 _VELOCITY_SAMPLES = 50
 """Number of samples over which a displacement is compared with a velocity."""
 _VELOCITY_TOLERANCE = 0.25
-_CLEAR = 0.3
+"""Largest error of the reported velocity [share of the velocity from the positions]"""
+_LEAST_CORRELATION = 0.3
 """Least correlation of force and position for a clear sign."""
 
 _STEP_TOLERANCE = 0.01
+"""Largest difference of encoder step and force limit from the expected ones [share]"""
 _DAMPING_TOLERANCE = 0.1
 """Share by which measured damping and friction may be below the expected ones, because of noise."""
 
-_CABLE = "try another cable, another port, or no hub"
+_TOO_LITTLE_MOTION = f"the handle moved by less than {_LEAST_MOTION_STEPS:g} encoder steps"
+_CABLE_ADVICE = "try another cable, another port, or no hub"
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,8 @@ class Observation:
     advice: str = ""
     forbids_force: bool = False
     """True if a wrong property forbids any force"""
+    detail: bool = False
+    """True if a summary shows it only when it is wrong"""
 
     @property
     def finding(self) -> Finding | None:
@@ -60,39 +68,46 @@ class Observation:
         )
 
 
-def observe_at_rest(listened: Mapping[str, Any]) -> list[Observation]:
+def observe_at_rest(summary: Mapping[str, Any]) -> list[Observation]:
     """Judges a summary of `measure` with its ticks, measured without force."""
-    ticks, wanted = listened["kept"], listened["wanted_rate_hz"]
-    step = listened["profile"].encoder_step
+    ticks, wanted = summary["kept"], summary["wanted_rate_hz"]
+    step = summary["profile"].encoder_step
     observations = [
-        _rate(listened["rate_hz"], wanted),
-        _period(listened["period"], wanted),
+        _rate(summary["rate_hz"], wanted),
+        _period(summary["period"], wanted),
         _clock(ticks, wanted),
-        _losses(listened),
-        _encoder(ticks["position"], step, wanted),
+        _losses(summary),
+        _encoder(ticks["position"], step, summary["profile"].position_unit, wanted),
         _velocity(ticks, step),
     ]
-    if not listened["orderly"]:
-        observations.insert(0, Observation("stream", listened["ended"], False, _CABLE, True))
-    if "round_trip" in listened:
-        observations.append(Observation("round trip", _percentiles(listened["round_trip"])))
-    if "malformed" in listened:
-        counts = ("malformed", "stalls", "bus_errors", "timeouts", "skipped_commands")
+    if not summary["orderly"]:
+        observations.insert(0, Observation("connection", summary["ended"], False, _CABLE_ADVICE, True))
+    if "round_trip" in summary:
+        observations.append(Observation("round trip", _percentiles(summary["round_trip"]), detail=True))
+    if "malformed" in summary:
+        counts = {
+            "malformed": "malformed packets",
+            "stalls": "stalls",
+            "bus_errors": "bus errors",
+            "timeouts": "timeouts",
+            "skipped_commands": "skipped commands",
+        }
         observations.append(
             Observation(
-                "wire",
-                ", ".join(f"{listened[name]} {name.replace('_', ' ')}" for name in counts),
-                not (listened["malformed"] or listened["stalls"] or listened["bus_errors"]),
-                _CABLE,
+                "USB errors",
+                ", ".join(f"{summary[name]} {words}" for name, words in counts.items()),
+                not (summary["malformed"] or summary["stalls"] or summary["bus_errors"]),
+                f"malformed packets, stalls and bus errors must be 0: {_CABLE_ADVICE}",
+                detail=True,
             )
         )
-    if listened["transducer"]:
+    if summary["transducer"]:
         observations.append(_transducer(ticks["position"], ticks["measured"], step))
     return observations
 
 
 def _percentiles(durations: Mapping[str, float]) -> str:
-    names = {"p50_us": "p50", "p99_us": "p99", "p999_us": "p99.9", "max_us": "max"}
+    names = {"p50_us": "median", "p99_us": "99 % below", "p999_us": "99.9 % below", "max_us": "longest"}
     return ", ".join(f"{name} {durations[key]:.0f} us" for key, name in names.items())
 
 
@@ -101,16 +116,19 @@ def _rate(rate_hz: float, wanted: float) -> Observation:
         "rate",
         f"{rate_hz:.1f} Hz of {wanted:g} Hz",
         bool(abs(rate_hz / wanted - 1.0) <= _RATE_TOLERANCE),
-        "close other programs, or give the loop real-time priority",
+        f"must be within {_RATE_TOLERANCE:.0%}: close other programs, or give the loop real-time priority",
     )
 
 
 def _period(period: Mapping[str, float], wanted: float) -> Observation:
+    longest_us = _LARGEST_PERIOD_RATIO * 1e6 / wanted
     return Observation(
         "period",
         _percentiles(period),
-        period["p999_us"] <= _LATEST_PERIOD * 1e6 / wanted,
-        "give the loop real-time priority, or a quieter machine",
+        period["p999_us"] <= longest_us,
+        f"99.9 % must be below {longest_us:.0f} us: close other programs, or give the loop "
+        "real-time priority",
+        detail=True,
     )
 
 
@@ -118,60 +136,67 @@ def _clock(ticks: Mapping[str, Any], wanted: float) -> Observation:
     """Judges the device's clock between consecutive samples."""
     steps = np.diff(ticks["device_time"])[np.diff(ticks["sequence"].astype(np.int64)) == 1]
     if not steps.size:
-        return Observation("clock of the device", "no two samples in a row", False, _CABLE)
+        return Observation("device clock", "no two consecutive samples arrived", False, _CABLE_ADVICE)
     mean = float(steps.mean())
     return Observation(
-        "clock of the device",
-        f"{1e6 * mean:.1f} us a sample, spread {1e6 * float(steps.std()):.1f} us",
+        "device clock",
+        f"{1e6 * mean:.1f} us per sample, spread {1e6 * float(steps.std()):.1f} us",
         bool(abs(mean * wanted - 1.0) <= _CLOCK_TOLERANCE),
-        f"it should be {1e6 / wanted:.1f} us: its firmware is not what it says",
+        f"must be within {_CLOCK_TOLERANCE:.1%} of {1e6 / wanted:.1f} us: the firmware does not "
+        "keep its stated rate",
+        detail=True,
     )
 
 
-def _losses(listened: Mapping[str, Any]) -> Observation:
-    lost, repeated, ticks = (listened[name] for name in ("lost_samples", "repeated_samples", "ticks"))
+def _losses(summary: Mapping[str, Any]) -> Observation:
+    lost, repeated, ticks = (summary[name] for name in ("lost_samples", "repeated_samples", "ticks"))
     return Observation(
         "samples",
         f"{lost} lost and {repeated} repeated of {ticks}",
-        bool(lost + repeated <= _LOST_SHARE * ticks),
-        _CABLE,
+        bool(lost + repeated <= _LARGEST_LOST_SHARE * ticks),
+        f"must be at most {_LARGEST_LOST_SHARE:.1%}: {_CABLE_ADVICE}",
     )
 
 
-def _encoder(position: Float1D, step: float, rate_hz: float) -> Observation:
+def _encoder(position: Float1D, step: float, unit: str, rate_hz: float) -> Observation:
     """Judges the noise in the quietest piece. A parabola is subtracted, because hands drift."""
-    length = max(10, round(_REST_S * rate_hz))
+    length = max(10, round(_REST_DURATION_S * rate_hz))
     pieces = position[: len(position) // length * length].reshape(-1, length)
     if not len(pieces):
-        return Observation("encoder", "too few samples", None, "check for longer")
+        return Observation("encoder", "not measured: too few samples", None, "check for longer")
     drift = np.vander(np.linspace(-1.0, 1.0, length), 3)
-    left = pieces.T - drift @ np.linalg.lstsq(drift, pieces.T, rcond=None)[0]
-    noise = float(np.sqrt((left**2).mean(axis=0)).min())
+    residual = pieces.T - drift @ np.linalg.lstsq(drift, pieces.T, rcond=None)[0]
+    noise = float(np.sqrt((residual**2).mean(axis=0)).min())
     in_steps = noise / step if step > 0.0 else 0.0
     return Observation(
         "encoder",
-        f"step {step:.4g}, noise at its stillest {in_steps:.2f} steps RMS, moved by {np.ptp(position):.4g}",
-        in_steps <= _QUIET_STEPS,
-        "hold the handle still for a second; look at the encoder's cable and ground",
+        f"step {step:.4g} {unit}, noise at rest {in_steps:.2f} steps RMS, moved by "
+        f"{np.ptp(position):.4g} {unit}",
+        in_steps <= _LARGEST_NOISE_STEPS,
+        f"noise must be at most {_LARGEST_NOISE_STEPS:g} steps: hold the handle still for one second; "
+        "check the cable and the ground of the encoder",
         True,
     )
 
 
 def _velocity(ticks: Mapping[str, Any], step: float) -> Observation:
     """Compares the velocity with the displacement: damping of a wrong sign would give energy."""
-    name = "sign of the velocity"
+    name = "velocity"
     position, time, velocity = (np.asarray(ticks[key]) for key in ("position", "device_time", "velocity"))
-    if np.ptp(position) < _MOVED_STEPS * step or len(position) < 2 * _VELOCITY_SAMPLES:
-        return Observation(name, "not seen", None, "move the handle while this runs")
-    ways = position[_VELOCITY_SAMPLES:] - position[:-_VELOCITY_SAMPLES]
+    if np.ptp(position) < _LEAST_MOTION_STEPS * step or len(position) < 2 * _VELOCITY_SAMPLES:
+        return Observation(
+            name, f"not measured: {_TOO_LITTLE_MOTION}", None, "move the handle during the check"
+        )
+    displacements = position[_VELOCITY_SAMPLES:] - position[:-_VELOCITY_SAMPLES]
     integrated = np.concatenate(([0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time))))
-    told = integrated[_VELOCITY_SAMPLES:] - integrated[:-_VELOCITY_SAMPLES]
-    share = float(ways @ told) / float(ways @ ways)
+    reported_motion = integrated[_VELOCITY_SAMPLES:] - integrated[:-_VELOCITY_SAMPLES]
+    share = float(displacements @ reported_motion) / float(displacements @ displacements)
     return Observation(
         name,
-        f"{'right' if share > 0.0 else 'flipped'}: {share:.2f} of what the positions show",
+        f"{share:.2f} times the velocity from the positions",
         abs(share - 1.0) <= _VELOCITY_TOLERANCE,
-        "its firmware measures it wrongly; do not enable force",
+        f"must be within {_VELOCITY_TOLERANCE:.0%} of 1, a negative value is a reversed sign: correct the "
+        "firmware; do not enable force",
         share <= 0.0,
     )
 
@@ -179,16 +204,28 @@ def _velocity(ticks: Mapping[str, Any], step: float) -> Observation:
 def _transducer(position: Float1D, measured: Float1D, step: float) -> Observation:
     """Judges the sign of the transducer: the force of a pressed object grows with position."""
     name = "sign of the transducer"
-    if np.ptp(position) < _MOVED_STEPS * step or np.ptp(measured) == 0.0:
-        return Observation(name, "not seen", None, "move the handle against an object while this runs")
+    if np.ptp(position) < _LEAST_MOTION_STEPS * step or np.ptp(measured) == 0.0:
+        return Observation(
+            name,
+            f"not measured: {_TOO_LITTLE_MOTION}, or the force was constant",
+            None,
+            "move the handle against an object during the check",
+        )
     correlation = float(np.corrcoef(position, measured)[0, 1])
-    if abs(correlation) < _CLEAR:
-        return Observation(name, f"not clear (correlation {correlation:.2f})", None, "press a plain spring")
+    if abs(correlation) < _LEAST_CORRELATION:
+        return Observation(
+            name,
+            f"not clear: correlation of force and position {correlation:.2f}",
+            None,
+            f"must be above {_LEAST_CORRELATION:g}: press a plain spring",
+        )
     return Observation(
         name,
-        "right" if correlation > 0.0 else f"flipped (correlation {correlation:.2f})",
+        f"{'correct' if correlation > 0.0 else 'reversed'}: correlation of force and position "
+        f"{correlation:.2f}",
         correlation > 0.0,
-        "an object pulls where it should push: mirror the encoder or the transducer; do not enable force",
+        "must be positive when an object is pressed: reverse the sign of the encoder or the transducer; do "
+        "not enable force",
         True,
     )
 
@@ -220,24 +257,26 @@ def compare(expected: DeviceProfile, measured: Mapping[str, float | None], *, na
         1.0 + _CLOCK_TOLERANCE
     ):
         wrong.append(
-            f"its period gets {1e6 * (period + jitter):.0f} us long, {1e6 * longest:.0f} us are counted on"
+            f"longest period {1e6 * (period + jitter):.0f} us, expected at most {1e6 * longest:.0f} us"
         )
     if delay is not None and delay > expected.delay_s:
-        wrong.append(f"its delay is {1e6 * delay:.0f} us, {1e6 * expected.delay_s:.0f} us are counted on")
+        wrong.append(f"delay {1e6 * delay:.0f} us, expected at most {1e6 * expected.delay_s:.0f} us")
     if not math.isclose(step, expected.encoder_step, rel_tol=_STEP_TOLERANCE):
-        wrong.append(f"its encoder step is {step:.4g}, {expected.encoder_step:.4g} is counted on")
+        wrong.append(f"encoder step {step:.4g}, expected {expected.encoder_step:.4g}")
     if limit < expected.force_limit * (1.0 - _STEP_TOLERANCE):
-        wrong.append(f"its largest force is {limit:.4g}, {expected.force_limit:.4g} is counted on")
+        wrong.append(f"largest force {limit:.4g}, expected at least {expected.force_limit:.4g}")
     if damping is not None and damping < expected.viscous_damping * (1.0 - _DAMPING_TOLERANCE):
-        wrong.append(f"its damping is {damping:.3g}, {expected.viscous_damping:.3g} is counted on")
+        wrong.append(f"damping {damping:.3g}, expected at least {expected.viscous_damping:.3g}")
     if friction is not None and friction < expected.coulomb_friction * (1.0 - _DAMPING_TOLERANCE):
-        wrong.append(f"its friction is {friction:.3g}, {expected.coulomb_friction:.3g} is counted on")
-    seen = {"delay": delay, "damping": damping, "friction": friction}
-    unseen = [word for word, value in seen.items() if value is None]
-    held = "holds" + (f" as far as it was seen (not: {', '.join(unseen)})" if unseen else "")
+        wrong.append(f"friction {friction:.3g}, expected at least {expected.coulomb_friction:.3g}")
+    measured_by_name = {"delay": delay, "damping": damping, "friction": friction}
+    not_measured = [word for word, value in measured_by_name.items() if value is None]
+    agreement = "agrees with the measurement" + (
+        f" (not measured: {', '.join(not_measured)})" if not_measured else ""
+    )
     return Observation(
         name,
-        "; ".join(wrong) if wrong else f"{expected.id}: {held}",
+        "; ".join(wrong) if wrong else f"{expected.id}: {agreement}",
         not wrong,
-        "plan the model again with the profile that check-device --push --write-profile writes",
+        "write a profile with check-device --push --write-profile, and plan the model with it",
     )

@@ -13,32 +13,33 @@ from scipy.optimize import least_squares
 
 from .._typing import Float1D, Float2D
 
-_LARGE = 0.9
+_LARGE_PUSH_SHARE = 0.9
 """Least push whose displacement is averaged for the sign of the force [share of the largest push]"""
 _FEWEST_PUSHES = 3
+"""Least number of pushes with a standard error"""
 
-_SEEN = 10.0
+_LEAST_FITTED_STEPS = 10.0
 """Least displacement of a push that is fitted [encoder steps]"""
 
-_SIZES_APART = 1.25
+_LEAST_SIZE_RATIO = 1.25
 """Ratio of the largest to the smallest push that separates friction from damping [-]"""
 
-_MOST_LEFT = 0.03
+_LARGEST_RESIDUAL_SHARE = 0.03
 """Largest RMS residual of accepted mechanics [share of the RMS motion]"""
 
-_ROUNDING = 1.0
+_ROUNDING_STEPS = 1.0
 """RMS residual that is always accepted [encoder steps]"""
 
-_RESERVE = 0.05
+_FRICTION_RESERVE_SHARE = 0.05
 """Reserve of the friction, because a real handle differs from the fitted one [share]"""
 
-_SURE = 3.0
+_FRICTION_RESERVE_ERRORS = 3.0
 """Reserve of the friction [standard errors]"""
 
-_WIDEST = 40.0
+_LARGEST_LOGARITHM = 40.0
 """Range of the logarithms of J and b [-]"""
 
-_STARTS = (0.05, 0.4)
+_START_FRICTION_SHARES = (0.05, 0.4)
 """Friction from which the search begins, over the largest push [-]"""
 
 
@@ -52,32 +53,36 @@ class Mechanics:
     """b, viscous [N*s/m or N*m*s/rad]"""
     friction: float
     """f_c, Coulomb [N or N*m]"""
-    friction_unsure: float
+    friction_standard_error: float
     """Standard error of `friction`; 0 if it was given [N or N*m]"""
 
     @property
-    def friction_at_least(self) -> float:
+    def friction_lower_bound(self) -> float:
         """Lower bound of the friction for a certificate, reduced by the uncertainty of the fit."""
-        if self.friction_unsure == 0.0:
+        if self.friction_standard_error == 0.0:
             return self.friction
-        return max(0.0, (1.0 - _RESERVE) * self.friction - _SURE * self.friction_unsure)
+        return max(
+            0.0,
+            (1.0 - _FRICTION_RESERVE_SHARE) * self.friction
+            - _FRICTION_RESERVE_ERRORS * self.friction_standard_error,
+        )
 
 
 @dataclass(frozen=True)
 class Push:
     """Response of a handle to pushes."""
 
-    moved: float
-    """Mean displacement by a push, > 0 in the direction of a right sign [m or rad]"""
-    unsure: float
+    displacement: float
+    """Mean displacement by a push, > 0 for a correct sign [m or rad]"""
+    standard_error: float
     """Standard error of that mean [m or rad]; infinite for fewer than three pushes"""
-    obeyed: bool
+    reported_sign_agrees: bool
     """True if the force that the device reports has the sign of the commanded force"""
     delay_samples: int | None
     """Whole samples from command to force"""
     mechanics: Mechanics | None
     """Inertia, damping and friction; None if they cannot be fitted"""
-    unseen: str = ""
+    mechanics_problem: str = ""
     """Reason why they cannot be fitted"""
 
 
@@ -97,41 +102,47 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
     friction : float, optional
         Coulomb friction of the device, if known [N or N*m].
     """
-    fresh = np.concatenate(([True], np.diff(ticks["sequence"].astype(np.int64)) > 0))
+    new_samples = np.concatenate(([True], np.diff(ticks["sequence"].astype(np.int64)) > 0))
     sent, applied, position, time = (
-        np.asarray(ticks[name])[fresh] for name in ("force", "applied", "position", "device_time")
+        np.asarray(ticks[name])[new_samples] for name in ("force", "applied", "position", "device_time")
     )
-    ways: list[float] = []
+    displacements: list[float] = []
     sizes: list[float] = []
-    obedience = 0.0
+    agreement = 0.0
     # A reading reports the force that acted until then: a push begins one reading earlier.
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
     for begin in begins[begins > 2]:  # the motion before the first push is unknown
-        held = int(np.argmin(pushing[begin + 1 :])) or len(pushing) - begin - 1
-        commanded = float(np.sign(sent[max(0, begin + 1 - held) : begin + 1 + held].sum()))
-        obedience += commanded * float(np.sign(applied[begin + 1]))
-        ways.append(-commanded * _distance(time, position, begin, held))
-        sizes.append(float(np.abs(applied[begin + 1 : begin + 1 + held]).max()))
-    large = [way for way, size in zip(ways, sizes, strict=True) if size >= _LARGE * max(sizes)]
-    ways = large if len(large) >= _FEWEST_PUSHES else ways
-    mechanics, unseen = _mechanics(applied, position, time, encoder_step, friction)
-    enough = len(ways) >= _FEWEST_PUSHES
+        samples = int(np.argmin(pushing[begin + 1 :])) or len(pushing) - begin - 1
+        commanded = float(np.sign(sent[max(0, begin + 1 - samples) : begin + 1 + samples].sum()))
+        agreement += commanded * float(np.sign(applied[begin + 1]))
+        displacements.append(-commanded * _push_displacement(time, position, begin, samples))
+        sizes.append(float(np.abs(applied[begin + 1 : begin + 1 + samples]).max()))
+    large = [
+        displacement
+        for displacement, size in zip(displacements, sizes, strict=True)
+        if size >= _LARGE_PUSH_SHARE * max(sizes)
+    ]
+    displacements = large if len(large) >= _FEWEST_PUSHES else displacements
+    mechanics, mechanics_problem = _mechanics(applied, position, time, encoder_step, friction)
+    enough = len(displacements) >= _FEWEST_PUSHES
     return Push(
-        moved=float(np.mean(ways)) if ways else 0.0,
-        unsure=float(np.std(ways, ddof=1)) / math.sqrt(len(ways)) if enough else math.inf,
-        obeyed=obedience >= 0.0,
+        displacement=float(np.mean(displacements)) if displacements else 0.0,
+        standard_error=float(np.std(displacements, ddof=1)) / math.sqrt(len(displacements))
+        if enough
+        else math.inf,
+        reported_sign_agrees=agreement >= 0.0,
         delay_samples=_delay(ticks),
         mechanics=mechanics,
-        unseen=unseen,
+        mechanics_problem=mechanics_problem,
     )
 
 
-def _distance(time: Float1D, position: Float1D, begin: int, held: int) -> float:
+def _push_displacement(time: Float1D, position: Float1D, begin: int, samples: int) -> float:
     """Returns the displacement of a push from the previous motion, a parabola because hands are slow."""
-    before, end = slice(max(0, begin - 2 * held), begin + 1), min(begin + held, len(position) - 1)
-    hand = np.polynomial.Polynomial.fit(time[before], position[before], 2)
-    return float(position[end] - hand(time[end]))
+    before, end = slice(max(0, begin - 2 * samples), begin + 1), min(begin + samples, len(position) - 1)
+    previous_motion = np.polynomial.Polynomial.fit(time[before], position[before], 2)
+    return float(position[end] - previous_motion(time[end]))
 
 
 def _delay(ticks: Mapping[str, Any]) -> int | None:
@@ -165,42 +176,45 @@ def _mechanics(
     """
     applied, moved, seconds = _windows(applied, position, time)
     if len(applied) == 0:
-        return None, "there was no whole push"
+        return None, "no complete push was recorded"
     size = np.abs(applied).max(axis=1)
-    least = _SEEN * (encoder_step or 1e-9)
+    least = _LEAST_FITTED_STEPS * (encoder_step or 1e-9)
     moving = np.abs(moved).max(axis=1) >= least
     if not moving.any():
-        return None, f"no push moved the handle by {_SEEN:g} encoder steps"
-    if friction is None and size[moving].max() < _SIZES_APART * size[moving].min():
-        return None, "no two sizes of push moved the handle, which separates friction from damping"
+        return None, f"no push moved the handle by at least {_LEAST_FITTED_STEPS:g} encoder steps"
+    if friction is None and size[moving].max() < _LEAST_SIZE_RATIO * size[moving].min():
+        return None, "pushes of two sizes must move the handle to separate friction from damping"
     applied, moved, seconds = applied[moving], moved[moving], seconds[moving]
     largest = float(size.max())
 
     def residuals(unknown: Float1D) -> Float1D:
         inertia, damping = np.exp(unknown[:2])
-        rubbing = largest * unknown[2] if friction is None else friction
-        left = moved - _way(applied, seconds, inertia, damping, rubbing)
-        return np.asarray((left - left.mean(axis=1, keepdims=True)).ravel() / least)
+        friction_force = largest * unknown[2] if friction is None else friction
+        residual = moved - _displacement(applied, seconds, inertia, damping, friction_force)
+        return np.asarray((residual - residual.mean(axis=1, keepdims=True)).ravel() / least)
 
-    start = _start(applied, moved, seconds)
-    starts = [[*start, share] for share in _STARTS] if friction is None else [[*start]]
-    lower, upper = [-_WIDEST, -_WIDEST, 0.0], [_WIDEST, _WIDEST, 1.0]
+    start = _start_values(applied, moved, seconds)
+    starts = [[*start, share] for share in _START_FRICTION_SHARES] if friction is None else [[*start]]
+    lower, upper = (
+        [-_LARGEST_LOGARITHM, -_LARGEST_LOGARITHM, 0.0],
+        [_LARGEST_LOGARITHM, _LARGEST_LOGARITHM, 1.0],
+    )
     fits = [
         least_squares(residuals, each, bounds=(lower[: len(each)], upper[: len(each)])) for each in starts
     ]
     fit = min(fits, key=lambda each: float(each.cost))
     rms = least * np.sqrt(2.0 * fit.cost / fit.fun.size)
     spread = float(np.sqrt(np.mean((moved - moved.mean(axis=1, keepdims=True)) ** 2)))
-    if rms > max(_MOST_LEFT * spread, _ROUNDING * encoder_step):
-        return None, "inertia, damping and friction do not explain the motion; let go of the handle"
+    if rms > max(_LARGEST_RESIDUAL_SHARE * spread, _ROUNDING_STEPS * encoder_step):
+        return None, "inertia, damping and friction do not explain the motion; take the hand off the handle"
     inertia, damping = (float(value) for value in np.exp(fit.x[:2]))
     if friction is not None:
         return Mechanics(inertia, damping, friction, 0.0), ""
     variance = 2.0 * fit.cost / (fit.fun.size - fit.x.size)
     slopes = np.asarray(fit.jac, dtype=np.float64)
     covariance = variance * np.linalg.pinv(slopes.T @ slopes)
-    unsure = largest * float(np.sqrt(covariance[2, 2]))
-    return Mechanics(inertia, damping, largest * float(fit.x[2]), unsure), ""
+    standard_error = largest * float(np.sqrt(covariance[2, 2]))
+    return Mechanics(inertia, damping, largest * float(fit.x[2]), standard_error), ""
 
 
 def _windows(applied: Float1D, position: Float1D, time: Float1D) -> tuple[Float2D, Float2D, Float2D]:
@@ -215,7 +229,7 @@ def _windows(applied: Float1D, position: Float1D, time: Float1D) -> tuple[Float2
     return applied[rows][:, 1:], position[rows] - position[begins][:, None], np.diff(time[rows], axis=1)
 
 
-def _start(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[float, float]:
+def _start_values(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[float, float]:
     """Returns the logarithms of J and b from the impulse, displacement and duration of a push."""
     impulse = float(np.median(np.abs((applied * seconds).sum(axis=1))))
     way = float(np.median(np.abs(moved).max(axis=1)))
@@ -223,7 +237,9 @@ def _start(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[float, f
     return float(np.log(0.25 * impulse * duration / way)), float(np.log(0.5 * impulse / way))
 
 
-def _way(applied: Float2D, seconds: Float2D, inertia: float, damping: float, friction: float) -> Float2D:
+def _displacement(
+    applied: Float2D, seconds: Float2D, inertia: float, damping: float, friction: float
+) -> Float2D:
     """Returns the displacement (p, n + 1) of a handle at rest under held forces (p, n), in closed form."""
     way = np.zeros((len(applied), applied.shape[1] + 1))
     velocity = np.zeros(len(applied))

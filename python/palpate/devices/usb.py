@@ -23,17 +23,18 @@ from ..errors import InputError
 from ..recording.files import replacing
 
 _TIMEOUT_MS = 500
+"""Longest wait for the answer to a request [ms]"""
 
 
 class DeviceError(Exception):
     """Failure of a device: one sentence with its name, the reason and the likely cure."""
 
 
-def device_error(device: str, doing: str, error: Any) -> DeviceError:
-    """Returns the sentence for an error of pyusb while `doing` something with `device`."""
+def device_error(device: str, action: str, error: Any) -> DeviceError:
+    """Returns the sentence for an error of pyusb during an action on `device`."""
     cause = core.usb_cause(getattr(error, "backend_error_code", None) or 0)
-    said = getattr(error, "strerror", None) or str(error) or type(error).__name__
-    return DeviceError(f"{device}, {doing}: {cause or f'{said}; plug it in again'}")
+    reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return DeviceError(f"{device}, {action}: {cause or f'{reason}; plug it in again'}")
 
 
 def _pyusb() -> ModuleType:
@@ -83,7 +84,7 @@ class UsbSetup:
 
     def identify(self) -> dict[str, Any]:
         """Reads the names and the identity of the device: see :func:`palpate._core.device.decode_info`."""
-        answer = self._request(UsbRequest.GetInfo, "asking who it is", core.usb_largest_packet)
+        answer = self._request(UsbRequest.GetInfo, "reading its identity", core.usb_largest_packet)
         info = core.decode_info(answer)
         self.product = self._string(self._handle.iProduct)
         self.serial = self._string(self._handle.iSerialNumber)
@@ -117,7 +118,7 @@ class UsbSetup:
 
         usb.util.dispose_resources(self._handle)
 
-    def _request(self, request: UsbRequest, doing: str, size: int = 0, *, value: int = 0) -> bytes:
+    def _request(self, request: UsbRequest, action: str, size: int = 0, *, value: int = 0) -> bytes:
         pyusb = _pyusb()
         try:
             answer = self._handle.ctrl_transfer(
@@ -129,7 +130,7 @@ class UsbSetup:
                 timeout=_TIMEOUT_MS,
             )
         except (pyusb.USBError, NotImplementedError) as error:
-            raise device_error(self.name, doing, error) from None
+            raise device_error(self.name, action, error) from None
         return bytes(answer) if size else b""
 
     def _string(self, index: int) -> str:
@@ -165,10 +166,10 @@ def _candidates() -> Iterator[UsbSetup]:
         raise DeviceError("USB devices need libusb-1.0: apt-get install libusb-1.0-0") from None
     for handle in handles:
         kinds = {
-            (face.bInterfaceClass, face.bInterfaceSubClass, face.bInterfaceProtocol)
+            (interface.bInterfaceClass, interface.bInterfaceSubClass, interface.bInterfaceProtocol)
             for configuration in handle
-            for face in configuration
-            if face.bInterfaceNumber == core.usb_interface
+            for interface in configuration
+            if interface.bInterfaceNumber == core.usb_interface
         }
         if core.usb_interface_kind in kinds:
             yield UsbSetup(handle)
@@ -230,7 +231,9 @@ def open_usb(serial: str = "") -> UsbSetup:
     if problems:
         raise DeviceError("; ".join(problems))
     wanted = f" with serial number {serial}" if serial else ""
-    raise DeviceError(f"no haptic USB device{wanted} is plugged in; `palpate devices` lists what there is")
+    raise DeviceError(
+        f"no haptic USB device{wanted} is plugged in; `palpate devices` lists the connected devices"
+    )
 
 
 RULE = "60-palpate.rules"
@@ -239,12 +242,12 @@ FOLDER = Path("/etc/udev/rules.d")
 _RELOAD = (("udevadm", "control", "--reload-rules"), ("udevadm", "trigger", "--subsystem-match=usb"))
 
 
-def install_rule(tell: Callable[[str], None], *, folder: Path = FOLDER) -> None:
+def install_rule(report: Callable[[str], None], *, folder: Path = FOLDER) -> None:
     """Writes the rule and makes udev read it.
 
     Parameters
     ----------
-    tell : callable
+    report : callable
         Called with a sentence for each step.
     folder : Path
         Folder of the rules of this machine.
@@ -257,23 +260,24 @@ def install_rule(tell: Callable[[str], None], *, folder: Path = FOLDER) -> None:
     target = folder / RULE
     if not folder.is_dir():
         raise DeviceError(
-            f"this machine has no folder {folder}: udev, which gives users their rights, is not here"
+            f"this machine has no folder {folder}: udev, which gives users access to devices, is "
+            "not installed"
         )
     if not os.access(folder, os.W_OK):
-        again = f"sudo {sys.executable} -m palpate devices --install-udev-rule"
-        raise DeviceError(f"writing {target} needs root; run: {again}")
+        command_text = f"sudo {sys.executable} -m palpate devices --install-udev-rule"
+        raise DeviceError(f"writing {target} needs root; run: {command_text}")
     text = files(__package__).joinpath(RULE).read_text(encoding="utf-8")
     with replacing(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    tell(f"wrote {target}:")
-    tell(text.splitlines()[-1])
+    report(f"wrote {target}:")
+    report(text.splitlines()[-1])
     for command in _RELOAD:
         if shutil.which(command[0]) is None:
-            tell(f"there is no {command[0]} here: plug the device in again, or restart the machine")
+            report(f"{command[0]} is not installed: plug the device in again, or restart the machine")
             return
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
-            tell(f"{' '.join(command)}: {done.stderr.strip() or 'failed'}; restart the machine instead")
+            report(f"{' '.join(command)}: {done.stderr.strip() or 'failed'}; restart the machine instead")
             return
-        tell(f"ran {' '.join(command)}")
-    tell("plug the device in again")
+        report(f"ran {' '.join(command)}")
+    report("plug the device in again")

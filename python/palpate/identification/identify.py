@@ -16,7 +16,7 @@ from .._typing import Float1D, Float2D
 from ..errors import InputError
 from ..model import Model
 from ..recording import Source
-from ..recording.reading import Given, recordings_from
+from ..recording.reading import RecordingLike, recordings_from
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
 from .classes.findings import identified, verdict_of
@@ -30,7 +30,7 @@ from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fie
 
 
 def identify(
-    recording: Given | Iterable[Given] | npt.ArrayLike,
+    recording: RecordingLike | Iterable[RecordingLike] | npt.ArrayLike,
     force: npt.ArrayLike | None = None,
     *,
     time: npt.ArrayLike | None = None,

@@ -31,7 +31,7 @@ from ..arguments import path_of
 from ..errors import InputError
 from ..model import Model
 from ..recording import Source
-from ..recording.conversion import mirrored
+from ..recording.conversion import mirror_notes
 from ..recording.motion import strokes_from_order
 from ..recording.reading import PART_ROWS, LongRecording, open_long_recording
 from ..recording.rows import LeftOut
@@ -230,7 +230,7 @@ def _identified(
 ) -> Model:
     width = 0.0 if summary.level is None else 2.0**summary.level
     refuse_isolated(summary.position, summary.count, width)
-    notes += mirrored(summary.correlation)
+    notes += mirror_notes(summary.correlation)
     side: Float1D | None = summary.side.astype(np.float64)
     decisions: tuple[Decision, ...] = ()
     findings: list[Finding] = []

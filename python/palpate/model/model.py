@@ -23,13 +23,13 @@ from ..recording.files import require_file
 from ..verdict import Verdict
 from .model_file import Fit, PathStep, describe, write_json
 
-_HELD_OUT = "held_out_every"
+_HELD_OUT_KEY = "held_out_every"
 """Key in the notes of a file: every k-th row of the data was not used."""
 
-_NUMBERS = ("bias", "bias_hysteresis", "period", "play_radius")
+_NUMBER_ARGUMENTS = ("bias", "bias_hysteresis", "period", "play_radius")
 """Arguments that are one number."""
 
-_OPTIONAL = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis", "period", "play_radius")
+_OPTIONAL_ARGUMENTS = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis", "period", "play_radius")
 """Arguments that may be None."""
 
 
@@ -135,7 +135,7 @@ class Model(ForceModel):
             instance_of(name, word, str, "one of the words in the documentation of Model")
         instance_of("inputs", inputs, (list, tuple), "the names of the inputs")
         instance_of("units", units, Mapping, "the units of position and force")
-        instance_of("fit", fit, Fit, "how the identification ended")
+        instance_of("fit", fit, Fit, "the result of the identification")
         instance_of("data", data, Source, "the source of the recordings")
         of_velocity = kind == "position_velocity" and len(inputs) == 2
         super().__init__(**network, below=below, above=above, of_velocity=of_velocity)
@@ -250,8 +250,8 @@ class Model(ForceModel):
         """Returns the content of a model file."""
         notes = dict(self.notes)
         if self.data.held_out_every:
-            notes[_HELD_OUT] = self.data.held_out_every
-        losses = self.weight_hysteresis, self.linear_hysteresis
+            notes[_HELD_OUT_KEY] = self.data.held_out_every
+        hysteresis_weights = self.weight_hysteresis, self.linear_hysteresis
         bounds = self.slope_bounds
         return {
             "format": "palpate-model",
@@ -265,10 +265,14 @@ class Model(ForceModel):
                 "alpha": self.alpha.tolist(),
                 "beta": self.beta.tolist(),
                 "weight": self.weight.tolist(),
-                "weight_hysteresis": None if losses[0] is None else losses[0].tolist(),
+                "weight_hysteresis": None
+                if hysteresis_weights[0] is None
+                else hysteresis_weights[0].tolist(),
                 "linear": self.linear.tolist(),
                 "bias": self.bias,
-                "linear_hysteresis": None if losses[1] is None else losses[1].tolist(),
+                "linear_hysteresis": None
+                if hysteresis_weights[1] is None
+                else hysteresis_weights[1].tolist(),
                 "bias_hysteresis": self.bias_hysteresis,
             },
             "play_radius": self.play_radius,
@@ -304,7 +308,7 @@ class Model(ForceModel):
             del file[part]
         network, domain, continuation = (file.pop(part) for part in ("network", "domain", "continuation"))
         bounds, fit, data = (file.pop(part) for part in ("slope_bounds", "fit", "data"))
-        held_out_every = file.get("notes", {}).get(_HELD_OUT, 0)
+        held_out_every = file.get("notes", {}).get(_HELD_OUT_KEY, 0)
         return cls(
             **file,
             **{name: value for name, value in network.items() if name != "dimension"},
@@ -356,7 +360,7 @@ class Model(ForceModel):
 
 def _require_numbers(name: str, value: object) -> None:
     """Refuses a network argument that is not made of real numbers."""
-    if value is None and name in _OPTIONAL:
+    if value is None and name in _OPTIONAL_ARGUMENTS:
         return
     try:
         given = np.asarray(value)
@@ -365,8 +369,8 @@ def _require_numbers(name: str, value: object) -> None:
         given.astype(np.float64)
     except (TypeError, ValueError):
         given = None
-    if given is None or (name in _NUMBERS and given.ndim > 0):
-        right = "a number" if name in _NUMBERS else "an array of numbers"
+    if given is None or (name in _NUMBER_ARGUMENTS and given.ndim > 0):
+        right = "a number" if name in _NUMBER_ARGUMENTS else "an array of numbers"
         raise InputError(f"{name} is {shown(value)}; it must be {right}")
 
 

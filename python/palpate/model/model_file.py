@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from .._core.stability import Certificate
-from ..errors import visible
+from ..errors import escaped
 from ..recording.files import replacing
 
-_OPENED = ("network", "fit", "plan", "certificate")
+_MULTILINE_FIELDS = ("network", "fit", "plan", "certificate")
 """Objects with one line for each field in the file."""
 
 
@@ -88,8 +88,8 @@ def _lines(content: dict[str, Any], indent: str) -> str:
     inner = indent + "  "
     fields = []
     for key, value in content.items():
-        opened = key in _OPENED and not indent and value is not None
-        text = _lines(value, inner) if opened else json.dumps(value, allow_nan=False)
+        multiline = key in _MULTILINE_FIELDS and not indent and value is not None
+        text = _lines(value, inner) if multiline else json.dumps(value, allow_nan=False)
         fields.append(f"{inner}{json.dumps(key)}: {text}")
     return "{\n" + ",\n".join(fields) + f"\n{indent}}}"
 
@@ -107,13 +107,13 @@ def describe(model: Model) -> str:
         *(f"  {reason}" for reason in model.verdict.reasons),
         f"{model.kind} model: {model.n_wavelets} wavelets, {model.n_parameters} parameters "
         f"(model class {fit.model_class}, stopped by {fit.stop_reason})",
-        f"  NRMSE {fit.nrmse:.4g} on {data.rows} rows of {', '.join(map(visible, data.files)) or 'arrays'}",
+        f"  NRMSE {fit.nrmse:.4g} on {data.rows} rows of {', '.join(map(escaped, data.files)) or 'arrays'}",
     ]
     if data.held_out_every:
         lines.append(f"  every {data.held_out_every}th row was held out")
     for index, name in enumerate(model.inputs):
         unit = f" {position}" if name == "position" else ""
-        lines.append(f"  {visible(name)} from {model.lower[index]:.6g} to {model.upper[index]:.6g}{unit}")
+        lines.append(f"  {escaped(name)} from {model.lower[index]:.6g} to {model.upper[index]:.6g}{unit}")
     outside = f"below: {model.below}, above: {model.above}"
     lines.append(
         f"  outside: {outside}" if model.period is None else f"  repeats every {model.period:.6g} {position}"
@@ -136,16 +136,16 @@ def _terms(model: Model, force: str) -> list[str]:
     names = ["x"] if model.dimension == 1 else [f"x{k + 1}" for k in range(model.dimension)]
     linear = " ".join(f"{c:+.6g} {name}" for c, name in zip(model.linear, names, strict=True))
     network = "sum_i w_i psi(alpha_i (x - beta_i)) " if model.n_wavelets else ""
-    tail = f"  [{force}]"
+    unit = f"  [{force}]"
     hysteretic = model.weight_hysteresis is not None and model.linear_hysteresis is not None
     if not hysteretic:
-        formula = [f"  f(x) = {network}{linear} {model.bias:+.6g}{tail}"]
+        formula = [f"  f(x) = {network}{linear} {model.bias:+.6g}{unit}"]
     else:
         assert model.linear_hysteresis is not None
         loss = f"{model.linear_hysteresis[0]:+.6g} x {model.bias_hysteresis:+.6g}"
         network_h = network.replace("w_i", "v_i")
         formula = [
-            f"  f(x, s) = g(x) + s h(x){tail}, s = +1 pressing, -1 releasing",
+            f"  f(x, s) = g(x) + s h(x){unit}, s = +1 pressing, -1 releasing",
             f"  g(x) = {network}{linear} {model.bias:+.6g}",
             f"  h(x) = {network_h}{loss}",
         ]

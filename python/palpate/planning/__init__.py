@@ -11,7 +11,7 @@ from .._core.rendering import Scheme, explicit_slope_limit
 from .._core.simulation import Hand, TestRig
 from .._core.stability import Certificate, Inequality
 from ..arguments import named_arguments
-from .device_profile import EXAMPLES, DeviceProfile, example_profiles, profile_file
+from .device_profile import EXAMPLES, DeviceProfile, example_profiles, mechanical_units, profile_file
 from .plan import ACCEPTED_FORCE_ERROR, Plan, StaticForceError, describe
 from .simulation import (
     Comparison,
@@ -46,6 +46,7 @@ __all__ = [
     "force_error",
     "force_range",
     "judge",
+    "mechanical_units",
     "profile_file",
     "rig_for",
     "simulate",

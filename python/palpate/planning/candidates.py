@@ -12,10 +12,10 @@ from .._core.model import ForceModel
 from .._core.rendering import Scheme, compensated_share, default_play_radius
 from .._core.stability import (
     Certificate,
-    balancing_shift,
     certify,
     explicit_scheme,
     force_bounds,
+    passive_shift,
     steepest_stick,
     stiffest_coupling,
     usual_coupling_share,
@@ -78,7 +78,7 @@ class Task:
     coupling_damping: float | None = None
     mass: float | None = None
     object_damping: float | None = None
-    """Object damping"""
+    """B_o [force*s/position]"""
     play_radius: float | None = None
     predict: int | None = None
     """Samples of the prediction. 0: none; None: chosen by the plan"""
@@ -194,7 +194,7 @@ def _massless(task: Task) -> Candidate | Refusal:
     if stiffness is None:
         static = coupling_damping == 0.0 and not model.hysteretic
         falling = 0.0 if static else max(0.0, -force_bounds(model, task.usual_play).slope_min)
-        stiffness = stiffest_coupling(damping=coupling_damping, falling=falling, device=device)
+        stiffness = stiffest_coupling(coupling_damping=coupling_damping, falling=falling, device=device)
         if static:
             stiffness = min(stiffness, usual_coupling_share * high)
     if stiffness <= 0.0:
@@ -230,7 +230,7 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
         coupling_damping = _COUPLING_DAMPING_SHARE * task.device.viscous_damping
     stiffness = task.coupling_stiffness
     if stiffness is None:
-        stiffness = stiffest_coupling(damping=coupling_damping, falling=0.0, device=task.device)
+        stiffness = stiffest_coupling(coupling_damping=coupling_damping, falling=0.0, device=task.device)
     if stiffness <= 0.0:
         return Refusal(f"device damping is {task.device.viscous_damping:.4g}: too small for any coupling")
     return task.certified(
@@ -239,7 +239,7 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
             coupling_stiffness=stiffness,
             coupling_damping=coupling_damping,
             mass=task.mass,
-            damping=task.object_damping or 0.0,
+            object_damping=task.object_damping or 0.0,
             play_radius=task.usual_play,
         )
     )
@@ -253,7 +253,7 @@ def _explicit(task: Task) -> Candidate | Refusal:
         force_bounds(task.model, task.usual_play, task.device.force_limit),
         task.device,
         mass=task.mass,
-        damping=task.object_damping,
+        object_damping=task.object_damping,
         coupling_stiffness=task.coupling_stiffness,
         coupling_damping=task.coupling_damping,
         play_radius=task.usual_play,
@@ -348,7 +348,7 @@ def _fits(model: ForceModel, low: float, high: float) -> bool:
 
 def _balanced(model: ForceModel, device: DeviceProfile) -> ForceModel:
     """Shifts a periodic model so that its mean force, limited by the device, is 0."""
-    shift = balancing_shift(model, device.force_limit)
+    shift = passive_shift(model, device.force_limit)
     return with_network(model, bias=model.bias + shift) if shift else model
 
 

@@ -44,6 +44,11 @@ def profile_file(name: str) -> Path:
     return example if not file.exists() and example.exists() else file
 
 
+def mechanical_units(position_unit: str) -> tuple[str, str, str]:
+    """Returns the units of inertia, damping and force of a rotary ("rad") or linear device."""
+    return ("kg*m^2", "N*m*s/rad", "N*m") if position_unit == "rad" else ("kg", "N*s/m", "N")
+
+
 class DeviceProfile(_core.device.DeviceProfile):
     """Properties of a haptic device of one degree of freedom; SI units, rotary or linear.
 

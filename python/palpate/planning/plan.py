@@ -15,7 +15,7 @@ from .._core.io import checked_certificate, scheme_of
 from .._core.model import ForceModel
 from .._core.rendering import Scheme, solver_name
 from .._core.simulation import motion_driven
-from .._core.stability import Certificate, certify, device_difference, felt_slope
+from .._core.stability import Certificate, certify, device_difference, slope_behind_coupling
 from .._typing import Float1D, Float2D
 from ..arguments import instance_of
 from ..errors import InputError
@@ -162,7 +162,7 @@ class Plan:
             "coupling": {"stiffness": scheme.coupling_stiffness, "damping": scheme.coupling_damping}
             if scheme.has_coupling
             else None,
-            "inertia": {"mass": scheme.mass, "damping": scheme.damping} if scheme.has_mass else None,
+            "inertia": {"mass": scheme.mass, "damping": scheme.object_damping} if scheme.has_mass else None,
             "compensated": scheme.compensated,
             "play_radius": scheme.play_radius or None,
             "predict": scheme.predict or None,
@@ -178,7 +178,7 @@ class Plan:
         )
 
     @property
-    def felt_slopes(self) -> tuple[float, float]:
+    def slopes_behind_coupling(self) -> tuple[float, float]:
         """Steepest felt slope and that of the model; a coupling makes it softer [force/position].
 
         If the coupling was subtracted from the model, the bounds of the certificate are for the remainder.
@@ -187,36 +187,42 @@ class Plan:
         steepest = max(0.0, self.certificate.bounds.slope_max)
         if not self.scheme.has_coupling:
             return steepest, steepest
-        felt = felt_slope(steepest, self.scheme.coupling_stiffness)
-        return felt, felt if self.scheme.compensated else steepest
+        softened = slope_behind_coupling(steepest, self.scheme.coupling_stiffness)
+        return softened, softened if self.scheme.compensated else steepest
 
-    def rows(self) -> dict[str, str]:
-        """Returns the numbers of a certified plan for display, by name."""
+    def summary(self) -> dict[str, str]:
+        """Returns the main properties of a certified plan for display, by name."""
         assert self.certificate is not None
-        scheme, error = self.scheme, self.force_error
+        error, certificate = self.force_error, self.certificate
         rows = {"structure": self.description}
-        if self.solver is not None:
-            rows["solver"] = self.solver
-        if scheme.has_coupling:
-            rows["coupling"] = f"K_c = {scheme.coupling_stiffness:.4g}, B_c = {scheme.coupling_damping:.4g}"
-        if scheme.has_mass:
-            rows["object"] = f"mass {scheme.mass:.4g}, damping {scheme.damping:.4g}"
-        if scheme.predict:
-            rows["prediction"] = f"half a sample ahead, from {scheme.predict} previous samples"
-        if scheme.play_radius:
-            rows["play radius"] = f"{scheme.play_radius:.4g}"
         unit = self.model.units["force"] or "in the model's unit"
-        felt, steepest = self.felt_slopes
-        if felt < steepest:
-            rows["softer"] = f"slopes up to {steepest:.4g} are felt as up to {felt:.4g}"
+        softened, steepest = self.slopes_behind_coupling
+        if softened < steepest:
+            rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {softened:.4g}"
         rows["force error"] = (
             f"up to {error.largest:.4g} {unit}, "
             f"{100.0 * error.share:.3g} % of the range; RMS {100.0 * error.rms_share:.3g} % of the spread"
             if error.largest
             else "none"
         )
-        rows["certificate"] = _CERTIFICATE[self.certificate.verdict]
-        rows["holds for"] = f"up to {1e3 * self.certificate.longest_period_s:.4g} ms between two samples"
+        rows["certificate"] = _CERTIFICATE[certificate.verdict]
+        if not certificate.refused:
+            rows["certificate"] += f", for up to {1e3 * certificate.longest_period_s:.4g} ms between samples"
+        return rows
+
+    def settings(self) -> dict[str, str]:
+        """Returns the settings of the structure for display, by name."""
+        scheme, rows = self.scheme, {}
+        if self.solver is not None:
+            rows["solver"] = self.solver
+        if scheme.has_coupling:
+            rows["coupling"] = f"K_c = {scheme.coupling_stiffness:.4g}, B_c = {scheme.coupling_damping:.4g}"
+        if scheme.has_mass:
+            rows["object"] = f"mass {scheme.mass:.4g}, damping {scheme.object_damping:.4g}"
+        if scheme.predict:
+            rows["prediction"] = f"half a sample ahead, from {scheme.predict} previous samples"
+        if scheme.play_radius:
+            rows["play radius"] = f"{scheme.play_radius:.4g}"
         return rows
 
     def certified_for(self, device: DeviceProfile) -> Plan:
@@ -242,9 +248,9 @@ class Plan:
         if self.certificate is None:
             return (usable("the plan has no certificate: make a plan for a device with palpate plan"),)
         if self.certificate.refused:
-            cure = f"the object {self.needs}; " if self.needs else ""
-            reasons = "; ".join(self.refused) or self.certificate.why
-            return (no(f"no structure can render the model on this device: {cure}{reasons}"),)
+            cure = f"; the object {self.needs}" if self.needs else ""
+            reason = "" if self.needs else f": {self.certificate.reason}"
+            return (no(f"no structure can render the model on this device{cure}{reason}"),)
         if not self.certificate.certified:
             cure = f"; for a certificate the object {self.needs}" if self.needs else ""
             return (
@@ -280,7 +286,7 @@ class Plan:
 
 def describe(scheme: Scheme) -> str:
     """Returns a scheme in words: "implicit, m = 0.001, B_o = 0.5"."""
-    mass = [f"m = {scheme.mass:.3g}", f"B_o = {scheme.damping:.3g}"] if scheme.has_mass else []
+    mass = [f"m = {scheme.mass:.3g}", f"B_o = {scheme.object_damping:.3g}"] if scheme.has_mass else []
     return ", ".join([*_words(scheme), *mass])
 
 
@@ -297,7 +303,7 @@ def require_force(model: Model) -> None:
     """Refuses a model whose force is a motor current."""
     if model.units["force"] == "A":
         raise InputError(
-            "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A"
+            "the model's force is a motor current in A: identify it with --torque-constant-Nm-per-A"
         )
 
 
@@ -337,8 +343,8 @@ def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Sch
         return StaticForceError(0.0, 0.0, 0.0, 0.0)
     x = np.linspace(identified.lower[0], identified.upper[0], SAMPLES)
     wanted = strokes(identified, x)
-    felt = strokes(rendered, x) if exact else _behind_coupling(rendered, scheme, x)
-    error = felt - wanted
+    rendered_force = strokes(rendered, x) if exact else _behind_coupling(rendered, scheme, x)
+    error = rendered_force - wanted
     largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))
     return StaticForceError(
         largest, rms, _share(largest, float(np.ptp(wanted)), wanted), _share(rms, float(wanted.std()), wanted)

@@ -32,7 +32,7 @@ def plan(
     coupling_stiffness: float | None = None,
     coupling_damping: float | None = None,
     mass: float | None = None,
-    damping: float | None = None,
+    object_damping: float | None = None,
     play_radius: float | None = None,
     predict: int | Literal["auto", "off"] = "auto",
     accept_force_error: float = ACCEPTED_FORCE_ERROR,
@@ -52,7 +52,7 @@ def plan(
         Renders through a virtual coupling even if none is needed.
     coupling_stiffness, coupling_damping : float, optional
         K_c and B_c [force/position, force*s/position]; either requires a coupling.
-    mass, damping : float, optional
+    mass, object_damping : float, optional
         Mass and damping of the object [force*s^2/position, force*s/position]. Default: those of the model. 0
         removes them.
     play_radius : float, optional
@@ -83,7 +83,7 @@ def plan(
         "coupling_stiffness": coupling_stiffness,
         "coupling_damping": coupling_damping,
         "mass": mass,
-        "damping": damping,
+        "object_damping": object_damping,
         "play_radius": play_radius,
         "accept_force_error": accept_force_error,
     }.items():
@@ -108,7 +108,7 @@ def plan(
         coupling_stiffness=coupling_stiffness,
         coupling_damping=coupling_damping,
         mass=model.mass if mass is None else mass,
-        object_damping=model.damping if damping is None else damping,
+        object_damping=model.damping if object_damping is None else object_damping,
         play_radius=play_radius,
         predict=samples,
     )
@@ -132,7 +132,7 @@ def plan(
         chosen = outcome
         if not chosen.certificate.refused:
             break
-        refused.append(f"{name}: {chosen.certificate.why}")
+        refused.append(f"{name}: {chosen.certificate.reason}")
     assert chosen is not None  # the direct or the explicit structure always has a scheme
     identified = chosen.rendered is task.model
     planned = Plan(

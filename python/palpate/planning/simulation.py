@@ -310,7 +310,7 @@ def compare_structures(model: Model, rig: TestRig, duration: float) -> tuple[Com
         rig.scheme(model, structure="direct"),
         rig.scheme(model, structure="massless", compensated=True, coupling_damping=quarter),
         rig.scheme(model, structure="massless"),
-        rig.scheme(model, structure="implicit", damping=0.0),
+        rig.scheme(model, structure="implicit", object_damping=0.0),
         rig.scheme(model, structure="implicit"),
         rig.scheme(model, structure="explicit"),
     )

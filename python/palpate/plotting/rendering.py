@@ -145,7 +145,7 @@ def root_locus(scheme: Scheme, slopes: Float1D, period_s: float) -> RootLocus:
         T [s].
     """
     slopes = np.asarray(slopes, dtype=np.float64)
-    largest = max(2.0 * scheme.mass / period_s - scheme.coupling_damping, scheme.damping)
+    largest = max(2.0 * scheme.mass / period_s - scheme.coupling_damping, scheme.object_damping)
     # A sample where two poles meet, T B/m = 2 sqrt(c) - c with c = T^2 K/m: their path has a corner there.
     c = np.maximum(period_s**2 * (slopes + scheme.coupling_stiffness) / scheme.mass, 0.0)
     meeting = scheme.mass / period_s * (2.0 * np.sqrt(c) - c) - scheme.coupling_damping
@@ -156,7 +156,7 @@ def root_locus(scheme: Scheme, slopes: Float1D, period_s: float) -> RootLocus:
         slopes=slopes,
         dampings=dampings,
         poles=_poles(scheme, slopes[:, None], dampings[None, :], period_s),
-        chosen=_poles(scheme, slopes, np.full_like(slopes, scheme.damping), period_s),
+        chosen=_poles(scheme, slopes, np.full_like(slopes, scheme.object_damping), period_s),
     )
 
 
@@ -208,7 +208,7 @@ def draw_root_locus(axes: Axes, plan: Plan, device: DeviceProfile) -> None:
             color="black",
             markerfacecolor="white",
             zorder=3,
-            label=f"the same, damping {scheme.damping:.3g}",
+            label=f"the same, damping {scheme.object_damping:.3g}",
         )
     axes.set_aspect("equal")
     axes.set_xlim(-1.3, 1.3)

@@ -57,7 +57,7 @@ DIRECTION_NAMES = ("direction", "segment")
 """Columns that give the direction of the stroke if the caller names none."""
 
 
-_NO_CANDIDATES = (*TIME.preferred_stems, *DIRECTION_NAMES, "unnamed", "index", "sample", "id")
+_UNLIKELY_STEMS = (*TIME.preferred_stems, *DIRECTION_NAMES, "unnamed", "index", "sample", "id")
 """Stems of columns without a unit that a cure names last."""
 
 _LIKELY_UNITS = {"angle": "rad", "torque": "Nm", "moment": "Nm", "current": "A"}
@@ -91,7 +91,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class _Wish:
+class _Request:
     """Columns and units that the caller or a cure states."""
 
     roles: Mapping[str, str | None]
@@ -145,60 +145,62 @@ def choose_columns(
         A named column or unit does not exist, or no rule chooses.
     """
     roles = {"position": position, "force": force, "time": time}
-    wish = _Wish(roles, direction, tuple(inputs), dict(units or {}))
-    choice, problems = _attempt(names, wish, unstated)
+    request = _Request(roles, direction, tuple(inputs), dict(units or {}))
+    choice, problems = _attempt(names, request, unstated)
     if choice is not None:
-        silent = None if choice.time is not None else _silent_time(names, wish, text)
-        if silent is None:
+        unitless_time = None if choice.time is not None else _time_without_unit(names, request, text)
+        if unitless_time is None:
             return choice
-        added = " ".join(_time_options(silent))
-        note = f"column {shortened(silent)} has no unit and is not used; if it is in s, add: {added}"
+        added = " ".join(_time_options(unitless_time))
+        note = f"column {shortened(unitless_time)} has no unit and is not used; if it is in s, add: {added}"
         return replace(choice, notes=(*choice.notes, note))
-    told = "; ".join(problems.values())
-    if "no column" in told:
-        told += f"; its columns are {listed(names)}"
-    raise InputError(f"{file}: {told}{_cure(names, wish, unstated, text, steady, problems)}")
+    message = "; ".join(problems.values())
+    if "no column" in message:
+        message += f". Its columns are {listed(names)}"
+    raise InputError(f"{file}: {message}{_cure(names, request, unstated, text, steady, problems)}")
 
 
 def _attempt(
-    names: Sequence[str], wish: _Wish, unstated: Collection[str]
+    names: Sequence[str], request: _Request, unstated: Collection[str]
 ) -> tuple[Choice | None, dict[str, str]]:
     """Returns the choice, or the problems by role or option."""
     problems: dict[str, str] = {}
-    options = [(f"--{role}", name) for role, name in (*wish.roles.items(), ("direction", wish.direction))]
-    for option, name in (*options, *(("inputs", name) for name in wish.inputs)):
+    options = [
+        (f"--{role}", name) for role, name in (*request.roles.items(), ("direction", request.direction))
+    ]
+    for option, name in (*options, *(("inputs", name) for name in request.inputs)):
         if name is not None and name not in names:
             problems[option.strip("-")] = f"it has no column {shortened(name)!r} for {option}"
-    columns = _with_units(names, wish, problems)
+    columns = _with_units(names, request, problems)
     notes: list[str] = []
     chosen: dict[str, Column | None] = {}
     for role in ROLES:
         if role.name not in problems:
-            chosen[role.name] = _choose(role, columns, wish.roles[role.name], unstated, notes, problems)
-    the_position, the_force = chosen.get("position"), chosen.get("force")
-    if the_position is not None and the_force is not None and the_position.name == the_force.name:
-        both = f"column {shortened(the_force.name)} cannot be both the position and the force"
+            chosen[role.name] = _choose(role, columns, request.roles[role.name], unstated, notes, problems)
+    position_column, force_column = chosen.get("position"), chosen.get("force")
+    if position_column is not None and force_column is not None and position_column.name == force_column.name:
+        both = f"column {shortened(force_column.name)} cannot be both the position and the force"
         problems.setdefault("force", both)
-    if problems or the_position is None or the_force is None:
+    if problems or position_column is None or force_column is None:
         return None, problems
-    direction = wish.direction or next((name for name in DIRECTION_NAMES if name in names), None)
+    direction = request.direction or next((name for name in DIRECTION_NAMES if name in names), None)
     return Choice(
-        position=the_position,
-        force=the_force,
+        position=position_column,
+        force=force_column,
         time=chosen["time"],
         direction=direction,
-        inputs=tuple(next(column for column in columns if column.name == name) for name in wish.inputs),
+        inputs=tuple(next(column for column in columns if column.name == name) for name in request.inputs),
         notes=tuple(notes),
     ), {}
 
 
-def _with_units(names: Sequence[str], wish: _Wish, problems: dict[str, str]) -> list[Column]:
+def _with_units(names: Sequence[str], request: _Request, problems: dict[str, str]) -> list[Column]:
     """Gives every column the unit in its name, or the unit that the caller states."""
     stated: dict[str, Unit] = {}
-    for key, symbol in wish.units.items():
-        column = key if key in names else wish.roles.get(key)
+    for key, symbol in request.units.items():
+        column = key if key in names else request.roles.get(key)
         unit = unit_of(symbol)
-        if column is None and key in wish.roles:
+        if column is None and key in request.roles:
             problems[key] = f"--units {key}={symbol} also needs --{key} NAME, which names its column"
         elif column is None:
             problems[f"units {key}"] = (
@@ -206,7 +208,7 @@ def _with_units(names: Sequence[str], wish: _Wish, problems: dict[str, str]) -> 
             )
         elif unit is None:
             problems[f"units {key}"] = (
-                f"--units {key}={symbol}: {shortened(symbol)!r} is no unit; use one of {', '.join(UNITS)}"
+                f"--units {key}={symbol}: {shortened(symbol)!r} is not a unit; use one of {', '.join(UNITS)}"
             )
         else:
             stated[column] = unit
@@ -263,7 +265,7 @@ def _best(candidates: Sequence[Column], notes: list[str]) -> list[list[Column]]:
 
 
 def _prefer_si(same_stem: list[Column], notes: list[str]) -> list[Column]:
-    """Applies rule 2: keeps the columns of one stem whose unit is nearest to SI."""
+    """Keeps the columns of one stem whose unit is nearest to SI."""
 
     def distance_from_si(column: Column) -> int:
         assert column.unit is not None, "candidates have units"
@@ -275,7 +277,7 @@ def _prefer_si(same_stem: list[Column], notes: list[str]) -> list[Column]:
     kept = [column for column in same_stem if distance_from_si(column) == nearest]
     if len(kept) == 1 < len(same_stem):
         others = listed(column.name for column in same_stem if column is not kept[0])
-        notes.append(f"{kept[0].name} is used in place of {others} (SI wins)")
+        notes.append(f"{kept[0].name} is used in place of {others} (SI units are preferred)")
     return kept
 
 
@@ -286,22 +288,22 @@ def _require_unit(role: Role, column: Column, problems: dict[str, str]) -> None:
     elif column.unit.si not in role.si_units:
         problems[role.name] = (
             f"column {shortened(column.name)} is in {column.unit.symbol}, "
-            f"which is no unit of {role.name} ({allowed})"
+            f"which is not a unit of {role.name} ({allowed})"
         )
 
 
 def _cure(
     names: Sequence[str],
-    wish: _Wish,
+    request: _Request,
     unstated: Collection[str],
     text: Collection[str],
     steady: Collection[str],
     problems: Mapping[str, str],
 ) -> str:
     """Returns the options to add. They are tried first."""
-    none = "; a recording needs two columns of numbers, a position and a force"
-    roles, units, direction = dict(wish.roles), dict(wish.units), wish.direction
-    inputs = tuple(name for name in wish.inputs if name in names)
+    no_cure = ". A recording needs two columns of numbers, a position and a force"
+    roles, units, direction = dict(request.roles), dict(request.units), request.direction
+    inputs = tuple(name for name in request.inputs if name in names)
     assumed: list[str] = []
     added: list[str] = []
     for key in list(units):
@@ -313,45 +315,49 @@ def _cure(
     if "direction" in problems:
         direction = next(iter(difflib.get_close_matches(str(direction), names, 1, 0.0)), None)
         added.append(f"--direction {shlex.quote(str(direction))}")
-    columns = _with_units(names, replace(wish, units=units), {})
+    columns = _with_units(names, replace(request, units=units), {})
     for role in (role for role in ROLES if role.name in problems):
         others = {name for other, name in roles.items() if other != role.name}
-        wrong = roles[role.name]
+        named_column = roles[role.name]
         if (
-            wrong in names
-            and wrong not in others
-            and f"column {wrong} has no known unit" in problems[role.name]
+            named_column in names
+            and named_column not in others
+            and f"column {named_column} has no known unit" in problems[role.name]
         ):
-            pick: Column | None = next(column for column in columns if column.name == wrong)
+            suggestion: Column | None = next(column for column in columns if column.name == named_column)
         else:
             left_out = {*others, *text, *DIRECTION_NAMES}
-            pick = _suggested(role, [each for each in columns if each.name not in left_out], steady)
-        if pick is None:
-            return none
-        if pick.name != wrong:
-            added.append(f"--{role.name} {shlex.quote(pick.name)}")
-        roles[role.name] = pick.name
-        if role.name not in units and (pick.unit is None or pick.unit.si not in role.si_units):
-            stem = stem_key(pick.stem)
+            suggestion = _suggested(role, [each for each in columns if each.name not in left_out], steady)
+        if suggestion is None:
+            return no_cure
+        if suggestion.name != named_column:
+            added.append(f"--{role.name} {shlex.quote(suggestion.name)}")
+        roles[role.name] = suggestion.name
+        if role.name not in units and (suggestion.unit is None or suggestion.unit.si not in role.si_units):
+            stem = stem_key(suggestion.stem)
             unit = next((unit for word, unit in _LIKELY_UNITS.items() if word in stem), role.example)
-            units[pick.name] = unit if UNITS[unit].si in role.si_units else role.example
-            added.append(f"--units {shlex.quote(f'{pick.name}={units[pick.name]}')}")
-            assumed.append(f"{shortened(pick.name)} is in {units[pick.name]}")
-    choice, _ = _attempt(names, _Wish(roles, direction, inputs, units), unstated)
-    if choice is not None and choice.time is None and (silent := _silent_time(names, wish, text)):
-        added += _time_options(silent)
-        assumed.append(f"{shortened(silent)} is in s")
+            units[suggestion.name] = unit if UNITS[unit].si in role.si_units else role.example
+            added.append(f"--units {shlex.quote(f'{suggestion.name}={units[suggestion.name]}')}")
+            assumed.append(f"{shortened(suggestion.name)} is in {units[suggestion.name]}")
+    choice, _ = _attempt(names, _Request(roles, direction, inputs, units), unstated)
+    if (
+        choice is not None
+        and choice.time is None
+        and (unitless_time := _time_without_unit(names, request, text))
+    ):
+        added += _time_options(unitless_time)
+        assumed.append(f"{shortened(unitless_time)} is in s")
     options = " ".join(added)
     if choice is None or not added or len(options) > LONGEST_CURE:
-        return none
-    condition = f"if {' and '.join(assumed)}, " if assumed else "for example "
-    return f"; {condition}add: {options}"
+        return no_cure
+    condition = f"If {' and '.join(assumed)}, " if assumed else "For example, "
+    return f". {condition}add: {options}"
 
 
-def _silent_time(names: Sequence[str], wish: _Wish, text: Collection[str]) -> str | None:
+def _time_without_unit(names: Sequence[str], request: _Request, text: Collection[str]) -> str | None:
     """Returns a column that is named time but has no unit and is not used."""
-    taken = {*wish.roles.values(), *wish.inputs, *text}
-    times = (name for name in names if stem_key(name) in TIME.preferred_stems and name not in taken)
+    used = {*request.roles.values(), *request.inputs, *text}
+    times = (name for name in names if stem_key(name) in TIME.preferred_stems and name not in used)
     return next(times, None)
 
 
@@ -364,16 +370,16 @@ def _suggested(role: Role, columns: Sequence[Column], steady: Collection[str]) -
     fitting = [column for column in columns if column.unit is not None and column.unit.si in role.si_units]
     if fitting:
         return _best(fitting, [])[0][0]
-    foreign = [word for other in ROLES if other is not role for word in other.words]
+    words_of_other_roles = [word for other in ROLES if other is not role for word in other.words]
 
     def rank(column: Column) -> tuple[bool, ...]:
         stem = stem_key(column.stem)
         return (
             stem not in role.preferred_stems,
-            stem in _NO_CANDIDATES,
+            stem in _UNLIKELY_STEMS,
             column.name in steady,
             not any(word in stem for word in role.words),
-            any(word in stem for word in foreign),
+            any(word in stem for word in words_of_other_roles),
         )
 
     return min((column for column in columns if column.unit is None), key=rank, default=None)

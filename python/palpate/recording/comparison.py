@@ -18,22 +18,22 @@ from ..verdict import Finding, no, usable
 from .recording import Recording
 from .units import GRAVITY
 
-MOST_ROWS = 100_000
+MOST_COMPARED_ROWS = 100_000
 """Most rows that the comparison of cells uses. Longer recordings are thinned evenly."""
 
-CELLS = 64
+MOST_CELLS = 64
 """Largest number of position cells."""
 
-ROWS_A_CELL = 8
+LEAST_ROWS_PER_CELL = 8
 """Least mean number of rows in a cell of one stroke."""
 
-ROWS_TO_COMPARE = 3
+LEAST_COMPARED_ROWS = 3
 """Rows that a cell of one stroke needs to be compared with another."""
 
-PLAY_SHARE = 0.02
+PLAY_RADIUS_SHARE = 0.02
 """Play radius over the travel. A smaller motion back does not end a stroke."""
 
-TAIL = 0.5
+SPIKE_PERCENT = 0.5
 """Percentage of the rows at each end that may be position spikes."""
 
 
@@ -58,7 +58,7 @@ class Travel:
     @staticmethod
     def of(position: Float1D) -> Travel:
         """Returns the range of all rows within half a travel of the inner 99 % of the rows."""
-        low, high = np.percentile(position, (TAIL, 100.0 - TAIL))
+        low, high = np.percentile(position, (SPIKE_PERCENT, 100.0 - SPIKE_PERCENT))
         margin = 0.5 * (high - low)
         inside = (position >= low - margin) & (position <= high + margin)
         kept = position[inside]
@@ -89,10 +89,10 @@ def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
     """Returns the rows by cell, or None if too few rows move."""
     side = sides(recording, travel)
     row = np.flatnonzero(travel.inside & (side != 0))
-    row = row[:: max(1, -(-len(row) // MOST_ROWS))]
-    if not travel.length > 0.0 or len(row) < 8 * ROWS_A_CELL:
+    row = row[:: max(1, -(-len(row) // MOST_COMPARED_ROWS))]
+    if not travel.length > 0.0 or len(row) < 8 * LEAST_ROWS_PER_CELL:
         return None
-    cells = min(len(row) // (2 * ROWS_A_CELL), CELLS)
+    cells = min(len(row) // (2 * LEAST_ROWS_PER_CELL), MOST_CELLS)
     x, f, release = recording.position[row], recording.force[row], side[row] < 0
     place = cells * ((x - travel.lower) / travel.length)
     at = np.minimum(place.astype(np.intp), cells - 1)
@@ -103,12 +103,12 @@ def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
     residual = np.zeros_like(f)
     curves: list[tuple[Float1D, Float1D, Float1D]] = []
     for rows, of in ((~release, slice(0, cells)), (release, slice(cells, None))):
-        known = count[of] >= ROWS_TO_COMPARE
-        curve = mean_x[of][known], mean_f[of][known]
-        if known.any():
+        compared = count[of] >= LEAST_COMPARED_ROWS
+        curve = mean_x[of][compared], mean_f[of][compared]
+        if compared.any():
             residual[rows] = f[rows] - np.interp(x[rows], *curve)
-        scatter = np.bincount(cell, residual**2, 2 * cells)[of][known]
-        curves.append((*curve, np.sqrt(scatter) / count[of][known]))
+        scatter = np.bincount(cell, residual**2, 2 * cells)[of][compared]
+        curves.append((*curve, np.sqrt(scatter) / count[of][compared]))
     (press_x, press_f, press_error), (release_x, release_f, release_error) = curves
     loop, error = np.empty(0), np.empty(0)
     if len(press_x) and len(release_x):
@@ -124,37 +124,37 @@ def sides(recording: Recording, travel: Travel) -> NDArray[np.int8]:
         return recording.direction
     if not travel.length > 0.0:
         return np.zeros(len(recording), dtype=np.int8)
-    radius = PLAY_SHARE * travel.length
+    radius = PLAY_RADIUS_SHARE * travel.length
     position = np.clip(recording.position, travel.lower, travel.upper)
     state = (position - play(position, radius)) / radius
     return (state > 0.99).astype(np.int8) - (state < -0.99).astype(np.int8)
 
 
-BLOCKS = 32
+SPLIT_BLOCKS = 32
 """Blocks of rows between which a file is split."""
 
-EXPLAINED = 0.4
+LEAST_EXPLAINED_SHARE = 0.4
 """Least share of the scatter about the mean curves that a split into two parts must explain."""
 
-APART = 0.02
+LEAST_PART_DISTANCE = 0.02
 """Least distance of the two parts, as a share of the force's spread."""
 
-PATTERN = 16
+PATTERN_ROWS = 16
 """Number of rows by which a repetition of the beginning is found."""
 
-LEAST_COPY = 0.1
+LEAST_COPY_SHARE = 0.1
 """Least share of the rows in a copy."""
 
-MOST_COPIES = 4
+MOST_COPY_STARTS = 4
 """Most places that begin like the file and are compared to the end."""
 
-SAME_PLACE = 0.1
+LARGEST_MEAN_OFFSET = 0.1
 """Largest distance of the mean positions of two parts in a cell at which they are compared [cells]."""
 
-CURVE_POINTS = 64
+MOST_CURVE_POINTS = 64
 """Largest number of points of a curve."""
 
-POINT_ROWS = 4
+ROWS_PER_POINT = 4
 """Mean number of rows that are averaged for a point of a curve."""
 
 UNIT_RATIOS = {
@@ -169,28 +169,28 @@ UNIT_RATIOS = {
 }
 """Ratios of units that files mix up."""
 
-SHARED = 0.3
+LEAST_SHARED_TRAVEL = 0.3
 """Least common share of the travel of two recordings that are compared."""
 
-DIFFERENT = 0.25
+LEAST_CURVE_DIFFERENCE = 0.25
 """RMS difference of two curves above which they differ, as a share of the force's spread."""
 
-SAME = 0.1
+LARGEST_EXPLAINED_DIFFERENCE = 0.1
 """Largest RMS difference at which a ratio explains it, as a share of the force's spread."""
 
-ONE_WAY = 0.99
+ONE_STROKE_SHARE = 0.99
 """Least share of the moving rows with one direction in a recording of one stroke."""
 
-PRESS_ABOVE = 0.9
+PRESS_ABOVE_SHARE = 0.9
 """Least share of the shared positions at which the press is above the release of the same object."""
 
-SAME_RANGE = 2.0
+LARGEST_RANGE_RATIO = 2.0
 """Largest ratio of the force ranges of two strokes of one object.
 
 The release begins where the press ends. 74 measured pairs have 0.9 to 1.2.
 """
 
-MOST_RECORDINGS = 20
+MOST_COMPARED_RECORDINGS = 20
 """Largest number of recordings in the search for the one that agrees best with the others."""
 
 Curve = tuple[Float1D, Float1D]
@@ -201,28 +201,28 @@ def merged_findings(recording: Recording, cells: CellRows | None) -> list[Findin
     """Returns findings on repeated rows and on a force with two branches, one before and one after a row."""
     if recording.input_names:
         return []
-    if (again := _appended_to_itself(recording)) is not None:
+    if (copy_start := _copy_start(recording)) is not None:
         return [
             usable(
-                f"the rows from {again} on repeat those from 0 on exactly: the file was probably appended to "
-                f"itself; give --rows 0:{again}"
+                f"the rows from {copy_start} on repeat those from 0 on exactly: the file was probably "
+                f"appended to itself; give --rows 0:{copy_start}"
             )
         ]
-    return [] if cells is None else _two_parts(recording, cells)
+    return [] if cells is None else _change_findings(recording, cells)
 
 
-def _two_parts(recording: Recording, cells: CellRows) -> list[Finding]:
+def _change_findings(recording: Recording, cells: CellRows) -> list[Finding]:
     """Compares the parts before and after each block edge, cell by cell."""
     total = float(np.sum(cells.residual**2))
     spread = float(np.std(recording.force))
     if not total > 0.0 or not spread > 0.0:
         return []
     width = 2 * cells.cells
-    block = cells.row * BLOCKS // len(recording)
+    block = cells.row * SPLIT_BLOCKS // len(recording)
     code = block * width + cells.cell
 
     def sums(values: Float1D | None) -> Float2D:
-        table = np.bincount(code, values, BLOCKS * width).reshape(BLOCKS, width)
+        table = np.bincount(code, values, SPLIT_BLOCKS * width).reshape(SPLIT_BLOCKS, width)
         return table.cumsum(axis=0, dtype=np.float64)
 
     count, force, place = sums(None), sums(cells.residual), sums(cells.place)
@@ -230,7 +230,11 @@ def _two_parts(recording: Recording, cells: CellRows) -> list[Finding]:
     one, other = np.maximum(before, 1.0), np.maximum(after, 1.0)
     apart = force[:-1] / one - (force[-1] - force[:-1]) / other
     moved = place[:-1] / one - (place[-1] - place[:-1]) / other
-    both = (before >= ROWS_TO_COMPARE) & (after >= ROWS_TO_COMPARE) & (np.abs(moved) <= SAME_PLACE)
+    both = (
+        (before >= LEAST_COMPARED_ROWS)
+        & (after >= LEAST_COMPARED_ROWS)
+        & (np.abs(moved) <= LARGEST_MEAN_OFFSET)
+    )
     between = np.where(both, before * after / (one + other) * apart**2, 0.0)
     explained = between.sum(axis=1) / total
     best = int(np.argmax(explained))
@@ -239,33 +243,33 @@ def _two_parts(recording: Recording, cells: CellRows) -> list[Finding]:
         return []
     rows = (before[best] + after[best])[shared]
     distance = float(np.sqrt(np.average(apart[best][shared] ** 2, weights=rows)))
-    if explained[best] < EXPLAINED or distance < APART * spread:
+    if explained[best] < LEAST_EXPLAINED_SHARE or distance < LEAST_PART_DISTANCE * spread:
         return []
-    split = (best + 1) * len(recording) // BLOCKS
+    split = (best + 1) * len(recording) // SPLIT_BLOCKS
     return [
         usable(
-            f"before and after about row {split} the force at the same position and stroke differs by "
-            f"{amount(distance, recording.units['force'])}, {distance / spread:.0%} of its spread: the file "
-            "probably holds two objects or two zeros, or the object changed (drift, settling); identify "
-            f"each part by itself with --rows 0:{split} and --rows {split}:{len(recording)}"
+            f"near row {split} the force at the same position and stroke changes by "
+            f"{amount(distance, recording.units['force'])}, {distance / spread:.0%} of its spread. The file "
+            "probably holds two objects or two zeros, or the object changed (drift, settling): identify "
+            f"each part separately with --rows 0:{split} and --rows {split}:{len(recording)}"
         )
     ]
 
 
-def _appended_to_itself(recording: Recording) -> int | None:
+def _copy_start(recording: Recording) -> int | None:
     """Returns the first row of a copy of the beginning that continues to the end of the file."""
     x, f = recording.position, recording.force
     n = len(x)
-    least = int(LEAST_COPY * n)
-    if least < PATTERN:
+    least = int(LEAST_COPY_SHARE * n)
+    if least < PATTERN_ROWS:
         return None
     starts = np.arange(n // 3, n - least + 1)
-    for k in (*range(PATTERN), *np.linspace(PATTERN, least - 1, PATTERN).astype(int).tolist()):
+    for k in (*range(PATTERN_ROWS), *np.linspace(PATTERN_ROWS, least - 1, PATTERN_ROWS).astype(int).tolist()):
         starts = starts[(x[starts + k] == x[k]) & (f[starts + k] == f[k])]
-    for start in starts[:MOST_COPIES].tolist():
+    for start in starts[:MOST_COPY_STARTS].tolist():
         copied = slice(0, n - start)
         same = np.array_equal(x[start:], x[copied]) and np.array_equal(f[start:], f[copied])
-        if same and len(np.unique(f[copied])) > PATTERN:
+        if same and len(np.unique(f[copied])) > PATTERN_ROWS:
             return int(start)
     return None
 
@@ -274,7 +278,7 @@ def _appended_to_itself(recording: Recording) -> int | None:
 class _Strokes:
     """Curves of one recording."""
 
-    way: int
+    direction: int
     """+1: all rows go into the object, -1: out of it, 0: both or unknown"""
     curves: Mapping[int, Curve]
     """Of the rows of each direction, and of all rows (0)"""
@@ -283,13 +287,13 @@ class _Strokes:
     def of(recording: Recording, side: Float1D | None) -> _Strokes:
         """Returns the curves of a recording; `side` (n,) is the direction of its rows, None: as recorded."""
         travel = Travel.of(recording.position)
-        words = sides(recording, travel) if side is None else side
-        into, out = words > 0, words < 0
+        signs = sides(recording, travel) if side is None else side
+        into, out = signs > 0, signs < 0
         moving = max(int(np.count_nonzero(into | out)), 1)
-        mean = float(np.count_nonzero(into)) / moving, float(np.count_nonzero(out)) / moving
-        way = 1 if mean[0] >= ONE_WAY else -1 if mean[1] >= ONE_WAY else 0
+        shares = float(np.count_nonzero(into)) / moving, float(np.count_nonzero(out)) / moving
+        direction = 1 if shares[0] >= ONE_STROKE_SHARE else -1 if shares[1] >= ONE_STROKE_SHARE else 0
         rows = {0: travel.inside, 1: travel.inside & into, -1: travel.inside & out}
-        return _Strokes(way, {key: _curve(recording, at) for key, at in rows.items() if at.any()})
+        return _Strokes(direction, {key: _curve(recording, at) for key, at in rows.items() if at.any()})
 
 
 def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
@@ -309,19 +313,19 @@ def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None)
     directions = [None] * len(recordings) if side is None else np.split(side, ends)
     strokes = [_Strokes.of(*each) for each in zip(recordings, directions, strict=True)]
     apart = [
-        [min(_apart(one, other), 1.0) for other in strokes[:MOST_RECORDINGS]]
-        for one in strokes[:MOST_RECORDINGS]
+        [min(_difference(one, other), 1.0) for other in strokes[:MOST_COMPARED_RECORDINGS]]
+        for one in strokes[:MOST_COMPARED_RECORDINGS]
     ]
     reference = int(np.argmin(np.sum(apart, axis=1)))
     found = []
     for index, each in enumerate(strokes):
         if index == reference:
             continue
-        difference = _apart(strokes[reference], each)
-        if difference <= DIFFERENT:
+        difference = _difference(strokes[reference], each)
+        if difference <= LEAST_CURVE_DIFFERENCE:
             continue
         name, other = _name(recordings, index), _name(recordings, reference)
-        if (explained := _ratio(*_pair(strokes[reference], each))) is not None:
+        if (explained := _ratio(*_shared_curves(strokes[reference], each))) is not None:
             role, ratio, units = explained
             found.append(
                 no(
@@ -334,7 +338,8 @@ def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None)
             found.append(
                 usable(
                     f"{name} and {other} differ by {difference:.0%} of the force's spread at the same "
-                    "positions: they are probably of two objects or have two zeros; identify them one by one"
+                    "positions: they probably belong to two objects or have two zeros; identify "
+                    "them separately"
                 )
             )
     return found
@@ -351,32 +356,32 @@ def _curve(recording: Recording, rows: NDArray[np.bool_]) -> Curve:
     lower, length = float(x.min()), float(np.ptp(x))
     if not length > 0.0:
         return x[:1], f[:1]
-    cells = int(np.clip(len(x) // POINT_ROWS, 2, CURVE_POINTS))
+    cells = int(np.clip(len(x) // ROWS_PER_POINT, 2, MOST_CURVE_POINTS))
     cell = np.minimum((cells * ((x - lower) / length)).astype(np.intp), cells - 1)
     count = np.bincount(cell, minlength=cells)
-    known = count > 0
+    filled = count > 0
     return (
-        np.bincount(cell, x, cells)[known] / count[known],
-        np.bincount(cell, f, cells)[known] / count[known],
+        np.bincount(cell, x, cells)[filled] / count[filled],
+        np.bincount(cell, f, cells)[filled] / count[filled],
     )
 
 
-def _pair(one: _Strokes, other: _Strokes) -> tuple[Curve, Curve]:
+def _shared_curves(one: _Strokes, other: _Strokes) -> tuple[Curve, Curve]:
     """Returns the curves of the stroke that both recordings contain, or of all rows."""
-    way = 0 if one.way * other.way < 0 else one.way or other.way
-    return one.curves.get(way, one.curves[0]), other.curves.get(way, other.curves[0])
+    direction = 0 if one.direction * other.direction < 0 else one.direction or other.direction
+    return one.curves.get(direction, one.curves[0]), other.curves.get(direction, other.curves[0])
 
 
-def _apart(one: _Strokes, other: _Strokes) -> float:
+def _difference(one: _Strokes, other: _Strokes) -> float:
     """Returns the difference of two recordings; 0 if they differ only by hysteresis."""
-    difference = _curve_difference(*_pair(one, other))
-    if one.way * other.way < 0 and np.isfinite(difference):
-        press, release = (one, other) if one.way > 0 else (other, one)
+    difference = _curve_difference(*_shared_curves(one, other))
+    if one.direction * other.direction < 0 and np.isfinite(difference):
+        press, release = (one, other) if one.direction > 0 else (other, one)
         (x, f), (at, force) = press.curves[0], release.curves[0]
         shared = (at >= x[0]) & (at <= x[-1])
         above = np.mean(np.interp(at[shared], x, f) >= force[shared])
         ranges = float(np.ptp(f)), float(np.ptp(force))
-        if above >= PRESS_ABOVE and max(ranges) <= SAME_RANGE * min(ranges):
+        if above >= PRESS_ABOVE_SHARE and max(ranges) <= LARGEST_RANGE_RATIO * min(ranges):
             return 0.0
     return difference
 
@@ -387,7 +392,11 @@ def _curve_difference(one: Curve, other: Curve) -> float:
     shared = (at >= x[0]) & (at <= x[-1])
     reach = min(x[-1], at[-1]) - max(x[0], at[0])
     spread = float(np.std(f))
-    if reach < SHARED * max(x[-1] - x[0], at[-1] - at[0]) or np.count_nonzero(shared) < 3 or spread == 0.0:
+    if (
+        reach < LEAST_SHARED_TRAVEL * max(x[-1] - x[0], at[-1] - at[0])
+        or np.count_nonzero(shared) < 3
+        or spread == 0.0
+    ):
         return float("inf")
     apart = force[shared] - np.interp(at[shared], x, f)
     return float(np.sqrt(np.mean(apart**2))) / spread
@@ -402,4 +411,4 @@ def _ratio(one: Curve, other: Curve) -> tuple[str, float, str] | None:
             tried.append((_curve_difference(one, (by * x, f)), "position", by, units))
             tried.append((_curve_difference(one, (x, by * f)), "force", by, units))
     best = min(tried, key=lambda each: each[0])
-    return best[1:] if best[0] <= SAME else None
+    return best[1:] if best[0] <= LARGEST_EXPLAINED_DIFFERENCE else None

@@ -19,7 +19,7 @@ from .columns import Choice, Column, choose_columns
 from .files import Layout, sha256_of_file
 from .rows import RowCheck
 from .table import Cells, Places, Table, parse_number, to_numbers
-from .units import COLUMN_SUFFIX
+from .units import COLUMN_SUFFIX, UNITS, Unit
 
 UNSTATED = ""
 """Unit of an array that was given without one: SI, but not specified."""
@@ -30,7 +30,7 @@ MIN_ROWS = 10
 MIN_POSITIONS = 3
 """Least number of distinct positions of a recording."""
 
-FALLING = -0.3
+FALLING_CORRELATION = -0.3
 """Correlation of force and position below which the force falls over the whole file.
 
 A mirrored axis gives about -0.3 to -0.9 on indentation curves; humps, detents and friction -0.3 to 0.2.
@@ -114,7 +114,7 @@ class Conversion:
     ) -> Conversion:
         """Chooses the columns of a table; the arguments are those of `read_recording`."""
         metadata = dict(table.metadata)
-        layout = Layout.taken_from(name, metadata)
+        layout = Layout.pop_from(name, metadata)
         choice = choose_columns(
             name,
             table.names,
@@ -137,10 +137,11 @@ class Conversion:
         for each, column in zip(negate, negated, strict=True):
             if column not in used:
                 raise InputError(
-                    f"{name}: --negate {each} names no column that is used ({', '.join(sorted(used))})"
+                    f"{name}: --negate is {each}, must be position, force or a used column "
+                    f"({', '.join(sorted(used))})"
                 )
-        turned = frozenset(column for column in negated if negated.count(column) % 2)
-        return Conversion(name, choice, choice.direction, status, turned, drop, metadata)
+        negated_columns = frozenset(column for column in negated if negated.count(column) % 2)
+        return Conversion(name, choice, choice.direction, status, negated_columns, drop, metadata)
 
     @property
     def columns(self) -> list[Column]:
@@ -165,6 +166,12 @@ class Conversion:
         return {role: column.unit.si if column.unit else UNSTATED for role, column in roles.items()}
 
     @property
+    def file_units(self) -> dict[str, Unit]:
+        """Unit of position and force in the table, where it is known."""
+        roles = {"position": self.choice.position.unit, "force": self.choice.force.unit}
+        return {role: unit for role, unit in roles.items() if unit is not None}
+
+    @property
     def names(self) -> dict[str, str]:
         """Role, or name of an input, to the name of its column."""
         choice = self.choice
@@ -185,13 +192,15 @@ class Conversion:
         """
         check = RowCheck(self.name, table, first, len(cells[self.choice.position.name]), self.drop)
         if self.status is not None:
-            check.as_modelled(cells[self.status])
+            check.leave_out_other_forces(cells[self.status])
         for name in self.numbers:
             check.finite(name, cells[name])
-        words = None if self.direction is None else check.directions(self.direction, cells[self.direction])
+        directions = (
+            None if self.direction is None else check.directions(self.direction, cells[self.direction])
+        )
         if self.choice.time is not None:
             check.increasing(self.choice.time.name, cells[self.choice.time.name])
-        return check, words
+        return check, directions
 
     def si(self, column: Column, cells: Mapping[str, Cells]) -> Float1D:
         """Returns the values of a column in SI units, with the sign that the caller requires."""
@@ -239,74 +248,78 @@ def converted(
     direction, rows, zero, torque_constant, options
         Those of `read_recording`.
     """
-    how = Conversion.of(table, name, direction=direction, **options)
-    cells = table.read(numbers=how.numbers, text=how.text)
-    stroke = how.direction
+    conversion = Conversion.of(table, name, direction=direction, **options)
+    cells = table.read(numbers=conversion.numbers, text=conversion.text)
+    direction_column = conversion.direction
     if (
-        stroke == "segment"
+        direction_column == "segment"
         and direction is None
-        and all(parse_number(word) is not None for word in cells[stroke])
+        and all(parse_number(word) is not None for word in cells[direction_column])
     ):
         # Numbered segments do not state a direction.
-        cells[stroke], how = to_numbers(cells[stroke]), replace(how, direction=None)
-    choice = how.choice
+        cells[direction_column], conversion = (
+            to_numbers(cells[direction_column]),
+            replace(conversion, direction=None),
+        )
+    choice = conversion.choice
     notes = [*choice.notes, *(["1 torn line at the end is left out"] if table.torn else [])]
     total = len(cells[choice.position.name])
     start, stop = _row_range(name, rows, total)
-    whole = cells
+    all_cells = cells
     if (start, stop) != (0, total):
         notes.append(f"rows {start} to {stop - 1} of 0 to {total - 1} are used")
         cells = {each: column[start:stop] for each, column in cells.items()}
-    check, words = how.checked(table, cells, start)
+    check, directions = conversion.checked(table, cells, start)
     if not check.kept.all():
         cells = {each: column[check.kept] for each, column in cells.items()}
-        words = None if words is None else words[check.kept]
+        directions = None if directions is None else directions[check.kept]
     notes += check.notes
-    x, f = how.si(choice.position, cells), how.si(choice.force, cells)
-    units = how.units
+    x, f = conversion.si(choice.position, cells), conversion.si(choice.force, cells)
+    units, file_units = conversion.units, conversion.file_units
     if torque_constant is not None:
         if not (math.isfinite(torque_constant) and torque_constant > 0):
             raise InputError(f"--torque-constant-Nm-per-A is {torque_constant}; it must be a number > 0")
         if units["force"] != "A":
             raise InputError(
-                f"{name}: --torque-constant-Nm-per-A turns a current into a torque, but the force is "
+                f"{name}: --torque-constant-Nm-per-A converts a current to a torque, but the force is "
                 f"{choice.force.name}, which is not in A"
             )
-        f, units["force"] = f * torque_constant, "N*m"
+        f, units["force"], file_units["force"] = f * torque_constant, "N*m", UNITS["Nm"]
     if zero is not None:
         first, last = _row_range(name, zero, total)
         numbers = np.arange(start, stop)[check.kept]
-        free = (numbers >= first) & (numbers < last)
-        if not free.any():
-            raise InputError(f"{name}: --zero {first}:{last} holds none of the rows that are used")
-        offset = float(np.mean(f[free]))
+        without_contact = (numbers >= first) & (numbers < last)
+        if not without_contact.any():
+            raise InputError(f"{name}: --zero {first}:{last} contains no row that is used")
+        offset = float(np.mean(f[without_contact]))
         f = f - offset
         notes.append(
-            f"{offset:.6g} {units['force']}, the mean force of rows {first} to {last - 1}, is taken off"
+            f"{offset:.6g} {units['force']}, the mean force of rows {first} to {last - 1}, is subtracted"
         )
     _require_enough(name, choice.position, x, check.notes)
-    time = None if choice.time is None else how.si(choice.time, cells)
-    inputs = [how.si(column, cells) for column in choice.inputs]
-    used = {*how.numbers, how.direction}
-    partly = (start, stop) != (0, total)
+    time = None if choice.time is None else conversion.si(choice.time, cells)
+    inputs = [conversion.si(column, cells) for column in choice.inputs]
+    used = {*conversion.numbers, conversion.direction}
+    is_part = (start, stop) != (0, total)
     return {
         "position": x,
         "force": f,
         "time": time,
-        "direction": words,
+        "direction": directions,
         "inputs": np.column_stack(inputs) if inputs else np.empty((len(x), 0)),
         "input_names": tuple(map(_si_name, choice.inputs)),
         "columns": {each: column for each, column in cells.items() if each not in used},
-        "metadata": how.metadata,
+        "metadata": conversion.metadata,
         "units": units,
         "source": Source(
             files=() if file is None else (str(file),),
-            sha256=digest_of(x, f, time, *inputs, words) if file is None else sha256_of_file(file),
+            sha256=digest_of(x, f, time, *inputs, directions) if file is None else sha256_of_file(file),
             rows=len(x),
-            columns=how.names,
+            columns=conversion.names,
         ),
-        "notes": (how.note(torque_constant, table.notes), *notes, *_noticed(x, f, words)),
-        "part_of": _motion(how, whole, start + np.flatnonzero(check.kept)) if partly else None,
+        "notes": (conversion.note(torque_constant, table.notes), *notes, *_sign_notes(x, f, directions)),
+        "file_units": file_units,
+        "part_of": _motion(conversion, all_cells, start + np.flatnonzero(check.kept)) if is_part else None,
     }
 
 
@@ -319,13 +332,13 @@ def digest_of(*arrays: NDArray[Any] | None) -> str:
     return digest.hexdigest()
 
 
-def mirrored(correlation: float, against: bool = False) -> list[str]:
+def mirror_notes(correlation: float, position_falls: bool = False) -> list[str]:
     """Returns the note on a force that falls with position, or on a mirrored position."""
     signs = []
-    if correlation < FALLING:
+    if correlation < FALLING_CORRELATION:
         signs.append(f"the force falls with position over the whole file (correlation {correlation:.2f})")
-    if against:
-        signs.append("the position falls where the direction goes into the object")
+    if position_falls:
+        signs.append("the position falls in rows whose direction is into the object")
     if not signs:
         return []
     return [
@@ -334,12 +347,12 @@ def mirrored(correlation: float, against: bool = False) -> list[str]:
     ]
 
 
-def _noticed(x: Float1D, f: Float1D, words: Int8Vector | None) -> list[str]:
+def _sign_notes(x: Float1D, f: Float1D, directions: Int8Vector | None) -> list[str]:
     """Reports once a force or position that looks mirrored. No sign changes without an option."""
     x, f = _scaled(x), _scaled(f)
     correlation = float(np.corrcoef(x, f)[0, 1]) if np.ptp(f) > 0 else 0.0
-    against = words is not None and len(x) > 1 and float((np.diff(x) * words[1:]).sum()) < 0
-    return mirrored(correlation, against)
+    position_falls = directions is not None and len(x) > 1 and float((np.diff(x) * directions[1:]).sum()) < 0
+    return mirror_notes(correlation, position_falls)
 
 
 def _scaled(values: Float1D) -> Float1D:
@@ -348,11 +361,14 @@ def _scaled(values: Float1D) -> Float1D:
     return np.asarray(np.ldexp(values, -exponent))
 
 
-def _motion(how: Conversion, cells: Mapping[str, Cells], rows: NDArray[np.intp]) -> Motion | None:
+def _motion(conversion: Conversion, cells: Mapping[str, Cells], rows: NDArray[np.intp]) -> Motion | None:
     """Returns the motion of all rows of a file, or None without continuous time."""
-    if how.choice.time is None:
+    if conversion.choice.time is None:
         return None
-    position, time = how.si(how.choice.position, cells), how.si(how.choice.time, cells)
+    position, time = (
+        conversion.si(conversion.choice.position, cells),
+        conversion.si(conversion.choice.time, cells),
+    )
     usable = np.isfinite(position) & np.isfinite(time)
     if not usable[rows].all() or np.any(np.diff(time[usable]) <= 0.0):
         return None
@@ -365,7 +381,8 @@ def _row_range(name: str, rows: Range | None, total: int) -> tuple[int, int]:
     start, stop = first or 0, total if last is None else last
     if not 0 <= start < stop <= total and rows is not None:
         raise InputError(
-            f"{name}: rows {start}:{stop} were asked for; it has {total} rows, and START must be below STOP"
+            f"{name}: rows {start}:{stop} are outside the {total} rows of the file, or START is not "
+            "below STOP"
         )
     return start, stop
 
@@ -377,8 +394,8 @@ def _si_name(column: Column) -> str:
 
 def _require_enough(name: str, position: Column, x: Float1D, left_out: Sequence[str]) -> None:
     if len(x) < MIN_ROWS:
-        told = "".join(f"; {note}" for note in left_out)
-        raise InputError(f"{name} has {len(x)} usable rows; a recording needs at least {MIN_ROWS}{told}")
+        reasons = "".join(f"; {note}" for note in left_out)
+        raise InputError(f"{name} has {len(x)} usable rows; a recording needs at least {MIN_ROWS}{reasons}")
     distinct = len(np.unique(x))
     if distinct < MIN_POSITIONS:
         plural = "s" * (distinct > 1)

@@ -26,27 +26,27 @@ from .table import MISSING, Cells, LongTable, parse_with, to_numbers
 _CHUNK_ROWS = 1_000_000
 """Rows read at a time. Limits the memory in addition to the columns."""
 
-_EXACT: dict[str, Any] = (
+_EXACT_OPTIONS: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 )
 """Options for exact conversion of numbers; newer pandas versions always convert exactly."""
 
-_FURTHER = "\n"
+_TRAILING_COLUMN = "\n"
 """Name of the empty column if each row ends with a separator. A header cannot contain it."""
 
-_SNIFF_ROWS = 1000
+_EXAMINED_ROWS = 1000
 """Rows that are examined for text columns before the fast reader starts."""
 
-_BLOCK = 1 << 22
+_BLOCK_BYTES = 1 << 22
 """Bytes in which rows are counted at a time."""
 
-_BLANK = re.compile(rb"\n[ \t\r\n]")
+_BLANK_LINE = re.compile(rb"\n[ \t\r\n]")
 """Start of a line that may be blank."""
 
-_CLOSING = re.compile(rb'(?:[^"]|"")*"(?!")')
+_CLOSING_QUOTE = re.compile(rb'(?:[^"]|"")*"(?!")')
 """Rest of a quoted cell."""
 
-_OPENING = {separator: re.compile(rb'(?:^|%b)"' % separator) for separator in (b",", b";", b"\t")}
+_OPENING_QUOTE = {separator: re.compile(rb'(?:^|%b)"' % separator) for separator in (b",", b";", b"\t")}
 """Quote that opens a cell; it must be the first character of the cell."""
 
 
@@ -106,7 +106,7 @@ class CsvFile(LongTable):
         self.names = self._dialect.names
         self.metadata = self._dialect.metadata
         self.notes = self._dialect.notes
-        self.text_names, self.steady_names = self._sniff()
+        self.text_names, self.steady_names = self._examine_first_rows()
 
     def _leave_out_torn_line(self) -> None:
         with self._path.open("rb") as stream:
@@ -125,10 +125,10 @@ class CsvFile(LongTable):
     def _bytes(self, start: int = 0, stop: int | None = None) -> io.BufferedReader:
         return io.BufferedReader(FileBytes(self._path, start, self._size if stop is None else stop), 1 << 20)
 
-    def _not_decoded(self) -> InputError:
+    def _wrong_encoding(self) -> InputError:
         encoding = {"latin-1": "Latin-1"}.get(self._dialect.encoding, self._dialect.encoding.upper())
         return InputError(
-            f"{self._path} begins as {encoding} and later holds bytes that are not; if they are Latin-1, "
+            f"{self._path} begins as {encoding} and later has other bytes; if they are Latin-1, "
             "convert the file: iconv -f LATIN1 -t UTF-8 OLD.csv > NEW.csv"
         )
 
@@ -140,7 +140,7 @@ class CsvFile(LongTable):
             try:
                 yield lines
             except UnicodeDecodeError:
-                raise self._not_decoded() from None
+                raise self._wrong_encoding() from None
             except csv.Error as error:
                 raise not_csv(str(self._path), error) from None
 
@@ -151,7 +151,7 @@ class CsvFile(LongTable):
             if len(cells) > 1 or (cells and cells[0].strip()):
                 yield self._dialect.lines_before + reader.line_num, cells
 
-    def _sniff(self) -> tuple[set[str], set[str]]:
+    def _examine_first_rows(self) -> tuple[set[str], set[str]]:
         """Returns the names of the text columns, and of those with one or two values, in the first rows."""
         text: set[str] = set()
         values: dict[str, set[str]] = {name: set() for name in self.names}
@@ -165,7 +165,7 @@ class CsvFile(LongTable):
                         values[name].add(cell)
                     if name not in text and not self._numeric(cell):
                         text.add(name)
-                if row == _SNIFF_ROWS:
+                if row == _EXAMINED_ROWS:
                     break
         return text, {name for name, found in values.items() if len(found) < 3}
 
@@ -207,10 +207,10 @@ class CsvFile(LongTable):
             columns[name] = np.concatenate(parts.pop(name) or [empty])
         return columns
 
-    def _columns_with_text(self, known: set[str]) -> set[str]:
+    def _columns_with_text(self, text_names: set[str]) -> set[str]:
         found: set[str] = set()
         for chunk in self._chunks(dict.fromkeys(self.names, "str")):
-            for name in set(self.names) - known - found:
+            for name in set(self.names) - text_names - found:
                 cells = chunk[name]
                 if self._dialect.decimal == ",":
                     cells = cells.str.replace(",", ".")
@@ -243,16 +243,16 @@ class CsvFile(LongTable):
         wanted = [name for name in self.names if name in numbers or name in text]
         # Most files contain only numbers in number columns and are read fast. If a block does not, the part
         # is read again as text, without the rows that were already returned.
-        given = 0
+        returned = 0
         for as_text in ({*text}, {*text, *numbers}):
             types = {name: "str" if name in as_text else "float64" for name in wanted}
             first = 0
             try:
                 for chunk in self._chunks(types, part=part, columns=wanted, rows=rows):
                     stop = first + len(chunk)
-                    if stop > given:
-                        new = chunk.iloc[max(given - first, 0) :]
-                        begin, given = stop - len(new), stop
+                    if stop > returned:
+                        new = chunk.iloc[max(returned - first, 0) :]
+                        begin, returned = stop - len(new), stop
                         yield begin, {name: self._block(name, new[name], name in text) for name in wanted}
                     first = stop
                 return
@@ -288,7 +288,7 @@ class CsvFile(LongTable):
     ) -> Iterator[Any]:
         """Yields frames of the given number of rows, from the whole file or a part."""
         raw = FileBytes(self._path, *(part or (self._dialect.start, self._size)))
-        trailing = [_FURTHER] if self._dialect.trailing else []
+        trailing = [_TRAILING_COLUMN] if self._dialect.trailing else []
         before = 0
         try:
             with (
@@ -305,20 +305,20 @@ class CsvFile(LongTable):
                     dtype={**dtypes, **dict.fromkeys(trailing, "category")},
                     keep_default_na=False,
                     na_values={name: MISSING for name, dtype in dtypes.items() if dtype == "float64"},
-                    **_EXACT,
+                    **_EXACT_OPTIONS,
                     chunksize=rows,
                     engine="c",
                 ) as reader,
             ):
                 for chunk in reader:
                     if trailing:
-                        self._require_no_more(chunk.pop(_FURTHER), before, part)
+                        self._refuse_extra_cells(chunk.pop(_TRAILING_COLUMN), before, part)
                     before += len(chunk)
                     yield chunk
         except pd.errors.EmptyDataError:
             return
         except UnicodeDecodeError:
-            raise self._not_decoded() from None
+            raise self._wrong_encoding() from None
         except pd.errors.ParserError as error:
             if "source failed" in str(error):
                 # pandas hides the exception: a disk error or Ctrl-C.
@@ -327,7 +327,7 @@ class CsvFile(LongTable):
                 raise self._too_many_cells(self._line(int(cells[1]), part), int(cells[2])) from None
             raise InputError(f"{self._path} is not CSV: {str(error).strip()}") from None
 
-    def _require_no_more(self, cells: Any, before: int, part: tuple[int, int] | None) -> None:
+    def _refuse_extra_cells(self, cells: Any, before: int, part: tuple[int, int] | None) -> None:
         """Refuses a row that has more cells than the header has names."""
         if any(str(word).strip() for word in cells.cat.categories):
             more = cells.notna() & (cells.astype(str).str.strip() != "")
@@ -369,7 +369,7 @@ class RowCount:
     """First row that has more cells than the table has columns, and its number of cells"""
 
 
-def count_rows(stream: BinaryIO, separator: str, *, columns: int = 0, step: int = _BLOCK) -> RowCount:
+def count_rows(stream: BinaryIO, separator: str, *, columns: int = 0, step: int = _BLOCK_BYTES) -> RowCount:
     """Counts the rows of a stream and finds ends of rows. The stream must begin with a row.
 
     A line break within a quoted cell does not end a row. A line of white space does not count.
@@ -386,47 +386,47 @@ def count_rows(stream: BinaryIO, separator: str, *, columns: int = 0, step: int 
     """
     mark = separator.encode()
     space = b" \r" if mark == b"\t" else b" \t\r"
-    found, place, quoted, record = RowCount(), 0, False, b""
-    while block := stream.read(min(step, _BLOCK)):
+    found, offset, quoted, row = RowCount(), 0, False, b""
+    while block := stream.read(min(step, _BLOCK_BYTES)):
         block += stream.readline()
-        place += len(block)
+        offset += len(block)
         lines = block.count(b"\n") + (not block.endswith(b"\n"))
-        blank = block[0] in b"\n" + space or _BLANK.search(block)
-        even = not columns or block.count(mark) == lines * (columns - 1)
-        if not (quoted or blank or b'"' in block) and even:
+        blank = block[0] in b"\n" + space or _BLANK_LINE.search(block)
+        equal_rows = not columns or block.count(mark) == lines * (columns - 1)
+        if not (quoted or blank or b'"' in block) and equal_rows:
             found.rows += lines
         else:
             for line in block.removesuffix(b"\n").split(b"\n"):
                 if b'"' in line:
                     quoted = _ends_quoted(line, quoted, mark)
                 # Limits memory if a quote is never closed.
-                record += line[: _BLOCK - len(record)]
+                row += line[: _BLOCK_BYTES - len(row)]
                 if quoted:
-                    record += b"\n"
+                    row += b"\n"
                     continue
-                if record.strip(space):
-                    if columns and not found.too_wide and (cells := _cells(record, mark)) > columns:
+                if row.strip(space):
+                    if columns and not found.too_wide and (cells := _cell_count(row, mark)) > columns:
                         found.too_wide = found.rows, cells
                     found.rows += 1
-                record = b""
-        if not quoted and place - found.ends[-1] >= step:
-            found.ends.append(place)
-    if place > found.ends[-1]:
-        found.ends.append(place)
+                row = b""
+        if not quoted and offset - found.ends[-1] >= step:
+            found.ends.append(offset)
+    if offset > found.ends[-1]:
+        found.ends.append(offset)
     return found
 
 
-def _cells(record: bytes, mark: bytes) -> int:
-    if b'"' not in record:
-        return record.count(mark) + 1
-    return len(next(csv.reader([record.decode("latin-1")], delimiter=mark.decode())))
+def _cell_count(row: bytes, mark: bytes) -> int:
+    if b'"' not in row:
+        return row.count(mark) + 1
+    return len(next(csv.reader([row.decode("latin-1")], delimiter=mark.decode())))
 
 
 def _ends_quoted(line: bytes, quoted: bool, mark: bytes) -> bool:
     """Returns True if a line ends within a quoted cell; `quoted` is the state at its beginning."""
-    place = 0
+    offset = 0
     while True:
-        found = (_CLOSING.match if quoted else _OPENING[mark].search)(line, place)
+        found = (_CLOSING_QUOTE.match if quoted else _OPENING_QUOTE[mark].search)(line, offset)
         if found is None:
             return quoted
-        place, quoted = found.end(), not quoted
+        offset, quoted = found.end(), not quoted

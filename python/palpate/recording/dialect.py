@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 
-from ..errors import InputError, listed, shortened, visible
+from ..errors import InputError, escaped, listed, shortened
 from .table import MISSING, parse_number, parse_with
 from .units import split_name, unit_of
 
@@ -26,7 +26,11 @@ HEAD_LINES = 1000
 SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
 """Separators by preference: a comma may be a decimal comma, but a tab is always a separator."""
 
-_MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
+_BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
 
 RECORDING_FORMATS = "CSV, Parquet, Excel (.xlsx), NumPy (.npz), MATLAB (.mat) or MCAP"
 
@@ -35,16 +39,16 @@ Row = Sequence[str]
 LEAST_NUMBERS = 2
 """Least number of cells with numbers in a row of data: position and force."""
 
-LEAST_RUN = 3
+LEAST_CONSECUTIVE_ROWS = 3
 """Least number of consecutive rows of data, or all rows of a shorter table."""
 
-THOUSANDS = re.compile(
+THOUSANDS_SEPARATED = re.compile(
     r"[-+]?(\d{1,3}(,\d{3})+\.\d*|\d{1,3}(\.\d{3})+,\d*|\d{1,3}(,\d{3}){2,}|\d{1,3}(\.\d{3}){2,}"
     r"|\d{1,3}(['’ \u00a0\u202f]\d{3})+([.,]\d*)?)"
 )
 """Number with thousands separators, with any decimal mark."""
 
-MAYBE_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
+AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 """Number with one comma that may be a decimal comma or a thousands separator."""
 
 
@@ -97,32 +101,32 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
     if text is None or _is_binary(text):
         raise not_text(file)
     if text.lstrip().startswith("{") or file.endswith(".json"):
-        raise _json(file, text)
+        raise _json_refusal(file, text)
     lines = list(io.StringIO(text, newline=""))
     if not whole and len(lines) > 1:
         lines.pop()  # the last line may be cut
     found = _header(file, lines)
     separator, spans = found.separator, found.spans
     before, header_line = spans[found.header.row]
-    header, notes = named(f"{file}, line {header_line + 1}", found.header)
+    header, header_notes = with_checked_names(f"{file}, line {header_line + 1}", found.header)
     decimal = "."
     if found.sample:
         decimal = decimal_mark(f"{file}, line {spans[header.first][0] + 1}", found.sample, separator)
     lines_before = spans[header.row if header.units_row is None else header.units_row][1] + 1
-    told = []
+    notes = []
     if encoding != "utf-8":
-        told.append({"latin-1": "Latin-1"}.get(encoding, encoding.upper()))
+        notes.append({"latin-1": "Latin-1"}.get(encoding, encoding.upper()))
     if separator != ",":
-        told.append(f"separated by {SEPARATORS[separator]}s")
+        notes.append(f"separated by {SEPARATORS[separator]}s")
     if decimal == ",":
-        told.append("decimal comma")
+        notes.append("decimal comma")
     preamble = sum(1 for line in lines[:before] if line.strip() and not _is_comment(line))
     if preamble:
-        told.append(f"{preamble} line{'s' * (preamble > 1)} before the header in line {before + 1}")
+        notes.append(f"{preamble} line{'s' * (preamble > 1)} before the header in line {before + 1}")
     if _is_comment(lines[before]):
-        told.append(f"header in the comment in line {before + 1}")
+        notes.append(f"header in the comment in line {before + 1}")
     if header.units_row is not None:
-        told.append(f"units in line {spans[header.units_row][0] + 1}")
+        notes.append(f"units in line {spans[header.units_row][0] + 1}")
     return Dialect(
         encoding=encoding,
         separator=separator,
@@ -132,28 +136,28 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
         start=mark + len("".join(lines[:lines_before]).encode(encoding)),
         lines_before=lines_before,
         trailing=header.trailing,
-        notes=(*told, *notes),
+        notes=(*notes, *header_notes),
     )
 
 
 def not_csv(file: str, error: csv.Error) -> InputError:
-    """Returns the refusal of text that cannot be split into cells."""
-    return InputError(f"{file} is not CSV: {error}; a quotation mark may not be closed")
+    """Returns the error for text that cannot be split into cells."""
+    return InputError(f"{file} is not CSV: {error}; a closing quotation mark is probably missing")
 
 
 def not_text(file: str) -> InputError:
-    """Returns the refusal of a file that is neither text nor of another known format."""
+    """Returns the error for a file that is neither text nor of another known format."""
     return InputError(f"{file} is not text; a recording is {RECORDING_FORMATS}")
 
 
 def _encoding(head: bytes) -> tuple[int, str]:
-    for mark, encoding in _MARKS:
+    for mark, encoding in _BYTE_ORDER_MARKS:
         if head.startswith(mark):
             return len(mark), encoding
-    some = head[:4096]
-    even, odd = some[0::2].count(0), some[1::2].count(0)
+    start = head[:4096]
+    even, odd = start[0::2].count(0), start[1::2].count(0)
     # In UTF-16, one of the two bytes of Latin letters, digits and separators is zero.
-    if 4 * max(even, odd) > len(some) and 20 * min(even, odd) < max(even, odd):
+    if 4 * max(even, odd) > len(start) and 20 * min(even, odd) < max(even, odd):
         return 0, "utf-16-le" if odd > even else "utf-16-be"
     return 0, "utf-8"
 
@@ -166,18 +170,18 @@ def _decoded(file: str, head: bytes, encoding: str, whole: bool) -> str | None:
 
 def _is_binary(text: str) -> bool:
     """Returns True if one character in ten is a control character, or one is NUL."""
-    some = text[:4096]
-    control = sum(unicodedata.category(each) == "Cc" and each not in "\t\n\r\f" for each in some)
-    return "\x00" in some or 10 * control > len(some)
+    start = text[:4096]
+    control = sum(unicodedata.category(each) == "Cc" and each not in "\t\n\r\f" for each in start)
+    return "\x00" in start or 10 * control > len(start)
 
 
-def _json(file: str, text: str) -> InputError:
+def _json_refusal(file: str, text: str) -> InputError:
     kind = "a palpate model" if '"network"' in text or '"palpate' in text else "JSON"
     return InputError(f"{file} looks like {kind}; a recording is {RECORDING_FORMATS}")
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Candidate:
     """Header for one separator."""
 
     header: Header
@@ -188,13 +192,13 @@ class _Found:
     """First rows of data; empty without rows of numbers"""
 
 
-def _header(file: str, lines: list[str]) -> _Found:
+def _header(file: str, lines: list[str]) -> _Candidate:
     """Returns the header with the separator that gives most columns of numbers."""
-    every = ((k, line) for k, line in enumerate(lines) if line.strip() and not _is_comment(line))
-    plain = list(islice(every, HEAD_LINES))
+    with_text = ((k, line) for k, line in enumerate(lines) if line.strip() and not _is_comment(line))
+    plain = list(islice(with_text, HEAD_LINES))
     if not plain:
-        raise InputError(f"{file} holds no header: the first line must name the columns")
-    best: _Found | None = None
+        raise InputError(f"{file} has no header: the first line must name the columns")
+    best: _Candidate | None = None
     for separator in SEPARATORS:
         if not any(separator in line for _, line in plain):
             continue
@@ -206,12 +210,12 @@ def _header(file: str, lines: list[str]) -> _Found:
             spans, rows = _rows(file, [(above, lines[above].lstrip("# \t")), *plain], separator)
             header = find_header(rows)
         if header is not None and (best is None or header.numbers > best.header.numbers):
-            best = _Found(header, separator, spans, rows[header.first :])
+            best = _Candidate(header, separator, spans, rows[header.first :])
     if best is not None:
         return best
     separator = max(",;\t", key=lambda each: len(_rows(file, plain[:1], each)[1][0]))
     spans, rows = _rows(file, plain, separator)
-    return _Found(first_row_as_header(rows), separator, spans, [])
+    return _Candidate(first_row_as_header(rows), separator, spans, [])
 
 
 def _is_comment(line: str) -> bool:
@@ -224,11 +228,11 @@ def _rows(
     """Returns the first and last line of each row, and its cells."""
     spans, rows = [], []
     reader = csv.reader((line for _, line in plain), delimiter=separator)
-    begun = 0
+    first_line = 0
     try:
         for cells in reader:
-            spans.append((plain[begun][0], plain[reader.line_num - 1][0]))
-            begun = reader.line_num
+            spans.append((plain[first_line][0], plain[reader.line_num - 1][0]))
+            first_line = reader.line_num
             rows.append(cells)
     except csv.Error as error:
         raise not_csv(file, error) from None
@@ -246,7 +250,7 @@ def _metadata(lines: list[str], separator: str) -> Iterator[tuple[str, str]]:
         key, found, value = text.partition(":")
         if not comment and not found:
             key, _, value = text.partition(separator)
-        yield visible(key.strip()), visible(value.strip())
+        yield escaped(key.strip()), escaped(value.strip())
 
 
 @dataclass(frozen=True)
@@ -271,12 +275,12 @@ def find_header(rows: Sequence[Row]) -> Header | None:
     The header is a row above the run with the same number of cells and without numbers. Of several such rows
     the one with the most units in its names is chosen, then the lowest one.
     """
-    first = next((k for k in range(len(rows)) if _starts_run(rows, k)), None)
+    first = next((k for k in range(len(rows)) if _starts_data(rows, k)), None)
     if first is None:
         return None
     cells = len(rows[first])
     above = first
-    while above > 0 and _fits(rows, above - 1, first) and not _is_data(rows[above - 1]):
+    while above > 0 and _may_be_header(rows, above - 1, first) and not _is_data(rows[above - 1]):
         above -= 1
     candidates = [k for k in range(above, first) if not any(map(_is_number, rows[k]))]
     if not candidates:
@@ -286,22 +290,22 @@ def find_header(rows: Sequence[Row]) -> Header | None:
         row = candidates[-2]
     else:
         row = max(candidates, key=lambda k: (sum(split_name(name)[1] is not None for name in rows[k]), k))
-    names = [visible(name.strip()) for name in rows[row]]
+    names = [escaped(name.strip()) for name in rows[row]]
     names += [""] * (cells - len(names))
     if units_row is not None:
-        units = [visible(_bare(unit)) for unit in rows[units_row]] + [""] * len(names)
+        units = [escaped(_without_brackets(unit)) for unit in rows[units_row]] + [""] * len(names)
         names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=False)]
     numbers = sum(_is_number(cell) for cell in rows[first])
     found = Header(row, tuple(names), first, units_row, numbers=numbers)
-    return _without_trailing(found, rows[first : first + LEAST_RUN])
+    return _without_trailing(found, rows[first : first + LEAST_CONSECUTIVE_ROWS])
 
 
 def first_row_as_header(rows: Sequence[Row]) -> Header:
     """Takes the first row as the header if no row of numbers shows it."""
-    return Header(0, tuple(visible(name.strip()) for name in rows[0]), 1)
+    return Header(0, tuple(escaped(name.strip()) for name in rows[0]), 1)
 
 
-def named(where: str, header: Header) -> tuple[Header, list[str]]:
+def with_checked_names(where: str, header: Header) -> tuple[Header, list[str]]:
     """Checks the names of a header and names an unnamed first column. Returns the header and notes.
 
     Raises
@@ -323,7 +327,7 @@ def named(where: str, header: Header) -> tuple[Header, list[str]]:
     for name in names:
         if names.count(name) > 1:
             raise InputError(
-                f"{where}: column name {shortened(name)} stands {names.count(name)} times; "
+                f"{where}: column name {shortened(name)} occurs {names.count(name)} times; "
                 "rename these columns in the file"
             )
     if len(names) == 1:
@@ -347,10 +351,10 @@ def decimal_mark(where: str, rows: Sequence[Row], separator: str) -> str:
     if not commas:
         return "."
     points = next((cell for cell in cells if "." in cell and parse_number(cell) is not None), None)
-    if points is None and not all(MAYBE_THOUSANDS.fullmatch(cell) for cell in commas):
+    if points is None and not all(AMBIGUOUS_COMMA.fullmatch(cell) for cell in commas):
         return ","
-    other = f"{points!r} has a decimal point" if points else "every comma stands before three digits"
-    raise _either(f"{where} holds {commas[0]!r}, and {other}", separator)
+    other = f"{points!r} has a decimal point" if points else "three digits follow every comma"
+    raise _ambiguous_comma(f"{where} holds {commas[0]!r}, and {other}", separator)
 
 
 def refuse_marks(where: str, cells: Iterable[object], decimal: str, separator: str) -> None:
@@ -363,25 +367,25 @@ def refuse_marks(where: str, cells: Iterable[object], decimal: str, separator: s
         command that changes them.
     """
     for cell in dict.fromkeys(str(cell).strip() for cell in cells):
-        if THOUSANDS.fullmatch(cell):
+        if THOUSANDS_SEPARATED.fullmatch(cell):
             mark = re.findall(r"[^\d+-]", cell)[0]
             raise InputError(
                 f"{where} holds {cell!r}, which has thousands separators; export the file without them, "
-                f"or remove them: {_remove(mark, separator, '')}"
+                f"or remove them: {_sed_command(mark, separator, '')}"
             )
         if decimal == "." and "," in cell and parse_with(cell, ",") is not None:
-            raise _either(f"{where} holds {cell!r}, and the first rows have no comma", separator)
+            raise _ambiguous_comma(f"{where} holds {cell!r}, and the first rows have no comma", separator)
 
 
-def _either(told: str, separator: str) -> InputError:
-    points, nothing = (_remove(",", separator, by) for by in (".", ""))
+def _ambiguous_comma(finding: str, separator: str) -> InputError:
+    points, nothing = (_sed_command(",", separator, by) for by in (".", ""))
     return InputError(
-        f"{told}: the comma may be a decimal comma or a thousands separator. If it is a decimal comma, write "
-        f"points: {points}; if it is a thousands separator, remove it: {nothing}"
+        f"{finding}: the comma may be a decimal comma or a thousands separator. If it is a decimal comma, "
+        f"write points: {points}; if it is a thousands separator, remove it: {nothing}"
     )
 
 
-def _remove(mark: str, separator: str, by: str) -> str:
+def _sed_command(mark: str, separator: str, by: str) -> str:
     """Returns a command that replaces a mark between digits; in a comma-separated file only within quotes."""
     escaped = {".": "[.]", "'": "\\x27"}.get(mark, mark)
     digits = "[0-9]" if by else "[0-9]{3}"
@@ -397,7 +401,7 @@ def _is_number(cell: str) -> bool:
     return (
         parse_number(text) is not None
         or parse_with(text, ",") is not None
-        or THOUSANDS.fullmatch(text) is not None
+        or THOUSANDS_SEPARATED.fullmatch(text) is not None
     )
 
 
@@ -406,32 +410,32 @@ def _is_data(row: Row) -> bool:
     return numbers >= LEAST_NUMBERS
 
 
-def _starts_run(rows: Sequence[Row], k: int) -> bool:
-    run = rows[k : k + LEAST_RUN]
-    return all(len(row) == len(run[0]) and _is_data(row) for row in run)
+def _starts_data(rows: Sequence[Row], k: int) -> bool:
+    following = rows[k : k + LEAST_CONSECUTIVE_ROWS]
+    return all(len(row) == len(following[0]) and _is_data(row) for row in following)
 
 
-def _fits(rows: Sequence[Row], k: int, first: int) -> bool:
+def _may_be_header(rows: Sequence[Row], k: int, first: int) -> bool:
     """Returns True if row k can be the header of row `first`: it has an equal number of cells.
 
     Directly above, it may have one cell less if each row ends with a separator, or more if cells are missing.
     """
-    have, need = len(rows[k]), len(rows[first])
-    if have == need:
+    cells, needed = len(rows[k]), len(rows[first])
+    if cells == needed:
         return True
     if k + 1 != first:
         return False
-    ends_empty = all(row[-1].strip() == "" for row in rows[first : first + LEAST_RUN])
-    return have > need or (have == need - 1 and have >= LEAST_NUMBERS and ends_empty)
+    ends_empty = all(row[-1].strip() == "" for row in rows[first : first + LEAST_CONSECUTIVE_ROWS])
+    return cells > needed or (cells == needed - 1 and cells >= LEAST_NUMBERS and ends_empty)
 
 
-def _bare(unit: str) -> str:
+def _without_brackets(unit: str) -> str:
     text = unit.strip()
     return text[1:-1].strip() if text[:1] + text[-1:] in ("[]", "()") else text
 
 
 def _is_units(row: Row) -> bool:
-    stated = [_bare(cell) for cell in row if _bare(cell) not in ("", "-")]
+    stated = [_without_brackets(cell) for cell in row if _without_brackets(cell) not in ("", "-")]
     known = sum(unit_of(text) is not None for text in stated)
     return known > 0 and 2 * known >= len(stated) and not any(map(_is_number, stated))
 

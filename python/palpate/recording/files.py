@@ -24,14 +24,14 @@ import pandas as pd
 from ..errors import InputError, shortened
 from .table import Cells
 
-_BLOCK = 1 << 20
+_BLOCK_BYTES = 1 << 20
 
 
 def sha256_of_file(path: Path) -> str:
     """Returns the SHA-256 of a file in hexadecimal digits."""
     digest = hashlib.sha256()
     with path.open("rb") as stream:
-        while block := stream.read(_BLOCK):
+        while block := stream.read(_BLOCK_BYTES):
             digest.update(block)
     return digest.hexdigest()
 
@@ -102,12 +102,12 @@ def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator
         raise InputError(f"{path} cannot be written: it is a folder")
     if not replace:
         require_absent(Path(path))
-    before = target.stat() if target.exists() else None
-    if before is not None and not stat.S_ISREG(before.st_mode):
+    replaced = target.stat() if target.exists() else None
+    if replaced is not None and not stat.S_ISREG(replaced.st_mode):
         raise InputError(f"{path} cannot be written: it is not an ordinary file")
     temporary = target.with_name(f".{target.name[:40]}.{secrets.token_hex(8)}.tmp")
     try:
-        _create(temporary, before)
+        _create(temporary, replaced)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}") from None
     try:
@@ -128,14 +128,14 @@ def require_absent(path: Path) -> None:
         raise InputError(f"{path} exists already; choose another name, or replace it with --force")
 
 
-def _create(temporary: Path, before: os.stat_result | None) -> None:
+def _create(temporary: Path, replaced: os.stat_result | None) -> None:
     """Creates a new file with the owner and mode of the file that it will replace."""
-    mode = 0o666 if before is None else stat.S_IMODE(before.st_mode)
+    mode = 0o666 if replaced is None else stat.S_IMODE(replaced.st_mode)
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
     try:
-        if before is not None:
+        if replaced is not None:
             with suppress(PermissionError):  # only root may change the owner
-                os.fchown(descriptor, before.st_uid, before.st_gid)
+                os.fchown(descriptor, replaced.st_uid, replaced.st_gid)
             os.fchmod(descriptor, mode)  # without the umask
     finally:
         os.close(descriptor)
@@ -165,7 +165,7 @@ def _rename_to_free_name(temporary: Path, target: Path) -> None:
         temporary.replace(target)
 
 
-_KEY = "palpate-columns"
+_LAYOUT_KEY = "palpate-columns"
 """Metadata key: ``# palpate-columns: {"position": "position_rad", ...}``."""
 
 
@@ -177,9 +177,9 @@ class Layout:
     inputs: tuple[str, ...] = ()
 
     @staticmethod
-    def taken_from(file: str, metadata: dict[str, str]) -> Layout:
+    def pop_from(file: str, metadata: dict[str, str]) -> Layout:
         """Removes the layout from the metadata of a file and returns it."""
-        text = metadata.pop(_KEY, None)
+        text = metadata.pop(_LAYOUT_KEY, None)
         if text is None:
             return Layout()
         try:
@@ -188,7 +188,7 @@ class Layout:
             return Layout({role: str(name) for role, name in found.items()}, inputs)
         except (ValueError, AttributeError, TypeError):
             raise InputError(
-                f"{file}: the line '# {_KEY}:' holds {text!r}, not a JSON object of roles and columns"
+                f"{file}: the line '# {_LAYOUT_KEY}:' holds {text!r}, not a JSON object of roles and columns"
             ) from None
 
 
@@ -215,7 +215,7 @@ def write_csv(
         replacing(path, replace=replace) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as stream,
     ):
-        for key, value in (*metadata.items(), (_KEY, stated)):
+        for key, value in (*metadata.items(), (_LAYOUT_KEY, stated)):
             line = f"# {key}: {value}"
             if len(line.splitlines()) != 1 or ":" in key:
                 raise InputError(

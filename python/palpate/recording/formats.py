@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, listed, shortened, visible
+from ..errors import InputError, escaped, listed, shortened
 from .csv_file import CsvFile
-from .dialect import decimal_mark, find_header, first_row_as_header, named, refuse_marks
+from .dialect import decimal_mark, find_header, first_row_as_header, refuse_marks, with_checked_names
 from .files import readable
 from .table import MISSING, Cells, LongTable, Table, parse_with, to_numbers
 
@@ -29,10 +29,10 @@ STEADY_ROWS = 1000
 """Number of rows in which a column with one or two values counts as steady."""
 
 
-_HEADER = 128
+_MATLAB_HEADER_BYTES = 128
 """Number of bytes before the first element."""
 
-_MATRIX, _COMPRESSED = 14, 15
+_MATRIX_TYPE, _COMPRESSED_TYPE = 14, 15
 """Types of elements that contain an array, and a compressed array with a checksum."""
 
 _ITEM_BYTES = {
@@ -43,10 +43,10 @@ _ITEM_BYTES = {
 }
 """Size of an item of each element type [bytes]."""
 
-_NUMERIC = range(6, 16)
+_NUMERIC_CLASSES = range(6, 16)
 """Classes of numeric arrays: flags, dimensions, name, values, and imaginary parts if complex."""
 
-_COMPLEX = 1 << 11
+_COMPLEX_FLAG = 1 << 11
 """Bit of the flags of an array."""
 
 
@@ -58,7 +58,7 @@ def open_table(path: Path) -> Table:
     InputError
         The file does not have that format, or the library that reads it is not installed.
     """
-    kinds: dict[str, Callable[[Path], Table]] = {
+    readers: dict[str, Callable[[Path], Table]] = {
         ".parquet": ParquetFile,
         ".xlsx": _excel,
         ".xlsm": _excel,
@@ -66,7 +66,7 @@ def open_table(path: Path) -> Table:
         ".mat": _matlab,
         ".mcap": _mcap,
     }
-    return kinds.get(path.suffix.lower(), CsvFile)(path)
+    return readers.get(path.suffix.lower(), CsvFile)(path)
 
 
 class MemoryTable(Table):
@@ -105,7 +105,8 @@ class MemoryTable(Table):
         }
         if len(self.names) < 2:
             raise InputError(
-                f"{path} has no two columns ({listed(self.names)}); a recording needs a position and a force"
+                f"{path} has fewer than two columns ({listed(self.names)}); a recording needs a "
+                "position and a force"
             )
 
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
@@ -132,7 +133,7 @@ def _as_text(value: Any) -> str:
     return "" if value is None or value != value else f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _needed(name: str, path: Path, kind: str, extra: str) -> Any:
+def _import_library(name: str, path: Path, kind: str, extra: str) -> Any:
     try:
         return import_module(name)
     except ImportError:
@@ -146,27 +147,27 @@ class ParquetFile(LongTable):
     """A Parquet recording."""
 
     def __init__(self, path: Path) -> None:
-        parquet = _needed("pyarrow.parquet", path, "Parquet", "parquet")
+        parquet = _import_library("pyarrow.parquet", path, "Parquet", "parquet")
         self._path = path
         with readable(path, "Parquet"):
             # Read in small pieces: a file or one of its row groups may be larger than memory.
             self._file = parquet.ParquetFile(path, buffer_size=_BUFFER_BYTES, pre_buffer=False)
             schema = self._file.schema_arrow
             self._stored = tuple(str(name) for name in schema.names)
-            self.names = tuple(map(visible, self._stored))
+            self.names = tuple(map(escaped, self._stored))
             self.text_names = {
                 name
                 for name, field in zip(self.names, schema, strict=True)
                 if str(getattr(field.type, "value_type", field.type)) in ("string", "large_string")
             }
             self.metadata = {
-                visible(key.decode()): visible(value.decode())
+                escaped(key.decode()): escaped(value.decode())
                 for key, value in (schema.metadata or {}).items()
                 # Notes of the writing libraries do not describe the measurement.
                 if key not in (b"pandas", b"ARROW:schema")
             }
         if len(set(self.names)) < len(self.names):
-            raise InputError(f"{path}: a column name stands twice in {listed(self.names)}")
+            raise InputError(f"{path}: a column name occurs twice in {listed(self.names)}")
         if len(self.names) == 1:
             raise InputError(
                 f"{path}: there is one column ({shortened(self.names[0])}); a recording needs a position and "
@@ -178,13 +179,13 @@ class ParquetFile(LongTable):
             return _arrow_cells(self._file.read(), self.names, numbers, text)
 
     def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
-        runs, start, held = [], 0, 0
+        parts, start, rows_in_part = [], 0, 0
         for group in range(self._file.num_row_groups):
-            held += self._file.metadata.row_group(group).num_rows
-            if held >= rows or group == self._file.num_row_groups - 1:
-                runs.append((start, group + 1))
-                start, held = group + 1, 0
-        return self._file.metadata.num_rows, runs
+            rows_in_part += self._file.metadata.row_group(group).num_rows
+            if rows_in_part >= rows or group == self._file.num_row_groups - 1:
+                parts.append((start, group + 1))
+                start, rows_in_part = group + 1, 0
+        return self._file.metadata.num_rows, parts
 
     def blocks(
         self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
@@ -217,7 +218,9 @@ class ParquetFile(LongTable):
             if row < rows:
                 stored = self._stored[self.names.index(name)]
                 with readable(self._path, "Parquet"):
-                    return _word(self._file.read_row_group(group, columns=[stored]).column(0)[row].as_py())
+                    return _cell_text(
+                        self._file.read_row_group(group, columns=[stored]).column(0)[row].as_py()
+                    )
             row -= rows
         raise IndexError(row)
 
@@ -231,23 +234,23 @@ def _arrow_cells(
         values = table.column(index).to_pandas().to_numpy()
         numeric = values.dtype.kind in "iufb"
         if name in text or (name not in numbers and not numeric):
-            columns[name] = np.array([_word(value) for value in values], dtype=object)
+            columns[name] = np.array([_cell_text(value) for value in values], dtype=object)
         else:
             columns[name] = values.astype(np.float64) if numeric else to_numbers(_as_objects(values))
     return columns
 
 
-def _word(value: Any) -> str:
+def _cell_text(value: Any) -> str:
     return "" if value is None or value != value else str(value)
 
 
 def _as_objects(values: Cells) -> Cells:
-    return np.array([_word(value) for value in values], dtype=object)
+    return np.array([_cell_text(value) for value in values], dtype=object)
 
 
 def _excel(path: Path) -> Table:
     """Returns the first sheet of a workbook that is not empty."""
-    openpyxl = _needed("openpyxl", path, "an Excel file", "excel")
+    openpyxl = _import_library("openpyxl", path, "an Excel file", "excel")
     with readable(path, "Excel (.xlsx)"):
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         sheets = [(sheet.title, [*sheet.iter_rows(values_only=True)]) for sheet in book.worksheets]
@@ -260,7 +263,9 @@ def _excel(path: Path) -> Table:
     width = max(k + 1 for row in (values[k] for k in kept) for k, cell in enumerate(row) if cell is not None)
     values = [values[k][:width] for k in kept]
     rows = [["" if cell is None else str(cell) for cell in row] for row in values[:MOST_HEADER_ROWS]]
-    header, told = named(f"{path}, row {kept[0] + 1}", find_header(rows) or first_row_as_header(rows))
+    header, header_notes = with_checked_names(
+        f"{path}, row {kept[0] + 1}", find_header(rows) or first_row_as_header(rows)
+    )
     where = f"{path}, row {kept[min(header.first, len(kept) - 1)] + 1}"
     decimal = decimal_mark(where, rows[header.first :], ";") if header.numbers else "."
     notes = [f"sheet {shortened(title)}"] if len(filled) > 1 else []
@@ -273,11 +278,11 @@ def _excel(path: Path) -> Table:
     metadata = {}
     for row in rows[: header.row]:
         key, _, value = row[0].partition(":")
-        metadata[visible(key.strip())] = visible(" ".join(" ".join([value, *row[1:]]).split()))
+        metadata[escaped(key.strip())] = escaped(" ".join(" ".join([value, *row[1:]]).split()))
     if len(kept) > header.first and kept[-1] - kept[header.first] + 1 != len(data):
         notes.append("empty rows are left out")
     first = kept[header.first] + 1 if len(kept) > header.first else 0
-    return MemoryTable(path, columns, metadata, [*notes, *told], ("row", first), decimal)
+    return MemoryTable(path, columns, metadata, [*notes, *header_notes], ("row", first), decimal)
 
 
 def _cells(values: Sequence[Any], decimal: str) -> Cells:
@@ -297,7 +302,7 @@ def _numpy(path: Path) -> Table:
     with readable(path, "NumPy (.npz)"), path.open("rb") as stream:
         arrays = np.load(stream, allow_pickle=False)
         found = {name: arrays[name] for name in arrays.files}
-    return _of_arrays(path, found)
+    return _table_of_arrays(path, found)
 
 
 def _matlab(path: Path) -> Table:
@@ -321,7 +326,7 @@ def _matlab(path: Path) -> Table:
             arrays |= {f"{prefix}{field}": value[field][()] for field in value.dtype.names}
         else:
             arrays[name] = value
-    return _of_arrays(path, arrays)
+    return _table_of_arrays(path, arrays)
 
 
 def _refuse_damaged(content: bytes) -> None:
@@ -334,52 +339,52 @@ def _refuse_damaged(content: bytes) -> None:
     ValueError
         Names the byte at which the first such element begins.
     """
-    if len(content) < _HEADER or 0 in content[:4] or content[125] + content[124] != 1:
+    if len(content) < _MATLAB_HEADER_BYTES or 0 in content[:4] or content[125] + content[124] != 1:
         return
-    _elements(content, _HEADER, len(content), "<" if content[126:128] == b"IM" else ">")
+    _elements(content, _MATLAB_HEADER_BYTES, len(content), "<" if content[126:128] == b"IM" else ">")
 
 
-def _elements(content: bytes, at: int, end: int, order: str) -> list[tuple[int, int]]:
+def _elements(content: bytes, offset: int, end: int, order: str) -> list[tuple[int, int]]:
     """Checks the elements from one byte to another; returns the type and first byte of the data of each."""
     found = []
-    while at < end:
-        start = at
-        if at + 8 > end:
+    while offset < end:
+        start = offset
+        if offset + 8 > end:
             raise _damaged(start)
-        kind, size = struct.unpack_from(f"{order}II", content, at)
-        data = at + 8
+        kind, size = struct.unpack_from(f"{order}II", content, offset)
+        data = offset + 8
         if kind >> 16:  # a small element: type, size and data share 8 bytes
-            kind, size, data = kind & 0xFFFF, kind >> 16, at + 4
-            at += 8
+            kind, size, data = kind & 0xFFFF, kind >> 16, offset + 4
+            offset += 8
         else:
-            at = data + (size if kind == _COMPRESSED else -(-size // 8) * 8)
-        room = (start + 8 if data == start + 4 else end) - data
-        if kind not in _ITEM_BYTES or size % _ITEM_BYTES[kind] or size > room:
+            offset = data + (size if kind == _COMPRESSED_TYPE else -(-size // 8) * 8)
+        available = (start + 8 if data == start + 4 else end) - data
+        if kind not in _ITEM_BYTES or size % _ITEM_BYTES[kind] or size > available:
             raise _damaged(start)
-        if kind == _MATRIX and size:
+        if kind == _MATRIX_TYPE and size:
             inside = _elements(content, data, data + size, order)
             first = inside[0][1]
             flags = int.from_bytes(content[first : first + 4], "little" if order == "<" else "big")
-            if flags & 0xFF in _NUMERIC and len(inside) != (5 if flags & _COMPLEX else 4):
+            if flags & 0xFF in _NUMERIC_CLASSES and len(inside) != (5 if flags & _COMPLEX_FLAG else 4):
                 raise _damaged(start)
         found.append((kind, data))
     return found
 
 
-def _damaged(at: int) -> ValueError:
-    return ValueError(f"the element at byte {at} is damaged")
+def _damaged(offset: int) -> ValueError:
+    return ValueError(f"the element at byte {offset} is damaged")
 
 
-def _of_arrays(path: Path, found: Mapping[str, Any]) -> Table:
+def _table_of_arrays(path: Path, found: Mapping[str, Any]) -> Table:
     """Returns the vectors of the most frequent length as columns; single values are metadata."""
-    arrays = {visible(str(name)): np.squeeze(np.asarray(value)) for name, value in found.items()}
+    arrays = {escaped(str(name)): np.squeeze(np.asarray(value)) for name, value in found.items()}
     vectors = {name: each for name, each in arrays.items() if each.ndim == 1 and each.dtype.kind in "iufbUO"}
     lengths = Counter(len(array) for array in vectors.values())
     if not lengths:
         raise InputError(f"{path} holds no vectors, only {listed(arrays) or 'nothing'}")
     length = max(lengths, key=lambda each: (lengths[each], each))
     columns = {name: _vector(array) for name, array in vectors.items() if len(array) == length}
-    metadata = {name: visible(str(each)) for name, each in arrays.items() if each.ndim == 0}
+    metadata = {name: escaped(str(each)) for name, each in arrays.items() if each.ndim == 0}
     others = [name for name in arrays if name not in columns and name not in metadata]
     notes = [f"left out {listed(others)}, not vectors of {length} values"] if others else []
     return MemoryTable(path, columns, metadata, notes)
@@ -393,7 +398,7 @@ def _vector(array: Any) -> Cells:
 
 def _mcap(path: Path) -> Table:
     """Returns the JSON messages of an MCAP file: each topic is a table of its numbers and of its log time."""
-    reader = _needed("mcap.reader", path, "MCAP", "mcap")
+    reader = _import_library("mcap.reader", path, "MCAP", "mcap")
     topics: dict[str, list[dict[str, Any]]] = {}
     others: Counter[str] = Counter()
     with readable(path, "MCAP"), path.open("rb") as stream:
@@ -401,39 +406,39 @@ def _mcap(path: Path) -> Table:
             if channel.message_encoding != "json":
                 others[channel.message_encoding] += 1
                 continue
-            row = {"log_time_s": message.log_time, **dict(_flat(json.loads(message.data)))}
+            row = {"log_time_s": message.log_time, **dict(_named_values(json.loads(message.data)))}
             topics.setdefault(channel.topic, []).append(row)
     if not topics:
-        told = f"only messages in {listed(others)}" if others else "no messages"
+        content = f"only messages in {listed(others)}" if others else "no messages"
         raise InputError(
-            f"{path} holds {told}; JSON messages are read. Convert it to JSON messages or export CSV"
+            f"{path} holds {content}; it must hold JSON messages. Convert the messages to JSON or export CSV"
         )
     sizes = {topic: len({name for row in rows for name in row}) for topic, rows in topics.items()}
     wide = [topic for topic, size in sizes.items() if size > 2]
     if len(wide) != 1:
         raise InputError(
-            f"{path}: {len(wide)} topics hold two values or more ({listed(wide or sizes)}); position and "
-            "force must stand in the only such topic. Write them to one topic or export them as CSV"
+            f"{path}: {len(wide)} topics hold two values or more ({listed(wide or sizes)}); one topic must "
+            "hold position and force. Write both to one topic or export them as CSV"
         )
     rows = topics[wide[0]]
     names = dict.fromkeys(name for row in rows for name in row)
     start = rows[0]["log_time_s"]
     for row in rows:
         row["log_time_s"] = (row["log_time_s"] - start) * 1e-9
-    columns = {visible(name): _cells([row.get(name) for row in rows], ".") for name in names}
+    columns = {escaped(name): _cells([row.get(name) for row in rows], ".") for name in names}
     notes = [f"topic {shortened(wide[0])}"]
     if len(topics) > 1 or others:
         notes.append("other topics are left out")
     return MemoryTable(path, columns, {}, notes, ("message", 0))
 
 
-def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+def _named_values(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
     """Yields numbers and words of a message by names like ``wrench.force_N``."""
     if isinstance(value, dict):
         for key, item in value.items():
-            yield from _flat(item, f"{name}.{key}" if name else str(key))
+            yield from _named_values(item, f"{name}.{key}" if name else str(key))
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            yield from _flat(item, f"{name}.{index}")
+            yield from _named_values(item, f"{name}.{index}")
     elif isinstance(value, (int, float, str)) and not isinstance(value, bool):
         yield name or "value", value

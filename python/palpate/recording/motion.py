@@ -32,13 +32,13 @@ TURN_STEPS = 1.5
 LARGEST_TURN = 0.4
 """Largest of these limits as a share of the travel; above it turns cannot be separated from noise [-]."""
 
-GRID = 8.0
+GRID_STEPS = 8.0
 """Steps of that limit to which positions are rounded to find the turns."""
 
 MOST_DIFFERENCES = 100_000
 """Approximate largest number of differences of adjacent rows from which the noise is estimated."""
 
-LEAST_ROWS = 4
+LEAST_STROKE_ROWS = 4
 """Least number of rows between two turns; fewer rows are a jump, for example between two strokes."""
 
 JUMPING_SHARE = 0.1
@@ -68,22 +68,22 @@ def strokes_from_order(position: Float1D) -> Int8Vector | None:
         +1 into the object, -1 out of it, 0 in a hold at the end of a stroke. All rows have one direction if
         the position never turns back. None if the rows have no order or are too few.
     """
-    travel = float(np.ptp(position)) if len(position) > LEAST_ROWS else 0.0
+    travel = float(np.ptp(position)) if len(position) > LEAST_STROKE_ROWS else 0.0
     if not 0.0 < travel < np.inf:
         return None
     x = np.asarray((position - position.min()) / travel)
     noise = _noise(x)
-    back = max(TURN_SHARE, TURN_NOISE * noise, TURN_STEPS * _resolution(x))
-    if back > LARGEST_TURN:
+    turn = max(TURN_SHARE, TURN_NOISE * noise, TURN_STEPS * _resolution(x))
+    if turn > LARGEST_TURN:
         return None
     direction = np.zeros(len(x), dtype=np.int8)
     begin, jumping = 0, 0
     holds: list[slice] = []
-    ends = _stroke_ends(x, back)
+    ends = _stroke_ends(x, turn)
     for (end, sign), (next_end, _) in pairwise([*ends, (len(x) - 1, 0)]):
         around = x[begin : next_end + 1]
         reached = _rest(around, end - begin, 0.0)[0]
-        if reached + 1 < LEAST_ROWS:
+        if reached + 1 < LEAST_STROKE_ROWS:
             jumping += reached
             begin += reached
             continue
@@ -128,10 +128,10 @@ def _resolution(x: Float1D) -> float:
     return float(np.min(steps[steps > 1e-9]))
 
 
-def _stroke_ends(x: Float1D, back: float) -> list[tuple[int, int]]:
-    """Returns last row and direction of each stroke; a stroke ends if x moves back by more than `back`."""
+def _stroke_ends(x: Float1D, turn: float) -> list[tuple[int, int]]:
+    """Returns last row and direction of each stroke; a stroke ends if x moves back by more than `turn`."""
     # On a grid few rows are local extremes, at any noise.
-    grid = np.rint(x * (GRID / back))
+    grid = np.rint(x * (GRID_STEPS / turn))
     steps = np.diff(grid)
     moves = np.flatnonzero(steps)
     up = steps[moves] > 0.0
@@ -144,11 +144,11 @@ def _stroke_ends(x: Float1D, back: float) -> list[tuple[int, int]]:
             high = row, place
         if place < low[1]:
             low = row, place
-        if sign <= 0 and place - low[1] > GRID:
+        if sign <= 0 and place - low[1] > GRID_STEPS:
             if sign < 0:
                 ends.append((low[0], -1))
             sign, high = 1, (row, place)
-        elif sign >= 0 and high[1] - place > GRID:
+        elif sign >= 0 and high[1] - place > GRID_STEPS:
             if sign > 0:
                 ends.append((high[0], 1))
             sign, low = -1, (row, place)
@@ -170,25 +170,25 @@ def _rest(x: Float1D, row: int, within: float) -> tuple[int, int]:
     return first, last
 
 
-GAP = 2.5
+GAP_RATIO = 2.5
 """Ratio to the median time step above which a step is a gap. Derivatives and filters stop at gaps."""
 
-UNEVEN = 0.01
+LARGEST_STEP_DEVIATION = 0.01
 """Largest difference of the time steps of a piece, as a share of the period, without resampling."""
 
-MARGIN = 3.0
+MARGIN_TIME_CONSTANTS = 3.0
 """Time constants of L, 2/w_c for its two poles, that are removed at both ends of a piece."""
 
-FINEST = 0.25
+HIGHEST_CUTOFF = 0.25
 """Highest cutoff that is tried [1/period]; above it L would not filter."""
 
 NOISE_SHARE = 0.01
 """Largest share of position noise in the variance of a derivative after L."""
 
-STEP = 0.85
+CUTOFF_RATIO = 0.85
 """Ratio of successive cutoffs."""
 
-LEAST_CONSTANTS = 200.0
+LEAST_TIME_CONSTANTS = 200.0
 """Least duration of the recording in units of 1/w_c; slower changes are not motion."""
 
 
@@ -237,7 +237,7 @@ class LowPass:
 
     def margin(self, period: float) -> int:
         """Returns the number of samples at each end that the ends of a signal disturb."""
-        return math.ceil(2.0 * MARGIN / (self.cutoff * period))
+        return math.ceil(2.0 * MARGIN_TIME_CONSTANTS / (self.cutoff * period))
 
     def __call__(self, signal: Float1D, period: float) -> Float1D:
         """Returns the signal (k,) below the cutoff without delay. Its ends are mirrored."""
@@ -266,7 +266,7 @@ def pieces(recording: Recording) -> list[Piece]:
         raise InputError("velocity needs time: the recording has none (--time NAME)")
     steps = np.diff(motion.time)
     period = float(np.median(steps))
-    edges = [0, *(np.flatnonzero(steps > GAP * period) + 1), len(motion.time)]
+    edges = [0, *(np.flatnonzero(steps > GAP_RATIO * period) + 1), len(motion.time)]
     found = []
     for start, stop in pairwise(edges):
         first, last = np.searchsorted(motion.rows, [start, stop])
@@ -275,7 +275,7 @@ def pieces(recording: Recording) -> list[Piece]:
         rows = slice(int(first), int(last))
         at, position = motion.time[start:stop], motion.position[start:stop]
         row_time, force = recording.time[rows], recording.force[rows]
-        even = bool(np.all(np.abs(np.diff(at) - period) <= UNEVEN * period))
+        even = bool(np.all(np.abs(np.diff(at) - period) <= LARGEST_STEP_DEVIATION * period))
         whole = last - first == stop - start
         grid = at
         if not even:
@@ -312,8 +312,8 @@ def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
     noise = float(np.mean(np.concatenate(sixth) ** 2)) / math.comb(12, 6)
     derive = (velocity_of, acceleration_of)[order - 1]
     duration = sum(part.period * len(part.time) for part in parts)
-    low_pass = LowPass(FINEST / parts[0].period)
-    while low_pass.cutoff * duration > LEAST_CONSTANTS:
+    low_pass = LowPass(HIGHEST_CUTOFF / parts[0].period)
+    while low_pass.cutoff * duration > LEAST_TIME_CONSTANTS:
         moving = [
             low_pass(derive(part.position, part.period), part.period)[low_pass.margin(part.period) :][
                 : -low_pass.margin(part.period)
@@ -328,7 +328,7 @@ def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
         passed = float(np.sum(low_pass(derive(impulse, period), period) ** 2))
         if noise * passed <= NOISE_SHARE * float(np.mean(np.concatenate(moving) ** 2)):
             return low_pass
-        low_pass = LowPass(STEP * low_pass.cutoff)
+        low_pass = LowPass(CUTOFF_RATIO * low_pass.cutoff)
     return None
 
 
@@ -341,13 +341,13 @@ def at_rows(
     parts: Sequence[Piece], low_pass: LowPass, derive: Callable[[Piece], Float1D], n: int
 ) -> tuple[Float1D, NDArray[np.bool_]]:
     """Returns a derivative after L at the n rows of the pieces (n,), and which rows have one (n,)."""
-    result, known = np.zeros(n), np.zeros(n, dtype=np.bool_)
+    result, defined = np.zeros(n), np.zeros(n, dtype=np.bool_)
     for part in long_enough(parts, low_pass):
         margin = low_pass.margin(part.period)
         result[part.rows] = part.at_rows(low_pass(derive(part), part.period))
         first, last = part.time[margin], part.time[len(part.time) - 1 - margin]
-        known[part.rows] = (part.row_time >= first) & (part.row_time <= last)
-    return result, known
+        defined[part.rows] = (part.row_time >= first) & (part.row_time <= last)
+    return result, defined
 
 
 def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
@@ -371,8 +371,8 @@ def _derivative(recording: Recording, order: int) -> tuple[Float1D, NDArray[np.b
     low_pass = quiet_low_pass(parts, order=order)
     if low_pass is None:
         raise InputError(
-            f"no {('velocity', 'acceleration')[order - 1]} can be had from {len(recording)} rows: the pieces "
-            "between gaps of time are too short, or the position is all noise"
+            f"the {('velocity', 'acceleration')[order - 1]} cannot be computed from {len(recording)} rows: "
+            "the pieces between gaps in time are too short, or the noise of the position is too large"
         )
     derive = (lambda part: part.velocity) if order == 1 else (lambda part: part.acceleration)
     return at_rows(parts, low_pass, derive, len(recording))

@@ -15,80 +15,80 @@ from numpy.typing import NDArray
 from .._typing import Float1D
 from ..verdict import Finding, usable
 from .comparison import CellRows, Travel, amount, cell_rows, merged_findings, scale_findings, sides
-from .conversion import MIN_ROWS, mirrored
-from .motion import GAP
+from .conversion import MIN_ROWS, mirror_notes
+from .motion import GAP_RATIO
 from .recording import Recording
 
-TRAVEL = {"m": (1e-7, 0.5), "rad": (1e-3, 100.0 * np.pi)}
+PLAUSIBLE_TRAVEL = {"m": (1e-7, 0.5), "rad": (1e-3, 100.0 * np.pi)}
 """Least and largest plausible travel by unit: from the tip of a microscope to an arm, and up to 50 turns."""
 
-FORCE = {"N*m": (1e-6, 1e3), "A": (1e-5, 1e3)}
+PLAUSIBLE_FORCE_RANGE = {"N*m": (1e-6, 1e3), "A": (1e-5, 1e3)}
 """Least and largest plausible force range by unit; that of N depends on the travel."""
 
-SMALL_TRAVEL = 1e-4
+MICROSCOPE_TRAVEL = 1e-4
 """Travel below which a recording is from a microscope [m]."""
 
-SMALL_FORCE, LARGE_FORCE = (1e-10, 0.1), (1e-3, 1e4)
+MICROSCOPE_FORCE_RANGE, USUAL_FORCE_RANGE = (1e-10, 0.1), (1e-3, 1e4)
 """Plausible force range below that travel, and above it [N]."""
 
-LOOP_IN_LINE = 0.8
+LEAST_SAME_SIGN_SHARE = 0.8
 """Share of the positions at which a loop has the sign of its mean."""
 
-LEAST_LOOP = 0.02
+LEAST_LOOP_SHARE = 0.02
 """Least mean of press minus release force for a loop, as a share of the force's spread."""
 
-LOOP_ERRORS = 5.0
+LEAST_LOOP_ERRORS = 5.0
 """Least mean of press minus release force for a loop, over its standard error."""
 
-CLIPPED_ROWS = 5
+LEAST_CLIPPED_ROWS = 5
 """Least number of rows with a clipped force or position."""
 
-CLIPPED_POSITIONS = 3
+LEAST_CLIPPED_POSITIONS = 3
 """Least number of positions of a clipped force. A tool at rest has one."""
 
-CLIPPED_RATIO = 5.0
+LEAST_CLIPPED_RATIO = 5.0
 """Least ratio of rows at the extreme value to rows at any near value. A rounded force rarely exceeds 3."""
 
-NEAR_EXTREME = 0.1
+NEAR_EXTREME_SHARE = 0.1
 """Distance from the extreme that counts as near, as a share of the force's range."""
 
-CONTACT_FLOOR = 0.2
+CONTACT_FORCE_SHARE = 0.2
 """Share of the largest |force| below which the extreme belongs to a tool without contact."""
 
-FORCE_GOES_ON = 0.1
+LEAST_FORCE_CHANGE_SHARE = 0.1
 """Least change of force at a constant position, as a share of the force's range."""
 
-STANDING_NOISE = 6.0
+LEAST_FORCE_CHANGE_NOISE = 6.0
 """Least change of force at a constant position, over the force noise."""
 
-STUCK_FORCE = 0.005
+LEAST_STUCK_FORCE_SHARE = 0.005
 """Least change of force before a jump of the position, as a share of the force's range."""
 
-JUMP = 5.0
+LEAST_JUMP_RATIO = 5.0
 """Least ratio of that jump to the usual step."""
 
-REGULAR_RUNS = 0.8
+LEAST_REGULAR_SHARE = 0.8
 """Least share of the rows in runs of one length or its multiples."""
 
-SLOWER = 1.5
+LEAST_CHANGE_RATIO = 1.5
 """Least ratio of the changes of the other column to those of the held column."""
 
-TOLD_LAG = 0.005
+LEAST_REPORTED_LAG = 0.005
 """Least change of force from run to run for which a lag is reported, as a share of its spread."""
 
-LONGEST_RUN = 1000
+LONGEST_HELD_ROWS = 1000
 """Rows of a run above which it is a pause, not a held sample."""
 
-LEAST_GAP = 0.02
+LEAST_GAP_SHARE = 0.02
 """Least width of a gap, as a share of the travel."""
 
-WIDER_GAP = 8.0
+LEAST_GAP_RATIO = 8.0
 """Least width of a gap over the 90th percentile of the distances between adjacent positions."""
 
-END_GAP = 0.05
+LARGEST_END_GAP = 0.05
 """Largest share of the travel that one stroke may omit at an end."""
 
-LEAST_LOST = 0.05
+LEAST_LOST_SHARE = 0.05
 """Least share of the duration for which missing samples are reported."""
 
 
@@ -129,12 +129,12 @@ def magnitude_findings(recording: Recording, travel: Travel) -> list[Finding]:
     """Returns findings on an implausible travel or force range. Unstated units are not checked."""
     position, force = recording.units["position"], recording.units["force"]
     inner = recording.force[travel.inside]
-    force_bounds = FORCE.get(force)
+    force_bounds = PLAUSIBLE_FORCE_RANGE.get(force)
     if position == "m" and force == "N":
-        force_bounds = SMALL_FORCE if travel.length < SMALL_TRAVEL else LARGE_FORCE
+        force_bounds = MICROSCOPE_FORCE_RANGE if travel.length < MICROSCOPE_TRAVEL else USUAL_FORCE_RANGE
     found = []
     for role, value, unit, bounds in (
-        ("travel", travel.length, position, TRAVEL.get(position)),
+        ("travel", travel.length, position, PLAUSIBLE_TRAVEL.get(position)),
         ("range of the force", float(np.ptp(inner)), force, force_bounds),
     ):
         if bounds is None or value == 0.0 or bounds[0] <= value <= bounds[1]:
@@ -152,36 +152,35 @@ def magnitude_findings(recording: Recording, travel: Travel) -> list[Finding]:
 
 def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) -> list[Finding]:
     """Returns findings on a reversed direction, an active loop, and a force that falls with position."""
-    words = recording.direction
-    if words is not None and len(words) > 1:
+    signs = recording.direction
+    if signs is not None and len(signs) > 1:
         # a spike goes both ways and does not count
-        step = np.where(travel.inside[1:] & travel.inside[:-1], np.diff(recording.position) * words[1:], 0.0)
+        step = np.where(travel.inside[1:] & travel.inside[:-1], np.diff(recording.position) * signs[1:], 0.0)
         if step.sum() < 0:
             against = float(np.mean(step[step != 0.0] < 0))
             return [
                 usable(
-                    f"the position falls in rows whose direction goes into the object ({against:.0%} of the "
-                    "moving rows): position or direction is probably turned; if the position grows out of "
-                    "the object give --negate position, else swap the words of the direction column"
+                    f"the position falls in rows whose direction is into the object ({against:.0%} of the "
+                    "moving rows): position or direction is probably reversed; if the position grows out of "
+                    "the object give --negate position, else exchange the words of the direction column"
                 )
             ]
     if recording.input_names:
         return []
     mean, is_loop = _loop(recording, cells)
     if is_loop and mean < 0.0:
-        late = "" if recording.time is None else "if the force was recorded late --force-late-s SECONDS, "
+        late = "" if recording.time is None else "; if the force was recorded late, --force-late-s SECONDS"
         return [
             usable(
-                f"the force on release is {amount(-mean, recording.units['force'])} above that on press on "
-                "average: the loop gives out energy, as no passive object does; if a sign is turned give "
-                f"--negate force or --negate position, {late}for a latch or a stored spring "
-                "--no-hysteresis-nonnegative"
+                f"on average the force on release is {amount(-mean, recording.units['force'])} above that "
+                "on press; a passive object cannot do that. If a sign is reversed, give --negate force or "
+                f"--negate position{late}; for a latch or a stored spring, --no-hysteresis-nonnegative"
             )
         ]
     x, f = recording.position[travel.inside], recording.force[travel.inside]
     if is_loop or not (np.ptp(f) > 0.0 and np.ptp(x) > 0.0):
         return []
-    return [usable(sentence) for sentence in mirrored(float(np.corrcoef(x, f)[0, 1]))]
+    return [usable(sentence) for sentence in mirror_notes(float(np.corrcoef(x, f)[0, 1]))]
 
 
 def _loop(recording: Recording, cells: CellRows | None) -> tuple[float, bool]:
@@ -190,54 +189,57 @@ def _loop(recording: Recording, cells: CellRows | None) -> tuple[float, bool]:
         return 0.0, False
     mean = float(np.mean(cells.loop))
     error = float(np.sqrt(np.mean(cells.loop_error**2) / len(cells.loop)))
-    in_line = float(np.mean(np.sign(cells.loop) == np.sign(mean)))
-    large = abs(mean) > max(LOOP_ERRORS * error, LEAST_LOOP * float(np.std(recording.force)))
-    return mean, large and in_line >= LOOP_IN_LINE
+    same_sign = float(np.mean(np.sign(cells.loop) == np.sign(mean)))
+    large = abs(mean) > max(LEAST_LOOP_ERRORS * error, LEAST_LOOP_SHARE * float(np.std(recording.force)))
+    return mean, large and same_sign >= LEAST_SAME_SIGN_SHARE
 
 
 def saturation_findings(recording: Recording, travel: Travel) -> list[Finding]:
     """Returns findings on a clipped force, a clipped position, and a stuck position."""
     x, f = recording.position, recording.force
-    reach = float(np.ptp(f))
-    if not reach > 0.0:
+    force_range = float(np.ptp(f))
+    if not force_range > 0.0:
         return []
     largest = float(np.max(np.abs(f)))
     found = []
     for value, name in ((float(f.max()), "largest"), (float(f.min()), "least")):
-        near = f[np.abs(f - value) <= NEAR_EXTREME * reach]
+        near = f[np.abs(f - value) <= NEAR_EXTREME_SHARE * force_range]
         rows = np.flatnonzero(f == value)
-        if abs(value) < CONTACT_FLOOR * largest or len(rows) < CLIPPED_ROWS:
+        if abs(value) < CONTACT_FORCE_SHARE * largest or len(rows) < LEAST_CLIPPED_ROWS:
             continue
         _, counts = np.unique(near, return_counts=True)
         others = np.delete(counts, -1 if name == "largest" else 0)
-        few = others.max(initial=1)
-        if len(rows) >= CLIPPED_RATIO * few and len(np.unique(x[rows])) >= CLIPPED_POSITIONS:
+        most_near = others.max(initial=1)
+        if (
+            len(rows) >= LEAST_CLIPPED_RATIO * most_near
+            and len(np.unique(x[rows])) >= LEAST_CLIPPED_POSITIONS
+        ):
             found.append(
                 usable(
-                    f"the {name} force, {amount(value, recording.units['force'])}, stands in {len(rows)} "
-                    f"rows ({len(rows) / len(f):.2g} of all) while the position goes on from "
+                    f"the {name} force, {amount(value, recording.units['force'])}, occurs in {len(rows)} "
+                    f"rows ({len(rows) / len(f):.2g} of all) while the position changes from "
                     f"{x[rows].min():.4g} to {x[rows].max():.4g}: the force sensor or its converter is "
                     "probably clipped there; record with a larger force range or press less far"
                 )
             )
-    return [*found, *_standing(recording, travel, reach)]
+    return [*found, *_constant_position_findings(recording, travel, force_range)]
 
 
-def _standing(recording: Recording, travel: Travel, reach: float) -> list[Finding]:
+def _constant_position_findings(recording: Recording, travel: Travel, force_range: float) -> list[Finding]:
     """Returns findings on a position that is constant in many rows while the force changes."""
     x, f = recording.position, recording.force
     noise = float(np.median(np.abs(np.diff(f)))) / 0.954
-    bound = max(FORCE_GOES_ON * reach, STANDING_NOISE * noise)
+    bound = max(LEAST_FORCE_CHANGE_SHARE * force_range, LEAST_FORCE_CHANGE_NOISE * noise)
     unit = recording.units["position"]
     for value, name in ((travel.upper, "largest"), (travel.lower, "least")):
         rows = np.flatnonzero(x == value)
-        if len(rows) >= max(CLIPPED_ROWS, CLIPPED_RATIO * _usual_count(x, value, travel)):
+        if len(rows) >= max(LEAST_CLIPPED_ROWS, LEAST_CLIPPED_RATIO * _usual_count(x, value, travel)):
             change = _change_inside(f, rows)
             if change > bound:
                 return [
                     usable(
-                        f"the {name} position, {amount(value, unit)}, stands in {len(rows)} rows while the "
-                        f"force changes by {change:.3g} and comes back: the position sensor is probably "
+                        f"the {name} position, {amount(value, unit)}, occurs in {len(rows)} rows while the "
+                        f"force changes by {change:.3g} and returns: the position sensor is probably "
                         "clipped there; record with a larger range of position"
                     )
                 ]
@@ -246,20 +248,20 @@ def _standing(recording: Recording, travel: Travel, reach: float) -> list[Findin
     if not len(moving):
         return []
     usual = float(np.median(moving))
-    bound = max(STUCK_FORCE * reach, STANDING_NOISE * noise)
+    bound = max(LEAST_STUCK_FORCE_SHARE * force_range, LEAST_FORCE_CHANGE_NOISE * noise)
     edges = np.r_[0, np.flatnonzero(step != 0.0) + 1, len(x)]
     lengths = np.diff(edges)
-    many = max(float(CLIPPED_ROWS), CLIPPED_RATIO * float(np.median(lengths)))
+    many = max(float(LEAST_CLIPPED_ROWS), LEAST_CLIPPED_RATIO * float(np.median(lengths)))
     for k in np.flatnonzero(lengths >= many).tolist():
         start, stop = int(edges[k]), int(edges[k + 1])
         jump = abs(float(x[stop] - x[stop - 1])) if stop < len(x) else 0.0
-        if jump > JUMP * usual and _range_of(f[start:stop]) > bound:
+        if jump > LEAST_JUMP_RATIO * usual and _inner_range(f[start:stop]) > bound:
             return [
                 usable(
-                    f"the position stands still in rows {start} to {stop - 1}, then jumps by "
-                    f"{amount(jump, unit)}, while the force changes by {_range_of(f[start:stop]):.3g}: the "
-                    f"position sensor was probably stuck; use the rows before or after with --rows 0:{start} "
-                    f"or --rows {stop}:{len(x)}"
+                    f"the position is constant in rows {start} to {stop - 1}, then jumps by "
+                    f"{amount(jump, unit)}, while the force changes by {_inner_range(f[start:stop]):.3g}: "
+                    "the position sensor was probably stuck; use the rows before or after with --rows "
+                    f"0:{start} or --rows {stop}:{len(x)}"
                 )
             ]
     return []
@@ -267,7 +269,7 @@ def _standing(recording: Recording, travel: Travel, reach: float) -> list[Findin
 
 def _usual_count(x: Float1D, value: float, travel: Travel) -> float:
     """Returns the number of rows at the values next to an extreme one."""
-    near = x[(np.abs(x - value) <= NEAR_EXTREME * travel.length) & (x != value)]
+    near = x[(np.abs(x - value) <= NEAR_EXTREME_SHARE * travel.length) & (x != value)]
     return float(np.median(np.unique(near, return_counts=True)[1])) if len(near) else 1.0
 
 
@@ -286,7 +288,7 @@ def _change_inside(f: Float1D, rows: NDArray[np.intp]) -> float:
     return float(max(above.max(), below.max()))
 
 
-def _range_of(values: Float1D) -> float:
+def _inner_range(values: Float1D) -> float:
     """Returns the range of the inner 90 %."""
     low, high = np.percentile(values, (5.0, 95.0))
     return float(high - low)
@@ -301,27 +303,29 @@ def hold_findings(recording: Recording) -> list[Finding]:
     rows = {"position": _held_for(x), "force": _held_for(f)}
     if rows["position"] == rows["force"]:
         return (
-            [] if recording.time is None else _held(recording, "position and force change", rows["force"], "")
+            []
+            if recording.time is None
+            else _held_findings(recording, "position and force change", rows["force"], "")
         )
     found = []
     for name, held, other in (("force", f, x), ("position", x, f)):
-        if np.count_nonzero(np.diff(other)) >= SLOWER * np.count_nonzero(np.diff(held)):
-            found += _held(
+        if np.count_nonzero(np.diff(other)) >= LEAST_CHANGE_RATIO * np.count_nonzero(np.diff(held)):
+            found += _held_findings(
                 recording, f"the {name} changes", rows[name], " while the other column changes in between"
             )
     return found
 
 
-def _held(recording: Recording, what: str, rows: int, other: str) -> list[Finding]:
+def _held_findings(recording: Recording, subject: str, rows: int, other: str) -> list[Finding]:
     f, lag = recording.force, (rows - 1) / 2.0
-    if rows < 2 or not np.std(f[rows:] - f[:-rows]) > TOLD_LAG * np.std(f):
+    if rows < 2 or not np.std(f[rows:] - f[:-rows]) > LEAST_REPORTED_LAG * np.std(f):
         return []
     late = ""
-    if what == "the force changes" and (period := recording.sample_period) is not None:
+    if subject == "the force changes" and (period := recording.sample_period) is not None:
         late = f", or give --force-late-s {lag * period:.3g}"
     return [
         usable(
-            f"{what} only once in {rows} rows{other}: a slower sensor was probably repeated, and "
+            f"{subject} only once in {rows} rows{other}: a slower sensor was probably repeated, and "
             f"is late by {lag:g} rows on average; keep one row of each {rows}, the first with a new "
             f"value{late}"
         )
@@ -332,12 +336,12 @@ def _held_for(values: Float1D) -> int:
     """Returns the number of rows for which a column is held; 1 without a common length."""
     edges = np.flatnonzero(np.diff(values)) + 1
     lengths = np.diff(edges)
-    lengths = lengths[lengths < LONGEST_RUN]
+    lengths = lengths[lengths < LONGEST_HELD_ROWS]
     if len(lengths) < 4:
         return 1
     rows = np.bincount(lengths) * np.arange(lengths.max() + 1)
     common = int(np.argmax(rows))
-    return common if rows[::common].sum() >= REGULAR_RUNS * rows.sum() else 1
+    return common if rows[::common].sum() >= LEAST_REGULAR_SHARE * rows.sum() else 1
 
 
 def gap_findings(recording: Recording, travel: Travel) -> list[Finding]:
@@ -350,21 +354,21 @@ def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
         return []
     side = sides(recording, travel)
     strokes = [(1, "press stroke"), (-1, "release stroke")] if recording.direction is not None else []
-    found, told = [], set()
+    found, reported = [], set()
     for of, name in [(0, "recording"), *strokes]:
         rows = travel.inside if of == 0 else travel.inside & (side == of)
         at = np.unique(recording.position[rows])
         if len(at) < 10:
             continue
         apart = np.diff(at)
-        bound = max(LEAST_GAP * travel.length, WIDER_GAP * float(np.percentile(apart, 90.0)))
+        bound = max(LEAST_GAP_SHARE * travel.length, LEAST_GAP_RATIO * float(np.percentile(apart, 90.0)))
         for k in np.flatnonzero(apart > bound).tolist():
-            if (at[k], at[k + 1]) not in told:
-                told.add((at[k], at[k + 1]))
+            if (at[k], at[k + 1]) not in reported:
+                reported.add((at[k], at[k + 1]))
                 found.append(_gap(recording, travel, name, float(at[k]), float(at[k + 1])))
-        if of and at[0] - travel.lower > END_GAP * travel.length:
+        if of and at[0] - travel.lower > LARGEST_END_GAP * travel.length:
             found.append(_gap(recording, travel, name, travel.lower, float(at[0])))
-        if of and travel.upper - at[-1] > END_GAP * travel.length:
+        if of and travel.upper - at[-1] > LARGEST_END_GAP * travel.length:
             found.append(_gap(recording, travel, name, float(at[-1]), travel.upper))
     return found
 
@@ -382,10 +386,10 @@ def _time_gaps(recording: Recording) -> list[Finding]:
         return []
     steps = np.diff(recording.time)
     period = float(np.median(steps))
-    gaps = steps[steps > GAP * period]
+    gaps = steps[steps > GAP_RATIO * period]
     duration = float(recording.time[-1] - recording.time[0])
     lost = float(np.sum(gaps - period)) / duration
-    if lost < LEAST_LOST:
+    if lost < LEAST_LOST_SHARE:
         return []
     many = "s" * (len(gaps) > 1)
     return [

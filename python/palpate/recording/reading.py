@@ -23,10 +23,10 @@ from .recording import Recording
 from .rows import LeftOut
 from .table import LongTable, Places, Table
 
-Given: TypeAlias = Recording | str | os.PathLike[str] | pd.DataFrame
+RecordingLike: TypeAlias = Recording | str | os.PathLike[str] | pd.DataFrame
 """A recording, or data that can be read as one."""
 
-CURE = "give a Recording, the name of a file, a DataFrame, or arrays of position and force"
+RECORDING_TYPES = "give a Recording, the name of a file, a DataFrame, or arrays of position and force"
 
 
 def read_recording(
@@ -122,7 +122,7 @@ def read_recording(
 
 
 def recording_from(
-    recording: Given | npt.ArrayLike,
+    recording: RecordingLike | npt.ArrayLike,
     force: npt.ArrayLike | None = None,
     time: npt.ArrayLike | None = None,
     direction: npt.ArrayLike | None = None,
@@ -150,7 +150,7 @@ def recording_from(
     """
     if force is not None:
         if isinstance(recording, (Recording, str, os.PathLike, pd.DataFrame)):
-            raise InputError(f"force is given beside {name}, which holds a force already; leave force out")
+            raise InputError(f"force is given, but {name} already contains a force; leave out force")
         return Recording.from_arrays(recording, force, time, direction)
     for role, array in (("time", time), ("direction", direction)):
         if array is not None:
@@ -161,11 +161,11 @@ def recording_from(
         return Recording.from_frame(recording, inputs=inputs)
     if isinstance(recording, (str, os.PathLike)):
         return read_recording(path_of(name, recording), inputs=inputs)
-    raise InputError(f"{name} is {shown(recording)}; {CURE}")
+    raise InputError(f"{name} is {shown(recording)}; {RECORDING_TYPES}")
 
 
 def recordings_from(
-    recording: Given | Iterable[Given] | npt.ArrayLike,
+    recording: RecordingLike | Iterable[RecordingLike] | npt.ArrayLike,
     force: npt.ArrayLike | None = None,
     time: npt.ArrayLike | None = None,
     direction: npt.ArrayLike | None = None,
@@ -187,9 +187,9 @@ def recordings_from(
         return [recording_from(several, force, time, direction, inputs=inputs)]
     found = list(several)
     if not found:
-        raise InputError(f"recording is an empty list; {CURE}")
+        raise InputError(f"recording is an empty list; {RECORDING_TYPES}")
     if all(isinstance(each, (int, float, np.number)) for each in found):
-        raise InputError(f"recording is a list of numbers, and force is not given; {CURE}")
+        raise InputError(f"recording is a list of numbers, and force is not given; {RECORDING_TYPES}")
     return [
         recording_from(each, inputs=inputs, name=f"recording[{number}]") for number, each in enumerate(found)
     ]
@@ -221,7 +221,7 @@ class LongRecording:
     """Description of a long file from :func:`open_long_recording`, small enough to send to workers."""
 
     path: Path
-    how: Conversion
+    conversion: Conversion
     """Conversion of position, force and direction"""
     parts: tuple[tuple[int, int], ...]
     """Places between which the file is read in parts"""
@@ -234,12 +234,12 @@ class LongRecording:
     @property
     def direction(self) -> str | None:
         """Column of the direction."""
-        return self.how.direction
+        return self.conversion.direction
 
     @property
     def units(self) -> Mapping[str, str]:
         """SI unit of position and force."""
-        return self.how.units
+        return self.conversion.units
 
     def blocks(self, part: tuple[int, int]) -> Iterator[Block]:
         """Yields position, force and direction of the rows of a part in blocks.
@@ -249,14 +249,15 @@ class LongRecording:
         InputError
             A row has no finite number or no known direction, and rows may not be dropped.
         """
-        table = _long(open_table(self.path), self.path)
-        how = self.how
-        for first, cells in table.blocks(part, BLOCK_ROWS, numbers=how.numbers, text=how.text):
-            check, words = how.checked(_Part(table, part), cells, first)
+        table = _require_long_table(open_table(self.path), self.path)
+        conversion = self.conversion
+        for first, cells in table.blocks(part, BLOCK_ROWS, numbers=conversion.numbers, text=conversion.text):
+            check, directions = conversion.checked(_PartPlaces(table, part), cells, first)
             position, force = (
-                how.si(column, cells)[check.kept] for column in (how.choice.position, how.choice.force)
+                conversion.si(column, cells)[check.kept]
+                for column in (conversion.choice.position, conversion.choice.force)
             )
-            direction = None if words is None else words[check.kept]
+            direction = None if directions is None else directions[check.kept]
             yield Block(position, force, direction, len(check.kept), check.left_out)
 
     def places(self) -> Places:
@@ -264,7 +265,7 @@ class LongRecording:
         return open_table(self.path)
 
 
-class _Part:
+class _PartPlaces:
     """Places of the rows of a part. The rows before the part are counted only when a place is needed."""
 
     def __init__(self, table: LongTable, part: tuple[int, int]) -> None:
@@ -299,7 +300,7 @@ def open_long_recording(
     file = Path(path)
     require_file(file)
     table = open_table(file)
-    how = Conversion.of(
+    conversion = Conversion.of(
         table,
         str(file),
         position=position,
@@ -310,22 +311,22 @@ def open_long_recording(
         negate=negate,
         drop=invalid == "drop",
     )
-    if how.direction == "segment" and direction is None and "segment" not in table.text_names:
-        how = replace(how, direction=None)  # numbered segments do not state the stroke
-    notes = how.note(dialect=table.notes), *how.choice.notes
-    how = replace(how, choice=replace(how.choice, time=None, inputs=()))
-    rows, parts = _long(table, file).parts(part_rows)
+    if conversion.direction == "segment" and direction is None and "segment" not in table.text_names:
+        conversion = replace(conversion, direction=None)  # numbered segments do not state the stroke
+    notes = conversion.note(dialect=table.notes), *conversion.choice.notes
+    conversion = replace(conversion, choice=replace(conversion.choice, time=None, inputs=()))
+    rows, parts = _require_long_table(table, file).parts(part_rows)
     return LongRecording(
         path=file,
-        how=how,
+        conversion=conversion,
         parts=tuple(parts),
         rows=rows,
-        source=Source(files=(str(file),), sha256=sha256_of_file(file), rows=0, columns=how.names),
+        source=Source(files=(str(file),), sha256=sha256_of_file(file), rows=0, columns=conversion.names),
         notes=notes,
     )
 
 
-def _long(table: Table, file: Path) -> LongTable:
+def _require_long_table(table: Table, file: Path) -> LongTable:
     if not isinstance(table, LongTable):
         raise InputError(
             f"{file} cannot be read part by part; leave out --out-of-core, --jobs and --scheduler, or "

@@ -19,7 +19,7 @@ from ..errors import InputError
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
 from .files import Layout, free_name, write_csv
 from .table import FRAME, Cells, FrameTable, python_arguments
-from .units import COLUMN_SUFFIX, FORCE_UNITS, POSITION_UNITS
+from .units import COLUMN_SUFFIX, FORCE_UNITS, POSITION_UNITS, Unit
 
 T = TypeVar("T")
 
@@ -53,6 +53,8 @@ class Recording:
     """Choices, dropped rows and observations of the reader, in sentences"""
     part_of: Motion | None = field(default=None, repr=False)
     """Motion that contains the rows; None if the recording contains all of it"""
+    file_units: Mapping[str, Unit] = field(default_factory=dict, repr=False)
+    """Units of "position" and "force" in the file, for messages; a missing one is that of `units`"""
 
     def __post_init__(self) -> None:
         n = len(self.position)
@@ -62,15 +64,15 @@ class Recording:
                 continue
             if array.shape != (n,):
                 raise InputError(f"{name} has shape {array.shape}, but position has {n} samples")
-            _freeze(array)
+            _make_read_only(array)
         if self.inputs.shape != (n, len(self.input_names)):
             raise InputError(
                 f"inputs have shape {self.inputs.shape}; {len(self.input_names)} names and {n} samples need "
                 f"({n}, {len(self.input_names)})"
             )
-        _freeze(self.inputs)
+        _make_read_only(self.inputs)
         for cells in self.columns.values():
-            _freeze(cells)
+            _make_read_only(cells)
 
     @classmethod
     def from_arrays(
@@ -112,9 +114,9 @@ class Recording:
         arrays: dict[str, Float1D] = {}
         given_inputs = _mapping("inputs", inputs)
         named: dict[str, npt.ArrayLike | None] = {"position": position, "force": force, "time": time}
-        if clash := sorted({*named, "direction", "hysteresis"} & set(given_inputs)):
+        if reserved := sorted({*named, "direction", "hysteresis"} & set(given_inputs)):
             raise InputError(
-                f"an input is called {clash[0]!r}, which a recording has already; name it otherwise"
+                f"an input is called {reserved[0]!r}, a name that every recording has; choose another name"
             )
         for name, values in (*named.items(), *given_inputs.items()):
             if values is None and name == "time":
@@ -122,20 +124,20 @@ class Recording:
             arrays[name] = vector_of(name, values)
         for name in ("position", "force"):
             if not len(arrays.get(name, ())):
-                raise InputError(f"{name} holds no value; give one for each row")
+                raise InputError(f"{name} is empty; give one value for each row")
         if time is not None:
-            stuck = np.flatnonzero(np.diff(arrays["time"]) <= 0)
-            if stuck.size:
+            not_later = np.flatnonzero(np.diff(arrays["time"]) <= 0)
+            if not_later.size:
                 raise InputError(
-                    f"time[{stuck[0] + 1}] is not later than time[{stuck[0]}]; time must increase"
+                    f"time[{not_later[0] + 1}] is not later than time[{not_later[0]}]; time must increase"
                 )
-        words: Int8Vector | None = None
+        signs: Int8Vector | None = None
         if direction is not None:
             given = vector_of("direction", direction)
             if not np.isin(given, (-1, 0, 1)).all():
                 wrong = given[~np.isin(given, (-1, 0, 1))].flat[0]
                 raise InputError(f"direction holds {wrong:g}; it must be +1, -1 or 0")
-            words = given.astype(np.int8)
+            signs = given.astype(np.int8)
         checked_units = {"position": UNSTATED, "force": UNSTATED, **_mapping("units", units)}
         for role, allowed in (("position", POSITION_UNITS), ("force", FORCE_UNITS)):
             if checked_units[role] not in (*allowed, UNSTATED):
@@ -152,13 +154,13 @@ class Recording:
             position=arrays["position"],
             force=arrays["force"],
             time=arrays.get("time"),
-            direction=words,
+            direction=signs,
             inputs=np.array([arrays[name] for name in given_inputs]).reshape(-1, n).T.copy(),
             input_names=tuple(given_inputs),
             columns={},
             metadata=_mapping("metadata", metadata),
             units=checked_units,
-            source=Source(files=(), sha256=digest_of(*arrays.values(), words), rows=n, columns={}),
+            source=Source(files=(), sha256=digest_of(*arrays.values(), signs), rows=n, columns={}),
         )
 
     @classmethod
@@ -195,9 +197,9 @@ class Recording:
         InputError
             One sentence that names the column, the row and the value.
         """
-        what: object = invalid
-        if not isinstance(what, str) or what not in ("refuse", "drop"):
-            raise InputError(f"invalid is {shown(what)}; it must be 'refuse' or 'drop'")
+        treatment: object = invalid
+        if not isinstance(treatment, str) or treatment not in ("refuse", "drop"):
+            raise InputError(f"invalid is {shown(treatment)}; it must be 'refuse' or 'drop'")
         with python_arguments():
             fields = converted(
                 FrameTable(frame),
@@ -214,6 +216,10 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.position)
+
+    def in_file_unit(self, role: Literal["position", "force"], value: float) -> str:
+        """Returns a position or force [SI] as text in the unit of the file, such as "4.14 mm"."""
+        return self.file_units.get(role, Unit(self.units[role], self.units[role], 1.0)).text(value)
 
     @property
     def motion(self) -> Motion:
@@ -285,26 +291,26 @@ class Recording:
             The recording has no time, or late_s is negative or longer than the recording.
         """
         if self.time is None:
-            raise InputError("a force that was recorded late can be brought back only with a column of time")
+            raise InputError("late_s needs a recording with a column of time (--time NAME)")
         time = self.time
         late_s = real_of("late_s", late_s)
-        then = time - late_s
-        rows = then >= time[0]
+        shifted_time = time - late_s
+        rows = shifted_time >= time[0]
         if not (late_s >= 0.0 and rows.any()):
             last = float(time[-1] - time[0])
-            raise InputError(f"the force is late by {late_s} s; it must be a number from 0 to {last:g} s")
+            raise InputError(f"late_s is {late_s} s; it must be a number from 0 to {last:g} s")
 
-        def before(values: Float1D) -> Float1D:
-            return np.interp(then, time, values)
+        def at_shifted_time(values: Float1D) -> Float1D:
+            return np.interp(shifted_time, time, values)
 
-        moved = replace(
+        shifted = replace(
             self,
-            position=before(self.position),
-            inputs=np.column_stack([*map(before, self.inputs.T), np.empty((len(self), 0))]),
+            position=at_shifted_time(self.position),
+            inputs=np.column_stack([*map(at_shifted_time, self.inputs.T), np.empty((len(self), 0))]),
             notes=(*self.notes, f"each force belongs to the position {late_s:g} s before"),
             part_of=None,
         )
-        return moved._rows(rows)
+        return shifted._rows(rows)
 
     def write(self, path: str | os.PathLike[str], *, replace: bool = True) -> Path:
         """Writes the recording as CSV that :func:`palpate.read_recording` reads back exactly without options.
@@ -324,13 +330,13 @@ class Recording:
             The folder does not exist or cannot be written, or the metadata does not fit on one line.
         """
         file = path_of("path", path)
-        taken = {*self.columns, *self.input_names}
+        used_names = {*self.columns, *self.input_names}
         suffixes = {"time": "_s", "direction": ""}
         for role in ("position", "force"):
             unit = self.units[role]
             suffixes[role] = f"_{COLUMN_SUFFIX[unit]}" if unit else ""
         roles = {
-            role: free_name(role, suffixes[role], taken)
+            role: free_name(role, suffixes[role], used_names)
             for role in ("time", "position", "force", "direction")
             if getattr(self, role) is not None
         }
@@ -349,5 +355,5 @@ def _mapping(name: str, value: Mapping[str, T] | None) -> dict[str, T]:
     return dict(given)
 
 
-def _freeze(array: Cells) -> None:
+def _make_read_only(array: Cells) -> None:
     array.flags.writeable = False

@@ -39,8 +39,8 @@ class LeftOut:
 
     def drop(self, reason: str, count: int, first: int) -> None:
         """Counts dropped rows."""
-        known, before = self.dropped.get(reason, (0, first))
-        self.dropped[reason] = known + count, min(before, first)
+        earlier_count, earlier_first = self.dropped.get(reason, (0, first))
+        self.dropped[reason] = earlier_count + count, min(earlier_first, first)
 
     def add(self, other: LeftOut, rows_before: int) -> None:
         """Adds the counts of a part that begins after `rows_before` rows."""
@@ -50,13 +50,13 @@ class LeftOut:
 
     def sentences(self, table: Places) -> list[str]:
         """Returns one sentence for each reason, with the place of the first row."""
-        told = []
+        sentences = []
         if count := self.status.total():
             words = ", ".join(f"{number} {word}" for word, number in sorted(self.status.items()))
-            told.append(f"{_rows(count)} whose force was not the model's alone are left out ({words})")
+            sentences.append(f"left out {_rows(count)} whose force is not the model's force ({words})")
         for reason, (count, first) in self.dropped.items():
-            told.append(f"dropped {_rows(count)} {reason} (first: {table.place(first)})")
-        return told
+            sentences.append(f"dropped {_rows(count)} {reason} (first: {table.place(first)})")
+        return sentences
 
 
 class RowCheck:
@@ -86,7 +86,7 @@ class RowCheck:
         """One sentence for each reason for ignored rows."""
         return self.left_out.sentences(self._table)
 
-    def as_modelled(self, words: Cells) -> None:
+    def leave_out_other_forces(self, words: Cells) -> None:
         """Removes the rows whose status states that the force was not the model's alone: start ramp, clipped,
         or zero after a fault. They do not describe the object.
         """
@@ -98,8 +98,8 @@ class RowCheck:
     def finite(self, name: str, values: Float1D) -> None:
         """Requires a finite number in every row of this column."""
         bad = self.kept & ~np.isfinite(values)
-        self._settle(
-            bad, name, "holds {cell}, which is no finite number", "without a finite number in " + name
+        self._refuse_or_drop(
+            bad, name, "holds {cell}, which is not a finite number", "without a finite number in " + name
         )
 
     def directions(self, name: str, cells: Cells) -> Int8Vector:
@@ -112,14 +112,16 @@ class RowCheck:
             if value is not None:
                 values[index] = value
             elif word.strip():
-                known = ", ".join(DIRECTION_WORDS)
+                accepted_words = ", ".join(DIRECTION_WORDS)
                 where = self._where(int(np.flatnonzero(rows)[0]))
                 raise InputError(
-                    f"{where}: column {name} holds {shortened(word)!r}, which is no direction; "
-                    f"known words are {known}"
+                    f"{where}: column {name} holds {shortened(word)!r}, which is not a direction; "
+                    f"use one of {accepted_words}"
                 )
             else:
-                self._settle(self.kept & rows, name, "says no direction", "without a direction in " + name)
+                self._refuse_or_drop(
+                    self.kept & rows, name, "has no direction", "without a direction in " + name
+                )
         return values[codes]
 
     def increasing(self, name: str, time: Float1D) -> None:
@@ -127,26 +129,26 @@ class RowCheck:
         rows = np.flatnonzero(self.kept)
         usable = time[rows]
         latest_before = np.maximum.accumulate(usable)[:-1]
-        stuck = np.zeros_like(self.kept)
-        stuck[rows[1:][usable[1:] <= latest_before]] = True
-        self._settle(
-            stuck,
+        not_later = np.zeros_like(self.kept)
+        not_later[rows[1:][usable[1:] <= latest_before]] = True
+        self._refuse_or_drop(
+            not_later,
             name,
-            "holds {cell}, no later than the time before it",
-            "whose time repeats or runs backward",
+            "holds {cell}, must be later than the time before it",
+            "with a time that repeats or decreases",
         )
 
-    def _settle(self, bad: NDArray[np.bool_], name: str, sentence: str, reason: str) -> None:
+    def _refuse_or_drop(self, bad: NDArray[np.bool_], name: str, sentence: str, reason: str) -> None:
         count = int(np.count_nonzero(bad))
         if not count:
             return
         first = int(np.flatnonzero(bad)[0])
         if not self._drop:
             cell = self._table.cell(self._first_row + first, name)
-            told = sentence.format(cell=repr(shortened(cell)) if cell else "nothing")
+            problem = sentence.format(cell=repr(shortened(cell)) if cell else "nothing")
             others = f" (and {count - 1} more such rows)" if count > 1 else ""
             raise InputError(
-                f"{self._where(first)}: column {name} {told}{others}; correct the file or drop such rows "
+                f"{self._where(first)}: column {name} {problem}{others}; correct the file or drop such rows "
                 "with --invalid drop"
             )
         self.left_out.drop(reason, count, self._first_row + first)

@@ -143,8 +143,8 @@ class FrameTable(Table):
                     f"{FRAME} has a column called {name!r}; names must be text that ends in a unit"
                 )
         if not frame.columns.is_unique:
-            twice = frame.columns[frame.columns.duplicated()][0]
-            raise InputError(f"{FRAME} has several columns called {twice}; give each one name")
+            repeated = frame.columns[frame.columns.duplicated()][0]
+            raise InputError(f"{FRAME} has several columns called {repeated}; give each one name")
         self._frame = frame
         self.names = tuple(frame.columns)
         self.metadata = {str(key): str(value) for key, value in frame.attrs.items()}
@@ -154,7 +154,7 @@ class FrameTable(Table):
         return {
             name: _numbers(self._frame[name])
             if name in numbers
-            else _words(self._frame[name])
+            else _texts(self._frame[name])
             if name in text or not _is_real(self._frame[name])
             else _floats(self._frame[name])
             for name in self.names
@@ -199,7 +199,9 @@ def _number(cell: object) -> float:
         return np.nan
 
 
-def _words(column: pd.Series[Any]) -> Cells:
+def _texts(column: pd.Series[Any]) -> Cells:
     """Returns the cells of a column as text; missing cells are empty."""
     missing = column.isna()
-    return np.array(["" if gone else str(cell) for cell, gone in zip(column, missing, strict=True)], object)
+    return np.array(
+        ["" if is_missing else str(cell) for cell, is_missing in zip(column, missing, strict=True)], object
+    )

@@ -24,6 +24,10 @@ class Unit:
     factor: float
     """value in SI = factor * value in this unit"""
 
+    def text(self, value: float) -> str:
+        """Returns an SI value in this unit, with four significant digits and the symbol."""
+        return f"{value / self.factor:.4g} {self.si if self.factor == 1.0 else self.symbol}".rstrip()
+
 
 _FACTORS: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "cm": 1e-2, "in": 0.0254},

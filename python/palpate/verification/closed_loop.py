@@ -142,8 +142,8 @@ def force_driven(
         scheme = Scheme(**{**scheme.to_dict(), "structure": "implicit"})
         notes = (
             f"The implicit environment is used: with object mass {scheme.mass:g} and object damping "
-            f"{scheme.damping:g} the explicit one is stable below a slope of {limit:.4g}, and the steepest "
-            f"slope of the model is {steepest:.4g}.",
+            f"{scheme.object_damping:g} the explicit one is stable below a slope of {limit:.4g}, and the "
+            f"steepest slope of the model is {steepest:.4g}.",
         )
 
     def run(_position: Float1D, force: Float1D) -> dict[str, Any]:

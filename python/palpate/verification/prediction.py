@@ -19,7 +19,7 @@ from ..identification.data.strokes import HysteresisInput
 from ..model import Model
 from ..recording import Recording
 from ..recording.conversion import Motion
-from ..recording.motion import GAP, acceleration, ordered_strokes, turns_of, velocity
+from ..recording.motion import GAP_RATIO, acceleration, ordered_strokes, turns_of, velocity
 
 NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are not compared."
 """Note on rows without velocity, with their number."""
@@ -199,7 +199,7 @@ def _gaps(time: Float1D | None) -> NDArray[np.intp]:
     if time is None or len(time) < 2:
         return np.empty(0, dtype=np.intp)
     steps = np.diff(time)
-    return np.flatnonzero(steps > GAP * np.median(steps)) + 1
+    return np.flatnonzero(steps > GAP_RATIO * np.median(steps)) + 1
 
 
 def require_same_units(model: Model, units: Mapping[str, str]) -> None:

@@ -18,7 +18,7 @@ from ..identification.data.rows import require_in_range
 from ..model import Model
 from ..recording import Recording, Source
 from ..recording.comparison import amount
-from ..recording.reading import Given, recording_from
+from ..recording.reading import RecordingLike, recording_from
 from ..verdict import FORCE_JND, GOOD, Finding, Verdict, no, usable
 from .explanation import explanation
 from .metrics import (
@@ -98,7 +98,7 @@ class Verification:
 
 def verify(
     model: Model,
-    recording: Given | npt.ArrayLike,
+    recording: RecordingLike | npt.ArrayLike,
     force: npt.ArrayLike | None = None,
     *,
     time: npt.ArrayLike | None = None,

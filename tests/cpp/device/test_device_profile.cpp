@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-TEST(DeviceProfile, RefusesImpossibleValuesByName) {
+TEST(DeviceProfile, RefusesInvalidValuesByName) {
     const auto refusal = [](auto change) -> std::string {
         DeviceProfile profile;
         change(profile);

@@ -76,7 +76,7 @@ TEST(Wire, OutPacketsAreWrittenByteByByte) {
     EXPECT_EQ(bytes, expected);
 }
 
-TEST(Wire, AnotherSizeMagicOrVersionIsAnErrorForBothPackets) {
+TEST(Wire, WrongSizeMagicOrVersionIsAnErrorForBothPackets) {
     const Bytes good = Packet{}.bytes();
     for (std::size_t size = 0; size <= 64; ++size) {
         Bytes other = good;
@@ -97,7 +97,7 @@ TEST(Wire, AnotherSizeMagicOrVersionIsAnErrorForBothPackets) {
     }
 }
 
-TEST(Wire, InfoIsReadAndImpossibleFieldsAreRefused) {
+TEST(Wire, ReadsInfoAndRefusesInvalidFields) {
     const Bytes good{'I', 1, 0x02, 0x01, 0,  0,  1, 0, 0x40, 0x4B, 0x4C, 0, 0xE8, 3, 20, 0,
                      3,   0, 0,    0,    32, 16, 1, 0, 1,    2,    3,    4, 5,    6, 7,  8};
     wire::Info info;
@@ -117,14 +117,14 @@ TEST(Wire, InfoIsReadAndImpossibleFieldsAreRefused) {
     }
 }
 
-TEST(Wire, AForceOutOfTheObjectIsATorqueTowardsSmallerCounts) {
+TEST(Wire, ForceOutOfTheObjectIsATorqueTowardsSmallerCounts) {
     EXPECT_EQ(wire::torque_of(0.5, 5'000'000), -500'000);
     EXPECT_EQ(wire::force_of(-500'000), 0.5);
     EXPECT_FALSE(std::signbit(wire::force_of(0)));
     EXPECT_NEAR(wire::position_of(16384, 65536), 0.5 * std::numbers::pi, 1e-15);
 }
 
-TEST(Wire, NoForceLeavesTheDevicesRangeAndOneThatIsNoNumberIsNone) {
+TEST(Wire, TorqueStaysInTheDevicesRangeAndNanIsZero) {
     for (const double force : {1e300, std::numeric_limits<double>::infinity(), 5.0001}) {
         EXPECT_EQ(wire::torque_of(force, 5'000'000), -5'000'000);
         EXPECT_EQ(wire::torque_of(-force, 5'000'000), 5'000'000);
@@ -138,7 +138,7 @@ TEST(Wire, NoForceLeavesTheDevicesRangeAndOneThatIsNoNumberIsNone) {
     }
 }
 
-TEST(Unwrapped, FollowsACounterThroughAllItsTurnsWithLossAndRepetition) {
+TEST(Unwrapped, FollowsACounterThroughWrapsLossAndRepetition) {
     test::Random random{2};
     wire::Unwrapped<std::uint16_t> counter;
     std::int64_t truth = 65'000;
@@ -164,7 +164,7 @@ TEST(PacketStream, MakesReadingsInSiWithTheSignsOfThisLibrary) {
     EXPECT_EQ(reading.status, Status::Ok);
 }
 
-TEST(PacketStream, HasNoMeasuredForceWithoutATransducerAndDifferencesWhatIsNotMeasured) {
+TEST(PacketStream, HasNoMeasuredForceWithoutATransducerAndComputesAMissingVelocity) {
     PacketStream stream = stream_of(knob(0));
     ASSERT_TRUE(stream.take(Packet{1, 1000, 100, 77, 0, 1, 0, 0, 9}.bytes(), 0));
     EXPECT_TRUE(std::isnan(stream.reading().measured));
@@ -173,7 +173,7 @@ TEST(PacketStream, HasNoMeasuredForceWithoutATransducerAndDifferencesWhatIsNotMe
     EXPECT_NEAR(stream.reading().velocity, wire::position_of(10, 65536) / 2e-3, 1e-9);
 }
 
-TEST(PacketStream, ClockAndSequenceGoOnWhereTheirCountersWrap) {
+TEST(PacketStream, ClockAndSequenceContinueWhenTheirCountersWrap) {
     PacketStream stream = stream_of();
     std::uint16_t sequence = 65'530;
     std::uint32_t clock = 4'294'960'000U;
@@ -225,7 +225,7 @@ TEST(PacketStream, MeasuresRoundTripAndDelayFromTheEcho) {
     EXPECT_EQ(stream.health().late_echoes, 0U);
 }
 
-TEST(PacketStream, AnEchoFromBeforeIsCountedAndMeasuresNothing) {
+TEST(PacketStream, EchoOfAnEarlierSessionIsCountedAndNotMeasured) {
     PacketStream stream = stream_of();
     ASSERT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, 1, 7, 0, 0}.bytes(), 0));
     for (int k = 0; k < 3; ++k) {
@@ -238,7 +238,7 @@ TEST(PacketStream, AnEchoFromBeforeIsCountedAndMeasuresNothing) {
     EXPECT_EQ(stream.health().round_trip.count(), 1U);
 }
 
-TEST(PacketStream, ACommandThatIsTooLateForItsCertificateIsATimeout) {
+TEST(PacketStream, CommandTooLateForItsCertificateIsATimeout) {
     PacketStream stream{knob(), ms + ms / 4};
     for (const std::uint32_t clock : {0U, 1000U, 2000U, 4000U}) {
         const std::uint16_t echo =
@@ -250,7 +250,7 @@ TEST(PacketStream, ACommandThatIsTooLateForItsCertificateIsATimeout) {
     EXPECT_EQ(stream.health().late_commands, 1U);
 }
 
-TEST(PacketStream, StatusBitsAreOneStatusAndTheWorstOne) {
+TEST(PacketStream, StatusIsThatOfTheMostSeriousBit) {
     const auto status = [](std::uint16_t bits) {
         PacketStream stream = stream_of();
         EXPECT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, wire::enabled, 0, 0, 0}.bytes(), 0));
@@ -268,7 +268,7 @@ TEST(PacketStream, StatusBitsAreOneStatusAndTheWorstOne) {
     EXPECT_EQ(status(0), Status::Fault);  // it was enabled before
 }
 
-TEST(PacketStream, AWatchdogThatTrippedBeforeThisSessionIsPast) {
+TEST(PacketStream, IgnoresAWatchdogTripOfAnEarlierSession) {
     PacketStream stream = stream_of();
     ASSERT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, 3, 500, 0, 0}.bytes(), 0));
     EXPECT_EQ(stream.reading().status, Status::Ok);
@@ -279,7 +279,7 @@ TEST(PacketStream, AWatchdogThatTrippedBeforeThisSessionIsPast) {
     EXPECT_EQ(stream.health().watchdog_trips, 1U);
 }
 
-TEST(PacketStream, TakesAnyBytesAndSaysNothingImpossible) {
+TEST(PacketStream, AcceptsAnyBytesAndReportsOnlyValidReadings) {
     test::Random random{4};
     PacketStream stream = stream_of();
     for (int k = 0; k < test::cases(20'000); ++k) {

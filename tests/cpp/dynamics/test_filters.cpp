@@ -24,7 +24,7 @@ double degrees(std::complex<double> value) {
 }
 
 // spec section 4: "poles 0.836 and 0.819 (179 and 199 rad/s)"
-TEST(Filters, DifferentiatorsRollOffWhereThePaperPutThem) {
+TEST(Filters, DifferentiatorsHaveThePolesOfThePaper) {
     const auto poles = environment_filters(FilterPair::Implicit).g1.poles();
     EXPECT_NEAR(poles[0].real(), 0.836, 5e-4);
     EXPECT_NEAR(poles[1].real(), 0.819, 5e-4);
@@ -34,7 +34,7 @@ TEST(Filters, DifferentiatorsRollOffWhereThePaperPutThem) {
 
 // spec section 4: "the paper's 31 makes the explicit G1 I1 4.8 % too large at low frequency (1.048; 29.58 is
 // exact); 14.8379 gives 1.0032"
-TEST(Filters, LowFrequencyGainOfThePaperIsSlightlyOff) {
+TEST(Filters, LowFrequencyGainOfThePaperIsSlightlyAboveOne) {
     constexpr double low = 1e-3;
     EXPECT_NEAR(std::abs(product(FilterPair::Explicit, FilterDesign::Paper, low)), 1.048, 5e-4);
     EXPECT_NEAR(std::abs(product(FilterPair::Implicit, FilterDesign::Paper, low)), 1.0032, 5e-5);
@@ -50,7 +50,7 @@ TEST(Filters, MatchedGainIsExactAtLowFrequency) {
 
 // spec section 4: "at 100 rad/s |G I| is 0.78 with -53 degrees (implicit pair), 0.82 with -62 degrees
 // (explicit)"
-TEST(Filters, AtHundredRadiansPerSecondTheMatchIsGone) {
+TEST(Filters, PaperGainIsLowAtHundredRadiansPerSecond) {
     const auto implicit = product(FilterPair::Implicit, FilterDesign::Paper, 100.0);
     EXPECT_NEAR(std::abs(implicit), 0.78, 5e-3);
     EXPECT_NEAR(degrees(implicit), -53.0, 0.5);
@@ -67,7 +67,7 @@ TEST(Filters, OnlyTheExplicitForceIntegratorIsDelayed) {
     }
 }
 
-TEST(TransferFunction, RunsItsDifferenceEquation) {
+TEST(TransferFunction, ComputesItsDifferenceEquation) {
     TransferFunction filter{{0.5, -0.25, 0.125}, {1.0, -0.9, 0.3}};
     double u1 = 0.0;
     double u2 = 0.0;
@@ -87,7 +87,7 @@ TEST(TransferFunction, RunsItsDifferenceEquation) {
     EXPECT_EQ(filter.step(2.0), 1.0);
 }
 
-TEST(TransferFunction, AnswersASineAsItsResponseSays) {
+TEST(TransferFunction, ResponseToASineAgreesWithItsFrequencyResponse) {
     TransferFunction filter = environment_filters(FilterPair::Implicit).g1;
     constexpr double omega = 60.0;
     const std::complex<double> response = filter.at(unit(omega));

@@ -100,22 +100,23 @@ struct PieceObject {
 /// Returns the exact bounds of g + s h with a play, both of straight pieces between the same points.
 [[nodiscard]] inline ForceBounds bounds_of(const HysteresisPair<Pieces>& pair) {
     const Pieces& g = pair.force();
-    const Pieces& h = pair.loss();
+    const Pieces& h = pair.hysteresis_force();
     ForceBounds bounds;
     bounds.hysteresis = true;
     bounds.slope = {0.0, 0.0};
-    bounds.loss = {h.points().front(), h.points().front()};
+    bounds.hysteresis_force = {h.points().front(), h.points().front()};
     for (std::size_t k = 0; k < g.cells(); ++k) {
         const double slope = (g.points()[k + 1] - g.points()[k]) / g.step();
         const double bend = std::abs(h.points()[k + 1] - h.points()[k]) / h.step();
-        for (const double loss : {h.points()[k], h.points()[k + 1]}) {
-            const double stick = loss / pair.play_radius();
+        for (const double hysteresis : {h.points()[k], h.points()[k + 1]}) {
+            const double stick = hysteresis / pair.play_radius();
             bounds.slope = {std::min(bounds.slope.lower, slope - bend),
                             std::max(bounds.slope.upper, slope + bend + stick)};
             bounds.sliding = std::max(bounds.sliding, std::abs(slope) + bend);
             bounds.steepest = std::max(bounds.steepest, std::abs(slope) + bend + stick);
-            bounds.loss = {std::min(bounds.loss.lower, loss), std::max(bounds.loss.upper, loss)};
-            bounds.loss_per_play = std::max(bounds.loss_per_play, stick);
+            bounds.hysteresis_force = {std::min(bounds.hysteresis_force.lower, hysteresis),
+                                       std::max(bounds.hysteresis_force.upper, hysteresis)};
+            bounds.hysteresis_per_play = std::max(bounds.hysteresis_per_play, stick);
         }
     }
     return bounds;

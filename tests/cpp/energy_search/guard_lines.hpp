@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes of wheels, of the ramp at the start, and of softening.
+// Scenes of wheels, of the ramp at the start, and of the limit-cycle detector.
 #pragma once
 
 #include <algorithm>
@@ -125,7 +125,7 @@ template <class MeanOf>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// Makes a wheel with hysteresis that turns slowly. Its loss may exceed its mean force.
+/// Makes a wheel with hysteresis that turns slowly. Its hysteresis may exceed its mean force.
 [[nodiscard]] inline std::optional<Trial> draw_hysteresis_wheel(test::Random& random, double delay) {
     const int nodes = 300;
     const int cells = 10;
@@ -133,12 +133,12 @@ template <class MeanOf>
     const double size = std::exp(test::uniform(random, -1.0, 2.0));
     const Pieces g{0.0, 1.0 / cells,
                    random_wheel(random, cells, size, size * test::uniform(random, -0.5, 0.5)), true};
-    std::vector<double> losses;
-    const double loss = size * test::uniform(random, 0.0, 0.4);
+    std::vector<double> hysteresis;
+    const double largest_hysteresis = size * test::uniform(random, 0.0, 0.4);
     for (int k = 0; k < cells; ++k) {
-        losses.push_back(loss * test::uniform(random, 0.5, 1.0));
+        hysteresis.push_back(largest_hysteresis * test::uniform(random, 0.5, 1.0));
     }
-    const Pieces h{0.0, 1.0 / cells, losses, true};
+    const Pieces h{0.0, 1.0 / cells, hysteresis, true};
     const HysteresisPair<Pieces> pair{g, h, static_cast<double>(radius) / nodes};
     DeviceProfile device = random_device(random, delay);
     limit_by(random, device, largest_of(g.points()));
@@ -161,22 +161,22 @@ template <class MeanOf>
     scene.read = even_grid(0.0, 1.0 / nodes, nodes, 1, true);
     scene.table = play_table_of(Direct{pair}, scene.read, radius, sent_on(device));
     scene.held.assign(static_cast<std::size_t>(nodes),
-                      10.0 * (size + loss));  // only endless motion counts
+                      10.0 * (size + largest_hysteresis));  // only endless motion counts
     return trial_of(std::move(scene), *need, device);
 }
 
-/// Returns the guard that softens the object, after `buzzes` limit cycles.
-[[nodiscard]] inline LimitCycleDetector softened(int buzzes) {
+/// Returns the limit-cycle detector after `limit_cycles` limit cycles.
+[[nodiscard]] inline LimitCycleDetector scaled_after_limit_cycles(int limit_cycles) {
     LimitCycleDetector detector{{1e-9, 1000, 0.0}};
     double side = 1.0;
-    while (detector.buzzes() < static_cast<std::uint64_t>(buzzes)) {
+    while (detector.limit_cycles() < static_cast<std::uint64_t>(limit_cycles)) {
         detector.watch(side, side);
         side = -side;
     }
     return detector;
 }
 
-/// Makes a force that is softened at any time, more than once, and never hardened. It is a wheel or straight pieces.
+/// Makes a force that is scaled_after_limit_cycles at any time, more than once, and never hardened. It is a wheel or straight pieces.
 [[nodiscard]] inline std::optional<Trial> draw_softening(test::Random& random, double delay) {
     const bool wheel = random() % 2 == 0;
     const int nodes = wheel ? wheel_nodes(delay, true) / 2 : 40;
@@ -204,11 +204,11 @@ template <class MeanOf>
     if (!need || need->damping <= 0.0) {
         return std::nullopt;
     }
-    struct Softening {
+    struct ScaledLevels {
         HeldScene scene;
         std::vector<ForceTable> levels;
     };
-    auto shared = std::make_shared<Softening>();
+    auto shared = std::make_shared<ScaledLevels>();
     HeldScene& scene = shared->scene;
     scene.read = even_grid(0.0, wheel ? 1.0 / nodes : step, nodes,
                            wheel                    ? 1
@@ -218,9 +218,9 @@ template <class MeanOf>
     scene.held = held_energy(scene.read.grid, [&](double x) { return clipped(pieces.at(x).value, device); });
     scene.need = {need->damping / device.longest_period_s(), need->friction, device.whole_delay_samples(),
                   device.delay_fraction()};
-    for (int buzzes = 0; buzzes < 4; ++buzzes) {
+    for (int limit_cycles = 0; limit_cycles < 4; ++limit_cycles) {
         Sent sent = sent_on(device);
-        sent.guards.buzz = softened(buzzes);
+        sent.guards.limit_cycle = scaled_after_limit_cycles(limit_cycles);
         shared->levels.push_back(table_of(Direct{PieceObject{pieces}}, scene.read, 0, sent));
     }
     return Trial{[shared](double damping, double friction) {

@@ -161,7 +161,7 @@ template <class Force>
     scene.table = with_structure(
         model, scheme, device.period_s, device.force_limit,
         [&](const auto& structure) { return table_of(structure, scene.read, 0, sent_on(device)); });
-    // Behind a coupling the force at x is that of the object at y, so the felt force is again static.
+    // Behind a coupling the force at x is that of the object at y, so the rendered force is again static.
     scene.held = coupled ? with_structure(model, scheme, device.period_s, device.force_limit,
                                           [&](auto structure) {
                                               return held_energy(scene.read.grid, [&](double x) {
@@ -237,10 +237,10 @@ template <class Force>
     for (double& weight : h.weight) {
         weight *= test::uniform(random, -0.5, 0.5);
     }
-    LossParameters loss;
-    loss.weight = h.weight;
-    loss.bias = 0.01 - value_bounds(h, 0.0, 1.0, 1e-4).lower + test::uniform(random, 0.0, 0.2);
-    return {network, loss, test::unit_domain(), radius};
+    HysteresisParameters hysteresis;
+    hysteresis.weight = h.weight;
+    hysteresis.bias = 0.01 - value_bounds(h, 0.0, 1.0, 1e-4).lower + test::uniform(random, 0.0, 0.2);
+    return {network, hysteresis, test::unit_domain(), radius};
 }
 
 [[nodiscard]] inline std::optional<Trial> draw_hysteresis_network(test::Random& random, double delay) {
@@ -262,7 +262,7 @@ template <class Force>
     }
     const auto stick = [&](double x) {
         const Curve g = pair.force().at(x);
-        return g.value + pair.loss().at(x).integral / pair.play_radius();  // slope g' + h/r
+        return g.value + pair.hysteresis_force().at(x).integral / pair.play_radius();  // slope g' + h/r
     };
     HeldScene scene;
     scene.read =
@@ -352,7 +352,7 @@ template <class Force>
             need = need_at_less_friction(device, *need, certified).value_or(*need);
         }
         // The read play rests at the count, the handle is up to half a count away.
-        at_start = bounds_of(pair).loss_per_play * step * step / 8.0;
+        at_start = bounds_of(pair).hysteresis_per_play * step * step / 8.0;
         scene.table = play_table_of(Direct{pair}, scene.read, radius, sent_on(device));
     } else {
         limit_by(random, device, largest_of(g.points()));

@@ -149,8 +149,8 @@ template <class Structure>
                                        read.reading[node] + turned};
                 table.of[entry] = sent.force(structure, path, 2);
             }
-            const int slid = std::max(0, away - radius) + std::min(0, away + radius);
-            table.next_play[entry] = (play + slid + counts) % counts;
+            const int shift = std::max(0, away - radius) + std::min(0, away + radius);
+            table.next_play[entry] = (play + shift + counts) % counts;
         }
     }
     return table;

@@ -21,9 +21,9 @@ struct Need {
 /// Returns the least damping and friction that `certify` accepts; nothing if it always refuses.
 template <class Certify>
 [[nodiscard]] std::optional<Need> certified_need(DeviceProfile device, const Certify& certify) {
-    constexpr double any_damping = 1.2345e6;
+    constexpr double placeholder_damping = 1.2345e6;
     constexpr double any_friction = 5.4321e6;
-    device.viscous_damping = any_damping;
+    device.viscous_damping = placeholder_damping;
     device.coulomb_friction = any_friction;
     const Certificate generous = certify(std::as_const(device));
     if (!generous.certified()) {
@@ -31,7 +31,7 @@ template <class Certify>
     }
     Need need;
     for (const Inequality& line : generous.inequalities) {
-        if (line.left == any_damping) {
+        if (line.left == placeholder_damping) {
             need.damping = std::max(need.damping, line.right);
         } else if (line.left == any_friction) {
             need.friction = std::max(need.friction, line.right);
@@ -44,8 +44,8 @@ template <class Certify>
 template <class Certify>
 [[nodiscard]] std::optional<Need> need_at_less_friction(DeviceProfile device, const Need& need,
                                                         const Certify& certify) {
-    constexpr double any_damping = 1.2345e6;
-    device.viscous_damping = any_damping;
+    constexpr double placeholder_damping = 1.2345e6;
+    device.viscous_damping = placeholder_damping;
     device.coulomb_friction = need.friction * (1.0 - 1e-6);
     const Certificate certificate = certify(std::as_const(device));
     if (!certificate.certified()) {
@@ -53,7 +53,7 @@ template <class Certify>
     }
     Need other;
     for (const Inequality& line : certificate.inequalities) {
-        if (line.left == any_damping) {
+        if (line.left == placeholder_damping) {
             other.damping = std::max(other.damping, line.right);
         } else if (line.left == device.coulomb_friction) {
             other.friction = std::max(other.friction, line.right);
@@ -62,9 +62,9 @@ template <class Certify>
     return other;
 }
 
-/// A certified scene. `takes_energy` searches it on a device with the given multiples of the need.
+/// A certified scene. `finds_energy` searches it on a device with the given multiples of the need.
 struct Trial {
-    std::function<bool(double damping, double friction)> takes_energy;
+    std::function<bool(double damping, double friction)> finds_energy;
     Need need;
     std::string text{};  ///< the scene in words
 };
@@ -83,8 +83,8 @@ struct Line {
     /// Returns true if energy is taken out with `factor` of the line's need and all of the other needs.
     [[nodiscard]] bool fails(const Trial& trial, double factor) const {
         constexpr double rounding = 1.0 + 1e-9;
-        return part == Part::Damping ? trial.takes_energy(factor, rounding)
-                                     : trial.takes_energy(rounding, factor);
+        return part == Part::Damping ? trial.finds_energy(factor, rounding)
+                                     : trial.finds_energy(rounding, factor);
     }
 };
 

@@ -75,7 +75,7 @@ TEST(EnergySearch, FindsTheKnownNeedOfASpringAtAFractionalDelay) {
 }
 
 // b >= T M / 2 + t_d L does not hold between whole samples.
-TEST(EnergySearch, FindsEnergyWhereAFractionalDelayIsCountedWithItsShareOfASample) {
+TEST(EnergySearch, FindsEnergyIfAFractionalDelayIsCountedAsItsShareOfASample) {
     EXPECT_GT(spring_need(200, 4, 0, 0.25), 0.5 + 0.25 + 0.03);
 }
 
@@ -95,7 +95,7 @@ bool wheel_gives_energy(const std::vector<double>& forces, const Command& comman
 }
 
 // A peak of 8 N m on a device that makes 5: its mean is 0, the mean of the clipped force is not 0.
-TEST(EnergySearch, FindsTheMotorThatAForceLimitMakes) {
+TEST(EnergySearch, FindsTheActiveModelThatAForceLimitMakes) {
     std::vector<double> forces(10, -8.0 / 9.0);
     forces[3] = 8.0;
     const auto clip = [](double force) { return std::clamp(force, -5.0, 5.0); };
@@ -109,7 +109,7 @@ TEST(EnergySearch, FindsTheMotorThatAForceLimitMakes) {
     EXPECT_FALSE(wheel_gives_energy(forces, clip));
     EXPECT_FALSE(wheel_gives_energy(forces, [&](double force) { return 0.7 * clip(force); }));
     EXPECT_TRUE(wheel_gives_energy(forces, [&](double force) { return clip(0.7 * force); }))
-        << "softening before the limit";
+        << "scaling before the limit";
 }
 
 /// Returns the damping below which energy is taken out of a mass of 0.05 kg behind 90 N/m on a device that makes 5 N.

@@ -219,7 +219,7 @@ class ValueIteration {
             const double gain = sweep_once(sweep % 2 == 0, least_gain);
             finding.converged = gain <= least_gain;
             if (sweep % 8 == 7 || finding.converged) {
-                finding.cycle = a_cycle_pays(10.0 * least_gain);
+                finding.cycle = has_gaining_cycle(10.0 * least_gain);
                 finding.taken = taken_at_rest(held);
             }
             if (finding.converged) {
@@ -248,7 +248,7 @@ class ValueIteration {
         for (std::size_t state = 0; state < value_.size(); ++state) {
             value_[state] = 0.0;
             for (int jump = lowest(state); exists_[state] != 0 && jump <= highest(state); ++jump) {
-                value_[state] = std::min(value_[state], paid(state, jump) + later[after(state, jump)]);
+                value_[state] = std::min(value_[state], cost_of(state, jump) + later[after(state, jump)]);
             }
         }
     }
@@ -397,7 +397,7 @@ class ValueIteration {
         return windows_.moved(window, to) * plays_ + play;
     }
 
-    [[nodiscard]] double paid(std::size_t state, int jump) const noexcept {
+    [[nodiscard]] double cost_of(std::size_t state, int jump) const noexcept {
         const double d = move(place(state), jump);
         if (!samples_.empty()) {
             const Sample& sample =
@@ -430,7 +430,7 @@ class ValueIteration {
                                                                    windows_.stride() * plays_;
                 const double total =
                     (samples_.empty() ? cost_.of_move(move(from, jump), old, now, down(from), up(from))
-                                      : paid(state, jump)) +
+                                      : cost_of(state, jump)) +
                     value_[next];
                 if (total < best) {
                     best = total;
@@ -447,7 +447,7 @@ class ValueIteration {
     }
 
     /// Returns true if the best moves from some state lead around a cycle that takes energy out.
-    [[nodiscard]] bool a_cycle_pays(double least) const {
+    [[nodiscard]] bool has_gaining_cycle(double least) const {
         std::vector<std::uint32_t> seen(value_.size(), 0);
         std::uint32_t walk = 0;
         for (std::size_t first = 0; first < value_.size(); ++first) {
@@ -463,7 +463,7 @@ class ValueIteration {
             double sum = 0.0;
             std::size_t along = state;
             do {
-                sum += paid(along, policy_[along]);
+                sum += cost_of(along, policy_[along]);
                 along = after(along, policy_[along]);
             } while (along != state);
             if (sum < -least) {

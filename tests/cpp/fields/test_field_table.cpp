@@ -49,7 +49,7 @@ std::string hash_of(const Motor& motor) {
     return hash.text();
 }
 
-TEST(FieldTable, AnOptionalFieldIsCheckedOnlyWhereItIsGiven) {
+TEST(FieldTable, OptionalFieldIsCheckedOnlyIfItIsGiven) {
     EXPECT_NO_THROW(check_fields(Motor{}));
     EXPECT_NO_THROW(check_fields(Motor{1.0, 0.0}));
     try {
@@ -60,7 +60,7 @@ TEST(FieldTable, AnOptionalFieldIsCheckedOnlyWhereItIsGiven) {
     }
 }
 
-TEST(FieldTable, OnlyAnOptionalFieldMayBeMissingInAFile) {
+TEST(FieldTable, OnlyOptionalFieldsMayBeMissingInAFile) {
     EXPECT_FALSE(read(R"({"inertia": 2})").time_constant_s);
     EXPECT_EQ(read(R"({"inertia": 2, "time_constant_s": 0.5})").time_constant_s, 0.5);
     EXPECT_EQ(refusal(R"({"time_constant_s": 0.5})"), "motor.inertia is missing");
@@ -70,7 +70,7 @@ TEST(FieldTable, OnlyAnOptionalFieldMayBeMissingInAFile) {
               "motor.time_constant_s is null: must be a number");
 }
 
-TEST(FieldTable, AnOptionalFieldChangesAFingerprintOnlyWhereItIsGiven) {
+TEST(FieldTable, OptionalFieldChangesAFingerprintOnlyIfItIsGiven) {
     detail::NumberHash before;
     before.add(1.0);
     EXPECT_EQ(hash_of({}), before.text());

@@ -48,8 +48,8 @@ GuardSettings settings_for(const DeviceProfile& device) {
 
 struct Guarded {
     std::vector<double> forces;
-    std::size_t drained = 0;
-    std::size_t softened = 0;
+    std::size_t energy_limited = 0;
+    std::size_t limit_cycle_scaled = 0;
     EnergyAccount energy;
 };
 
@@ -59,8 +59,8 @@ Guarded render(const ForceModel& model, const DeviceProfile& device, const Guard
     Guarded run;
     const auto watch = [&](const Tick& tick, const Motion& /*handle*/, const EnergyAccount& /*account*/) {
         run.forces.push_back(tick.command.force);
-        run.drained += tick.status == Status::Drained ? 1 : 0;
-        run.softened += tick.status == Status::Softened ? 1 : 0;
+        run.energy_limited += tick.status == Status::EnergyLimited ? 1 : 0;
+        run.limit_cycle_scaled += tick.status == Status::LimitCycleScaled ? 1 : 0;
         return true;
     };
     Scheme scheme;
@@ -79,7 +79,7 @@ Scheme direct() {
 }
 
 // The scene of spec section 6, quantised and without friction: the guards do not change the force.
-TEST(Guards, TouchNoForceOfTheComparisonScene) {
+TEST(Guards, DoNotChangeForcesOfTheComparisonScene) {
     const test::ClickAndWall object;
     double held = 0.0;
     for (double x = 0.0; x < 0.5; x += 1e-5) {
@@ -105,13 +105,13 @@ TEST(Guards, TouchNoForceOfTheComparisonScene) {
     EXPECT_EQ(forces(guards), forces(Guards{}));
 }
 
-TEST(Guards, TouchNoForceOfCertifiedScenes) {
+TEST(Guards, DoNotChangeForcesOfCertifiedScenes) {
     test::Random random{3};
     for (int k = 0; k < test::cases(60); ++k) {
         test::Scene scene = test::random_certified_scene(random, 1.25);
         scene.device.force_limit = 1e9;
         GuardSettings settings = settings_for(scene.device);
-        settings.buzz_force = 0.01;
+        settings.limit_cycle_force = 0.01;
         settings.certified = true;
         Guards guards = guards_of(settings, scene.model, scene.scheme, scene.device.period_s);
         guards.reading = {};
@@ -122,7 +122,8 @@ TEST(Guards, TouchNoForceOfCertifiedScenes) {
                 return closed_loop(
                     std::move(structure), scene.device, hand, 1000, {8, 0.1, 0.0, guards},
                     [&](const Tick& tick, const Motion& /*handle*/, const EnergyAccount& /*account*/) {
-                        acted += tick.status == Status::Drained || tick.status == Status::Softened;
+                        acted +=
+                            tick.status == Status::EnergyLimited || tick.status == Status::LimitCycleScaled;
                         return true;
                     });
             });
@@ -130,7 +131,7 @@ TEST(Guards, TouchNoForceOfCertifiedScenes) {
     }
 }
 
-TEST(EnergyTank, PaysForNoMoreThanTheObjectHolds) {
+TEST(EnergyTank, GivesAtMostTheEnergyOfTheObject) {
     test::Random random{9};
     for (int k = 0; k < test::cases(50); ++k) {
         DeviceProfile device;
@@ -139,44 +140,44 @@ TEST(EnergyTank, PaysForNoMoreThanTheObjectHolds) {
         const double stiffness = test::uniform(random, 1.5, 8.0) * 2.0 * device.viscous_damping / period;
         const ForceModel model = wall(stiffness);
         GuardSettings settings = settings_for(device);
-        settings.buzz_force = 0.0;
-        const double held = most_energy(model, direct(), device.force_limit);
+        settings.limit_cycle_force = 0.0;
+        const double held = largest_stored_energy(model, direct(), device.force_limit);
         const auto lost = [&](bool tank) {
             settings.energy_tank = tank;
             const Guarded run = render(model, device, guards_of(settings, model, direct(), period),
                                        PassiveHand{15.0, 0.0, 0.0, 0.1}, 5000, 0.02);
             // Energy that the motor gave, minus nine tenths of the losses of the device.
-            return -(run.energy.motor + 0.9 * run.energy.loss);
+            return -(run.energy.motor + 0.9 * run.energy.dissipated);
         };
         EXPECT_LT(lost(true), 1.3 * held) << stiffness << " delay " << device.late_samples();
         EXPECT_GT(lost(false), 2.0 * held) << stiffness << " delay " << device.late_samples();
     }
 }
 
-TEST(EnergyTank, LetsForcesFadeWithinItsReserve) {
+TEST(EnergyTank, ScalesForcesDownWithinItsReserve) {
     EnergyTank tank{TankSettings{{.within = 1.0}, 0.0, 0.0, 0.0, period}};
     double force = -2.0;
     tank.book(-1.0, 1.0);  // the energy of the object; the reserve of 0.25 remains
     EXPECT_EQ(tank.apply(force), Status::Ok);
     tank.book(-0.15, 1.0);
-    EXPECT_EQ(tank.apply(force), Status::Drained);
+    EXPECT_EQ(tank.apply(force), Status::EnergyLimited);
     EXPECT_NEAR(force, -2.0 * 0.1 / 0.25, 1e-12);
     tank.book(-0.1, 1.0);
     force = 2.0;
-    EXPECT_EQ(tank.apply(force), Status::Drained);
+    EXPECT_EQ(tank.apply(force), Status::EnergyLimited);
     EXPECT_NEAR(force, 0.0, 1e-12);
     tank.book(3.0, 1.0);  // never more than full
     EXPECT_NEAR(tank.given(), 0.0, 1e-12);
     EXPECT_NEAR(tank.most_given(), 1.25, 1e-12);
 }
 
-TEST(EnergyTank, DoesNotChargeWhatTheDeviceTakes) {
+TEST(EnergyTank, CreditsTheDissipationOfTheDevice) {
     EnergyTank tank{TankSettings{{.within = 1.0}, 0.06, 0.02, 0.01, period}};
     tank.book(-30.0, 0.03);
     EXPECT_NEAR(tank.given(), 0.9 - (0.06 * 0.02 * 0.02 / period + 0.02 * 0.02), 1e-12);
 }
 
-TEST(StoredEnergy, GrowsWithWhereItHasBeen) {
+TEST(StoredEnergy, GrowsWithTheVisitedPositions) {
     StoredEnergy stored{{.within = 1.0,
                          .lower = 0.0,
                          .upper = 1.0,
@@ -195,22 +196,22 @@ TEST(StoredEnergy, GrowsWithWhereItHasBeen) {
     EXPECT_NEAR(stored.most(), 1.0 + 5.0 * 0.3, 1e-12);
 }
 
-TEST(ReadMotion, MovesNoFartherThanTheHandleMust) {
+TEST(ReadMotion, MovesTheLeastDistanceThatReadingsProve) {
     test::Random random{4};
     for (int k = 0; k < test::cases(200); ++k) {
         const double step = std::exp(test::uniform(random, -6.0, 0.0));
         ReadMotion motion{step};
         double at = test::uniform(random, -1.0, 1.0);
-        double true_way = 0.0;
-        double read_way = 0.0;
+        double true_distance = 0.0;
+        double read_distance = 0.0;
         const double reach = step * std::exp(test::uniform(random, -3.0, 2.0));
         (void)motion.to(step * std::round(at / step));
         for (int tick = 0; tick < 500; ++tick) {
             const double moved = reach * test::uniform(random, -1.0, 1.0);
             at += moved;
-            true_way += std::abs(moved);
-            read_way += std::abs(motion.to(step * std::round(at / step)));
-            ASSERT_LE(read_way, true_way + 0.5 * step + 1e-12);
+            true_distance += std::abs(moved);
+            read_distance += std::abs(motion.to(step * std::round(at / step)));
+            ASSERT_LE(read_distance, true_distance + 0.5 * step + 1e-12);
         }
     }
     ReadMotion motion{1.0};
@@ -222,7 +223,7 @@ TEST(ReadMotion, MovesNoFartherThanTheHandleMust) {
     EXPECT_TRUE(std::isnan(motion.to(7.0)));
 }
 
-TEST(EnergyTank, WithoutSizeHasNoEnd) {
+TEST(EnergyTank, WithoutABoundNeverActs) {
     EnergyTank tank;
     double force = -1.0;
     tank.book(-1e9, 1.0);
@@ -232,19 +233,19 @@ TEST(EnergyTank, WithoutSizeHasNoEnd) {
 
 TEST(EnergyTank, IsSizedByTheModelAndItsCoupling) {
     const ForceModel model = wall(100.0);
-    EXPECT_NEAR(most_energy(model, direct(), 20.0), 0.5, 1e-6);
-    EXPECT_NEAR(most_energy(model, direct(), 5.0), 0.125 + 0.25, 1e-6);  // of the clipped force
+    EXPECT_NEAR(largest_stored_energy(model, direct(), 20.0), 0.5, 1e-6);
+    EXPECT_NEAR(largest_stored_energy(model, direct(), 5.0), 0.125 + 0.25, 1e-6);  // of the clipped force
     Scheme coupled;
     coupled.coupling.stiffness = 50.0;
-    EXPECT_NEAR(most_energy(model, coupled, 5.0), 0.375 + 0.5 * 25.0 / 50.0, 1e-6);
+    EXPECT_NEAR(largest_stored_energy(model, coupled, 5.0), 0.375 + 0.5 * 25.0 / 50.0, 1e-6);
     coupled.compensated = true;
-    EXPECT_NEAR(most_energy(model, coupled, 5.0), 0.375 + 25.0 / 50.0, 1e-6);
+    EXPECT_NEAR(largest_stored_energy(model, coupled, 5.0), 0.375 + 25.0 / 50.0, 1e-6);
     const ForceModel motor{NetworkParameters{1, {}, {}, {}, {0.0}, 1.0}, {{0.0}, {1.0}, {}, {}, 1.0}};
-    EXPECT_TRUE(std::isinf(most_energy(motor, direct(), 5.0)));
+    EXPECT_TRUE(std::isinf(largest_stored_energy(motor, direct(), 5.0)));
 }
 
 // The account of the observer equals that of the simulation if the encoder is without steps.
-TEST(PassivityObserver, SeesWhatTheMotorTook) {
+TEST(PassivityObserver, MeasuresTheEnergyOfTheMotor) {
     DeviceProfile device;
     device.encoder_step = 0.0;
     device.delay_s = device.period_s;
@@ -272,41 +273,41 @@ struct Watched {
     }
 };
 
-TEST(LimitCycleDetector, FindsABuzzAndScalesItDown) {
+TEST(LimitCycleDetector, DetectsALimitCycleAndScalesForcesDown) {
     for (const double frequency : {30.0, 120.0, 333.0, 499.0}) {
-        Watched buzz;
-        buzz.shake(frequency, 2e-3, 0.0, 1000);
-        EXPECT_GE(buzz.detector.buzzes(), 1U) << frequency;
-        EXPECT_NEAR(buzz.detector.scale(), std::pow(0.7, buzz.detector.buzzes()), 1e-12);
+        Watched shaken;
+        shaken.shake(frequency, 2e-3, 0.0, 1000);
+        EXPECT_GE(shaken.detector.limit_cycles(), 1U) << frequency;
+        EXPECT_NEAR(shaken.detector.scale(), std::pow(0.7, shaken.detector.limit_cycles()), 1e-12);
     }
 }
 
-TEST(LimitCycleDetector, LeavesAloneWhatIsNoBuzz) {
+TEST(LimitCycleDetector, IgnoresOtherMotions) {
     Watched slow;
     slow.shake(12.0, 2e-2, 0.0, 4000);
-    EXPECT_EQ(slow.detector.buzzes(), 0U);
-    Watched dying;
-    dying.shake(100.0, 2e-2, 0.015, 4000);
-    EXPECT_EQ(dying.detector.buzzes(), 0U);
+    EXPECT_EQ(slow.detector.limit_cycles(), 0U);
+    Watched decaying;
+    decaying.shake(100.0, 2e-2, 0.015, 4000);
+    EXPECT_EQ(decaying.detector.limit_cycles(), 0U);
     Watched faint;
     faint.shake(100.0, 1e-4, 0.0, 4000);
-    EXPECT_EQ(faint.detector.buzzes(), 0U);
+    EXPECT_EQ(faint.detector.limit_cycles(), 0U);
     Watched turning;  // detents pass fast, but the knob never reverses
     turning.shake(100.0, 2e-3, 0.0, 4000, 2e-3);
-    EXPECT_EQ(turning.detector.buzzes(), 0U);
+    EXPECT_EQ(turning.detector.limit_cycles(), 0U);
 }
 
-TEST(LimitCycleDetector, StopsABuzzingWallAndSaysSo) {
+TEST(LimitCycleDetector, StopsALimitCycleAtAWallAndReportsIt) {
     const DeviceProfile device;
     const ForceModel model = wall(5.0 * 2.0 * device.viscous_damping / period);
     GuardSettings settings = settings_for(device);
     settings.energy_tank = false;
-    const auto swing = [&](double buzz_force) {
-        settings.buzz_force = buzz_force;
+    const auto swing = [&](double limit_cycle_force) {
+        settings.limit_cycle_force = limit_cycle_force;
         Guarded run = render(model, device, guards_of(settings, model, direct(), period),
                              PassiveHand{15.0, 0.0, 0.0, 0.1}, 3000, 0.0);
         const auto [low, high] = std::minmax_element(run.forces.end() - 500, run.forces.end());
-        return std::pair{*high - *low, run.softened};
+        return std::pair{*high - *low, run.limit_cycle_scaled};
     };
     EXPECT_GT(swing(0.0).first, 5.0);
     EXPECT_EQ(swing(0.0).second, 0U);
@@ -314,8 +315,8 @@ TEST(LimitCycleDetector, StopsABuzzingWallAndSaysSo) {
     EXPECT_GT(swing(0.05).second, 1000U);
 }
 
-TEST(GuardSettings, RefusesWhatIsImpossible) {
-    for (double GuardSettings::* field : {&GuardSettings::buzz_force, &GuardSettings::device_damping,
+TEST(GuardSettings, RefusesInvalidValues) {
+    for (double GuardSettings::* field : {&GuardSettings::limit_cycle_force, &GuardSettings::device_damping,
                                           &GuardSettings::device_friction, &GuardSettings::encoder_step}) {
         GuardSettings settings;
         settings.*field = -1.0;
@@ -335,7 +336,7 @@ class GuidedHandle {
 
     [[nodiscard]] static Opened open() { return {}; }
     static void close() noexcept {}
-    void go_to(double position) noexcept { to_ = position; }
+    void move_to(double position) noexcept { to_ = position; }
 
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         const auto delay = static_cast<std::size_t>(device_.whole_delay_samples());
@@ -345,8 +346,8 @@ class GuidedHandle {
         const double force = pending_[ticks_ % pending_.size()];
         const double way = to_ - at_;
         motor_ += force * way;
-        loss_ += std::abs(way) *
-                 (device_.viscous_damping * std::abs(way) / device_.period_s + device_.coulomb_friction);
+        dissipated_ += std::abs(way) * (device_.viscous_damping * std::abs(way) / device_.period_s +
+                                        device_.coulomb_friction);
         least_ = std::min(least_, energy());
         at_ = to_;
         ++ticks_;
@@ -360,10 +361,10 @@ class GuidedHandle {
     }
 
     /// Return the energy that the hand put in, and its least value so far [J].
-    [[nodiscard]] double energy() const noexcept { return motor_ + loss_; }
+    [[nodiscard]] double energy() const noexcept { return motor_ + dissipated_; }
     [[nodiscard]] double least() const noexcept { return least_; }
     [[nodiscard]] double motor() const noexcept { return motor_; }
-    void begin_account() noexcept { motor_ = loss_ = least_ = 0.0; }
+    void begin_account() noexcept { motor_ = dissipated_ = least_ = 0.0; }
 
   private:
     [[nodiscard]] double encoded(double position) const noexcept {
@@ -375,7 +376,7 @@ class GuidedHandle {
     double at_;
     double to_;
     double motor_ = 0.0;
-    double loss_ = 0.0;
+    double dissipated_ = 0.0;
     double least_ = 0.0;
     std::uint64_t ticks_ = 0;
     std::array<double, longest_delay_samples + 2> pending_{};
@@ -421,8 +422,8 @@ Guards certified_guards(const ForceModel& model, const Scheme& scheme, const Dev
 }
 
 struct Pressed {
-    std::size_t drained = 0;
-    std::size_t softened = 0;
+    std::size_t energy_limited = 0;
+    std::size_t limit_cycle_scaled = 0;
     double least = 0.0;  ///< of the true account after the ramp [J]
     std::uint64_t ticks = 0;
 };
@@ -441,8 +442,8 @@ Pressed press_readme_knob(int presses) {
     Pressed run;
     const auto tick = [&] {
         const Status status = controller.tick().status;
-        run.drained += status == Status::Drained ? 1 : 0;
-        run.softened += status == Status::Softened ? 1 : 0;
+        run.energy_limited += status == Status::EnergyLimited ? 1 : 0;
+        run.limit_cycle_scaled += status == Status::LimitCycleScaled ? 1 : 0;
         ++run.ticks;
     };
     for (int k = 0; k < 300; ++k) {  // the ramp
@@ -456,7 +457,7 @@ Pressed press_readme_knob(int presses) {
         const double bottom = test::uniform(random, 0.44, 0.46);
         const auto half = static_cast<int>((bottom - released) / speed);
         for (int way = 0; way <= 2 * half; ++way) {
-            handle.go_to(bottom - speed * std::abs(half - way));
+            handle.move_to(bottom - speed * std::abs(half - way));
             tick();
         }
     }
@@ -468,16 +469,16 @@ double knob_energy(double x) {
     return readme_knob().network()->curve().inside(x).integral;
 }
 
-TEST(GuardedAccount, SlowPressesOfTheReadmeKnobNeverDrainTheTankNorGiveEnergy) {
+TEST(GuardedAccount, SlowPressesOfTheReadmeKnobNeverEmptyTheTankNorGiveEnergy) {
     const Pressed run = press_readme_knob(test::cases(2000));
-    EXPECT_EQ(run.drained, 0U) << "of " << run.ticks << " ticks";
-    EXPECT_EQ(run.softened, 0U);
+    EXPECT_EQ(run.energy_limited, 0U) << "of " << run.ticks << " ticks";
+    EXPECT_EQ(run.limit_cycle_scaled, 0U);
     const double held = knob_energy(0.2) - energy_range(readme_knob()).least;
     EXPECT_GE(run.least, -held);
 }
 
 // A reading that flickers between two counts adds L Delta^2 for a cycle of the read motion, and the tank does not act.
-TEST(GuardedAccount, AFlickeringCountDoesNotDrainTheTank) {
+TEST(GuardedAccount, AFlickeringCountDoesNotEmptyTheTank) {
     const DeviceProfile device = bench_knob();
     const ForceModel model = readme_knob();
     const double border = device.encoder_step * (std::floor(0.4 / device.encoder_step) + 0.5);
@@ -485,13 +486,13 @@ TEST(GuardedAccount, AFlickeringCountDoesNotDrainTheTank) {
     Controller controller{handle, Direct{CompiledNetwork{*model.network()}},
                           certified_guards(model, direct(), device)};
     ASSERT_EQ(controller.start(), Status::Ok);
-    std::size_t drained = 0;
+    std::size_t energy_limited = 0;
     const int ticks = test::cases(2'000'000);
     for (int k = 0; k < ticks; ++k) {
-        handle.go_to(border + (k % 2 == 0 ? 1e-12 : -1e-12));
-        drained += controller.tick().status == Status::Drained ? 1 : 0;
+        handle.move_to(border + (k % 2 == 0 ? 1e-12 : -1e-12));
+        energy_limited += controller.tick().status == Status::EnergyLimited ? 1 : 0;
     }
-    EXPECT_EQ(drained, 0U);
+    EXPECT_EQ(energy_limited, 0U);
     EXPECT_LT(controller.guards().tank.most_given(), 1e-6);
     EXPECT_NEAR(controller.guards().observer.energy(), handle.motor(), 1e-4);
 }
@@ -523,8 +524,8 @@ class Motions {
             case 4:  // back and forth at constant speed
                 return centre_ + reach_ * (2.0 * std::abs(std::remainder(angle_ * tick, 2.0)) - 1.0);
             default:
-                walked_ = std::clamp(walked_ + 0.3 * reach_ * test::uniform(random, -1.0, 1.0), -1.0, 1.0);
-                return centre_ + walked_;
+                offset_ = std::clamp(offset_ + 0.3 * reach_ * test::uniform(random, -1.0, 1.0), -1.0, 1.0);
+                return centre_ + offset_;
         }
     }
 
@@ -532,11 +533,11 @@ class Motions {
     double centre_;
     double reach_;
     double angle_;
-    double walked_ = 0.0;
+    double offset_ = 0.0;
 };
 
 // Tests any motion on devices with exactly the damping and friction that a certificate requires.
-TEST(GuardedAccount, NoMotionDrainsTheTankOfACertifiedRendering) {
+TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
     test::Random random{31};
     double most = 0.0;
     std::map<std::string, int> scenes;
@@ -554,13 +555,13 @@ TEST(GuardedAccount, NoMotionDrainsTheTankOfACertifiedRendering) {
                        [&](auto structure) {
                            Controller controller{handle, std::move(structure), guards};
                            ASSERT_EQ(controller.start(), Status::Ok);
-                           std::size_t drained = 0;
+                           std::size_t energy_limited = 0;
                            for (int tick = 0; tick < 3000; ++tick) {
-                               handle.go_to(tick < 5 ? scene.start : motion.next(random, tick));
-                               drained += controller.tick().status == Status::Drained ? 1 : 0;
+                               handle.move_to(tick < 5 ? scene.start : motion.next(random, tick));
+                               energy_limited += controller.tick().status == Status::EnergyLimited ? 1 : 0;
                            }
                            const EnergyTank& tank = controller.guards().tank;
-                           EXPECT_EQ(drained, 0U) << "scene " << k << ": " << scene << "; given "
+                           EXPECT_EQ(energy_limited, 0U) << "scene " << k << ": " << scene << "; given "
                                                   << tank.most_given() << " of " << tank.stored().most();
                            most = std::max(most, tank.most_given() / tank.stored().most());
                        });
@@ -574,44 +575,44 @@ TEST(GuardedAccount, NoMotionDrainsTheTankOfACertifiedRendering) {
 
 // A spring of exactly 2 b / T, moved back and forth at every sample, gives exactly the energy that the damping
 // dissipates.
-TEST(GuardedAccount, RubbingASpringAtItsBoundNeedsFullCredit) {
+TEST(GuardedAccount, SlowMotionOnASpringAtItsBoundNeedsFullCredit) {
     DeviceProfile device;
     device.encoder_step = 0.0;
     const double stiffness = (2.0 - 1e-8) * device.viscous_damping / device.period_s;
     const ForceModel spring{NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0},
                             {{-0.04}, {0.04}, Continuation::Linear, Continuation::Linear, std::nullopt}};
     ASSERT_TRUE(certify(spring, direct(), device).certified());
-    const auto drained = [&](bool certified) {
+    const auto energy_limited = [&](bool certified) {
         GuidedHandle handle{device, 0.0};
         Guards guards = certified_guards(spring, direct(), device, certified);
-        guards.buzz = {};
+        guards.limit_cycle = {};
         Controller controller{handle, Direct{CompiledNetwork{*spring.network()}}, guards};
         EXPECT_EQ(controller.start(), Status::Ok);
         std::size_t count = 0;
         for (int k = 0; k < 10'000; ++k) {
-            handle.go_to(k % 2 == 0 ? 0.03 : -0.03);
-            count += controller.tick().status == Status::Drained ? 1 : 0;
+            handle.move_to(k % 2 == 0 ? 0.03 : -0.03);
+            count += controller.tick().status == Status::EnergyLimited ? 1 : 0;
         }
         return count;
     };
-    EXPECT_EQ(drained(true), 0U);
-    EXPECT_GT(drained(false), 1000U);
+    EXPECT_EQ(energy_limited(true), 0U);
+    EXPECT_GT(energy_limited(false), 1000U);
 }
 
 // A hand may press an object further than it was measured; the energy stored there is returned.
-TEST(GuardedAccount, PressesBeyondTheDomainDoNotDrainTheTank) {
+TEST(GuardedAccount, PressesBeyondTheDomainDoNotEmptyTheTank) {
     const DeviceProfile device = bench_knob();
     const ForceModel model = readme_knob();
     GuidedHandle handle{device, 0.4};
     Controller controller{handle, Direct{CompiledNetwork{*model.network()}},
                           certified_guards(model, direct(), device)};
     ASSERT_EQ(controller.start(), Status::Ok);
-    std::size_t drained = 0;
+    std::size_t energy_limited = 0;
     for (int k = 0; k < 20'000; ++k) {
-        handle.go_to(0.6 - 0.2 * std::cos(2.0 * std::numbers::pi * k / 1000.0));
-        drained += controller.tick().status == Status::Drained ? 1 : 0;
+        handle.move_to(0.6 - 0.2 * std::cos(2.0 * std::numbers::pi * k / 1000.0));
+        energy_limited += controller.tick().status == Status::EnergyLimited ? 1 : 0;
     }
-    EXPECT_EQ(drained, 0U);
+    EXPECT_EQ(energy_limited, 0U);
     const StoredEnergy& stored = controller.guards().tank.stored();
     EXPECT_NEAR(stored.most() - stored.within(), 5.0 * (0.8 - model.domain().upper[0]), 0.01);
 }
@@ -647,19 +648,19 @@ Wheel balanced_wheel(double limit) {
     return {low};
 }
 
-// Softening scales a force that is balanced with its limit. If it were scaled before the limit, it would drive the
+// The detector scales a force that is balanced with its limit. If the force were scaled before the limit, it would drive the
 // wheel.
-TEST(GuardedAccount, ASoftenedWheelWithAForceLimitIsNoMotor) {
+TEST(GuardedAccount, ScaledWheelWithAForceLimitIsPassive) {
     DeviceProfile device;
     device.encoder_step = device.viscous_damping = 0.0;
     Guards guards;
     guards.limit = {5.0};
-    LimitCycleDetector buzz{{0.05, 25, 0.0}};
-    for (int k = 0; buzz.buzzes() == 0; ++k) {
-        buzz.watch(k % 2 == 0 ? 0.01 : -0.01, k % 2 == 0 ? 1.0 : -1.0);
+    LimitCycleDetector detector{{0.05, 25, 0.0}};
+    for (int k = 0; detector.limit_cycles() == 0; ++k) {
+        detector.watch(k % 2 == 0 ? 0.01 : -0.01, k % 2 == 0 ? 1.0 : -1.0);
     }
-    ASSERT_NEAR(buzz.scale(), 0.7, 1e-12);
-    guards.buzz = buzz;
+    ASSERT_NEAR(detector.scale(), 0.7, 1e-12);
+    guards.limit_cycle = detector;
     GuidedHandle handle{device, 0.0};
     Controller controller{handle, Direct{balanced_wheel(5.0)}, guards};
     ASSERT_EQ(controller.start(), Status::Ok);
@@ -668,12 +669,12 @@ TEST(GuardedAccount, ASoftenedWheelWithAForceLimitIsNoMotor) {
         (void)controller.tick();
         handle.begin_account();
         for (int k = 1; k <= turn; ++k) {
-            handle.go_to(direction * 2.0 * std::numbers::pi * (direction > 0 ? k : k - turn) / turn);
+            handle.move_to(direction * 2.0 * std::numbers::pi * (direction > 0 ? k : k - turn) / turn);
             (void)controller.tick();
         }
         EXPECT_NEAR(handle.energy(), 0.0, 1e-3) << "J in a turn, direction " << direction;
     }
-    EXPECT_EQ(controller.guards().buzz.buzzes(), 1U);
+    EXPECT_EQ(controller.guards().limit_cycle.limit_cycles(), 1U);
 }
 
 TEST(GuardedAccount, ALimitedForceIsScaledAfterItsLimit) {
@@ -691,7 +692,7 @@ TEST(GuardedAccount, ALimitedForceIsScaledAfterItsLimit) {
 
 // While the forces increase, a handle can be moved in against a small force and pushed out with a larger one. The
 // account of the given energy starts after that, and the energy given before is stated separately.
-TEST(GuardedAccount, WhatARampGivesIsBookedByItself) {
+TEST(GuardedAccount, EnergyOfTheRampIsAccountedSeparately) {
     constexpr double stiffness = 20.0;
     constexpr double reach = 0.1;
     constexpr double stored = 0.5 * stiffness * reach * reach;
@@ -707,13 +708,13 @@ TEST(GuardedAccount, WhatARampGivesIsBookedByItself) {
         double after_ramp = 0.0;
         for (int k = 0; k < 400; ++k) {
             const int out = during ? 150 : 250;
-            handle.go_to(reach * std::clamp(k < out ? k / 20.0 : 1.0 - (k - out) / 20.0, 0.0, 1.0));
+            handle.move_to(reach * std::clamp(k < out ? k / 20.0 : 1.0 - (k - out) / 20.0, 0.0, 1.0));
             (void)controller.tick();
             if (k == 200) {
                 after_ramp = handle.energy();
             }
         }
-        const double in_ramp = -controller.guards().at_start.least();
+        const double in_ramp = -controller.guards().ramp_observer.least();
         const double after = -controller.guards().observer.least();
         EXPECT_LT(in_ramp, stored);
         EXPECT_LT(after, 1.2 * stored);  // without damping each sample on the way out adds K d^2 / 2
@@ -749,7 +750,7 @@ double stored_span(const ForceModel& model, double limit) {
             for (int j = 0; j < 100; ++j) {
                 const double at = x - r + r * (j + 0.5) / 100.0;
                 const double g = force.at(at).value;
-                const double pull = (at - (x - r)) / r * both->loss().at(at).value;
+                const double pull = (at - (x - r)) / r * both->hysteresis_force().at(at).value;
                 bent += (std::clamp(g + pull, -limit, limit) - std::clamp(g, -limit, limit)) * r / 100.0;
             }
         }
@@ -758,19 +759,19 @@ double stored_span(const ForceModel& model, double limit) {
     return largest - least;
 }
 
-TEST(MostEnergy, IsABoundOfTheEnergyOfTheClippedForce) {
+TEST(LargestStoredEnergy, BoundsTheEnergyOfTheClippedForce) {
     test::Random random{12};
     double worst = 1.0;
     for (int k = 0; k < test::cases(60); ++k) {
         const ForceModel model = test::random_model(random, k % 2 == 0);
         const double limit = std::exp(test::uniform(random, -3.0, 2.0));
         const double span = stored_span(model, limit);
-        const double most = most_energy(model, direct(), limit);
+        const double most = largest_stored_energy(model, direct(), limit);
         EXPECT_GE(most, span * (1.0 - 1e-5)) << "model " << k << ", limit " << limit;
-        const double bend =
-            model.hysteresis() == nullptr
-                ? 0.0
-                : 0.5 * model.hysteresis()->play_radius() * model.hysteresis()->loss().value_bounds().upper;
+        const double bend = model.hysteresis() == nullptr
+                                ? 0.0
+                                : 0.5 * model.hysteresis()->play_radius() *
+                                      model.hysteresis()->hysteresis_force().value_bounds().upper;
         if (energy_range(model, limit).least > -1e300 && model.domain().below == Continuation::Linear) {
             worst = std::max(worst, (most - bend) / std::max(span, 1e-3));
         }
@@ -780,7 +781,7 @@ TEST(MostEnergy, IsABoundOfTheEnergyOfTheClippedForce) {
 
 // The energy of a clipped force can have a larger range than that of the force, because the energy of a peak is cut
 // off.
-TEST(MostEnergy, CanBeLargerThanThatOfTheForce) {
+TEST(LargestStoredEnergy, CanExceedThatOfTheForce) {
     NetworkParameters network;
     network.alpha = {6.0};
     network.beta = {1.5};
@@ -788,7 +789,7 @@ TEST(MostEnergy, CanBeLargerThanThatOfTheForce) {
     network.linear = {0.0};
     network.bias = -0.5;
     const ForceModel model{network, {{0.0}, {3.0}, Continuation::Linear, Continuation::Linear, {}}};
-    EXPECT_GT(most_energy(model, direct(), 3.0), 1.2 * most_energy(model, direct(), 1e9));
+    EXPECT_GT(largest_stored_energy(model, direct(), 3.0), 1.2 * largest_stored_energy(model, direct(), 1e9));
 }
 
 }  // namespace

@@ -75,13 +75,13 @@ TEST_F(GrowingFileTest, RefusesASecondWriterWithAndWithoutForce) {
     EXPECT_EQ(text("a.csv"), "first\n");
 }
 
-TEST_F(GrowingFileTest, DoesNotReplaceAFileThatAppearsMeanwhile) {
+TEST_F(GrowingFileTest, DoesNotReplaceAFileCreatedMeanwhile) {
     GrowingFile growing;
     ASSERT_EQ(growing.open(file("a.csv")), "");
     (void)growing.append("new\n");
     put("a.csv", "precious\n");
     const std::string reason = growing.finish();
-    EXPECT_NE(reason.find("a.csv appeared while this was recorded"), std::string::npos) << reason;
+    EXPECT_NE(reason.find("a.csv was created by another program meanwhile"), std::string::npos) << reason;
     EXPECT_NE(reason.find("a.csv.part"), std::string::npos) << reason;
     EXPECT_EQ(text("a.csv"), "precious\n");
     EXPECT_EQ(text("a.csv.part"), "new\n");
@@ -108,18 +108,18 @@ TEST_F(GrowingFileTest, DiscardsOnlyItsOwnFile) {
     EXPECT_EQ(text("a.csv.part"), "of another\n");
 }
 
-TEST_F(GrowingFileTest, SetsARecordingThatWasCutOffAsideAndNeverReplacesIt) {
+TEST_F(GrowingFileTest, RenamesAnInterruptedRecordingAndNeverReplacesIt) {
     put("a.csv.part", "cut off\n");
     put("a.csv.1.part", "cut off before\n");
     GrowingFile growing;
     ASSERT_EQ(growing.open(file("a.csv"), true), "");
-    EXPECT_EQ(growing.set_aside_as(), file("a.csv.2.part"));
+    EXPECT_EQ(growing.interrupted_name(), file("a.csv.2.part"));
     EXPECT_EQ(growing.finish(), "");
     EXPECT_EQ(text("a.csv.1.part"), "cut off before\n");
     EXPECT_EQ(text("a.csv.2.part"), "cut off\n");
 }
 
-TEST_F(GrowingFileTest, LeavesARefusedRunsCutOffRecordingWhereItIs) {
+TEST_F(GrowingFileTest, KeepsAnInterruptedRecordingIfTheRunIsRefused) {
     put("a.csv", "precious\n");
     put("a.csv.part", "cut off\n");
     GrowingFile growing;
@@ -127,10 +127,10 @@ TEST_F(GrowingFileTest, LeavesARefusedRunsCutOffRecordingWhereItIs) {
     EXPECT_EQ(text("a.csv.part"), "cut off\n");
 }
 
-TEST_F(GrowingFileTest, RefusesAnEmptyPartThatMayBelongToARunThatStarts) {
+TEST_F(GrowingFileTest, RefusesAnEmptyPartThatMayBelongToAStartingRun) {
     put("a.csv.part", "");
     GrowingFile growing;
-    EXPECT_NE(growing.open(file("a.csv")).find("is empty and may belong to a run that just starts"),
+    EXPECT_NE(growing.open(file("a.csv")).find("is empty and may belong to a run that is starting"),
               std::string::npos);
 }
 
@@ -147,7 +147,7 @@ TEST_F(GrowingFileTest, KeepsASymbolicLinkAndReplacesItsTargetWithForce) {
     EXPECT_EQ(text("real.csv"), "new\n");
 }
 
-TEST_F(GrowingFileTest, DoesNotFollowALinkPlantedAtThePart) {
+TEST_F(GrowingFileTest, DoesNotFollowALinkAtThePart) {
     put("victim", "precious\n");
     std::filesystem::create_symlink(file("victim"), file("a.csv.part"));
     for (const bool force : {false, true}) {
@@ -157,7 +157,7 @@ TEST_F(GrowingFileTest, DoesNotFollowALinkPlantedAtThePart) {
     EXPECT_EQ(text("victim"), "precious\n");
 }
 
-TEST_F(GrowingFileTest, RefusesAPipeAndALinkToNothing) {
+TEST_F(GrowingFileTest, RefusesAPipeAndALinkToAMissingFile) {
     ASSERT_EQ(mkfifo(file("pipe").c_str(), 0600), 0);
     std::filesystem::create_symlink(file("nothing"), file("link"));
     for (const bool force : {false, true}) {

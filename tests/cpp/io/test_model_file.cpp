@@ -95,7 +95,7 @@ TEST(ModelFile, GivesThePlanItsOwnNetworkAndKeepsTheIdentifiedOne) {
     EXPECT_EQ(&plain.planned(), &plain.model);
 }
 
-TEST(ModelFile, SaysThatAFileIsNotThere) {
+TEST(ModelFile, ReportsAMissingFile) {
     EXPECT_THROW((void)load_model_file(corpus + "nothing.json"), std::invalid_argument);
 }
 

@@ -65,7 +65,7 @@ TEST(Bounds, HoldAtEveryPointOfRandomNetworks) {
 }
 
 // spec section 7: "mean-value form ... for 1 % of L"
-TEST(Bounds, AreWithinOnePercentOfWhatADenseSearchFinds) {
+TEST(Bounds, AreWithinOnePercentOfADenseSearch) {
     Random random{32};
     for (int k = 0; k < cases(20); ++k) {
         const NetworkParameters network = difficult_network(random, k);
@@ -86,7 +86,7 @@ TEST(Bounds, AreWithinOnePercentOfWhatADenseSearchFinds) {
     }
 }
 
-TEST(Bounds, OfALineAreTheLine) {
+TEST(Bounds, OfALineAreExact) {
     const NetworkParameters line{1, {}, {}, {}, {3.0}, -1.0};
     EXPECT_NEAR(value_bounds(line, 0.0, 2.0).lower, -1.0, 1e-12);
     EXPECT_NEAR(value_bounds(line, 0.0, 2.0).upper, 5.0, 1e-12);
@@ -94,14 +94,14 @@ TEST(Bounds, OfALineAreTheLine) {
     EXPECT_NEAR(slope_bounds(line, 0.0, 2.0).upper, 3.0, 1e-12);
 }
 
-TEST(Bounds, SeeANarrowWaveletBetweenTheFirstCells) {
+TEST(Bounds, IncludeANarrowWaveletBetweenTheFirstCells) {
     const NetworkParameters spike{1, {1e5}, {0.0313}, {1.0}, {0.0}, 0.0};
     EXPECT_LE(value_bounds(spike, 0.0, 1.0).lower, -1.0);
     EXPECT_GE(slope_bounds(spike, 0.0, 1.0).upper, 1.38e5);
 }
 
 // Two wavelets with a distance of a millionth of their width and weights of a million: the sum has the size of one.
-TEST(Bounds, AreTightWhereHugeWeightsCancel) {
+TEST(Bounds, AreTightForLargeWeightsThatCancel) {
     Random random{33};
     for (int k = 0; k < cases(20); ++k) {
         NetworkParameters network = test::random_network(random, 8);
@@ -112,15 +112,15 @@ TEST(Bounds, AreTightWhereHugeWeightsCancel) {
             network.weight[i + 1] = -network.weight[i];
         }
         const NetworkCurve curve{network, test::unit_domain()};
-        Interval seen{1e300, -1e300};
+        Interval sampled{1e300, -1e300};
         for (int j = 0; j <= 20'000; ++j) {
             const double slope = curve.inside(j / 20'000.0).slope;
-            seen = seen.with({slope, slope});
+            sampled = sampled.with({slope, slope});
         }
         const Interval proved = slope_bounds(network, 0.0, 1.0);
-        EXPECT_LE(proved.upper - seen.upper, 0.011 * seen.largest()) << k;
-        EXPECT_LE(seen.lower - proved.lower, 0.011 * seen.largest()) << k;
-        EXPECT_GE(proved.upper, seen.upper - 1e-6 * seen.largest());
+        EXPECT_LE(proved.upper - sampled.upper, 0.011 * sampled.largest()) << k;
+        EXPECT_LE(sampled.lower - proved.lower, 0.011 * sampled.largest()) << k;
+        EXPECT_GE(proved.upper, sampled.upper - 1e-6 * sampled.largest());
     }
 }
 
@@ -130,7 +130,7 @@ Domain unit_box(std::size_t dimension) {
 }
 
 // Along a direction psi is a sum of two Hermite functions. All angles to it are tested at every distance.
-TEST(RadialBounds, RestOnBoundsOfHigherDerivatives) {
+TEST(RadialBounds, HigherDerivativesAreWithinTheirBounds) {
     for (std::size_t d = 1; d <= 5; ++d) {
         const double others = static_cast<double>(d) - 1.0;
         const double supremum = (1.0 + 1e-15) * detail::fourth_derivative_supremum(d);
@@ -173,7 +173,7 @@ double fourth_derivative(std::span<const double> u, std::span<const double> t) {
     return (sixth + fourth * (square - x - others)) * std::exp(-0.5 * square) * length * length;
 }
 
-TEST(RadialBounds, SeeThatNearWaveletsTakeEachOtherAway) {
+TEST(RadialBounds, AccountForNearWaveletsThatCancel) {
     Random random{38};
     for (int k = 0; k < cases(20'000); ++k) {
         const std::size_t d = 1 + static_cast<std::size_t>(k % 3);
@@ -209,7 +209,7 @@ TEST(RadialBounds, SeeThatNearWaveletsTakeEachOtherAway) {
     }
 }
 
-TEST(RadialBounds, AreTightWhereHugeWeightsCancel) {
+TEST(RadialBounds, AreTightForLargeWeightsThatCancel) {
     Random random{39};
     for (int k = 0; k < cases(3); ++k) {
         NetworkParameters network = test::random_network(random, 8, 2);
@@ -220,25 +220,25 @@ TEST(RadialBounds, AreTightWhereHugeWeightsCancel) {
         const std::vector<double> lower{0.0, 0.0};
         const std::vector<double> upper{1.0, 1.0};
         const RadialSum hats{network, lower, upper};
-        Interval seen{1e300, -1e300};
+        Interval sampled{1e300, -1e300};
         for (int i = 0; i <= 200; ++i) {
             for (int j = 0; j <= 200; ++j) {
                 const std::vector<double> x{i / 200.0, j / 200.0};
                 double value = 0.0;
                 std::vector<double> gradient = network.linear;
                 hats.add(x.data(), value, gradient.data());
-                seen = seen.with({gradient[0], gradient[0]});
+                sampled = sampled.with({gradient[0], gradient[0]});
             }
         }
         const Interval proved = radial_bounds(network, lower, upper).gradient[0];
-        EXPECT_LE(proved.upper - seen.upper, 0.012 * seen.largest()) << k;
-        EXPECT_LE(seen.lower - proved.lower, 0.012 * seen.largest()) << k;
+        EXPECT_LE(proved.upper - sampled.upper, 0.012 * sampled.largest()) << k;
+        EXPECT_LE(sampled.lower - proved.lower, 0.012 * sampled.largest()) << k;
     }
 }
 
 // Every instruction set of this machine. In small boxes the remainder is small, so errors of each derivative are
 // visible.
-TEST(RadialBounds, TaylorsFormulaLeavesNoMoreThanItsRest) {
+TEST(RadialBounds, RemainderBoundsTheErrorOfTaylorsFormula) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{36};
         for (int k = 0; k < cases(200); ++k) {
@@ -272,10 +272,10 @@ TEST(RadialBounds, TaylorsFormulaLeavesNoMoreThanItsRest) {
                     double along = sums.gradient[j];
                     cubic += sums.gradient[j] * t[j];
                     for (std::size_t l = 0; l < d; ++l) {
-                        along += sums.bend[j * d + l] * t[l];
-                        cubic += sums.bend[j * d + l] * t[j] * t[l] / 2.0;
+                        along += sums.second_derivative[j * d + l] * t[l];
+                        cubic += sums.second_derivative[j * d + l] * t[j] * t[l] / 2.0;
                         for (std::size_t m = 0; m < d; ++m) {
-                            const double twist = sums.twist[(j * d + l) * d + m];
+                            const double twist = sums.third_derivative[(j * d + l) * d + m];
                             along += twist * t[l] * t[m] / 2.0;
                             cubic += twist * t[j] * t[l] * t[m] / 6.0;
                         }
@@ -357,7 +357,7 @@ TEST(RadialBounds, HoldAtEveryPointInsideAndOutside) {
     }
 }
 
-TEST(RadialBounds, AreWithinOnePercentOfWhatADenseSearchFinds) {
+TEST(RadialBounds, AreWithinOnePercentOfADenseSearch) {
     Random random{35};
     for (int k = 0; k < cases(4); ++k) {
         const std::size_t size = static_cast<std::size_t>(1 + 4 * (k % 4));

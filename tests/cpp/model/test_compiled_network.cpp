@@ -97,13 +97,13 @@ TEST(CompiledCurve, KeepsItsCertifiedErrorEverywhere) {
         const WaveletNetwork network = random_scene(random, static_cast<std::size_t>(2 + k % 40));
         const CompiledCurve curve{network.curve()};
         compiled += curve.compiled() ? 1 : 0;
-        const double asked = 1e-12 * network.curve().value_bounds().largest();
-        EXPECT_LE(curve.value_error(), asked);
+        const double required_error = 1e-12 * network.curve().value_bounds().largest();
+        EXPECT_LE(curve.value_error(), required_error);
         for (int j = 0; j < 2000; ++j) {
             const double x = uniform(random, 0.0, 1.0);
             const Curve here = curve.at(x);
             ASSERT_LE(std::abs(here.value - exact(network.parameters(), x, 0)),
-                      curve.compiled() ? curve.value_error() : asked)
+                      curve.compiled() ? curve.value_error() : required_error)
                 << k << " " << x;
             if (curve.compiled()) {
                 ASSERT_LE(std::abs(here.slope - exact(network.parameters(), x, 1)), curve.slope_error())
@@ -114,7 +114,7 @@ TEST(CompiledCurve, KeepsItsCertifiedErrorEverywhere) {
     EXPECT_GE(compiled, cases(60) * 9 / 10);
 }
 
-TEST(CompiledCurve, AsksForMoreCellsWhenMoreIsAsked) {
+TEST(CompiledCurve, UsesMoreCellsForASmallerError) {
     Random random{43};
     const WaveletNetwork network = random_scene(random, 12);
     std::size_t before = 0;
@@ -129,7 +129,7 @@ TEST(CompiledCurve, AsksForMoreCellsWhenMoreIsAsked) {
 }
 
 // A curve that cannot be certified is not compiled; it returns the values of the network exactly.
-TEST(CompiledCurve, DoesNotPretend) {
+TEST(CompiledCurve, IsNotCompiledIfTheErrorCannotBeCertified) {
     Random random{44};
     NetworkParameters cancelling = test::random_network(random, 8);
     for (std::size_t i = 0; i + 1 < 8; i += 2) {
@@ -160,7 +160,7 @@ TEST(CompiledCurve, DoesNotPretend) {
     }
 }
 
-TEST(CompiledCurve, ContinuesAsTheNetworkDoes) {
+TEST(CompiledCurve, ContinuesLikeTheNetwork) {
     Random random{45};
     for (const auto continuation : {Continuation::Linear, Continuation::Free}) {
         const WaveletNetwork network = random_scene(random, 9, test::unit_domain(continuation, continuation));
@@ -186,7 +186,7 @@ TEST(CompiledCurve, ContinuesAsTheNetworkDoes) {
     }
 }
 
-TEST(CompiledCurve, RepeatsAsTheNetworkDoes) {
+TEST(CompiledCurve, RepeatsLikeTheNetwork) {
     Random random{46};
     const Domain knob{{0.1}, {0.8}, Continuation::Linear, Continuation::Linear, 0.8 - 0.1};
     const WaveletNetwork network = random_scene(random, 9, knob);
@@ -219,14 +219,14 @@ TEST(CompiledCurve, EnergyIsTheAntiderivativeOfTheForce) {
     }
 }
 
-TEST(CompiledHysteresis, AnswersAsTheNetworkDoes) {
+TEST(CompiledHysteresis, AgreesWithTheNetwork) {
     Random random{48};
     NetworkParameters network = test::random_network(random, 10);
-    const LossParameters loss{std::vector<double>(10, 0.02), 0.0, 0.5};
-    const HysteresisNetwork both{network, loss, test::unit_domain(Continuation::Free), 0.01};
+    const HysteresisParameters hysteresis{std::vector<double>(10, 0.02), 0.0, 0.5};
+    const HysteresisNetwork both{network, hysteresis, test::unit_domain(Continuation::Free), 0.01};
     const CompiledHysteresis compiled{both};
     ASSERT_TRUE(compiled.force().compiled());
-    ASSERT_TRUE(compiled.loss().compiled());
+    ASSERT_TRUE(compiled.hysteresis_force().compiled());
     auto state = both.start(0.5);
     auto compiled_state = compiled.start(0.5);
     double x = 0.5;

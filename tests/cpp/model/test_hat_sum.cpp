@@ -59,7 +59,7 @@ double position(Random& random, int k) {
 }
 
 // Every instruction set of this machine.
-TEST(HatSum, IsRightToThirteenDigitsOnEveryInstructionSet) {
+TEST(HatSum, IsAccurateToThirteenDigitsOnEveryInstructionSet) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{71};
         for (int k = 0; k < cases(5000); ++k) {
@@ -79,7 +79,7 @@ TEST(HatSum, IsRightToThirteenDigitsOnEveryInstructionSet) {
     }
 }
 
-TEST(HatSum, GivesTheSameInBatches) {
+TEST(HatSum, BatchesAgreeWithSinglePositions) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{72};
         for (int k = 0; k < cases(200); ++k) {
@@ -130,7 +130,7 @@ TEST(HatSum, IsSafeForEveryDouble) {
     }
 }
 
-TEST(HatSum, ExponentialIsRightToTheLastDigits) {
+TEST(HatSum, ExponentialIsAccurateToTheLastDigits) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{74};
         std::vector<double> square{0.0, 1e-300, detail::hat_reach * detail::hat_reach};
@@ -152,7 +152,7 @@ TEST(HatSum, ExponentialIsRightToTheLastDigits) {
     }
 }
 
-TEST(NetworkCurve, GivesTheSameInBatchesAcrossItsEdges) {
+TEST(NetworkCurve, BatchesAcrossTheEdgesAgreeWithSinglePositions) {
     Random random{75};
     for (const bool periodic : {false, true}) {
         Domain domain = test::unit_domain(Continuation::Free);

@@ -20,18 +20,18 @@ using test::uniform;
 HysteresisNetwork random_hysteresis(Random& random) {
     const std::size_t size = 1 + static_cast<std::size_t>(uniform(random, 0.0, 6.0));
     const NetworkParameters network = test::random_network(random, size);
-    LossParameters loss;
+    HysteresisParameters hysteresis;
     double deepest = 0.0;
     for (std::size_t i = 0; i < size; ++i) {
-        loss.weight.push_back(uniform(random, -0.2, 0.2));
-        deepest += std::abs(loss.weight.back());
+        hysteresis.weight.push_back(uniform(random, -0.2, 0.2));
+        deepest += std::abs(hysteresis.weight.back());
     }
-    loss.linear = uniform(random, 0.0, 0.5);
-    loss.bias = deepest;
+    hysteresis.linear = uniform(random, 0.0, 0.5);
+    hysteresis.bias = deepest;
     const auto side = [&] {
         return uniform(random, 0.0, 1.0) < 0.5 ? Continuation::Linear : Continuation::Free;
     };
-    return {network, loss, test::unit_domain(side(), side()), std::exp(uniform(random, -6.0, -1.0))};
+    return {network, hysteresis, test::unit_domain(side(), side()), std::exp(uniform(random, -6.0, -1.0))};
 }
 
 /// Returns the work done on the object over a straight move. The move is split where the play operator starts to slide
@@ -48,7 +48,7 @@ double work(const HysteresisNetwork& object, HysteresisNetwork::State& state, do
 }
 
 // spec section 3: "h >= 0 makes every loop, inner ones and x-dependent h included, never generate energy"
-TEST(Hysteresis, NeverGivesBackMoreThanItStored) {
+TEST(Hysteresis, NeverGivesMoreEnergyThanItStored) {
     Random random{11};
     for (int k = 0; k < cases(60); ++k) {
         const HysteresisNetwork object = random_hysteresis(random);
@@ -79,7 +79,7 @@ TEST(Hysteresis, IsLosslessWhileItSticks) {
     }
 }
 
-TEST(Hysteresis, DoesGenerateWhereTheLossIsNegative) {
+TEST(Hysteresis, NegativeHysteresisGeneratesEnergy) {
     const HysteresisNetwork object{{1, {}, {}, {}, {2.0}, 0.0}, {{}, 0.0, -0.1}, test::unit_domain(), 0.01};
     HysteresisNetwork::State state = object.start(0.2);
     const double there = work(object, state, 0.2, 0.8);
@@ -87,7 +87,7 @@ TEST(Hysteresis, DoesGenerateWhereTheLossIsNegative) {
     EXPECT_LT(there + back, -0.1);
 }
 
-TEST(Hysteresis, PressAndReleaseAreTheTwoSlides) {
+TEST(Hysteresis, PressAndReleaseAreTheSlidingForces) {
     Random random{13};
     const HysteresisNetwork object = random_hysteresis(random);
     const double r = object.play_radius();
@@ -100,14 +100,14 @@ TEST(Hysteresis, PressAndReleaseAreTheTwoSlides) {
     EXPECT_NEAR(object.at(0.5, state).force, object.sliding(0.5, -1.0).force, 1e-12);
 }
 
-TEST(Hysteresis, StartsWithoutPushingEitherWay) {
+TEST(Hysteresis, StartsWithoutHysteresisForce) {
     Random random{14};
     const HysteresisNetwork object = random_hysteresis(random);
     const auto state = object.start(0.4);
     EXPECT_DOUBLE_EQ(object.at(0.4, state).force, object.force().at(0.4).value);
 }
 
-TEST(Hysteresis, SlopeBelongsToTheForceInStickAndSlide) {
+TEST(Hysteresis, SlopeIsTheDerivativeWhileStickingAndSliding) {
     Random random{15};
     for (int k = 0; k < cases(100); ++k) {
         const HysteresisNetwork object = random_hysteresis(random);
@@ -125,15 +125,15 @@ TEST(Hysteresis, SlopeBelongsToTheForceInStickAndSlide) {
     }
 }
 
-TEST(Hysteresis, LossDiesOutWithTheForceWhereContactIsLost) {
+TEST(Hysteresis, FreeContinuationDecreasesHysteresisToZero) {
     // g(0) = 0.1 falls with max|g| / travel = 2.1 and is zero at -1/21; h decreases with it.
     const HysteresisNetwork object{
         {1, {}, {}, {}, {2.0}, 0.1}, {{}, 0.0, 0.05}, test::unit_domain(Continuation::Free), 0.01};
-    EXPECT_NEAR(object.loss().at(-0.5 / 21.0).value, 0.025, 1e-12);
+    EXPECT_NEAR(object.hysteresis_force().at(-0.5 / 21.0).value, 0.025, 1e-12);
     EXPECT_NEAR(object.sliding(-0.5 / 21.0, -1.0).force, 0.025, 1e-12);
-    EXPECT_NEAR(object.loss().at(-1.0 / 21.0 + 1e-9).value, 0.0, 1e-8);
-    EXPECT_EQ(object.loss().at(-0.1).value, 0.0);
-    EXPECT_EQ(object.loss().at(1.5).value, 0.05);
+    EXPECT_NEAR(object.hysteresis_force().at(-1.0 / 21.0 + 1e-9).value, 0.0, 1e-8);
+    EXPECT_EQ(object.hysteresis_force().at(-0.1).value, 0.0);
+    EXPECT_EQ(object.hysteresis_force().at(1.5).value, 0.05);
 }
 
 TEST(Hysteresis, RefusesAPlayRadiusOfZero) {

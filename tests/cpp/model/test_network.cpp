@@ -32,7 +32,7 @@ TEST(Network, SumsItsWavelets) {
     }
 }
 
-TEST(Network, SlopeAndEnergyBelongToTheForceInsideAndOutside) {
+TEST(Network, SlopeAndEnergyAgreeWithTheForceInsideAndOutside) {
     Random random{1};
     for (int k = 0; k < cases(200); ++k) {
         const auto side = [&] {
@@ -86,7 +86,7 @@ TEST(Network, LinearContinuationNeverFallsAndKeepsTheEnergyBoundedBelow) {
     }
 }
 
-TEST(Network, FreeContinuationLetsGo) {
+TEST(Network, FreeContinuationEndsAtZeroForce) {
     const WaveletNetwork pushing{{1, {}, {}, {}, {2.0}, 0.1}, unit_domain(Continuation::Free)};
     // The edge pushes the tool out, so the line falls with at least max|f| / travel = 2.1 instead of 2.
     EXPECT_NEAR(force(pushing, -0.02), 0.1 - 0.02 * 2.1, 1e-9);
@@ -99,7 +99,7 @@ TEST(Network, FreeContinuationLetsGo) {
     EXPECT_EQ(force(touching, -1e-9), 0.0);
 }
 
-TEST(Network, PeriodicForceRepeatsWithoutAJumpAndItsEnergyGoesOn) {
+TEST(Network, PeriodicForceRepeatsWithoutAJumpAndItsEnergyContinues) {
     Random random{4};
     for (int k = 0; k < cases(100); ++k) {
         Domain domain = unit_domain();
@@ -111,11 +111,11 @@ TEST(Network, PeriodicForceRepeatsWithoutAJumpAndItsEnergyGoesOn) {
             EXPECT_FALSE(knob.at(x + turns, {}).extrapolated);
         }
         EXPECT_NEAR(force(knob, 1.0 - 1e-10), force(knob, 1.0 + 1e-10), 1e-6);
-        for (const double seam : {-2.0, -1.0, 0.0, 1.0, 2.0, 3.0}) {
-            const Curve before = knob.curve().at(seam - 1e-10);
-            const Curve after = knob.curve().at(seam + 1e-10);
-            EXPECT_NEAR(before.integral, after.integral, 1e-6) << seam;
-            EXPECT_NEAR(before.double_integral, after.double_integral, 1e-6) << seam;
+        for (const double edge : {-2.0, -1.0, 0.0, 1.0, 2.0, 3.0}) {
+            const Curve before = knob.curve().at(edge - 1e-10);
+            const Curve after = knob.curve().at(edge + 1e-10);
+            EXPECT_NEAR(before.integral, after.integral, 1e-6) << edge;
+            EXPECT_NEAR(before.double_integral, after.double_integral, 1e-6) << edge;
         }
         constexpr double h = 1e-5;
         for (const double at : {x - 2.0, x, x + 1.0}) {
@@ -129,7 +129,7 @@ TEST(Network, PeriodicForceRepeatsWithoutAJumpAndItsEnergyGoesOn) {
     }
 }
 
-TEST(Network, ClosingTheSeamLeavesTheMiddleOfThePeriod) {
+TEST(Network, RemovingTheJumpKeepsTheMiddleOfThePeriod) {
     Random random{8};
     const NetworkParameters parameters = random_network(random, 5);
     Domain domain{{0.2}, {1.2}, {}, {}, 1.0};
@@ -138,7 +138,7 @@ TEST(Network, ClosingTheSeamLeavesTheMiddleOfThePeriod) {
     EXPECT_NEAR(force(knob, 0.7), force(WaveletNetwork{parameters, domain}, 0.7), 1e-12);
 }
 
-TEST(Network, AClosedSeamStaysAsItIs) {
+TEST(Network, PeriodicNetworkWithoutAJumpIsUnchanged) {
     Random random{9};
     for (int k = 0; k < cases(100); ++k) {
         Domain domain{{-0.3}, {0.7}, {}, {}, 1.0};
@@ -149,7 +149,7 @@ TEST(Network, AClosedSeamStaysAsItIs) {
     }
 }
 
-TEST(Network, NanInIsNanOut) {
+TEST(Network, NanGivesNan) {
     const WaveletNetwork network{{1, {5.0}, {0.5}, {1.0}, {2.0}, 0.0}, unit_domain()};
     EXPECT_TRUE(std::isnan(force(network, std::numeric_limits<double>::quiet_NaN())));
 }
@@ -163,7 +163,7 @@ std::string refusal(NetworkParameters parameters, Domain domain) {
     return "accepted";
 }
 
-TEST(Network, RefusesImpossibleNumbersByName) {
+TEST(Network, RefusesInvalidNumbersByName) {
     const NetworkParameters good{1, {5.0}, {0.5}, {1.0}, {2.0}, 0.0};
     EXPECT_EQ(refusal(good, unit_domain()), "accepted");
     auto bad = good;

@@ -41,7 +41,7 @@ TEST(RadialNetwork, GradientAgreesWithDifferences) {
     }
 }
 
-TEST(RadialNetwork, GoesOnFromTheBoxWithAClampedGradient) {
+TEST(RadialNetwork, ContinuesOutsideTheBoxWithAClampedGradient) {
     Random random{6};
     for (int k = 0; k < cases(50); ++k) {
         const RadialNetwork network{random_network(random, 7, 2), {{0, 0}, {1, 1}, {}, {}, std::nullopt}};
@@ -92,7 +92,7 @@ double plain(const NetworkParameters& network, std::span<const double> x, std::s
 }
 
 // Every instruction set of this machine.
-TEST(RadialNetwork, ValueAndGradientInOnePassAreEquation4) {
+TEST(RadialNetwork, ValueAndGradientInOnePassSatisfyEquation4) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{8};
         for (int k = 0; k < cases(80); ++k) {

@@ -22,7 +22,7 @@ struct Collector {
     }
 };
 
-TEST(FlightRecorder, HasHandedOverEverythingWhenItIsStopped) {
+TEST(FlightRecorder, StopPassesOnAllRecords) {
     Collector collector;
     FlightRecorder<std::uint64_t, Collector> recorder{collector, 1 << 16, std::chrono::milliseconds{1}};
     for (std::uint64_t k = 0; k < 50'000; ++k) {
@@ -34,7 +34,7 @@ TEST(FlightRecorder, HasHandedOverEverythingWhenItIsStopped) {
     EXPECT_EQ(recorder.lost(), 0U);
 }
 
-TEST(FlightRecorder, CountsWhatFindsNoRoom) {
+TEST(FlightRecorder, CountsRecordsThatDoNotFit) {
     Collector collector;
     collector.slow = std::chrono::milliseconds{20};
     FlightRecorder<std::uint64_t, Collector> recorder{collector, 16, std::chrono::milliseconds{1}};
@@ -46,7 +46,7 @@ TEST(FlightRecorder, CountsWhatFindsNoRoom) {
     EXPECT_EQ(collector.taken.size() + recorder.lost(), 10'000U);
 }
 
-TEST(LastRecords, KeepsTheLastOnesOldestFirst) {
+TEST(LastRecords, KeepsTheLastRecordsOldestFirst) {
     LastRecords<int> last{3};
     EXPECT_TRUE(last.in_order().empty());
     for (int k = 0; k < 5; ++k) {

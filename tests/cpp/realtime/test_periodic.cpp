@@ -9,7 +9,7 @@
 namespace palpate {
 namespace {
 
-TEST(Periodic, NeverWakesBeforeItsDeadlineAndKeepsToItsGrid) {
+TEST(Periodic, NeverWakesBeforeItsDeadlineAndKeepsItsGrid) {
     constexpr Nanoseconds period = 500'000;
     Periodic clock{period};
     clock.start();

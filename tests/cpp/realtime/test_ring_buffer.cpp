@@ -12,7 +12,7 @@
 namespace palpate {
 namespace {
 
-TEST(RingBuffer, GivesBackWhatWasPutInInOrder) {
+TEST(RingBuffer, ReturnsElementsInOrder) {
     RingBuffer<int> ring{4};
     std::vector<int> out(10);
     for (int round = 0; round < 5; ++round) {
@@ -25,7 +25,7 @@ TEST(RingBuffer, GivesBackWhatWasPutInInOrder) {
     EXPECT_EQ(ring.pop(out), 0U);
 }
 
-TEST(RingBuffer, RefusesWhenFullAndLosesNothingThatItTook) {
+TEST(RingBuffer, RefusesElementsWhenFullAndKeepsThoseItAccepted) {
     RingBuffer<int> ring{4};
     for (int k = 0; k < 4; ++k) {
         EXPECT_TRUE(ring.push(k));
@@ -44,7 +44,7 @@ struct Pair {
     std::uint64_t inverse = ~std::uint64_t{0};
 };
 
-TEST(RingBuffer, PassesEveryElementWholeBetweenTwoThreads) {
+TEST(RingBuffer, PassesCompleteElementsBetweenTwoThreads) {
     const auto total = static_cast<std::uint64_t>(test::cases(100'000));
     RingBuffer<Pair> ring{64};
     std::thread writer{[&] {

@@ -31,7 +31,7 @@ TEST(DurationHistogram, QuantilesAreThoseOfTheSortedDurationsToOnePartIn256) {
     EXPECT_EQ(histogram.largest(), durations.back());
 }
 
-TEST(DurationHistogram, TakesAnythingAndIsEmptyAtFirst) {
+TEST(DurationHistogram, AcceptsAnyDurationAndStartsEmpty) {
     DurationHistogram histogram;
     EXPECT_EQ(histogram.quantile(0.5), 0.0);
     histogram.add(-5);
@@ -41,7 +41,7 @@ TEST(DurationHistogram, TakesAnythingAndIsEmptyAtFirst) {
     EXPECT_EQ(histogram.count(), 2U);
 }
 
-TEST(LoopTiming, TellsPeriodLatenessAndRate) {
+TEST(LoopTiming, MeasuresPeriodLatenessAndRate) {
     LoopTiming timing;
     for (Nanoseconds k = 0; k < 1000; ++k) {
         timing.add({k * 1'000'000, k * 1'000'000 + 5'000, 0});
@@ -54,13 +54,13 @@ TEST(LoopTiming, TellsPeriodLatenessAndRate) {
     EXPECT_NEAR(timing.rate_hz(), 1000.0 / 1.002995, 1e-6);
 }
 
-TEST(RateCheck, KnowsOfAShortfallWithinOneSecond) {
+TEST(RateCheck, DetectsALowRateWithinOneSecond) {
     RateCheck check;
-    bool said = false;
+    bool window_ended = false;
     for (Nanoseconds now = 1; now < 1'000'000'000 && !said; now += 2'000'000) {
-        said = check.add(now);
+        window_ended = check.add(now);
     }
-    EXPECT_TRUE(said);
+    EXPECT_TRUE(window_ended);
     EXPECT_NEAR(check.rate_hz(), 500.0, 1e-6);
 }
 

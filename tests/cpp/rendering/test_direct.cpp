@@ -20,7 +20,7 @@
 namespace palpate {
 namespace {
 
-using bench::EvenHysteresis;
+using bench::ConstantHysteresis;
 using test::Spring;
 
 TEST(Prediction, AdvancesARampByHalfASampleForEveryNumberOfTaps) {
@@ -37,7 +37,7 @@ TEST(Prediction, AdvancesARampByHalfASampleForEveryNumberOfTaps) {
     }
 }
 
-TEST(Prediction, AdvanceIsTheMeanFormulaAndTheWeightedStepsFromTheFirstTick) {
+TEST(Prediction, MeanFormulaEqualsWeightedStepsFromTheFirstTick) {
     test::Random random{11};
     for (const int m : {1, 2, 3, 8, 16}) {
         HalfSamplePrediction prediction{m};
@@ -77,7 +77,7 @@ double largest_advance(const std::vector<double>& v) {
 }
 
 // With p_k = sum v_j d_{k-j} and sum v = 1/2, a spring needs K T (1/2 + max of -Re V). The minimum is 1/(2 m) by Fejer.
-TEST(Prediction, WeightsNeedTheLeastDampingAmongAllOfTheirNumber) {
+TEST(Prediction, WeightsNeedTheLeastDampingForTheirNumberOfTaps) {
     test::Random random{5};
     for (const int m : {1, 2, 4, 8}) {
         std::vector<double> w;
@@ -116,27 +116,27 @@ TEST(PredictedDirect, RendersTheForceAtThePredictedPosition) {
     }
 }
 
-TEST(PredictedDirect, PositionThatIsNotFiniteGivesNoForceAndChangesNothing) {
+TEST(PredictedDirect, PositionThatIsNotFiniteGivesZeroForceAndKeepsTheState) {
     constexpr double largest = std::numeric_limits<double>::max();  // its prediction overflows
     for (const double bad :
          {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), largest}) {
-        PredictedDirect structure{EvenHysteresis{{10.0, 0.0}, {0.0, 1.0}, 0.02}, 3};
-        PredictedDirect untouched = structure;
+        PredictedDirect structure{ConstantHysteresis{{10.0, 0.0}, {0.0, 1.0}, 0.02}, 3};
+        PredictedDirect reference = structure;
         for (const double x : {0.0, 0.01, 0.03}) {
             (void)structure.step(x);
-            (void)untouched.step(x);
+            (void)reference.step(x);
         }
         const Rendered refused = structure.step(bad);
         EXPECT_EQ(refused.status, Status::NonFinite);
         EXPECT_EQ(refused.force, 0.0);
         for (const double x : {0.05, 0.04, 0.0}) {
-            EXPECT_EQ(structure.step(x).force, untouched.step(x).force);
+            EXPECT_EQ(structure.step(x).force, reference.step(x).force);
         }
     }
 }
 
-TEST(PredictedDirect, ResetForgetsTheMotion) {
-    PredictedDirect structure{EvenHysteresis{{10.0, 0.0}, {0.0, 1.0}, 0.02}, 8};
+TEST(PredictedDirect, ResetClearsThePastMotion) {
+    PredictedDirect structure{ConstantHysteresis{{10.0, 0.0}, {0.0, 1.0}, 0.02}, 8};
     for (int k = 0; k < 20; ++k) {
         (void)structure.step(0.1 * k);
     }
@@ -145,7 +145,7 @@ TEST(PredictedDirect, ResetForgetsTheMotion) {
 }
 
 TEST(PredictedDirect, PlayFollowsTheMeasuredPosition) {
-    const EvenHysteresis object{{0.0, 0.0}, {0.0, 1.0}, 0.1};
+    const ConstantHysteresis object{{0.0, 0.0}, {0.0, 1.0}, 0.1};
     PredictedDirect structure{object, 1};
     structure.reset(0.0);
     (void)structure.step(0.15);                            // x_hat = 0.225; the play moves to 0.05, not 0.125

@@ -23,7 +23,7 @@ using test::Hardening;
 using test::inertia;
 using test::order;
 
-TEST(EnergyConsistent, IsOfSecondOrderAndOfFirstWithItsSwitch) {
+TEST(EnergyConsistent, IsOfSecondOrderAndSwitchedOfFirstOrder) {
     EXPECT_NEAR(
         order([](double T) { return EnergyConsistent{Hardening{}, inertia, coupling, T, 1e-4, false}; }), 2.0,
         0.1);
@@ -46,7 +46,7 @@ TEST(EnergyConsistent, KeepsTheEnergyOfAnUndampedObject) {
     }
 }
 
-TEST(EnergyConsistent, TheSwitchNeverGivesEnergy) {
+TEST(EnergyConsistent, SwitchedStepNeverGivesEnergy) {
     const Hardening object;
     EnergyConsistent structure{object, {0.001, 0.0}, coupling, 1e-3};
     structure.reset(0.3);
@@ -116,7 +116,7 @@ struct SwitchedStep {
 };
 
 // With s = 1.5 p the switched step has up to three roots.
-TEST(EnergyConsistent, TheSwitchTakesTheRootOfItsRuleWhereThereAreThree) {
+TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRuleAmongThree) {
     test::Random random{91};
     int three = 0;
     int tried = 0;
@@ -155,7 +155,7 @@ TEST(EnergyConsistent, TheSwitchTakesTheRootOfItsRuleWhereThereAreThree) {
 }
 
 // docs/certificate.md, behind a coupling: G eta >= the gain of stored and kinetic energy, for any slope and any root.
-TEST(EnergyConsistent, TheSwitchKeepsTheEnergyInequalityOfEveryStep) {
+TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
     test::Random random{92};
     int most = 0;
     int most_without_tables = 0;
@@ -208,7 +208,7 @@ TEST(EnergyConsistent, TheSwitchKeepsTheEnergyInequalityOfEveryStep) {
     EXPECT_LE(most_without_tables, 48);
 }
 
-TEST(EnergyConsistent, SettleOnTheSameForceBehindTheCoupling) {
+TEST(EnergyConsistent, BothStepsReachTheSameForceBehindTheCoupling) {
     test::expect_the_force_of_the_coupling_at_rest(Implicit{Hardening{}, inertia, coupling, 1e-3});
     test::expect_the_force_of_the_coupling_at_rest(EnergyConsistent{Hardening{}, inertia, coupling, 1e-3});
     test::expect_the_force_of_the_coupling_at_rest(
@@ -216,7 +216,7 @@ TEST(EnergyConsistent, SettleOnTheSameForceBehindTheCoupling) {
     test::expect_the_force_of_the_coupling_at_rest(Explicit{Hardening{}, inertia, coupling, 1e-3});
 }
 
-TEST(EnergyConsistent, RefuseNanAndGoOn) {
+TEST(EnergyConsistent, NanGivesZeroForceAndTheNextStepContinues) {
     test::expect_nan_is_refused(EnergyConsistent{Hardening{}, inertia, coupling, 1e-3});
 }
 

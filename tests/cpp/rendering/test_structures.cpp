@@ -127,7 +127,7 @@ TEST(ExplicitLimit, IsThreeThousandForThePapersMassAndDamping) {
 
 // spec section 5: "with B_o = 0 the poles lie on the unit circle for 0 < K < 4m/T^2 (the paper's
 // oscillation)"
-TEST(ExplicitLimit, WithoutDampingTheOscillationNeitherDiesNorGrows) {
+TEST(ExplicitLimit, UndampedOscillationKeepsItsAmplitude) {
     for (const double stiffness : {10.0, 400.0, 2000.0, 3900.0}) {
         const double ratio =
             growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.0}, coupling, period}, 20'000);
@@ -137,7 +137,7 @@ TEST(ExplicitLimit, WithoutDampingTheOscillationNeitherDiesNorGrows) {
 }
 
 // spec section 5: "with coupling, at a held device: K + K_c < (4m - 2(B_o + B_c)T)/T^2"
-TEST(ExplicitLimit, BehindTheCouplingTheCouplingCountsToo) {
+TEST(ExplicitLimit, IncludesTheCoupling) {
     const auto held = [](double stiffness) {
         Explicit structure{Spring{stiffness}, Inertia{0.001, 0.5}, coupling, period};
         double last = 0.0;
@@ -238,7 +238,7 @@ struct HandWork {
 template <class S>
 double work_of_a_throw(S structure, double limit) {
     constexpr double stiffness = 90.0;
-    constexpr double wound_up = 0.5;
+    constexpr double deflection = 0.5;
     HandWork hand{0.5 * stiffness, limit};
     structure.reset(0.0);
     Rendered now = structure.step(0.0);
@@ -247,7 +247,7 @@ double work_of_a_throw(S structure, double limit) {
         now = structure.step(to);
     };
     for (int k = 0; k < 60; ++k) {
-        move(hand.position + wound_up / 60.0);
+        move(hand.position + deflection / 60.0);
     }
     double before = -1.0;
     while (now.environment_position < hand.position + limit / stiffness &&
@@ -263,7 +263,7 @@ double work_of_a_throw(S structure, double limit) {
 }
 
 // spec of the certificate: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
-TEST(ForceLimit, InsideTheStepKeepsAThrownMassFromGivingEnergy) {
+TEST(ForceLimit, InsideTheStepPreventsEnergyFromAThrownMass) {
     const Inertia mass{0.05, 0.0};
     const VirtualCoupling spring{90.0, 0.0};
     constexpr double none = std::numeric_limits<double>::infinity();
@@ -281,7 +281,7 @@ TEST(ForceLimit, InsideTheStepKeepsAThrownMassFromGivingEnergy) {
 
 // spec of the certificate: "falling slopes with mass and limit fail: s = 0.31 K_c, m = 7 K_c T^2, F_max = 1.34 f_0,
 // a 68-sample cycle gives 0.44 f_0^2 / K_c"; this one gives 0.416
-TEST(ForceLimit, DoesNotKeepAFallingForceWithMassFromGivingEnergy) {
+TEST(ForceLimit, FallingForceWithMassGivesEnergy) {
     const PushingOut object{1.0, 0.31, 7.5};
     const Inertia mass{7.0, 0.0};
     constexpr double limit = 1.34;
@@ -371,7 +371,7 @@ TEST(ForceLimit, GivesObjectAndDeviceTheSameForce) {
               100);
 }
 
-TEST(ForceLimit, OfAMasslessObjectIsTheLimitOfItsForce) {
+TEST(ForceLimit, OfAMasslessObjectLimitsItsForce) {
     const ClickAndWall object;
     constexpr double limit = 1.0;
     using Limited = LimitedEnvironment<ClickAndWall>;
@@ -392,7 +392,7 @@ TEST(ForceLimit, OfAMasslessObjectIsTheLimitOfItsForce) {
 }
 
 // spec section 6: "f~ is the curve (x - f(x)/K_c, f(x))", of slope K_c f' / (K_c - f')
-TEST(Compensated, IsTheCurveWithTheSpringTakenOut) {
+TEST(Compensated, SubtractsTheComplianceOfTheSpring) {
     const ClickAndWall object;
     const Compensated<ClickAndWall> compensated{object, 100.0};
     for (double x = -0.1; x < 0.6; x += 0.003) {
@@ -418,20 +418,20 @@ TEST(Structure, ImplicitIsOfFirstOrder) {
 
 template <class S>
 void expect_zero_force_without_a_trace(S structure, const std::string& name) {
-    S untouched = structure;
+    S reference = structure;
     const double nan = std::numeric_limits<double>::quiet_NaN();
     for (int k = 0; k < 20; ++k) {
         (void)structure.step(0.01 * k);
-        (void)untouched.step(0.01 * k);
+        (void)reference.step(0.01 * k);
     }
     const Rendered refused = structure.step(nan);
     EXPECT_EQ(refused.force, 0.0) << name;
     EXPECT_EQ(refused.status, Status::NonFinite) << name;
     EXPECT_EQ(structure.step(std::numeric_limits<double>::infinity()).force, 0.0) << name;
-    EXPECT_EQ(structure.step(0.2).force, untouched.step(0.2).force) << name;
+    EXPECT_EQ(structure.step(0.2).force, reference.step(0.2).force) << name;
 }
 
-TEST(Structure, AnswersNanWithZeroForceAndGoesOn) {
+TEST(Structure, NanGivesZeroForceAndTheNextStepContinues) {
     const ClickAndWall object;
     expect_zero_force_without_a_trace(Direct{object}, "direct");
     expect_zero_force_without_a_trace(Massless{object, coupling, period}, "massless");
@@ -439,7 +439,7 @@ TEST(Structure, AnswersNanWithZeroForceAndGoesOn) {
     expect_zero_force_without_a_trace(Explicit{object, Inertia{}, coupling, period}, "explicit");
 }
 
-TEST(Structure, StartsAtRestWhereTheDeviceIs) {
+TEST(Structure, StartsAtRestAtTheDevicePosition) {
     const ClickAndWall object;
     const auto expect_at_rest = [&](auto structure, const char* name) {
         structure.reset(0.3);
@@ -462,7 +462,7 @@ ForceModel dashpot_model() {
     return ForceModel::of_velocity({2, {}, {}, {}, {5.0, 0.2}, 0.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}});
 }
 
-TEST(DirectVelocity, TakesTheVelocityFromTheLastTwoPositions) {
+TEST(DirectVelocity, ComputesTheVelocityFromTheLastTwoPositions) {
     DirectVelocity structure{*dashpot_model().velocity(), period};
     structure.reset(0.3);
     EXPECT_NEAR(structure.step(0.3).force, 1.5, 1e-12) << "the object rests under the device";
@@ -471,12 +471,12 @@ TEST(DirectVelocity, TakesTheVelocityFromTheLastTwoPositions) {
     const Rendered refused = structure.step(std::numeric_limits<double>::quiet_NaN());
     EXPECT_EQ(refused.status, Status::NonFinite);
     EXPECT_EQ(refused.force, 0.0);
-    EXPECT_NEAR(structure.step(0.31).force, 1.55, 1e-9) << "what was refused has changed nothing";
+    EXPECT_NEAR(structure.step(0.31).force, 1.55, 1e-9) << "a refused step keeps the state";
     EXPECT_FALSE(structure.step(0.3095).extrapolated);
     EXPECT_TRUE(structure.step(0.2).extrapolated);
 }
 
-TEST(Scheme, RendersAForceOfVelocityDirectlyOrNotAtAll) {
+TEST(Scheme, RendersAForceOfVelocityOnlyDirectly) {
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
     const Trace trace = simulate(dashpot_model(), scheme, DeviceProfile{}, Hand{}, 2000);
@@ -504,7 +504,7 @@ TEST(Scheme, SimulatesEveryStructureOfAModel) {
     }
 }
 
-TEST(Scheme, RefusesWhatCannotBeRendered) {
+TEST(Scheme, RefusesSchemesThatCannotBeRendered) {
     Scheme scheme;
     scheme.compensated = true;
     EXPECT_THROW((void)simulate(spring_model(95.0), scheme, {}, {}, 10), std::invalid_argument);
@@ -551,7 +551,7 @@ TEST(Scheme, IsRefusedAtAPeriodAtWhichItDiverges) {
     EXPECT_THROW(validate(scheme, spring_model(45.0), period), std::invalid_argument);
 }
 
-TEST(Scheme, SlopeBoundsOfAHysteresisModelKnowItsStick) {
+TEST(Scheme, SlopeBoundsOfAHysteresisModelIncludeSticking) {
     const ForceModel both{
         NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 1.0, 0.2}, test::unit_domain(), {}};
     EXPECT_NEAR(both.slope_bounds().lower, 4.0, 1e-9);

@@ -30,7 +30,7 @@ class ScriptedDevice {
     std::uint64_t sequence = 0;
 };
 
-TEST(Controller, SendsZeroForceOnAnyReadingThatIsNotSound) {
+TEST(Controller, SendsZeroForceOnAnyInvalidReading) {
     ScriptedDevice device;
     device.next.position = 0.2;
     Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
@@ -65,7 +65,7 @@ TEST(Controller, PutsTheObjectAtRestUnderTheHandleBeforeTheFirstForce) {
     EXPECT_EQ(controller.tick().command.force, expected.step(0.2).force);
 }
 
-TEST(Controller, RaisesTheForceFromZeroAndSaysSo) {
+TEST(Controller, RampsTheForceUpFromZeroAndReportsIt) {
     ScriptedDevice device;
     device.next.position = 0.2;
     Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
@@ -79,7 +79,7 @@ TEST(Controller, RaisesTheForceFromZeroAndSaysSo) {
     EXPECT_EQ(device.sent, 2.0);
 }
 
-TEST(Controller, ClipsToTheForceLimitAndSaysSo) {
+TEST(Controller, ClipsToTheForceLimitAndReportsIt) {
     ScriptedDevice device;
     device.next.position = -3.0;
     Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},

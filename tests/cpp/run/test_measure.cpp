@@ -26,7 +26,7 @@ struct Sweep {
     std::vector<double> commands;
 };
 
-Sweep swept(SimulatedRig& device, const ProbeSettings& settings, int ticks) {
+Sweep sweep_of(SimulatedRig& device, const ProbeSettings& settings, int ticks) {
     (void)device.open();
     Controller controller{device, Probe{settings, period}, ForceLimit{settings.force_limit}};
     (void)controller.start();
@@ -39,17 +39,17 @@ Sweep swept(SimulatedRig& device, const ProbeSettings& settings, int ticks) {
     return sweep;
 }
 
-SimulatedRig nobody_holds(const std::function<double(double)>& object, bool transducer = true) {
+SimulatedRig rig_without_hand(const std::function<double(double)>& object, bool transducer = true) {
     SimulatedRig device{DeviceProfile{}, Hand{0.0, 0.0, 0.0, 0.0, 0.5}};
     device.mount({object, transducer});
     return device;
 }
 
 TEST(Probe, CoversItsRangeSlowlyThroughAFallingForce) {
-    SimulatedRig device = nobody_holds(detent);
+    SimulatedRig device = rig_without_hand(detent);
     ProbeSettings settings;
     settings.upper = 0.4;
-    const Sweep sweep = swept(device, settings, 5000);
+    const Sweep sweep = sweep_of(device, settings, 5000);
     double lowest = 1.0;
     double highest = -1.0;
     double fastest = 0.0;
@@ -63,12 +63,12 @@ TEST(Probe, CoversItsRangeSlowlyThroughAFallingForce) {
     EXPECT_LT(fastest, 5.0 * settings.speed);
 }
 
-TEST(Probe, TurnsRoundWhereTheObjectHoldsItsLimit) {
-    SimulatedRig device = nobody_holds([](double x) { return 20.0 * x; });
+TEST(Probe, ReversesIfTheObjectHoldsItsLimit) {
+    SimulatedRig device = rig_without_hand([](double x) { return 20.0 * x; });
     ProbeSettings settings;
     settings.upper = 3.0;
     settings.force_limit = 0.8;
-    const Sweep sweep = swept(device, settings, 6000);
+    const Sweep sweep = sweep_of(device, settings, 6000);
     double highest = 0.0;
     for (const Reading& reading : sweep.readings) {
         highest = std::max(highest, reading.position);
@@ -80,14 +80,14 @@ TEST(Probe, TurnsRoundWhereTheObjectHoldsItsLimit) {
     }
 }
 
-TEST(Probe, ComesBackWhenItStartsBeyondItsRange) {
+TEST(Probe, ReturnsIfItStartsOutsideItsRange) {
     SimulatedRig device{DeviceProfile{}, Hand{0.0, 0.0, 0.0, 0.0, 0.5}, 20, 0.9};
     ProbeSettings settings;
     settings.upper = 0.3;
-    EXPECT_LT(swept(device, settings, 4000).readings.back().position, 0.32);
+    EXPECT_LT(sweep_of(device, settings, 4000).readings.back().position, 0.32);
 }
 
-TEST(Probe, SaysNothingToAPositionThatIsNone) {
+TEST(Probe, PositionThatIsNotFiniteGivesZeroForce) {
     Probe probe{{}, period};
     probe.reset(0.1);
     const Rendered rendered = probe.step(std::nan(""));
@@ -95,18 +95,18 @@ TEST(Probe, SaysNothingToAPositionThatIsNone) {
     EXPECT_EQ(rendered.force, 0.0);
 }
 
-TEST(Probe, RefusesARangeOfNoWidth) {
+TEST(Probe, RefusesARangeWithoutWidth) {
     EXPECT_THROW((Probe{{.lower = 0.2, .upper = 0.2}, period}), std::invalid_argument);
     EXPECT_THROW((Probe{{.speed = 0.0}, period}), std::invalid_argument);
 }
 
-TEST(ObjectForce, IsTheTransducersAndWithoutOneWhatTheMotorHolds) {
+TEST(ObjectForce, ComesFromTheTransducerOtherwiseFromTheMotor) {
     for (const bool transducer : {true, false}) {
-        SimulatedRig device = nobody_holds([](double x) { return 3.0 * x; }, transducer);
+        SimulatedRig device = rig_without_hand([](double x) { return 3.0 * x; }, transducer);
         ProbeSettings settings;
         settings.upper = 0.3;
         settings.force_limit = 5.0;
-        const Sweep sweep = swept(device, settings, 4000);
+        const Sweep sweep = sweep_of(device, settings, 4000);
         double worst = 0.0;
         for (std::size_t k = 500; k < sweep.readings.size(); ++k) {
             const Reading& reading = sweep.readings[k];
@@ -120,7 +120,7 @@ TEST(ObjectForce, IsTheTransducersAndWithoutOneWhatTheMotorHolds) {
     }
 }
 
-TEST(Pulses, AreShortAlternatingAndEndWhereTheHandleGotTooFar) {
+TEST(Pulses, AlternateAndEndAtTheFarthestPosition) {
     Pulses pulses{{.force = 0.5, .push_s = 0.03, .rest_s = 0.17, .farthest = 0.2}, period};
     pulses.reset(1.0);
     double sum = 0.0;
@@ -139,7 +139,7 @@ TEST(Pulses, AreShortAlternatingAndEndWhereTheHandleGotTooFar) {
     EXPECT_THROW((Pulses{{.force = 0.0}, period}), std::invalid_argument);
 }
 
-TEST(Pulses, AreSmallerInEverySecondThree) {
+TEST(Pulses, AreSmallerInEverySecondGroupOfThree) {
     Pulses pulses{{.force = 0.5, .smaller = 0.6, .push_s = 0.03, .rest_s = 0.17}, period};
     pulses.reset(0.0);
     std::vector<double> sizes;
@@ -152,14 +152,14 @@ TEST(Pulses, AreSmallerInEverySecondThree) {
     EXPECT_EQ(sizes, (std::vector<double>{0.5, -0.5, 0.5, -0.3, 0.3, -0.3, 0.5, -0.5}));
 }
 
-TEST(FreeMotion, LeavesTheHandleToTheHand) {
+TEST(FreeMotion, SendsZeroForce) {
     FreeMotion free;
     free.reset(1.0);
     EXPECT_EQ(free.step(0.3).force, 0.0);
     EXPECT_EQ(free.step(std::nan("")).status, Status::NonFinite);
 }
 
-TEST(SimulatedRig, FeelsTheObjectThatIsMountedOnIt) {
+TEST(SimulatedRig, MovesAgainstItsMountedObject) {
     SimulatedRig device{DeviceProfile{}, Hand{15.0, 0.05, 0.3, 0.3, 0.5}};
     device.mount({[](double x) { return 5.0 * x; }, true});
     (void)device.open();

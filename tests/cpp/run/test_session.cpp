@@ -107,17 +107,17 @@ namespace palpate {
 namespace {
 
 std::mutex a_mutex;
-std::atomic<void*> somewhere{nullptr};
+std::atomic<void*> escaped{nullptr};
 
 /// A simulated device that does one forbidden action, in its fifth exchange.
-template <class Sin>
-class Sinful {
+template <class ForbiddenAction>
+class FaultyHandle {
   public:
-    explicit Sinful(Sin sin) : sin_{sin} {}
+    explicit FaultyHandle(ForbiddenAction action) : action_{action} {}
     Opened open() { return device_.open(); }
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         if (++exchanges_ == 5) {
-            sin_();
+            action_();
         }
         return device_.exchange(command);
     }
@@ -125,14 +125,14 @@ class Sinful {
 
   private:
     SimulatedDevice device_{DeviceProfile{}};
-    Sin sin_;
+    ForbiddenAction action_;
     int exchanges_ = 0;
 };
 
 constexpr auto nothing = [] {};
 constexpr auto allocates = [] {
     void* memory = std::malloc(16);
-    somewhere = memory;
+    escaped = memory;
     std::free(memory);
 };
 constexpr auto locks_a_mutex = [] { const std::lock_guard guard{a_mutex}; };
@@ -181,8 +181,8 @@ ForceModel velocity_model() {
 
 /// Runs the real loop at 10 kHz with its real recorder. `before` runs in the loop's thread before it starts, `after` in
 /// that thread after its end.
-template <class Sin, class Before, class After>
-Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Before before, After after,
+template <class ForbiddenAction, class Before, class After>
+Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenAction action, Before before, After after,
                    int predict = 0) {
     Scheme scheme;
     scheme.structure = kind;
@@ -194,7 +194,7 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Befo
     Counts counts;
     with_structure(
         rendered, scheme, 1.0 / settings.rate_hz, GuardSettings{}.force_limit, [&](auto structure) {
-            Sinful<Sin> device{sin};
+            FaultyHandle<ForbiddenAction> device{action};
             EXPECT_TRUE(device.open());
             Controller controller{device, std::move(structure),
                                   guards_of(GuardSettings{}, rendered, scheme, 1.0 / settings.rate_hz)};
@@ -230,9 +230,9 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, Sin sin, Befo
     return counts;
 }
 
-template <class Sin>
-Counts counted(Sin sin, StructureKind kind = StructureKind::Massless) {
-    return run_watched(model(), kind, sin, nothing, nothing);
+template <class ForbiddenAction>
+Counts counted(ForbiddenAction action, StructureKind kind = StructureKind::Massless) {
+    return run_watched(model(), kind, action, nothing, nothing);
 }
 
 #define SKIP_UNDER_SANITIZERS()                                     \
@@ -240,7 +240,7 @@ Counts counted(Sin sin, StructureKind kind = StructureKind::Massless) {
         GTEST_SKIP() << "the sanitizer itself allocates and calls"; \
     }
 
-TEST(RealTimePath, AllocatesLocksAndThrowsNothingInAnyStructure) {
+TEST(RealTimePath, NoStructureAllocatesLocksOrThrows) {
     SKIP_UNDER_SANITIZERS();
     EXPECT_EQ(run_watched(velocity_model(), StructureKind::Direct, nothing, nothing, nothing).allocations, 0);
     for (const ForceModel& rendered : {model(), hysteresis_model()}) {
@@ -259,7 +259,7 @@ TEST(RealTimePath, AllocatesLocksAndThrowsNothingInAnyStructure) {
     }
 }
 
-TEST(RealTimePath, TheWatchdogsBark) {
+TEST(RealTimePath, CountersDetectAllocationsLocksAndExceptions) {
     SKIP_UNDER_SANITIZERS();
     EXPECT_EQ(counted(allocates).allocations, 2);
     EXPECT_EQ(counted(locks_a_mutex).locks, 1);
@@ -267,21 +267,21 @@ TEST(RealTimePath, TheWatchdogsBark) {
 }
 
 /// Shared memory in which a filtered child stores the number of the system call that killed it.
-int* shared_number() {
+int* shared_call_number() {
     static auto* const number = static_cast<int*>(
         mmap(nullptr, sizeof(int), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
     return number;
 }
 
-void tell_and_die(int /*signal*/, siginfo_t* info, void* /*context*/) {
-    *shared_number() = info->si_syscall;
+void report_system_call(int /*signal*/, siginfo_t* info, void* /*context*/) {
+    *shared_call_number() = info->si_syscall;
     _exit(99);
 }
 
 /// Restricts this thread to sleeping until a deadline, reading the clock and ending the process.
 void forbid_system_calls() {
     struct sigaction action{};
-    action.sa_sigaction = tell_and_die;
+    action.sa_sigaction = report_system_call;
     action.sa_flags = SA_SIGINFO;
     sigaction(SIGSYS, &action, nullptr);
     constexpr auto allow = [](unsigned number) {
@@ -305,7 +305,7 @@ void forbid_system_calls() {
         << "this kernel has no seccomp filters";
 }
 
-void sleep_for_ever() {
+void sleep_until_killed() {
     Periodic clock{1'000'000'000};
     for (clock.start();;) {
         (void)clock.wait();
@@ -313,22 +313,22 @@ void sleep_for_ever() {
 }
 
 /// Returns the number of the system call at which the loop was killed; 0 if it ran to its end.
-template <class Sin>
-int system_call_in_the_loop(Sin sin, StructureKind kind, const ForceModel& rendered) {
-    *shared_number() = 0;
+template <class ForbiddenAction>
+int system_call_in_the_loop(ForbiddenAction action, StructureKind kind, const ForceModel& rendered) {
+    *shared_call_number() = 0;
     const pid_t child = fork();
     if (child == 0) {
-        (void)run_watched(rendered, kind, sin, forbid_system_calls, sleep_for_ever);
+        (void)run_watched(rendered, kind, action, forbid_system_calls, sleep_until_killed);
         _exit(2);
     }
     int status = 0;
     waitpid(child, &status, 0);
     EXPECT_TRUE(WIFEXITED(status) && (WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == 99))
         << "the child ended with status " << status;
-    return WEXITSTATUS(status) == 99 ? *shared_number() : 0;
+    return WEXITSTATUS(status) == 99 ? *shared_call_number() : 0;
 }
 
-TEST(RealTimePath, CallsTheSystemForTheClockOnly) {
+TEST(RealTimePath, CallsTheSystemOnlyForTheClock) {
     SKIP_UNDER_SANITIZERS();
     for (const ForceModel& rendered : {model(), hysteresis_model()}) {
         for (int kind = 0; kind < 4; ++kind) {
@@ -338,7 +338,7 @@ TEST(RealTimePath, CallsTheSystemForTheClockOnly) {
     }
 }
 
-TEST(RealTimePath, TheFilterCatchesASystemCallAndTellsWhich) {
+TEST(RealTimePath, FilterReportsTheSystemCallItCaught) {
     SKIP_UNDER_SANITIZERS();
     EXPECT_EQ(system_call_in_the_loop(calls_the_system, StructureKind::Massless, model()), SYS_getppid);
 }

@@ -34,7 +34,7 @@ struct Judged {
     [[nodiscard]] std::uint64_t& count(Status status) {
         return report->loop.ticks_by_status[static_cast<std::size_t>(status)];
     }
-    void spend(Status status, std::uint64_t ticks) {
+    void set_ticks(Status status, std::uint64_t ticks) {
         count(Status::Ok) -= ticks;
         count(status) += ticks;
     }
@@ -53,7 +53,7 @@ TEST(SessionVerdict, IsGoodWithoutFindings) {
     EXPECT_EQ(Judged{}.text(), "good");
 }
 
-TEST(SessionVerdict, NamesMissedDeadlinesFromOneInAThousandOn) {
+TEST(SessionVerdict, ReportsMissedDeadlinesAboveOneInAThousand) {
     Judged one;
     one.tick(1'001'000'000, 1);
     EXPECT_EQ(one.text(), "good");
@@ -63,13 +63,13 @@ TEST(SessionVerdict, NamesMissedDeadlinesFromOneInAThousandOn) {
            "real-time priority");
 }
 
-TEST(SessionVerdict, NamesALowRateOfADeviceThatPacesTheLoop) {
+TEST(SessionVerdict, ReportsALowRateOfADeviceThatPacesTheLoop) {
     Judged slow;
     slow.settings.rate_hz = 1100.0;
     expect(slow, "usable: the rate was 1000 Hz of 1100 Hz", "choose a lower rate");
 }
 
-TEST(SessionVerdict, NamesLostSamplesAndLostRows) {
+TEST(SessionVerdict, ReportsLostSamplesAndLostRows) {
     Judged lost;
     lost.report->loop.lost_samples = 2;
     expect(lost, "usable: 2 of 1000 (0.2 %) samples of the device were lost or repeated", "check its cable");
@@ -78,18 +78,18 @@ TEST(SessionVerdict, NamesLostSamplesAndLostRows) {
     expect(rows, "usable: 1 of 1000 (0.1 %) rows are missing in the recording", "record to a faster disk");
 }
 
-TEST(SessionVerdict, NamesTicksWhoseForceWasNotTheModelsAboveOnePercent) {
+TEST(SessionVerdict, ReportsTicksWithChangedForcesAboveOnePercent) {
     for (const auto& [status, sentence] :
          {std::pair{Status::Limited, "clipped the force to its limit: raise the limit"},
-          {Status::Drained, "reduced the force, because the rendering gave energy"},
-          {Status::Softened, "reduced the force, because the rendering gave energy"},
+          {Status::EnergyLimited, "reduced the force, because the rendering gave energy"},
+          {Status::LimitCycleScaled, "reduced the force, because the rendering gave energy"},
           {Status::MaxIterations, "did not solve the load line"},
           {Status::NotUnique, "did not solve the load line"}}) {
         Judged few;
-        few.spend(status, 10);
+        few.set_ticks(status, 10);
         EXPECT_EQ(few.text(), "good");
         Judged many;
-        many.spend(status, 11);
+        many.set_ticks(status, 11);
         expect(many, "usable: 11 of 1000 (1.1 %) ticks ", sentence);
     }
     Judged outside;
@@ -97,7 +97,7 @@ TEST(SessionVerdict, NamesTicksWhoseForceWasNotTheModelsAboveOnePercent) {
     expect(outside, "usable: 300 of 1000 (30 %) ticks lay outside the model's data, from 0 to 1 rad",
            "stay within");
     Judged ramp;
-    ramp.spend(Status::Ramp, 1000);
+    ramp.set_ticks(Status::Ramp, 1000);
     expect(ramp, "usable: all 1000 ticks lay within the ramp at the start", "run for a longer time");
 }
 
@@ -113,13 +113,13 @@ TEST(SessionVerdict, RefusesARecordingWithoutMotion) {
     still.sinks.positions = {0.5, 0.5015};  // fewer than two encoder steps
     expect(still, "usable: the handle covered 0.0015 rad", "move it over the whole object");
     still.expected.recorded = true;
-    expect(still, "no: ", "so no force over position is known");
+    expect(still, "no: ", "so the force over position is unknown");
     still.sinks.positions = {0.5, 0.5021};
     still.expected.recorded = false;
     expect(still, "usable: the handle covered 0.0021 rad, 0.21 % of the model's domain", "move it");
 }
 
-TEST(SessionVerdict, NamesARealObjectOfWhichFewPositionsAreKnown) {
+TEST(SessionVerdict, ReportsARealObjectMeasuredAtFewPositions) {
     Judged object;
     object.expected.domain = {};
     EXPECT_EQ(object.text(), "good");
@@ -134,7 +134,7 @@ TEST(SessionVerdict, RefusesARecordingWithoutUsableRows) {
     expect(nothing, "no: nothing was recorded", "");
 }
 
-TEST(SessionVerdict, RefusesARunThatWasStoppedAndPutsThatFirst) {
+TEST(SessionVerdict, RefusesAStoppedRunWithThatFindingFirst) {
     Judged stopped;
     stopped.report->lost_records = 5;
     stopped.report->loop.exit_reason = ExitReason::DeviceFault;
@@ -142,7 +142,7 @@ TEST(SessionVerdict, RefusesARunThatWasStoppedAndPutsThatFirst) {
     expect(stopped, "no: stopped by a fault of the device: Fault", "; 5 of 1000 (0.5 %) rows are missing");
 }
 
-TEST(SessionVerdict, NamesNoMotionOfARunThatWasStopped) {
+TEST(SessionVerdict, DoesNotJudgeTheMotionOfAStoppedRun) {
     Judged stopped;
     stopped.report->loop.exit_reason = ExitReason::RateTooLow;
     stopped.sinks.positions = {0.5, 0.5};
@@ -150,10 +150,10 @@ TEST(SessionVerdict, NamesNoMotionOfARunThatWasStopped) {
     EXPECT_EQ(stopped.text().find("handle"), std::string::npos) << stopped.text();
 }
 
-TEST(SessionVerdict, RepeatsWhatTheRecordingWarnsOf) {
+TEST(SessionVerdict, RepeatsTheWarningsOfTheRecording) {
     Judged kept;
-    kept.expected.warnings = {"felt.csv appeared while this was recorded"};
-    EXPECT_EQ(kept.text(), "usable: felt.csv appeared while this was recorded");
+    kept.expected.warnings = {"rendered.csv is incomplete"};
+    EXPECT_EQ(kept.text(), "usable: rendered.csv is incomplete");
 }
 
 TEST(EnergyText, StatesTheEnergyOfTheRampSeparately) {
@@ -162,10 +162,10 @@ TEST(EnergyText, StatesTheEnergyOfTheRampSeparately) {
     report.given = 0.25;
     report.most_stored = 0.5;
     EXPECT_EQ(energy_text(report),
-              "given 0.0125 J during the ramp, 0.25 J after it; the object held at most 0.5 J");
+              "given 0.0125 J during the ramp, 0.25 J after it; the object stored at most 0.5 J");
     report.most_stored = std::numeric_limits<double>::infinity();
     EXPECT_EQ(energy_text(report),
-              "given 0.0125 J during the ramp, 0.25 J after it; no bound is known of what the object held");
+              "given 0.0125 J during the ramp, 0.25 J after it; no bound of the stored energy is known");
 }
 
 }  // namespace

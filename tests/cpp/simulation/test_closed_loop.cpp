@@ -33,13 +33,13 @@ DeviceProfile random_device(test::Random& random) {
 double open_balance(const DeviceProfile& device, double start_velocity, const ClosedLoopEnd& end) {
     const double kinetic =
         0.5 * device.inertia * (end.handle.velocity * end.handle.velocity - start_velocity * start_velocity);
-    const double off = end.energy.hand - end.energy.motor - end.energy.loss - kinetic;
+    const double off = end.energy.hand - end.energy.motor - end.energy.dissipated - kinetic;
     return std::abs(off) / (end.energy.throughput + std::abs(kinetic));
 }
 
 // spec section 7, "energy account": the work of the hand equals the energy of the motor, the losses, and the increase
 // of the handle's kinetic energy.
-TEST(EnergyAccount, ClosesToRoundingForEveryHand) {
+TEST(EnergyAccount, BalancesToRoundingForEveryHand) {
     test::Random random{11};
     double worst = 0.0;
     for (int k = 0; k < test::cases(200); ++k) {
@@ -61,7 +61,7 @@ TEST(EnergyAccount, ClosesToRoundingForEveryHand) {
     EXPECT_LT(worst, 1e-12);
 }
 
-TEST(EnergyAccount, ClosesForAMassThatDwarfsTheDevice) {
+TEST(EnergyAccount, BalancesForAMassMuchLargerThanTheDevice) {
     DeviceProfile device;
     device.viscous_damping = 0.02;
     const ClosedLoopEnd end = closed_loop(Direct{Spring{40.0}}, device, PassiveHand{0.0, 0.0, 100.0, 0.0},
@@ -69,7 +69,7 @@ TEST(EnergyAccount, ClosesForAMassThatDwarfsTheDevice) {
     EXPECT_LT(open_balance(device, 0.05, end), 1e-13);
 }
 
-TEST(Midpoint, FrictionHoldsAgainstLessAndTakesTheSpeedThatIsLeft) {
+TEST(Midpoint, FrictionHoldsAgainstSmallForcesAndDissipatesTheRemainingSpeed) {
     DeviceProfile device;
     device.viscous_damping = 0.0;
     device.coulomb_friction = 0.05;
@@ -85,7 +85,7 @@ TEST(Midpoint, FrictionHoldsAgainstLessAndTakesTheSpeedThatIsLeft) {
     EXPECT_GT(pushed(0.051, 0.0).handle().position, 0.0);
     const auto stopped = pushed(0.0, 0.5);
     EXPECT_EQ(stopped.handle().velocity, 0.0);
-    EXPECT_NEAR(stopped.plant().account().loss, 0.5 * device.inertia * 0.25, 1e-17);
+    EXPECT_NEAR(stopped.plant().account().dissipated, 0.5 * device.inertia * 0.25, 1e-17);
     EXPECT_NEAR(stopped.handle().position, 0.5 * device.inertia * 0.25 / 0.05, 1e-6);
 }
 

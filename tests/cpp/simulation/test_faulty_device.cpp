@@ -156,7 +156,7 @@ void expect_safe(const Rendering& run) {
     ASSERT_TRUE(run.observed.closed);
 }
 
-TEST(Faults, ARunWithoutThemIsOrderly) {
+TEST(Faults, RunWithoutFaultsIsOrderly) {
     const Rendering run = render({}, 2.0);
     expect_safe(run);
     EXPECT_EQ(run.report->exit_reason, ExitReason::TimeUp);
@@ -169,7 +169,7 @@ TEST(Faults, ARunWithoutThemIsOrderly) {
 }
 
 // A force that was held longer than certified is outside the certificate, for any later motion.
-TEST(Faults, ATickLaterThanCertifiedEndsTheRunWithZeroForceAndSaysSo) {
+TEST(Faults, TickLaterThanCertifiedEndsTheRunWithZeroForceAndAReason) {
     LoopSettings settings;
     settings.duration_s = 1.0;
     settings.longest_period_s = 1.5e-3;
@@ -192,7 +192,7 @@ struct Expected {
     ExitReason exit_reason;
 };
 
-TEST(Faults, EachHasItsWordAndZeroForceInItsOwnTick) {
+TEST(Faults, EachHasItsStatusAndZeroForceInItsTick) {
     // At 0.4 s the hand is moving and the force is far from zero.
     for (const Expected& expected :
          std::vector<Expected>{{FaultKind::Late, Status::Timeout, ExitReason::TimeUp},
@@ -218,7 +218,7 @@ TEST(Faults, EachHasItsWordAndZeroForceInItsOwnTick) {
     }
 }
 
-TEST(Faults, AFrozenEncoderIsFoundWhileTheHandleMoves) {
+TEST(Faults, FrozenEncoderIsDetectedWhileTheHandleMoves) {
     const Rendering run = render({{FaultKind::Frozen, 300, 100'000}}, 1.0);
     expect_safe(run);
     EXPECT_EQ(run.report->exit_reason, ExitReason::Guard);
@@ -226,7 +226,7 @@ TEST(Faults, AFrozenEncoderIsFoundWhileTheHandleMoves) {
     EXPECT_LE(run.ticks.size(), 300U + 52U);
 }
 
-TEST(Faults, ASaturatedMotorIsSaidAndTolerated) {
+TEST(Faults, SaturatedMotorIsReportedAndTolerated) {
     const Rendering run = render({{FaultKind::Saturated, 300, 50}}, 1.0);
     expect_safe(run);
     EXPECT_EQ(run.report->exit_reason, ExitReason::TimeUp);
@@ -234,7 +234,7 @@ TEST(Faults, ASaturatedMotorIsSaidAndTolerated) {
     EXPECT_NEAR(run.ticks[320].applied, 0.5 * run.ticks[319].force, 1e-12);
 }
 
-TEST(Faults, OneSampleMoreThanToleratedEndsTheRun) {
+TEST(Faults, OneBadSampleMoreThanToleratedEndsTheRun) {
     for (const std::uint64_t samples : {5U, 6U}) {
         const Rendering late = render({{FaultKind::Late, 300, samples}}, 0.5);
         const Rendering nan = render({{FaultKind::NotANumber, 300, samples}}, 0.5);

@@ -43,7 +43,7 @@ struct Motions {
 };
 
 // Held from the start of the tick at velocity v: too small by f' v T / 2 on average, by f' v T at the end.
-TEST(ForceError, HoldIsLateByHalfASampleOnTheMeanAndByAWholeOneAtTheEnd) {
+TEST(ForceError, HoldIsLateByHalfASampleInTheMeanAndByOneAtTheEnd) {
     constexpr double v = 0.5;
     const Motions motions{2000, 0.0, [&](double t) { return 1.0 + v * t; }};
     const ForceError error = force_error(motions.held(), period, square_law);
@@ -57,7 +57,7 @@ TEST(ForceError, HoldIsLateByHalfASampleOnTheMeanAndByAWholeOneAtTheEnd) {
     EXPECT_NEAR(error.work, work, -1e-3 * work) << "below 0: the rendering gives energy";
 }
 
-TEST(ForceError, AForceOfTheMiddleOfTheTickHasNoMeanErrorAndHalfTheErrorAtTheEnd) {
+TEST(ForceError, ForceOfTheMiddleHasNoMeanErrorAndHalfTheErrorAtTheEnd) {
     const Motions late{2000, 0.0, [](double t) { return 1.0 + 0.5 * t; }};
     const Motions ahead{2000, 0.5 * period, [](double t) { return 1.0 + 0.5 * t; }};
     const ForceError before = force_error(late.held(), period, square_law);
@@ -67,7 +67,7 @@ TEST(ForceError, AForceOfTheMiddleOfTheTickHasNoMeanErrorAndHalfTheErrorAtTheEnd
     EXPECT_NEAR(error.end, 0.5 * before.end, 1e-3 * before.end);
 }
 
-TEST(ForceError, AForceAheadByAWholeSampleHasNoErrorAtTheEndAndTheFullErrorOfTheMean) {
+TEST(ForceError, ForceAheadByOneSampleHasNoErrorAtTheEndAndTheFullMeanError) {
     const Motions late{2000, 0.0, [](double t) { return 1.0 + 0.5 * t; }};
     const Motions ahead{2000, period, [](double t) { return 1.0 + 0.5 * t; }};
     const ForceError before = force_error(late.held(), period, square_law);
@@ -86,7 +86,7 @@ TEST(ForceError, FollowsACurvedMotionWithinTheTick) {
     EXPECT_NEAR(error.work, -10.0 * std::pow(a * period * period, 3) / 3.0, 0.08 * 0.0267);
 }
 
-TEST(ForceError, BandKeepsSlowErrorsAndDropsFastOnes) {
+TEST(ForceError, BandKeepsSlowErrorsAndRemovesFastOnes) {
     const auto rms_of = [](double hertz) {
         std::vector<double> signal;
         for (int k = 0; k < 4000; ++k) {
@@ -129,15 +129,15 @@ TEST(ForceError, TraceHoldsTheMiddleOfEachTickAndTheMeanOfADelayedForce) {
     device.viscous_damping = 0.0;
     NetworkParameters line;
     line.bias = -0.1;
-    Hand nobody;
-    nobody.stiffness = nobody.damping = 0.0;
+    Hand no_hand;
+    no_hand.stiffness = no_hand.damping = 0.0;
     // A constant force: in the middle of each tick the handle is a T^2 / 8 away from the straight line.
     const Domain domain{{-1.0}, {1.0}, {}, {}, std::nullopt};
-    const Trace thrown = simulate({line, domain}, scheme, device, nobody, 50);
-    const double sag = 0.1 / device.inertia * 1e-6 / 8.0;
+    const Trace thrown = simulate({line, domain}, scheme, device, no_hand, 50);
+    const double deviation = 0.1 / device.inertia * 1e-6 / 8.0;
     for (std::size_t k = 1; k < 50; ++k) {
         const double straight = 0.5 * (thrown.handle_start[k] + thrown.handle_end[k]);
-        EXPECT_NEAR(straight - thrown.handle_middle[k], sag, 1e-9 * sag) << k;
+        EXPECT_NEAR(straight - thrown.handle_middle[k], deviation, 1e-9 * deviation) << k;
     }
     line.linear = {20.0};
     device.delay_s = 0.25e-3;

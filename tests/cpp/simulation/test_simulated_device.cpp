@@ -42,7 +42,7 @@ TEST(SimulatedDevice, ViscousDampingHasItsTimeConstant) {
     EXPECT_NEAR(device.handle_velocity(), 0.01 / 0.02 * (1.0 - std::exp(-1.0)), 1e-3);
 }
 
-TEST(SimulatedDevice, CoulombFrictionHoldsAgainstLessAndNeverTurnsTheHandleRound) {
+TEST(SimulatedDevice, CoulombFrictionHoldsAgainstSmallForcesAndNeverReversesTheHandle) {
     DeviceProfile profile = frictionless();
     profile.coulomb_friction = 0.05;
     SimulatedDevice device{profile, no_hand};
@@ -105,14 +105,14 @@ TEST(SimulatedDevice, AppliesACommandAFractionOfASampleLate) {
     EXPECT_NEAR(device.handle_velocity(), -(0.75 + 0.25 + 2.0 * 0.75) * T / profile.inertia, 1e-9);
 }
 
-TEST(SimulatedDevice, TakesAForceThatIsNoNumberAsZero) {
+TEST(SimulatedDevice, ReplacesAForceThatIsNotFiniteByZero) {
     SimulatedDevice device{DeviceProfile{}, no_hand};
     ASSERT_TRUE(device.open());
     EXPECT_EQ(device.exchange({std::numeric_limits<double>::quiet_NaN()}).applied, 0.0);
     EXPECT_EQ(device.exchange({std::numeric_limits<double>::infinity()}).applied, 0.0);
 }
 
-TEST(SimulatedDevice, CountsItsSamplesAndOpensAfresh) {
+TEST(SimulatedDevice, CountsItsSamplesAndRestartsOnOpening) {
     SimulatedDevice device{DeviceProfile{}};
     ASSERT_TRUE(device.open());
     for (std::uint64_t k = 1; k <= 5; ++k) {
@@ -126,7 +126,7 @@ TEST(SimulatedDevice, CountsItsSamplesAndOpensAfresh) {
     EXPECT_EQ(device.exchange({}).sequence, 1U);
 }
 
-TEST(SimulatedDevice, StartsAtRestWhereItIsTold) {
+TEST(SimulatedDevice, StartsAtRestAtTheGivenPosition) {
     SimulatedDevice device{DeviceProfile{}, no_hand, 20, 0.3};
     ASSERT_TRUE(device.open());
     EXPECT_EQ(device.handle_position(), 0.3);

@@ -16,7 +16,7 @@ ForceModel keyswitch(double travel, std::optional<double> play_radius = {}) {
     return {NetworkParameters{1, {}, {}, {}, {0.8 / travel}, 0.1}, {{}, 0.0, 0.05}, domain, play_radius};
 }
 
-TEST(TestRig, IsTheKnobAsAScaleModel) {
+TEST(TestRig, IsTheKnobScaledToTheModel) {
     const TestRig small = rig_for(keyswitch(0.004), false, 1e-3);
     const TestRig large = rig_for(keyswitch(0.4), false, 1e-3);
     EXPECT_NEAR(large.scale.length / small.scale.length, 100.0, 1e-9);
@@ -27,7 +27,7 @@ TEST(TestRig, IsTheKnobAsAScaleModel) {
     EXPECT_NEAR(small.device.force_limit, 1.05 * 0.95, 1e-9);
 }
 
-TEST(TestRig, LeavesAnAngleToTheKnobAsItIs) {
+TEST(TestRig, UsesTheUnscaledKnobForAnAngle) {
     const TestRig rig = rig_for(keyswitch(0.4), true, 2e-3);
     EXPECT_EQ(rig.device.id, DeviceProfile{}.id);
     EXPECT_EQ(rig.device.encoder_step, DeviceProfile{}.encoder_step);
@@ -35,7 +35,7 @@ TEST(TestRig, LeavesAnAngleToTheKnobAsItIs) {
     EXPECT_EQ(rig.scale.length, 1.0);
 }
 
-TEST(TestRig, SwitchesHysteresisByTheHandAndNotByTheEncoder) {
+TEST(TestRig, DefaultPlayRadiusCoversTravelShareAndEncoderSteps) {
     TestRig rig = rig_for(keyswitch(0.004), false, 1e-3);
     EXPECT_NEAR(rig.scheme(keyswitch(0.004)).play_radius, 4e-5, 1e-15);
     rig.device.encoder_step = 1e-4;
@@ -43,7 +43,7 @@ TEST(TestRig, SwitchesHysteresisByTheHandAndNotByTheEncoder) {
     EXPECT_EQ(rig.scheme(keyswitch(0.004, 1e-5)).play_radius, 0.0);  // the model defines one
 }
 
-TEST(TestRig, TakesWhatWasChosenAsItIsAndScalesTheRest) {
+TEST(TestRig, KeepsChosenFieldsAndScalesTheOthers) {
     const ForceModel model = keyswitch(0.004);
     const TestRig rig = rig_for(model, false, 1e-3);
     SchemeChoices chosen;

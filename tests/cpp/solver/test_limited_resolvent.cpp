@@ -69,7 +69,7 @@ TEST(LimitedEnvironment, ClipsTheForceAndItsSlope) {
     EXPECT_TRUE(std::isnan(object.at(std::nan(""), {}).force));
 }
 
-TEST(LimitedResolvent, FindsTheOneRootOfALimitedNetwork) {
+TEST(LimitedResolvent, FindsTheOnlyRootOfALimitedNetwork) {
     Random random{81};
     int limited = 0;
     for (int k = 0; k < cases(30); ++k) {
@@ -88,13 +88,13 @@ TEST(LimitedResolvent, FindsTheOneRootOfALimitedNetwork) {
     EXPECT_LT(limited, cases(30) * 270);
 }
 
-TEST(LimitedResolvent, FindsTheOneRootOfALimitedHysteresis) {
+TEST(LimitedResolvent, FindsTheOnlyRootOfALimitedHysteresis) {
     Random random{82};
     int limited = 0;
     for (int k = 0; k < cases(30); ++k) {
         const NetworkParameters parameters = test::random_network(random, 6);
-        const LossParameters loss{std::vector<double>(6, 0.02), 0.0, 0.5};
-        const HysteresisNetwork pair{parameters, loss, test::unit_domain(), 0.02};
+        const HysteresisParameters hysteresis{std::vector<double>(6, 0.02), 0.0, 0.5};
+        const HysteresisNetwork pair{parameters, hysteresis, test::unit_domain(), 0.02};
         const Interval force = pair.force().value_bounds();
         const double p = (4.0 * force.largest() - pair.force().slope_bounds().lower + 25.0) *
                          std::exp(uniform(random, 0.0, 2.0));
@@ -120,7 +120,7 @@ TEST(LimitedResolvent, SolvesACompensatedEnvironment) {
     EXPECT_GT(expect_the_bisected_root(random, object, solver, p), 30);
 }
 
-TEST(LimitedResolvent, FindsARootWhereTheLoadLineIsNotUnique) {
+TEST(LimitedResolvent, FindsARootOfALoadLineThatIsNotUnique) {
     Random random{84};
     int falling = 0;
     for (int k = 0; k < cases(30); ++k) {

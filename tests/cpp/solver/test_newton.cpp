@@ -33,7 +33,7 @@ TEST(LoadLineSolver, SolvesAnyUniqueLoadLineOfRandomNetworks) {
     }
 }
 
-TEST(LoadLineSolver, NeedsOneEvaluationWhereItAlreadyIs) {
+TEST(LoadLineSolver, NeedsOneEvaluationAtTheSolution) {
     const test::Spring spring{40.0};
     const Solution solution = LoadLineSolver{}.solve(spring, {}, {60.0, 50.0}, 0.5);
     EXPECT_EQ(solution.status, Status::Ok);
@@ -50,24 +50,24 @@ TEST(LoadLineSolver, SolvesALineInTwoEvaluations) {
     }
 }
 
-TEST(LoadLineSolver, SaysWhyItStopped) {
+TEST(LoadLineSolver, StatusIsTheReasonOfTheEnd) {
     const WaveletNetwork network{{1, {20.0}, {0.5}, {1.0}, {2.0}, 0.0}, test::unit_domain()};
     const double nan = std::numeric_limits<double>::quiet_NaN();
     EXPECT_EQ(LoadLineSolver{}.solve(network, {}, {100.0, nan}, 0.0).status, Status::NonFinite);
     EXPECT_EQ(LoadLineSolver{}.solve(network, {}, {100.0, 50.0}, nan).status, Status::NonFinite);
     EXPECT_EQ(LoadLineSolver{}.solve(network, {}, {100.0, 1e308}, 1e308).status, Status::NonFinite);
-    LoadLineSolver hasty;
-    hasty.max_evaluations = 1;
-    EXPECT_EQ(hasty.solve(network, {}, {100.0, 50.0}, 0.0).status, Status::MaxIterations);
+    LoadLineSolver limited;
+    limited.max_evaluations = 1;
+    EXPECT_EQ(limited.solve(network, {}, {100.0, 50.0}, 0.0).status, Status::MaxIterations);
 }
 
-TEST(LoadLineSolver, SaysWhenItStandsWhereTheEnvironmentFallsFaster) {
+TEST(LoadLineSolver, ReportsNotUniqueOnAFallingBranch) {
     // f(y) + p y has the slope -2 + 1: 0 is a solution, but no motion would stop there.
     const Solution solution = LoadLineSolver{}.solve(test::Spring{-2.0}, {}, {1.0, 0.0}, 0.0);
     EXPECT_EQ(solution.status, Status::NotUnique);
 }
 
-TEST(LoadLineSolver, FindsARootWhateverTheSlopesInItsBracket) {
+TEST(LoadLineSolver, FindsARootForAnySlopesInItsBracket) {
     const test::ClickAndWall object;
     Random random{23};
     for (int k = 0; k < cases(2000); ++k) {

@@ -127,7 +127,7 @@ TEST(Resolvent, AgreesWithNewtonInsideAndBeyondTheDomain) {
     }
 }
 
-TEST(Resolvent, AtTheEdgesIsTheEdge) {
+TEST(Resolvent, IsExactAtTheEdges) {
     Random random{63};
     const WaveletNetwork network = random_scene(random, 7);
     const double p = 2000.0;
@@ -141,7 +141,7 @@ TEST(Resolvent, AtTheEdgesIsTheEdge) {
     }
 }
 
-TEST(Resolvent, DoesNotPretend) {
+TEST(Resolvent, HasNoTableIfTheErrorCannotBeCertified) {
     Random random{64};
     const WaveletNetwork network = random_scene(random, 8);
     // NaN, an accuracy beyond double precision, too small a table, the slope of another load line: Newton's method
@@ -160,13 +160,13 @@ TEST(Resolvent, DoesNotPretend) {
     }
 }
 
-TEST(Resolvent, PromisesOnlyWhatWasAsked) {
+TEST(Resolvent, CertifiedErrorIsAtMostTheRequiredOne) {
     Random random{65};
     const WaveletNetwork network = random_scene(random, 8);
     int tabulated = 0;
-    for (double asked = 1e-6; asked > 1e-18; asked *= 0.5) {
-        const Resolvent resolvent{network.curve(), 500.0, {asked}};
-        EXPECT_LE(resolvent.position_error(), asked);
+    for (double required_error = 1e-6; required_error > 1e-18; required_error *= 0.5) {
+        const Resolvent resolvent{network.curve(), 500.0, {required_error}};
+        EXPECT_LE(resolvent.position_error(), required_error);
         tabulated += resolvent.tabulated() ? 1 : 0;
     }
     EXPECT_GE(tabulated, 20);
@@ -179,7 +179,7 @@ double hand(int tick) {
     return 0.25 - 0.24 * std::cos(std::numbers::pi * time) + 0.01 * std::sin(14.0 * std::numbers::pi * time);
 }
 
-TEST(Resolvent, RendersWhatNewtonRenders) {
+TEST(Resolvent, RendersLikeNewton) {
     const WaveletNetwork network = switch_and_wall();
     const Inertia inertia{0.001, 0.5};
     const VirtualCoupling coupling{100.0, 0.02};
@@ -216,14 +216,14 @@ WaveletNetwork two_clicks() {
     return {network, switch_and_wall().domain()};
 }
 
-TEST(RisingStretches, AreWhereADenseSearchFindsTheSlopePositive) {
+TEST(RisingIntervals, AgreeWithADenseSearch) {
     Random random{67};
     int folds = 0;
     for (int k = 0; k < cases(200); ++k) {
         const WaveletNetwork network = random_scene(random, static_cast<std::size_t>(1 + k % 20));
         const Interval slope = network.curve().slope_bounds();
         const double p = -uniform(random, slope.lower, slope.upper);
-        const auto stretches = rising_stretches(network.parameters(), p, 0.0, 1.0);
+        const auto stretches = rising_intervals(network.parameters(), p, 0.0, 1.0);
         ASSERT_TRUE(stretches);
         folds += static_cast<int>(stretches->size());
         for (int j = 0; j <= 4000; ++j) {
@@ -277,7 +277,7 @@ TEST(Resolvent, KeepsItsCertifiedErrorOnEveryBranch) {
 
 // spec section 5: "from the previous solution, the first root met in the direction of -residual". Tests 401 x 401 pairs
 // of start and right-hand side, for load lines that fold once, twice and in the steep wall of a knob's detent.
-TEST(Resolvent, ObeysTheBranchRuleAtEveryFold) {
+TEST(Resolvent, FollowsTheBranchRuleAtEveryFold) {
     const WaveletNetwork network = two_clicks();
     const double lowest = -network.curve().slope_bounds().lower;
     constexpr int fine = 120'000;
@@ -359,7 +359,7 @@ TEST(Resolvent, ObeysTheBranchRuleAtEveryFold) {
     }
 }
 
-TEST(Resolvent, TurnsWithAKnob) {
+TEST(Resolvent, RepeatsWithEveryTurnOfAKnob) {
     Random random{69};
     int folded = 0;
     for (int k = 0; k < cases(20); ++k) {
@@ -418,7 +418,7 @@ TEST(CertifiedSolver, NeedsOneEvaluationAStep) {
     EXPECT_LE(evaluations, 4000 * 105 / 100);
 }
 
-TEST(CertifiedSolver, IsNotFooledByTheKinksAtTheEdges) {
+TEST(CertifiedSolver, IsExactAtTheKinksAtTheEdges) {
     Random random{66};
     for (int k = 0; k < cases(100); ++k) {
         const WaveletNetwork network =

@@ -22,28 +22,28 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// Returns a random pair over [0, 1] whose loss is one or two bumps above a constant.
+/// Returns a random pair over [0, 1] whose hysteresis is one or two bumps above a constant.
 HysteresisNetwork random_pair(Random& random, std::size_t wavelets, double play_radius,
                               Continuation continuation = Continuation::Free) {
     const NetworkParameters network = test::random_network(random, wavelets);
-    LossParameters loss{std::vector<double>(wavelets, 0.0), 0.0, uniform(random, 0.3, 1.0)};
-    for (double& weight : loss.weight) {
+    HysteresisParameters hysteresis{std::vector<double>(wavelets, 0.0), 0.0, uniform(random, 0.3, 1.0)};
+    for (double& weight : hysteresis.weight) {
         weight = uniform(random, -0.2, 0.2) / static_cast<double>(wavelets);
     }
-    return {network, loss, test::unit_domain(continuation, continuation), play_radius};
+    return {network, hysteresis, test::unit_domain(continuation, continuation), play_radius};
 }
 
 /// Returns a p for which every slide is unique, with a small or large margin.
 double unique_slope(Random& random, const HysteresisNetwork& pair) {
     const double common = pair.force().slope_bounds().lower;
-    const double loss = pair.loss().slope_bounds().largest();
+    const double hysteresis = pair.hysteresis_force().slope_bounds().largest();
     const double edges =
-        4.0 * pair.force().value_bounds().largest() + 50.0 * pair.loss().value_bounds().largest();
-    return std::max(loss - common, edges) * std::exp(uniform(random, 0.1, 2.0));
+        4.0 * pair.force().value_bounds().largest() + 50.0 * pair.hysteresis_force().value_bounds().largest();
+    return std::max(hysteresis - common, edges) * std::exp(uniform(random, 0.1, 2.0));
 }
 
 // A motion that presses, releases and reverses anywhere, through sticking and sliding and past both edges.
-TEST(SlidingResolvent, SolvesWhatNewtonSolves) {
+TEST(SlidingResolvent, AgreesWithNewton) {
     Random random{71};
     int steps = 0;
     int by_table = 0;
@@ -79,7 +79,7 @@ TEST(SlidingResolvent, SolvesWhatNewtonSolves) {
     EXPECT_GT(by_table, steps / 2);
 }
 
-TEST(SlidingResolvent, NeedsTwoEvaluationsOrFewerWhereItSticks) {
+TEST(SlidingResolvent, NeedsAtMostTwoEvaluationsWhileSticking) {
     Random random{72};
     const HysteresisNetwork pair = random_pair(random, 8, 0.02);
     const double p = unique_slope(random, pair);
@@ -104,9 +104,10 @@ TEST(SlidingResolvent, NeedsTwoEvaluationsOrFewerWhereItSticks) {
 /// Returns the rounding error of f, and of s = (y - play) / r.
 double rounding_of(const HysteresisNetwork& pair, double x) {
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
-    const double loss = pair.loss().value_bounds().largest();
-    return jet_rounding(pair.force().parameters(), 1.4)[0] + jet_rounding(pair.loss().parameters(), 1.4)[0] +
-           8.0 * epsilon * (std::abs(x) + 1.0) * loss / pair.play_radius();
+    const double hysteresis = pair.hysteresis_force().value_bounds().largest();
+    return jet_rounding(pair.force().parameters(), 1.4)[0] +
+           jet_rounding(pair.hysteresis_force().parameters(), 1.4)[0] +
+           8.0 * epsilon * (std::abs(x) + 1.0) * hysteresis / pair.play_radius();
 }
 
 // Random jumps of q and of the play, for load lines that are unique by 1e-4 to 1. The full tier tests 10^6 steps.
@@ -124,15 +125,15 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
             domain = {{0.1}, {1.1}, Continuation::Linear, Continuation::Linear, 1.0};
         }
         const auto wavelets = static_cast<std::size_t>(1 + k % 12);
-        // Every seventh loss falls below zero, which is valid for a model but impossible for a passive object.
-        LossParameters loss{std::vector<double>(wavelets), 0.0,
-                            uniform(random, k % 7 == 6 ? -0.1 : 0.3, k % 7 == 6 ? 0.1 : 1.0)};
-        for (double& weight : loss.weight) {
+        // Every seventh hysteresis falls below zero, which is valid for a model but impossible for a passive object.
+        HysteresisParameters hysteresis{std::vector<double>(wavelets), 0.0,
+                                        uniform(random, k % 7 == 6 ? -0.1 : 0.3, k % 7 == 6 ? 0.1 : 1.0)};
+        for (double& weight : hysteresis.weight) {
             weight = uniform(random, -0.2, 0.2) / static_cast<double>(wavelets);
         }
         const double radius = k % 7 == 6 ? 0.1 : std::exp(uniform(random, -9.0, 0.0));
-        const HysteresisNetwork pair{test::random_network(random, wavelets), loss, domain, radius};
-        const double gain = std::max(0.0, -pair.loss().value_bounds().lower) / radius;
+        const HysteresisNetwork pair{test::random_network(random, wavelets), hysteresis, domain, radius};
+        const double gain = std::max(0.0, -pair.hysteresis_force().value_bounds().lower) / radius;
         const double fall =
             std::max(test::steepest_fall(piecewise(pair, 1.0)), test::steepest_fall(piecewise(pair, -1.0))) +
             gain;
@@ -163,7 +164,7 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
                 ASSERT_EQ(solution.status, Status::Ok) << k << " " << j;
                 ASSERT_LE(solution.evaluations, 4) << k << " " << j;
                 const EnvironmentSample there = pair.at(solution.position, state);
-                const double steepest = p + std::abs(there.slope) + loss.bias / radius;
+                const double steepest = p + std::abs(there.slope) + hysteresis.bias / radius;
                 const double residual = there.force + p * solution.position - q;
                 ASSERT_LE(std::abs(residual), 1.1e-12 * steepest + 2.0 * rounding_of(pair, x) +
                                                   8.0 * epsilon * (std::abs(there.force) + std::abs(q)))
@@ -185,7 +186,7 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
     EXPECT_LE(cells.back(), 2000U);
 }
 
-TEST(SlidingResolvent, LeavesToNewtonWhatIsNotUnique) {
+TEST(SlidingResolvent, UsesNewtonIfTheLoadLineIsNotUnique) {
     Random random{73};
     const HysteresisNetwork pair = random_pair(random, 8, 0.01);
     const double p = -0.5 * pair.force().slope_bounds().lower;
@@ -220,7 +221,7 @@ void expect_same_rendering(Random& random, S structure, T reference, double tole
     }
 }
 
-TEST(CompensatedResolvent, RendersWhatNewtonRenders) {
+TEST(CompensatedResolvent, RendersLikeNewton) {
     Random random{74};
     for (int k = 0; k < cases(10); ++k) {
         const WaveletNetwork network{test::random_network(random, static_cast<std::size_t>(1 + k % 9)),
@@ -246,7 +247,7 @@ TEST(CompensatedResolvent, RendersWhatNewtonRenders) {
     }
 }
 
-TEST(Scheme, RendersWithTablesWhatTheNetworkItselfWould) {
+TEST(Scheme, TablesRenderTheSameForceAsTheNetwork) {
     Random random{75};
     for (int k = 0; k < cases(10); ++k) {
         const NetworkParameters network = test::random_network(random, static_cast<std::size_t>(2 + k));

@@ -17,10 +17,10 @@ namespace {
 ForceModel hysteretic() {
     test::Random random{5};
     const NetworkParameters network = test::random_network(random, 4);
-    LossParameters loss;
-    loss.weight.assign(4, 0.0);
-    loss.bias = 0.05;
-    return {network, loss, test::unit_domain(), 0.02};
+    HysteresisParameters hysteresis;
+    hysteresis.weight.assign(4, 0.0);
+    hysteresis.bias = 0.05;
+    return {network, hysteresis, test::unit_domain(), 0.02};
 }
 
 Scheme direct() {
@@ -63,22 +63,22 @@ const std::vector<std::pair<std::string, std::function<void(ForceBounds&, double
     {"slope_max", [](ForceBounds& b, double by) { b.slope.upper += by; }},
     {"steepest", [](ForceBounds& b, double by) { b.steepest += by; }},
     {"sliding", [](ForceBounds& b, double by) { b.sliding += by; }},
-    {"loss_min", [](ForceBounds& b, double by) { b.loss.lower -= by; }},
-    {"loss_max", [](ForceBounds& b, double by) { b.loss.upper += by; }},
-    {"loss_per_play", [](ForceBounds& b, double by) { b.loss_per_play += by; }},
+    {"loss_min", [](ForceBounds& b, double by) { b.hysteresis_force.lower -= by; }},
+    {"loss_max", [](ForceBounds& b, double by) { b.hysteresis_force.upper += by; }},
+    {"loss_per_play", [](ForceBounds& b, double by) { b.hysteresis_per_play += by; }},
     {"mean_force", [](ForceBounds& b, double by) { b.mean_force += by; }},
 };
 
-TEST(CertificateCheck, BelievesWhatItWouldSayItself) {
+TEST(CertificateCheck, AcceptsAComputedCertificate) {
     const ForceModel model = hysteretic();
     EXPECT_EQ(disagreement(certify(model, direct(), strong()), model), "");
 }
 
 // An older release used wider bounds; its proofs remain valid.
-TEST(CertificateCheck, TakesEveryBoundThatIsWiderThanTodaysAndNoneThatIsTighter) {
+TEST(CertificateCheck, AcceptsWiderBoundsAndRefusesNarrowerOnes) {
     const ForceModel model = hysteretic();
     const Certificate certificate = certify(model, direct(), strong());
-    ASSERT_TRUE(certificate.certified()) << certificate.why;
+    ASSERT_TRUE(certificate.certified()) << certificate.reason;
     for (const auto& [name, widen] : wider) {
         const auto by = [&widen = widen](double amount) {
             return [&widen, amount](ForceBounds& bounds) { widen(bounds, amount); };
@@ -91,7 +91,7 @@ TEST(CertificateCheck, TakesEveryBoundThatIsWiderThanTodaysAndNoneThatIsTighter)
     }
 }
 
-TEST(CertificateCheck, TakesNoBoundThatIsNotANumber) {
+TEST(CertificateCheck, RefusesABoundThatIsNotANumber) {
     const ForceModel model = hysteretic();
     const Certificate certificate = certify(model, direct(), strong());
     for (const double none :
@@ -107,7 +107,7 @@ TEST(CertificateCheck, TakesNoBoundThatIsNotANumber) {
 }
 
 // Wider bounds with the lines of the narrower ones. The lines must follow from the bounds.
-TEST(CertificateCheck, RefusesLinesThatAreNotThoseOfTheStoredBounds) {
+TEST(CertificateCheck, RefusesLinesThatDoNotFollowFromTheStoredBounds) {
     const ForceModel model = hysteretic();
     Certificate certificate = certify(model, direct(), strong());
     certificate.bounds.slope.upper += 1.0;
@@ -115,7 +115,7 @@ TEST(CertificateCheck, RefusesLinesThatAreNotThoseOfTheStoredBounds) {
     EXPECT_EQ(wrong.rfind("certificate.inequalities[1].right is ", 0), 0U) << wrong;
 }
 
-TEST(CertificateCheck, RefusesAWideBoundThatProvesNothingAnyMore) {
+TEST(CertificateCheck, RefusesABoundTooWideForACertificate) {
     const ForceModel model = hysteretic();
     const Certificate certificate = certify(model, direct(), strong());
     Certificate weak = with_bounds(certificate, [](ForceBounds& bounds) { bounds.slope.upper = 1e9; });
@@ -139,7 +139,7 @@ TEST(CertificateCheck, RefusesAnEditedDeviceEvenIfNoLineUsesTheField) {
     EXPECT_TRUE(refused([](auto& d) { d.delay_s = 1e-15; }));
 }
 
-TEST(CertificateCheck, AcceptsItsResultAgainAfterRoundingOnAnotherMachine) {
+TEST(CertificateCheck, AcceptsRoundingOfAnotherMachine) {
     const ForceModel model = hysteretic();
     Certificate stored = certify(model, direct(), strong());
     for (Inequality& line : stored.inequalities) {
@@ -150,19 +150,19 @@ TEST(CertificateCheck, AcceptsItsResultAgainAfterRoundingOnAnotherMachine) {
     EXPECT_EQ(disagreement(checked(stored, model), model), "");
 }
 
-TEST(CertificateCheck, ComparesNoText) {
+TEST(CertificateCheck, DoesNotCompareTexts) {
     const ForceModel model = hysteretic();
     Certificate stored = certify(model, direct(), strong());
     const Certificate before = stored;
-    stored.why = "";
+    stored.reason = "";
     for (Inequality& line : stored.inequalities) {
         line.name = line.formula = line.source = "";
     }
-    EXPECT_EQ(checked(stored, model).why, before.why);
+    EXPECT_EQ(checked(stored, model).reason, before.reason);
     EXPECT_EQ(checked(stored, model).inequalities[1].formula, before.inequalities[1].formula);
 }
 
-TEST(CertificateCheck, NamesTheFirstFieldOfADeviceThatIsAnother) {
+TEST(CertificateCheck, NamesTheFirstFieldInWhichADeviceDiffers) {
     const DeviceProfile device = strong();
     EXPECT_EQ(device_difference(device, device), "");
     const auto difference = [&](const std::function<void(DeviceProfile&)>& change) {

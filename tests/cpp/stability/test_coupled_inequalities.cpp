@@ -117,10 +117,11 @@ Account account_of(S structure, const CoupledScene& scene, const Parts& parts) {
         forces.push_back(rendered.force);
         const std::size_t now = forces.size() - 1 - static_cast<std::size_t>(whole);
         const double work = forces[now - 1] * before + forces[now] * after;
-        const double loss = scene.device.viscous_damping *
-                            ((share > 0.0 ? before * before / share : 0.0) + after * after / (1.0 - share));
-        energy += work + loss;
-        account.throughput += std::abs(work) + loss;
+        const double dissipated =
+            scene.device.viscous_damping *
+            ((share > 0.0 ? before * before / share : 0.0) + after * after / (1.0 - share));
+        energy += work + dissipated;
+        account.throughput += std::abs(work) + dissipated;
         account.least = std::min(account.least, energy);
         account.last = energy;
         x += before + after;
@@ -263,7 +264,7 @@ double optimised(test::Random& random, const CoupledScene& scene, int trials) {
     return least;
 }
 
-TEST(CoupledAccount, OptimisedMotionsGetNoEnergyOutOfCertifiedScenes) {
+TEST(CoupledAccount, OptimisedMotionsTakeNoEnergyOutOfCertifiedScenes) {
     test::Random random{41};
     int tried = 0;
     while (tried < test::cases(200)) {

@@ -28,7 +28,7 @@ Scheme direct_scheme() {
     return scheme;
 }
 
-TEST(DirectLines, JitterCostsTheLongerPeriodAndTheSamplesThatComeCloser) {
+TEST(DirectLines, JitterAddsTheLongerPeriodAndTheCloserSamples) {
     DeviceProfile late = device(1.0);
     const double steady = device_need(late, {1.0, 1.0});
     EXPECT_NEAR(steady, 1.5, 1e-12);
@@ -43,7 +43,7 @@ TEST(DirectLines, JitterCostsTheLongerPeriodAndTheSamplesThatComeCloser) {
     EXPECT_DOUBLE_EQ(device_need(late, {1.0, 5.0}), 0.5);
 }
 
-TEST(DirectLines, ALittleJitterCostsAFallingForceLittle) {
+TEST(DirectLines, SmallJitterChangesTheNeedOfAFallingForceLittle) {
     DeviceProfile late = device(2.0);
     const double steady = device_need(late, {0.0, 1.0});
     late.jitter_s = 1e-8;
@@ -82,7 +82,7 @@ TEST(DirectLines, RenderableSlopesAreCertifiedAndNotLessThanWithEqualSides) {
     }
 }
 
-TEST(DirectLines, TheLongestPeriodOfALateForceIsTheLastThatIsCertified) {
+TEST(DirectLines, LongestPeriodOfALateForceIsJustCertified) {
     for (const double delay : {0.0, 0.25, 1.0, 2.0}) {
         for (const double falling : {0.0, 5.0, 25.0}) {
             DeviceProfile profile = device(delay);
@@ -99,7 +99,7 @@ TEST(DirectLines, TheLongestPeriodOfALateForceIsTheLastThatIsCertified) {
     }
 }
 
-TEST(DirectLines, AForceThatFallsGetsTheRoomThatItsRiseLeaves) {
+TEST(DirectLines, FallingSlopeUsesTheMarginOfTheRisingSlope) {
     const DeviceProfile late = device(1.0);
     const Interval rises = renderable_slopes(late, 0.0, {100.0, 1.0});
     const Interval falls = renderable_slopes(late, 0.0, {1.0, 1000.0});
@@ -114,14 +114,14 @@ TEST(DirectLines, NarrowestPlayIsJustCertified) {
     sliding.hysteresis = true;
     sliding.slope = {-5.0, 10.0};
     sliding.sliding = sliding.steepest = 10.0;
-    sliding.loss = {0.0, 0.1};
+    sliding.hysteresis_force = {0.0, 0.1};
     for (const double delay : {0.0, 0.5, 1.0}) {
         for (const double step : {0.0, 2e-4}) {
             const DeviceProfile profile = device(delay, step);
             const double radius = narrowest_play(sliding, profile, 4.0 * step, 1.0);
             const auto certified = [&](double r) {
                 ForceBounds bounds = sliding;
-                bounds.loss_per_play = 0.1 / r;
+                bounds.hysteresis_per_play = 0.1 / r;
                 bounds.slope.upper += 0.1 / r;
                 return certify(bounds, direct_scheme(), profile).certified();
             };
@@ -134,13 +134,13 @@ TEST(DirectLines, NarrowestPlayIsJustCertified) {
 }
 
 /// Without delay the play of the reading is treated as exact: h / r adds to the friction once.
-TEST(DirectLines, EncoderOfHysteresisCountsTheStickOnce) {
+TEST(DirectLines, EncoderErrorOfHysteresisIncludesStickingOnce) {
     ForceBounds bounds;
     bounds.hysteresis = true;
     bounds.slope = {-10.0, 60.0};
     bounds.sliding = 20.0;
-    bounds.loss = {0.0, 1.0};
-    bounds.loss_per_play = 40.0;
+    bounds.hysteresis_force = {0.0, 1.0};
+    bounds.hysteresis_per_play = 40.0;
     DeviceProfile profile = device(0.0, 1e-3);
     const double more = 20.0 * 1e-3 / (2.0 * 0.025);
     profile.viscous_damping = 0.5e-3 * (60.0 + more) * (1.0 + 1e-12);
@@ -154,8 +154,8 @@ TEST(DirectLines, EncoderOfHysteresisCountsTheStickOnce) {
     EXPECT_TRUE(certify(bounds, direct, profile).certified());
     profile.coulomb_friction *= 0.99;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
-    bounds.loss_per_play = bounds.loss.upper / 0.4e-3;  // a play smaller than half a step
-    profile.coulomb_friction = (20.0 + 1.5 * bounds.loss_per_play) * 0.5e-3;
+    bounds.hysteresis_per_play = bounds.hysteresis_force.upper / 0.4e-3;  // a play smaller than half a step
+    profile.coulomb_friction = (20.0 + 1.5 * bounds.hysteresis_per_play) * 0.5e-3;
     profile.viscous_damping = 10.0;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
 }
@@ -213,14 +213,15 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
         ForceBounds bounds;
         bounds.hysteresis = true;
         const double r = 0.5 + 3.0 * unit(random);
-        bounds.loss = {0.0, *std::max_element(h.at_corner.begin(), h.at_corner.end())};
-        bounds.loss_per_play = bounds.loss.upper / r;
+        bounds.hysteresis_force = {0.0, *std::max_element(h.at_corner.begin(), h.at_corner.end())};
+        bounds.hysteresis_per_play = bounds.hysteresis_force.upper / r;
         for (std::size_t k = 0; k < g.at_corner.size(); ++k) {
             g.at_corner[k] -= mean;
         }
         for (std::size_t k = 0; k < g.at_corner.size(); ++k) {
             const double steep = std::abs(h.slope(k));
-            bounds.slope = bounds.slope.with({g.slope(k) - steep, g.slope(k) + steep + bounds.loss_per_play});
+            bounds.slope =
+                bounds.slope.with({g.slope(k) - steep, g.slope(k) + steep + bounds.hysteresis_per_play});
             bounds.sliding = std::max(bounds.sliding, std::abs(g.slope(k)) + steep);
         }
         DeviceProfile profile = device(0.0, 1.0);

@@ -41,7 +41,7 @@ TEST(HeldForce, ASpringNeedsHalfASampleMoreThanItsDelay) {
     }
 }
 
-TEST(HeldForce, ClosedFormIsTheLeastOverGamma) {
+TEST(HeldForce, ClosedFormIsTheMinimumOverGamma) {
     for (const double lag : {0.3, 0.5, 1.0, 1.7, 2.0, 3.0, 6.5}) {
         for (const double falling : {0.0, 0.4, 1.0, 1.3, 2.0, 3.1, 10.0}) {
             const SlopeRange slopes{1.0, falling};
@@ -72,7 +72,7 @@ TEST(HeldForce, StepEnergyIsTheLargestOverAllRatios) {
     }
 }
 
-TEST(HeldForce, FallingSlopesCostLessThanRisingOnesWithDelay) {
+TEST(HeldForce, FallingSlopesNeedLessThanRisingOnesWithDelay) {
     EXPECT_NEAR(delayed_need(1, 0.0, {0.0, 1.0}), 0.50, 0.005);
     EXPECT_NEAR(delayed_need(2, 0.0, {0.0, 1.0}), 0.82, 0.005);
     EXPECT_NEAR(delayed_need(3, 0.0, {0.0, 1.0}), 1.15, 0.005);
@@ -81,14 +81,14 @@ TEST(HeldForce, FallingSlopesCostLessThanRisingOnesWithDelay) {
     EXPECT_GT(delayed_need(1, 0.0, {1.0, 2.2}), 1.505);
 }
 
-TEST(HeldForce, PredictionCostsLessTheMoreSamplesItTakes) {
+TEST(HeldForce, PredictionFromMoreSamplesNeedsLess) {
     EXPECT_NEAR(filtered_need(prediction(1), {1.0, 1.0}), 1.00, 0.005);
     EXPECT_NEAR(filtered_need(prediction(2), {1.0, 1.0}), 0.77, 0.005);
     EXPECT_NEAR(filtered_need(prediction(4), {1.0, 1.0}), 0.66, 0.005);
     EXPECT_NEAR(filtered_need(prediction(8), {1.0, 1.0}), 0.60, 0.005);
 }
 
-TEST(HeldForce, ASpringWithAFractionOfASampleNeedsMoreThanInProportion) {
+TEST(HeldForce, FractionalDelayOfASpringNeedsMoreThanItsShare) {
     EXPECT_NEAR(delayed_need(0, 0.25, {1.0, 0.0}), 0.808, 5e-4);
     for (const double tau : {0.01, 0.1, 0.25, 0.5, 0.9}) {
         const double exact = 0.5 * (0.5 + tau + std::sqrt(0.25 + 2.0 * tau));
@@ -177,7 +177,7 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
     struct Event {
         double time;
         int sample;    ///< taken here, or -1
-        int takes_on;  ///< command that starts here, or -1
+        int command;  ///< command that starts here, or -1
     };
     std::vector<Event> events;
     for (int k = 0; k < count; ++k) {
@@ -205,7 +205,7 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
         if (events[e].sample >= 0) {
             position[static_cast<std::size_t>(events[e].sample)] = x;
         } else {
-            acting = events[e].takes_on;  // the last command of the turn acts at its start
+            acting = events[e].command;  // the last command of the turn acts at its start
         }
         moved[e] -= time[e] > 1e-9 ? turn * time[e] / count : 0.0;
         x += moved[e];
@@ -223,8 +223,8 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
     double work = 0.0;
     double lost = 0.0;
     for (std::size_t e = 0; e < events.size(); ++e) {
-        if (events[e].takes_on >= 0) {
-            force = command(events[e].takes_on);
+        if (events[e].command >= 0) {
+            force = command(events[e].command);
         }
         work += force * moved[e];
         lost += moved[e] == 0.0 ? 0.0 : b * moved[e] * moved[e] / time[e];

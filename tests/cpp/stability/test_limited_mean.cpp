@@ -31,7 +31,7 @@ NetworkParameters peak() {
 }
 
 NetworkParameters balanced(NetworkParameters network, double force_limit) {
-    network.bias += balancing_shift(ForceModel{network, wheel()}, force_limit);
+    network.bias += passive_shift(ForceModel{network, wheel()}, force_limit);
     return network;
 }
 
@@ -41,15 +41,16 @@ double given_in_a_turn(const ForceModel& model, double force_limit, double side 
     double given = 0.0;
     for (int k = 0; k < steps; ++k) {
         const double x = turn * (k + 0.5) / steps;
-        const double force = model.network() != nullptr ? model.network()->curve().at(x).value
-                                                        : model.hysteresis()->force().at(x).value +
-                                                              side * model.hysteresis()->loss().at(x).value;
+        const double force = model.network() != nullptr
+                                 ? model.network()->curve().at(x).value
+                                 : model.hysteresis()->force().at(x).value +
+                                       side * model.hysteresis()->hysteresis_force().at(x).value;
         given += std::clamp(force, -force_limit, force_limit) * turn / steps;
     }
     return given;
 }
 
-TEST(LimitedMean, ABalancedWheelWithAPeakAboveTheLimitIsAMotor) {
+TEST(LimitedMean, BalancedWheelWithAPeakAboveTheLimitIsActive) {
     const ForceModel model{balanced(peak(), no_limit), wheel()};
     EXPECT_GT(force_bounds(model).slope.upper, 0.0);
     EXPECT_EQ(force_bounds(model).mean_force, 0.0);
@@ -58,12 +59,12 @@ TEST(LimitedMean, ABalancedWheelWithAPeakAboveTheLimitIsAMotor) {
     EXPECT_NEAR(force_bounds(model, 0.0, 5.0).mean_force, given / turn, 1e-8);
 }
 
-TEST(LimitedMean, BalancingTheLimitedForceLeavesNoMotor) {
+TEST(LimitedMean, ShiftOfTheLimitedForceMakesItPassive) {
     for (const double limit : {0.5, 2.0, 5.0, 7.9, 20.0}) {
         const ForceModel model{balanced(peak(), limit), wheel()};
         EXPECT_EQ(force_bounds(model, 0.0, limit).mean_force, 0.0) << limit;
         EXPECT_NEAR(given_in_a_turn(model, limit), 0.0, 1e-7) << limit;
-        EXPECT_EQ(balancing_shift(model, limit), 0.0) << limit;
+        EXPECT_EQ(passive_shift(model, limit), 0.0) << limit;
     }
 }
 
@@ -86,25 +87,25 @@ TEST(LimitedMean, EnclosesTheMeanOfRandomWheels) {
     }
 }
 
-TEST(LimitedMean, ALossAboveTheMeanNeedsNoBalancing) {
+TEST(LimitedMean, HysteresisAboveTheMeanNeedsNoShift) {
     NetworkParameters force = balanced(peak(), 5.0);
     force.bias += 0.1;
-    LossParameters loss;
-    loss.weight.assign(3, 0.0);
-    loss.linear = {0.0};
-    loss.bias = 0.3;
-    const ForceModel lossy{force, loss, wheel(), 0.1};
-    EXPECT_EQ(force_bounds(lossy, 0.0, 5.0).mean_force, 0.0);
-    EXPECT_EQ(balancing_shift(lossy, 5.0), 0.0);
-    loss.bias = 0.02;
-    const ForceModel motor{force, loss, wheel(), 0.1};
-    const double pushes = force_bounds(motor, 0.0, 5.0).mean_force;
-    EXPECT_NEAR(pushes, given_in_a_turn(motor, 5.0, -1.0) / turn, 1e-8);
-    EXPECT_GT(pushes, 0.05);
-    force.bias += balancing_shift(motor, 5.0);
-    const ForceModel still{force, loss, wheel(), 0.1};
-    EXPECT_EQ(force_bounds(still, 0.0, 5.0).mean_force, 0.0);
-    EXPECT_NEAR(given_in_a_turn(still, 5.0, -1.0), 0.0, 1e-7);
+    HysteresisParameters hysteresis;
+    hysteresis.weight.assign(3, 0.0);
+    hysteresis.linear = {0.0};
+    hysteresis.bias = 0.3;
+    const ForceModel dissipative{force, hysteresis, wheel(), 0.1};
+    EXPECT_EQ(force_bounds(dissipative, 0.0, 5.0).mean_force, 0.0);
+    EXPECT_EQ(passive_shift(dissipative, 5.0), 0.0);
+    hysteresis.bias = 0.02;
+    const ForceModel active{force, hysteresis, wheel(), 0.1};
+    const double excess = force_bounds(active, 0.0, 5.0).mean_force;
+    EXPECT_NEAR(excess, given_in_a_turn(active, 5.0, -1.0) / turn, 1e-8);
+    EXPECT_GT(excess, 0.05);
+    force.bias += passive_shift(active, 5.0);
+    const ForceModel balanced_model{force, hysteresis, wheel(), 0.1};
+    EXPECT_EQ(force_bounds(balanced_model, 0.0, 5.0).mean_force, 0.0);
+    EXPECT_NEAR(given_in_a_turn(balanced_model, 5.0, -1.0), 0.0, 1e-7);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Command line as a whole: endings, exit codes, one clear sentence, recipients of the output."""
+"""Common behaviour of the command line: exit codes, one-sentence errors, help, output streams."""
 
 import json
 import os
@@ -29,32 +29,32 @@ def run(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("arguments", [[], ["identify"], ["verify"], ["simulate"], ["show"]])
-def test_without_arguments_there_is_help_and_exit_code_2(
+def test_missing_arguments_print_help_and_exit_with_code_2(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(arguments) == 2
-    shown = capsys.readouterr()
-    assert shown.err.startswith("Usage: palpate")
-    assert shown.out == ""
+    captured = capsys.readouterr()
+    assert captured.err.startswith("Usage: palpate")
+    assert captured.out == ""
 
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_help_ends_with_one_example(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([verb, "--help"]) == 0
-    last = capsys.readouterr().out.strip().split("\n\n")[-1]
-    assert " ".join(last.split()).startswith(f"Example: palpate {verb}")
+    last_paragraph = capsys.readouterr().out.strip().split("\n\n")[-1]
+    assert " ".join(last_paragraph.split()).startswith(f"Example: palpate {verb}")
 
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_help_fits_a_narrow_terminal(verb: str) -> None:
-    answer = run(verb, "--help", env={**os.environ, "COLUMNS": "40"})
-    assert answer.returncode == 0
-    wide = [line for line in answer.stdout.splitlines() if len(line) > 40]
+    completed = run(verb, "--help", env={**os.environ, "COLUMNS": "40"})
+    assert completed.returncode == 0
+    wide_lines = [line for line in completed.stdout.splitlines() if len(line) > 40]
     # Names of options and their values are not wrapped.
-    assert [line for line in wide if not line.lstrip().startswith("-")] == []
+    assert [line for line in wide_lines if not line.lstrip().startswith("-")] == []
 
 
-def test_every_option_with_a_number_has_its_default_or_says_what_happens_without() -> None:
+def test_every_option_has_a_help_text() -> None:
     context = click.Context(palpate)
     for verb in VERBS:
         command = palpate.get_command(context, verb)
@@ -64,14 +64,14 @@ def test_every_option_with_a_number_has_its_default_or_says_what_happens_without
                 assert option.help, f"{verb} {option.name} has no help"
 
 
-def test_the_help_of_the_program_imports_nothing_heavy() -> None:
+def test_program_help_imports_no_large_library() -> None:
     code = (
         "import sys; from palpate.cli.main import main; main(['--help']);"
         "heavy = {'numpy', 'scipy', 'pandas', 'matplotlib', 'pydantic'};"
         "print(sorted(heavy & set(sys.modules)), file=sys.stderr)"
     )
-    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert answer.stderr.strip() == "[]"
+    completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert completed.stderr.strip() == "[]"
 
 
 @pytest.mark.parametrize(
@@ -88,20 +88,20 @@ def test_the_help_of_the_program_imports_nothing_heavy() -> None:
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else "",
 )  # fmt: skip
-def test_every_failure_is_one_sentence_with_its_exit_code(
+def test_every_failure_has_one_sentence_and_an_exit_code(
     error: BaseException, code: int, sentence: str
 ) -> None:
-    ending = ending_of(error)
-    assert (ending.code, ending.sentence) == (code, sentence)
+    status = ending_of(error)
+    assert (status.code, status.sentence) == (code, sentence)
 
 
-def test_a_defect_is_told_with_its_place_and_without_a_traceback() -> None:
+def test_a_defect_is_reported_with_file_and_line_and_without_traceback() -> None:
     try:
         raise RuntimeError("two\nlines")
     except RuntimeError as error:
-        ending = ending_of(error)
-    assert ending.code == 1
-    assert "RuntimeError: two lines (test_cli.py, line" in ending.sentence
+        status = ending_of(error)
+    assert status.code == 1
+    assert "RuntimeError: two lines (test_cli.py, line" in status.sentence
 
 
 @pytest.mark.parametrize(
@@ -109,15 +109,15 @@ def test_a_defect_is_told_with_its_place_and_without_a_traceback() -> None:
     [["frobnicate"], ["show", "--frob", "m.json"], ["simulate", "m.json", "--structure", "nice"],
      ["show", "nothing.json"], ["simulate", "nothing.json", "--plot", "p.txt"]],
 )  # fmt: skip
-def test_bad_usage_is_one_line_on_standard_error(
+def test_bad_usage_is_reported_in_one_line_on_standard_error(
     arguments: list[str], capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert shown.err.startswith("error: ")
-    assert shown.err.count("\n") == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("error: ")
+    assert captured.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 
 
@@ -128,12 +128,12 @@ def test_with_json_a_failure_is_one_object_on_standard_output(capsys: pytest.Cap
     assert list(json.loads(capsys.readouterr().out)) == ["error"]
 
 
-def test_a_number_that_json_cannot_say_is_null(capsys: pytest.CaptureFixture[str]) -> None:
+def test_nan_and_infinity_are_null_in_json(capsys: pytest.CaptureFixture[str]) -> None:
     print_json({"r2": float("nan"), "path": [{"criterion": float("inf")}], "n": 3})
     assert json.loads(capsys.readouterr().out) == {"r2": None, "path": [{"criterion": None}], "n": 3}
 
 
-def a_missing_folder(base: Path) -> Path:
+def in_a_missing_folder(base: Path) -> Path:
     return base / "nowhere" / "m.json"
 
 
@@ -142,7 +142,7 @@ def below_a_file(base: Path) -> Path:
     return base / "file" / "m.json"
 
 
-def a_folder(base: Path) -> Path:
+def an_existing_folder(base: Path) -> Path:
     return base
 
 
@@ -150,7 +150,7 @@ def in_proc(base: Path) -> Path:
     return Path("/proc/m.json")
 
 
-@pytest.mark.parametrize("target", [a_missing_folder, below_a_file, a_folder, in_proc])
+@pytest.mark.parametrize("target", [in_a_missing_folder, below_a_file, an_existing_folder, in_proc])
 def test_an_output_that_cannot_be_written_is_refused(target: Callable[[Path], Path], tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written: "):
         require_writable(target(tmp_path))
@@ -159,9 +159,9 @@ def test_an_output_that_cannot_be_written_is_refused(target: Callable[[Path], Pa
 def test_an_input_is_never_overwritten(tmp_path: Path) -> None:
     recording = tmp_path / "a.csv"
     recording.write_text("x")
-    other_name = tmp_path / "link.csv"
-    other_name.symlink_to(recording)
-    for target in (recording, other_name):
+    symbolic_link = tmp_path / "link.csv"
+    symbolic_link.symlink_to(recording)
+    for target in (recording, symbolic_link):
         with pytest.raises(InputError, match="is an input as well"):
             require_writable(target, inputs=[recording])
 
@@ -172,19 +172,19 @@ def test_two_results_do_not_share_a_file(tmp_path: Path) -> None:
         require_writable(tmp_path / "a", tmp_path / "a")
 
 
-def test_checking_an_output_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_checking_an_output_creates_no_file(tmp_path: Path) -> None:
     require_writable(tmp_path / "m.json")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_ctrl_c_while_results_are_written_comes_too_late() -> None:
+def test_ctrl_c_is_ignored_while_results_are_written() -> None:
     with finishing():
         os.kill(os.getpid(), signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
         os.kill(os.getpid(), signal.SIGINT)
 
 
-def test_a_reader_who_leaves_is_no_traceback() -> None:
+def test_closed_stdout_exits_without_traceback() -> None:
     with subprocess.Popen(
         [sys.executable, "-m", "palpate", "identify", "--help"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -197,12 +197,12 @@ def test_a_reader_who_leaves_is_no_traceback() -> None:
 
 
 @pytest.mark.parametrize("arguments", [["--version"], ["simulate", "nothing.json", "--json"]])
-def test_a_full_disk_behind_standard_output_is_one_sentence(arguments: list[str]) -> None:
-    with open("/dev/full", "w") as full:
-        answer = subprocess.run(
+def test_a_full_disk_under_standard_output_is_reported_in_one_sentence(arguments: list[str]) -> None:
+    with open("/dev/full", "w") as full_device:
+        completed = subprocess.run(
             [sys.executable, "-m", "palpate", *arguments],
-            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+            stdout=full_device, stderr=subprocess.PIPE, text=True, check=False,
         )  # fmt: skip
-    assert answer.returncode != 0
-    assert answer.stderr.startswith("error: ")
-    assert answer.stderr.count("\n") == 1
+    assert completed.returncode != 0
+    assert completed.stderr.startswith("error: ")
+    assert completed.stderr.count("\n") == 1

@@ -32,25 +32,27 @@ JSON_FIELDS += [
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     model_by_hand().save("m.json")
     return tmp_path
 
 
-def test_what_was_rendered_is_written_and_measured(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_rendered_recording_is_written_and_its_errors_are_printed(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     arguments = ["simulate", "m.json", "--structure", "direct", "--duration-s", "0.5"]
     assert main([*arguments, "-o", "r.csv", "--plot", "r.png"]) == 0
-    shown = capsys.readouterr()
-    assert shown.err.startswith("read m.json: ")
-    assert "simulated" in shown.err
+    captured = capsys.readouterr()
+    assert captured.err.startswith("read m.json: ")
+    assert "simulated" in captured.err
     for name in ("end of tick", "mean of a tick", "below 50 Hz", "sampled"):
-        assert f"force error, {name}" in shown.out
+        assert f"force error, {name}" in captured.out
     assert len(read_recording("r.csv")) == 500
     assert Path("r.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_json_names_the_structure_and_its_errors(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_names_the_structure_and_its_errors(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", "m.json", "--structure", "implicit", "--json"]) in (0, 1)
     result = json.loads(capsys.readouterr().out)
     assert list(result) == JSON_FIELDS
@@ -59,27 +61,27 @@ def test_json_names_the_structure_and_its_errors(here: Path, capsys: pytest.Capt
     assert result["status"] == {"Ok": 4000}
 
 
-def test_the_numbers_of_the_scheme_are_options(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_settings_of_the_scheme_are_options(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     errors = []
     for stiffness in ("50", "500"):
         assert main(["simulate", "m.json", "--coupling-stiffness", stiffness, "--json"]) in (0, 1)
         errors.append(json.loads(capsys.readouterr().out)["force_error_end"])
-    assert errors[0] > 5 * errors[1], "a stiffer coupling loses less"
+    assert errors[0] > 5 * errors[1], "a stiffer coupling has a smaller force error"
 
 
 def test_predict_alone_renders_directly_with_less_force_error(
-    here: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     results = []
     for arguments in (["--structure", "direct"], ["--predict", "2"]):
         assert main(["simulate", "m.json", *arguments, "--json"]) == 0
         results.append(json.loads(capsys.readouterr().out))
-    plain, predicted = results
+    direct, predicted = results
     assert predicted["structure"] == "direct"
-    assert plain["force_error_mean"] > 3 * predicted["force_error_mean"]
-    assert plain["force_error_band"] > 4 * predicted["force_error_band"]
-    assert plain["force_error_work"] < 0.0
-    assert abs(predicted["force_error_work"]) < 0.1 * abs(plain["force_error_work"])
+    assert direct["force_error_mean"] > 3 * predicted["force_error_mean"]
+    assert direct["force_error_band"] > 4 * predicted["force_error_band"]
+    assert direct["force_error_work"] < 0.0
+    assert abs(predicted["force_error_work"]) < 0.1 * abs(direct["force_error_work"])
 
 
 @pytest.mark.parametrize(
@@ -98,34 +100,34 @@ def test_predict_alone_renders_directly_with_less_force_error(
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_bad_usage_is_one_sentence(
-    arguments: list[str], sentence: str, here: Path, capsys: pytest.CaptureFixture[str]
+def test_bad_usage_of_simulate_is_reported_in_one_sentence(
+    arguments: list[str], sentence: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["simulate", "m.json", *arguments]) == 2
-    shown = capsys.readouterr()
-    assert sentence in shown.err.splitlines()[-1]
-    assert shown.out == ""
-    assert [path.name for path in here.iterdir()] == ["m.json"]
+    captured = capsys.readouterr()
+    assert sentence in captured.err.splitlines()[-1]
+    assert captured.out == ""
+    assert [path.name for path in folder.iterdir()] == ["m.json"]
 
 
-def test_a_current_is_not_rendered(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_model_in_ampere_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model_by_hand(units={"position": "rad", "force": "A"}).save("a.json")
     assert main(["simulate", "a.json", "--json"]) == 2
     assert "--torque-constant-Nm-per-A" in json.loads(capsys.readouterr().out)["error"]
 
 
-def test_a_rendering_that_ran_away_is_a_failure_of_the_work(
-    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+def test_a_diverged_rendering_exits_with_code_1(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No known plan passes the checks and diverges; the verdict must not depend on that."""
 
-    def run_away(*arguments: Any) -> Recording:
+    def diverging_simulate(*arguments: Any) -> Recording:
         recording = simulate(*arguments)
         status = recording.columns["status"].copy()
         status[-7:] = "NonFinite"
         return replace(recording, columns={**recording.columns, "status": status})
 
-    monkeypatch.setattr("palpate.cli.simulate.render", run_away)
+    monkeypatch.setattr("palpate.cli.simulate.render", diverging_simulate)
     assert main(["simulate", "m.json", "-o", "r.csv"]) == 1
     verdict, reason, *_ = capsys.readouterr().out.splitlines()
     assert verdict == "verdict: no"
@@ -134,19 +136,19 @@ def test_a_rendering_that_ran_away_is_a_failure_of_the_work(
 
 
 def test_an_existing_recording_is_refused_and_replaced_with_force(
-    here: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("r.csv").write_text("precious", encoding="utf-8")
-    words = ["simulate", "m.json", "--structure", "direct", "--duration-s", "0.5", "-o", "r.csv"]
-    assert main(words) == 2
+    arguments = ["simulate", "m.json", "--structure", "direct", "--duration-s", "0.5", "-o", "r.csv"]
+    assert main(arguments) == 2
     assert "r.csv exists already; choose another name, or replace it with --force" in capsys.readouterr().err
     assert Path("r.csv").read_text(encoding="utf-8") == "precious"
-    assert main([*words, "--force"]) == 0
+    assert main([*arguments, "--force"]) == 0
     assert len(read_recording("r.csv")) == 500
 
 
 def test_the_verdict_follows_the_share_of_the_force_error(
-    here: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     levels = {}
     for stiffness in ("10", "100", "3000"):
@@ -179,54 +181,54 @@ def test_the_verdict_follows_the_share_of_the_force_error(
         ("1e-9", "duration_s is 1e-09, must be at least one period"),
     ],
 )
-def test_a_simulated_time_without_bound_is_refused_at_once(
-    duration: str, sentence: str, here: Path, capsys: pytest.CaptureFixture[str]
+def test_a_simulated_time_out_of_range_is_refused_before_the_work(
+    duration: str, sentence: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["simulate", "m.json", "--duration-s", duration]) == 2
     assert sentence in capsys.readouterr().err.splitlines()[-1]
 
 
-class _RangError(Exception):
+class _AlarmError(Exception):
     pass
 
 
-def _ring(_number: int, _frame: Any) -> None:
-    raise _RangError
+def _raise_alarm(_number: int, _frame: Any) -> None:
+    raise _AlarmError
 
 
-def test_a_signal_ends_a_long_simulation_within_a_fifth_of_a_second() -> None:
+def test_a_signal_ends_a_long_simulation_within_200_ms() -> None:
     """Takes the fastest of three attempts, because the test machine may be busy."""
     model = model_by_hand()
     scheme, device, hand = Scheme(), DeviceProfile(), Hand()
-    late = []
-    before = signal.signal(signal.SIGALRM, _ring)
+    delays_s = []
+    previous_handler = signal.signal(signal.SIGALRM, _raise_alarm)
     try:
         for _ in range(3):
-            due = time.monotonic() + 0.3
+            due_s = time.monotonic() + 0.3
             signal.setitimer(signal.ITIMER_REAL, 0.3)
-            with pytest.raises(_RangError):
+            with pytest.raises(_AlarmError):
                 _core.simulation.simulate(model, scheme, device, hand, 3600.0)
-            late.append(time.monotonic() - due)
+            delays_s.append(time.monotonic() - due_s)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
-    assert min(late) < 0.2, late
+        signal.signal(signal.SIGALRM, previous_handler)
+    assert min(delays_s) < 0.2, delays_s
 
 
-@pytest.mark.parametrize("view", ["motion_driven", "force_driven"])
-def test_a_signal_ends_a_long_closed_loop(view: str) -> None:
+@pytest.mark.parametrize("simulation_name", ["motion_driven", "force_driven"])
+def test_a_signal_ends_a_long_closed_loop(simulation_name: str) -> None:
     model, scheme = model_by_hand(), Scheme(structure="implicit")
-    before = signal.signal(signal.SIGALRM, _ring)
+    previous_handler = signal.signal(signal.SIGALRM, _raise_alarm)
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.2)
-        with pytest.raises(_RangError):
-            getattr(_core.simulation, view)(model, scheme, np.zeros(20_000_000), 1e-3)
+        with pytest.raises(_AlarmError):
+            getattr(_core.simulation, simulation_name)(model, scheme, np.zeros(20_000_000), 1e-3)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGALRM, previous_handler)
 
 
-def test_progress_is_called_and_other_threads_go_on() -> None:
+def test_progress_is_called_during_the_simulation() -> None:
     ticks: list[int] = []
     _core.simulation.simulate(
         model_by_hand(),
@@ -242,7 +244,7 @@ def test_progress_is_called_and_other_threads_go_on() -> None:
 
 
 @pytest.mark.parametrize("substeps", [0, -1, 1001, 2**31 - 1])
-def test_substeps_have_a_bound(substeps: int) -> None:
+def test_substeps_outside_their_bounds_are_refused(substeps: int) -> None:
     with pytest.raises(ValueError, match=rf"substeps is {substeps}, must be 1 to 1000"):
         _core.simulation.simulate(
             model_by_hand(),
@@ -255,7 +257,7 @@ def test_substeps_have_a_bound(substeps: int) -> None:
 
 
 def test_a_model_with_hysteresis_is_rendered_with_a_play_radius(
-    here: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     keyswitch_by_hand().save("k.json")
     assert main(["simulate", "k.json", "--structure", "direct", "--json", "--plot", "k.png"]) == 0
@@ -263,7 +265,7 @@ def test_a_model_with_hysteresis_is_rendered_with_a_play_radius(
 
 
 @pytest.fixture(scope="module")
-def demonstrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
+def demo_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
     """Runs the demo once; returns its folder, standard output and standard error."""
     from click.testing import CliRunner
 
@@ -273,53 +275,55 @@ def demonstrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, s
     return folder, result.stdout, result.stderr
 
 
-def test_the_demo_names_every_file_it_writes(demonstrated: tuple[Path, str, str]) -> None:
-    folder, out, _ = demonstrated
+def test_the_demo_names_every_file_it_writes(demo_run: tuple[Path, str, str]) -> None:
+    folder, output, _ = demo_run
     written = {str(path) for path in folder.iterdir()}
-    named = {line.partition(": ")[0] for line in out.splitlines() if line.startswith(str(folder))}
+    named = {line.partition(": ")[0] for line in output.splitlines() if line.startswith(str(folder))}
     assert named == written
     assert len([path for path in written if path.endswith(".png")]) == 3
 
 
-def test_the_demo_calls_everything_simulated(demonstrated: tuple[Path, str, str]) -> None:
-    folder, _, err = demonstrated
-    assert err.splitlines()[0].startswith("everything in this demo is simulated")
+def test_the_demo_labels_all_its_data_as_simulated(demo_run: tuple[Path, str, str]) -> None:
+    folder, _, messages = demo_run
+    assert messages.splitlines()[0].startswith("everything in this demo is simulated")
     for name in ("sample-1.csv", "sample-2.csv"):
         assert any(
             "simulated" in f"{key} {value}" for key, value in read_recording(folder / name).metadata.items()
         )
 
 
-def test_the_demo_renders_every_structure(demonstrated: tuple[Path, str, str]) -> None:
-    _, out, _ = demonstrated
+def test_the_demo_renders_every_structure(demo_run: tuple[Path, str, str]) -> None:
+    _, output, _ = demo_run
     rows = re.findall(
-        r"^((?:direct|massless|implicit|explicit).*?)\s{2,}([\d.e-]+)((?:\s+[\d.e-]+){3})$", out, re.MULTILINE
+        r"^((?:direct|massless|implicit|explicit).*?)\s{2,}([\d.e-]+)((?:\s+[\d.e-]+){3})$",
+        output,
+        re.MULTILINE,
     )
     assert [name for name, _, _ in rows] == [
         "direct, predict 4", "direct", "massless, compensated", "massless",
         "implicit, m = 0.001, B_o = 0", "implicit, m = 0.001, B_o = 0.5", "explicit, m = 0.001, B_o = 0.5",
     ]  # fmt: skip
-    felt = [float(mean) for _, mean, _ in rows]
-    assert 2.0 * felt[0] < felt[1] < felt[3] < felt[5]
-    assert felt[2] == pytest.approx(felt[1], rel=0.1)
+    mean_errors = [float(mean) for _, mean, _ in rows]
+    assert 2.0 * mean_errors[0] < mean_errors[1] < mean_errors[3] < mean_errors[5]
+    assert mean_errors[2] == pytest.approx(mean_errors[1], rel=0.1)
 
 
-def test_the_demo_s_model_explains_the_fresh_recording_to_its_noise(
-    demonstrated: tuple[Path, str, str],
+def test_the_error_of_the_demo_model_on_the_fresh_recording_is_the_noise(
+    demo_run: tuple[Path, str, str],
 ) -> None:
     from palpate import verify
 
-    folder, out, _ = demonstrated
+    folder, output, _ = demo_run
     model = load_model(folder / "model.json")
     verification = verify(model, read_recording(folder / "sample-2.csv"))
     assert verification.fresh
     assert model.n_wavelets <= 10
     assert verification.rmse < 1.1 * 0.02, "noise of the sample: 0.02 N*m"
-    assert re.search(rf"^wavelets +{model.n_wavelets}$", out, re.MULTILINE)
+    assert re.search(rf"^wavelets +{model.n_wavelets}$", output, re.MULTILINE)
 
 
-def test_the_demo_refuses_a_folder_that_cannot_be_before_it_works(
-    here: Path, capsys: pytest.CaptureFixture[str]
+def test_the_demo_refuses_a_folder_that_cannot_be_created_before_the_work(
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for target in ("nowhere/demo", "m.json", "m.json/demo", "/proc/demo", "/proc"):
         assert main(["demo", "-o", target]) == 2

@@ -21,7 +21,7 @@ UNITS = {"position": "rad", "force": "N*m"}
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Returns a folder with a model and a recording that it explains except for noise."""
     monkeypatch.chdir(tmp_path)
     model = model_by_hand()
@@ -34,24 +34,24 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_numbers_go_to_standard_output_and_talk_to_standard_error(
-    here: Path, capsys: pytest.CaptureFixture[str]
+def test_numbers_go_to_standard_output_and_progress_to_standard_error(
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["verify", "m.json", "a.csv"]) == 0
-    shown = capsys.readouterr()
-    assert shown.err.startswith("read a.csv: 2000 rows; position is position_rad")
-    assert [line.split()[0] for line in shown.out.splitlines()][:5] == [
+    captured = capsys.readouterr()
+    assert captured.err.startswith("read a.csv: 2000 rows; position is position_rad")
+    assert [line.split()[0] for line in captured.out.splitlines()][:5] == [
         "verdict:",
-        "nrmse",
-        "rmse",
-        "r2",
-        "worst",
+        "error",
+        "largest",
+        "not",
+        "rows",
     ]
-    assert "fresh" in shown.out
+    assert "fresh" in captured.out
 
 
 def test_json_is_one_object_with_the_fields_of_the_contract(
-    here: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["verify", "m.json", "a.csv", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
@@ -63,8 +63,8 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
     assert result["units"] == UNITS
 
 
-def test_a_verdict_of_no_ends_with_exit_code_1_and_names_the_cure(
-    here: Path, capsys: pytest.CaptureFixture[str]
+def test_a_verdict_of_no_exits_with_code_1_and_names_the_cure(
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["verify", "m.json", "a.csv", "--negate", "force"]) == 1
     assert capsys.readouterr().out.startswith("verdict: no\n")
@@ -74,7 +74,7 @@ def test_a_verdict_of_no_ends_with_exit_code_1_and_names_the_cure(
     assert "give --negate force" in verdict
 
 
-def test_both_figures_are_drawn(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_both_figures_are_drawn(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["verify", "m.json", "a.csv", "--plot", "a.png", "--plot-closed-loop", "b.pdf"]
     assert main(arguments) == 0
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
@@ -84,19 +84,19 @@ def test_both_figures_are_drawn(here: Path, capsys: pytest.CaptureFixture[str]) 
 
 @pytest.mark.parametrize(("metadata", "name"), [({"simulated": "yes"}, "simulated data"), ({}, "measured")])
 def test_a_simulated_recording_is_never_called_measured(
-    metadata: dict[str, str], name: str, here: Path, monkeypatch: pytest.MonkeyPatch
+    metadata: dict[str, str], name: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = replace(read_recording("a.csv"), metadata=metadata)
     model = load_model("m.json")
     legends: list[str] = []
     savefig = Figure.savefig
 
-    def looked_at(figure: Figure, *arguments: Any, **options: Any) -> None:
-        shown = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
-        legends.extend(text.get_text() for legend in shown if legend for text in legend.get_texts())
+    def record_legends(figure: Figure, *arguments: Any, **options: Any) -> None:
+        captured = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
+        legends.extend(text.get_text() for legend in captured if legend for text in legend.get_texts())
         savefig(figure, *arguments, **options)
 
-    monkeypatch.setattr(Figure, "savefig", looked_at)
+    monkeypatch.setattr(Figure, "savefig", record_legends)
     picture_verification(Path("a.png"), model, [(recording, verify(model, recording))])
     assert legends == [name, "model"]
     legends.clear()
@@ -104,43 +104,45 @@ def test_a_simulated_recording_is_never_called_measured(
     assert set(legends) == {"recorded (simulated)" if metadata else "recorded", "rendered"}
 
 
-def test_a_recording_with_strokes_is_drawn(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    switch = keyswitch_by_hand()
-    switch.save("k.json")
+def test_a_recording_with_strokes_is_drawn(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    keyswitch = keyswitch_by_hand()
+    keyswitch.save("k.json")
     direction = np.repeat([1, 0, -1], 100)
     position = np.concatenate([np.linspace(0, 0.004, 100), np.full(100, 0.004), np.linspace(0.004, 0, 100)])
-    force = switch.force(position, direction=direction.astype(float))
+    force = keyswitch.force(position, direction=direction.astype(float))
     units = {"position": "m", "force": "N"}
     Recording.from_arrays(position, force, direction=direction, units=units).write("k.csv")
     assert main(["verify", "k.json", "k.csv", "--plot", "k.png", "--plot-closed-loop", "l.png"]) == 0
-    shown = capsys.readouterr()
-    assert "assumed" in shown.err, "a stroke speed that nobody measured is called assumed"
+    captured = capsys.readouterr()
+    assert "assumed" in captured.out, "a stroke speed without a measurement is called assumed"
     assert Path("k.png").exists()
     assert Path("l.png").exists()
 
 
-def test_the_files_may_not_be_written_over(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_figures_with_one_name_are_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["verify", "m.json", "a.csv", "--plot", "a.png", "--plot-closed-loop", "a.png"]
     assert main(arguments) == 2
     assert "two results" in capsys.readouterr().err
 
 
-def test_units_that_do_not_fit_are_one_sentence(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_units_that_do_not_match_are_reported_in_one_sentence(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     keyswitch_by_hand().save("k.json")
     assert main(["verify", "k.json", "a.csv", "--json"]) == 2
     assert "the model's position is in m" in json.loads(capsys.readouterr().out)["error"]
 
 
-def changed(content: dict[str, Any], path: str, value: Any) -> str:
+def with_changed_field(content: dict[str, Any], path: str, value: Any) -> str:
     """Returns a model file with one field changed; `value` None removes it."""
-    *parents, last = path.split(".")
-    place = content
+    *parents, last_name = path.split(".")
+    parent = content
     for name in parents:
-        place = place[name]
+        parent = parent[name]
     if value is None:
-        del place[last]
+        del parent[last_name]
     else:
-        place[last] = value
+        parent[last_name] = value
     return json.dumps(content)
 
 
@@ -156,22 +158,22 @@ BAD_FIELDS = {
 
 @pytest.mark.parametrize("verb", ["show bad.json", "simulate bad.json", "verify bad.json a.csv"])
 @pytest.mark.parametrize("case", BAD_FIELDS)
-def test_a_bad_model_is_one_sentence_that_names_the_field(
-    case: str, verb: str, here: Path, capsys: pytest.CaptureFixture[str]
+def test_a_bad_model_is_reported_in_one_sentence_that_names_the_field(
+    case: str, verb: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, value, expected = BAD_FIELDS[case]
-    Path("bad.json").write_text(changed(json.loads(Path("m.json").read_text()), path, value))
+    Path("bad.json").write_text(with_changed_field(json.loads(Path("m.json").read_text()), path, value))
     assert main(verb.split()) == 2
-    shown = capsys.readouterr()
-    sentence = shown.err.splitlines()[-1]
+    captured = capsys.readouterr()
+    sentence = captured.err.splitlines()[-1]
     assert sentence.startswith("error: bad.json")
     assert expected in sentence
-    assert shown.out == ""
+    assert captured.out == ""
 
 
 @pytest.mark.parametrize("content", ["", "not json", "[1, 2", "NaN", '{"format": NaN}'])
-def test_a_model_that_is_no_json_is_one_sentence(
-    content: str, here: Path, capsys: pytest.CaptureFixture[str]
+def test_a_model_file_without_valid_json_is_reported_in_one_sentence(
+    content: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("bad.json").write_text(content)
     assert main(["show", "bad.json"]) == 2
@@ -180,6 +182,6 @@ def test_a_model_that_is_no_json_is_one_sentence(
     assert error.count("\n") == 1
 
 
-def test_show_prints_the_model_for_a_person(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_show_prints_the_text_form_of_the_model(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", "m.json"]) == 0
     assert capsys.readouterr().out == f"{model_by_hand()}\n"

@@ -35,13 +35,13 @@ UNWRITABLE = {
 
 
 @pytest.fixture
-def here(tmp_path: Path) -> Path:
+def folder(tmp_path: Path) -> Path:
     spring(tmp_path / "a.csv")
     model_by_hand().save(tmp_path / "m.json")
     return tmp_path
 
 
-def run(command: str, here: Path, redirection: str = "") -> subprocess.CompletedProcess[str]:
+def run(command: str, folder: Path, redirection: str = "") -> subprocess.CompletedProcess[str]:
     program = f"'{sys.executable}' -m palpate {command}"
     if redirection.startswith("|"):  # the reader has ended before the first word
         program = f"(sleep 0.2; {program}; echo $? > code) {redirection}; sleep 0.2; wait"
@@ -49,11 +49,11 @@ def run(command: str, here: Path, redirection: str = "") -> subprocess.Completed
     else:
         script = f"{program} {redirection}"
     return subprocess.run(
-        ["sh", "-c", script], cwd=here, capture_output=True, text=True, check=False, timeout=120
+        ["sh", "-c", script], cwd=folder, capture_output=True, text=True, check=False, timeout=120
     )
 
 
-def test_the_table_holds_every_verb() -> None:
+def test_the_table_contains_every_verb() -> None:
     assert sorted(VERBS) == sorted(group.list_commands(None))  # type: ignore[arg-type]
 
 
@@ -63,23 +63,23 @@ def test_the_table_holds_every_verb() -> None:
     ids=[*UNWRITABLE, "disk full, json"],
 )
 @pytest.mark.parametrize("verb", VERBS)
-def test_output_that_cannot_be_written_ends_with_exit_code_1_and_no_traceback(
-    verb: str, streams: str, options: str, here: Path
+def test_unwritable_output_exits_with_code_1_without_traceback(
+    verb: str, streams: str, options: str, folder: Path
 ) -> None:
-    answer = run(VERBS[verb] + options, here, UNWRITABLE[streams])
-    assert answer.returncode == 1, answer.stderr
+    completed = run(VERBS[verb] + options, folder, UNWRITABLE[streams])
+    assert completed.returncode == 1, completed.stderr
     for word in ("Traceback", "Exception", "defect"):
-        assert word not in answer.stderr
+        assert word not in completed.stderr
     if streams in ("stdout closed", "disk full"):
-        assert answer.stderr.splitlines()[-1].startswith("error: standard output cannot be written: ")
-    if (here / "out.json").exists():
-        load_model(here / "out.json")
-    assert not list(here.glob(".*"))
+        assert completed.stderr.splitlines()[-1].startswith("error: standard output cannot be written: ")
+    if (folder / "out.json").exists():
+        load_model(folder / "out.json")
+    assert not list(folder.glob(".*"))
 
 
 @pytest.mark.parametrize("redirection", ["2>&-", "2>/dev/full"])
-def test_talk_that_cannot_be_written_changes_no_result(redirection: str, here: Path) -> None:
-    answer = run(VERBS["identify"], here, redirection)
-    assert answer.returncode == 0
-    assert answer.stdout.startswith("verdict: good\n")
-    load_model(here / "out.json")
+def test_unwritable_messages_change_no_result(redirection: str, folder: Path) -> None:
+    completed = run(VERBS["identify"], folder, redirection)
+    assert completed.returncode == 0
+    assert completed.stdout.startswith("verdict: good\n")
+    load_model(folder / "out.json")

@@ -14,7 +14,7 @@ from test_every_verb import VERBS
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     spring(tmp_path / "a.csv")
     model_by_hand().save("m.json")
@@ -23,29 +23,29 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("verb", sorted(VERBS))
 def test_the_verdict_is_the_first_line_and_sets_the_exit_code(
-    verb: str, here: Path, capsys: pytest.CaptureFixture[str]
+    verb: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code = main(VERBS[verb].split())
-    shown = capsys.readouterr()
-    word, _, level = shown.out.split("\n")[0].partition(": ")
-    assert word == "verdict", shown.err
+    captured = capsys.readouterr()
+    word, _, level = captured.out.split("\n")[0].partition(": ")
+    assert word == "verdict", captured.err
     assert level in LEVELS
     assert code == (1 if level == "no" else 0)
 
 
 @pytest.mark.parametrize("verb", sorted(VERBS))
 def test_the_verdict_is_a_field_of_the_json_object_and_sets_the_exit_code(
-    verb: str, here: Path, capsys: pytest.CaptureFixture[str]
+    verb: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code = main([*VERBS[verb].split(), "--json"])
-    shown = capsys.readouterr()
-    level = json.loads(shown.out)["verdict"].partition(":")[0]
+    captured = capsys.readouterr()
+    level = json.loads(captured.out)["verdict"].partition(":")[0]
     assert level in LEVELS
     assert code == (1 if level == "no" else 0)
 
 
-def test_show_ends_with_exit_code_1_if_the_identification_was_judged_no(
-    here: Path, capsys: pytest.CaptureFixture[str]
+def test_show_exits_with_code_1_if_the_verdict_of_the_identification_is_no(
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = model_by_hand()
     model.notes["verdict"] = Verdict((no("the model explains 20% of the force"),)).record()
@@ -57,25 +57,25 @@ def test_show_ends_with_exit_code_1_if_the_identification_was_judged_no(
 
 
 def test_show_prints_one_json_object_with_the_fields_of_the_model(
-    here: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = model_by_hand()
     assert main(["plan", "m.json", "--device", "bench-knob", "-o", "planned.json"]) == 0
     capsys.readouterr()
     assert main(["show", "planned.json", "--json"]) == 0
-    shown = json.loads(capsys.readouterr().out)
-    assert shown["verdict"] == "good"
-    assert shown["units"] == {"position": "rad", "force": "N*m"}
-    assert shown["domain"] == {"lower": [0.0], "upper": [0.5]}
-    assert shown["fit"]["nrmse"] == model.fit.nrmse
-    assert shown["fit"]["n_wavelets"] == len(shown["network"]["weight"]) == model.n_wavelets
-    assert shown["plan"]["device"] == "bench-knob"
+    captured = json.loads(capsys.readouterr().out)
+    assert captured["verdict"] == "good"
+    assert captured["units"] == {"position": "rad", "force": "N*m"}
+    assert captured["domain"] == {"lower": [0.0], "upper": [0.5]}
+    assert captured["fit"]["nrmse"] == model.fit.nrmse
+    assert captured["fit"]["n_wavelets"] == len(captured["network"]["weight"]) == model.n_wavelets
+    assert captured["plan"]["device"] == "bench-knob"
     assert main(["show", "m.json", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["plan"] is None
 
 
-def test_two_models_that_a_hand_tells_apart_are_reported(
-    here: Path, capsys: pytest.CaptureFixture[str]
+def test_a_difference_that_a_hand_notices_is_reported(
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["show", "m.json", "--beside", "m.json"]) == 0
     assert capsys.readouterr().out.startswith("verdict: good\n")
@@ -97,7 +97,7 @@ def test_two_models_that_a_hand_tells_apart_are_reported(
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )
 def test_a_file_in_the_wrong_role_is_named_with_the_cure(
-    arguments: list[str], cure: str, here: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], cure: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(arguments) == 2
     error = capsys.readouterr().err

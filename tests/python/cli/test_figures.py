@@ -18,16 +18,16 @@ def test_the_title_of_a_figure_names_source_and_error(
     titles: list[str] = []
     savefig = Figure.savefig
 
-    def looked_at(figure: Figure, *arguments: Any, **options: Any) -> None:
+    def record_title(figure: Figure, *arguments: Any, **options: Any) -> None:
         titles.append(figure.get_suptitle())
         savefig(figure, *arguments, **options)
 
-    monkeypatch.setattr(Figure, "savefig", looked_at)
+    monkeypatch.setattr(Figure, "savefig", record_title)
     position = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(1.0, 0.0, 50)])
     force = 2.0 * position + np.repeat([0.1, -0.1], 50)
     units = {"position": "rad", "force": "N*m"}
-    made = Recording.from_arrays(position, force, direction=np.repeat([1, -1], 50), units=units)
-    source = made.write(tmp_path / "press.csv")
+    written = Recording.from_arrays(position, force, direction=np.repeat([1, -1], 50), units=units)
+    source = written.write(tmp_path / "press.csv")
     recording = read_recording(source)
     model = identify(recording)
     verification = verify(model, recording)

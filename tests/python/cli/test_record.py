@@ -14,7 +14,7 @@ import pytest
 
 import palpate
 from conftest import ROOT
-from control_program import PATIENT, PROGRAM, every_row, needs_program
+from control_program import ANY_RATE, PROGRAM, every_row, needs_program
 from palpate import InputError, Model, identify, load_model, read_recording
 from palpate.cli.live import LiveLine
 from palpate.cli.main import main
@@ -24,34 +24,35 @@ from usb_emulation import emulated, frames, needs_emulation
 OBJECT = ROOT / "tests" / "models" / "good" / "position.json"
 STIFFNESS = 3.0
 SPRING = ["--lock-step", "--spring", str(STIFFNESS)]
-MOST_BEHIND = 5  # packets between device and host in lock-step
+MOST_PACKETS_IN_FLIGHT = 5  # packets between device and host in lock-step
 
 
-def recorded(out: Path, *words: Any, device: list[str]) -> subprocess.CompletedProcess[str]:
+def run_record(out: Path, *arguments: Any, device: list[str]) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "palpate", "record", out, "--device", "usb", "--duration-s", 3]
-    return emulated(*command, "--wait-ms", 2000, *words, device=device)
+    return emulated(*command, "--wait-ms", 2000, *arguments, device=device)
 
 
 def stiffness(model: Model) -> float:
     """Returns the stiffness over the inner four fifths of the range; the mean of both strokes."""
     lower, upper = model.lower[0], model.upper[0]
-    ends = np.array([0.9 * lower + 0.1 * upper, 0.1 * lower + 0.9 * upper])
-    near, far = np.mean([model.force(ends, direction=way) for way in (1, -1)], axis=0)
-    return float(far - near) / float(np.ptp(ends))
+    positions = np.array([0.9 * lower + 0.1 * upper, 0.1 * lower + 0.9 * upper])
+    lower_force, upper_force = np.mean([model.force(positions, direction=sign) for sign in (1, -1)], axis=0)
+    return float(upper_force - lower_force) / float(np.ptp(positions))
 
 
 @needs_emulation
 @needs_program
-def test_a_spring_is_identified_with_its_own_stiffness_and_rendered_back_pushes_the_right_way(
+def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_and_sign(
     tmp_path: Path,
 ) -> None:
-    felt, again, model_file, trace = (tmp_path / name for name in ("a.csv", "b.csv", "m.json", "t.csv"))
-    answer = recorded(felt, "--json", device=[*SPRING, "--trace", str(trace)])
-    assert answer.returncode == 0, answer.stderr
-    summary = json.loads(answer.stdout)
+    names = ("a.csv", "b.csv", "m.json", "t.csv")
+    recording_file, rendered_file, model_file, trace = (tmp_path / name for name in names)
+    completed = run_record(recording_file, "--json", device=[*SPRING, "--trace", str(trace)])
+    assert completed.returncode == 0, completed.stderr
+    summary = json.loads(completed.stdout)
     assert summary["recorded"] == summary["ticks"] == 3000
     assert not any(frame.enabled for frame in frames(trace))  # moved by a hand, without force
-    recording = read_recording(felt)
+    recording = read_recording(recording_file)
     assert recording.metadata["force"].endswith("from the device's force transducer")
     model = identify(recording)
     assert stiffness(model) == pytest.approx(STIFFNESS, rel=0.002)
@@ -65,30 +66,30 @@ def test_a_spring_is_identified_with_its_own_stiffness_and_rendered_back_pushes_
         "--structure",
         "direct",
         "--uncertified",
-        *PATIENT,
+        *ANY_RATE,
         "--wait-ms",
         2000,
     ]
-    answer = emulated(
-        *device, "--duration-s", 3, "--record", again, device=["--lock-step", "--trace", str(trace)]
+    completed = emulated(
+        *device, "--duration-s", 3, "--record", rendered_file, device=["--lock-step", "--trace", str(trace)]
     )
-    assert answer.returncode == 0, answer.stderr
+    assert completed.returncode == 0, completed.stderr
     # After the ramp the device receives a torque towards smaller positions, proportional to the position.
-    felt = frames(trace)
-    acting = [index for index, frame in enumerate(felt) if frame.torque != 0.0]
-    pressed = [frame for frame in felt[acting[0] + 300 : acting[-1]] if frame.position > 0.1]
+    sent_frames = frames(trace)
+    active = [index for index, frame in enumerate(sent_frames) if frame.torque != 0.0]
+    pressed = [frame for frame in sent_frames[active[0] + 300 : active[-1]] if frame.position > 0.1]
     assert len(pressed) > 500
     assert all(-4.0 < frame.torque / frame.position < -2.0 for frame in pressed)
-    assert stiffness(identify(read_recording(again))) == pytest.approx(STIFFNESS, rel=0.02)
+    assert stiffness(identify(read_recording(rendered_file))) == pytest.approx(STIFFNESS, rel=0.02)
 
 
 @needs_emulation
-def test_a_probe_finds_the_stiffness_of_a_spring_that_nobody_touches(tmp_path: Path) -> None:
+def test_a_probe_measures_the_stiffness_of_a_spring_without_a_hand(tmp_path: Path) -> None:
     out, trace = tmp_path / "a.csv", tmp_path / "t.csv"
     probe = ["--probe", "--upper", 0.3, "--force-limit", 1.2, "--speed", 0.3, "--lowest-rate-share", 0]
-    nobody = [*SPRING, "--no-hand", "--no-transducer", "--trace", str(trace)]
-    answer = recorded(out, *probe, device=nobody)
-    assert answer.returncode == 0, answer.stderr
+    device_without_hand = [*SPRING, "--no-hand", "--no-transducer", "--trace", str(trace)]
+    completed = run_record(out, *probe, device=device_without_hand)
+    assert completed.returncode == 0, completed.stderr
     recording = read_recording(out)
     assert "including the device's friction" in recording.metadata["force"]
     assert np.ptp(recording.position) == pytest.approx(0.3, rel=0.1)
@@ -102,51 +103,53 @@ def test_a_probe_finds_the_stiffness_of_a_spring_that_nobody_touches(tmp_path: P
 
 
 @needs_emulation
-@pytest.mark.parametrize("words", [[], ["--force-limit", 0.05]], ids=["default", "the device's own"])
-def test_a_probe_may_use_the_whole_force_of_a_weak_device(words: list[Any], tmp_path: Path) -> None:
+@pytest.mark.parametrize("arguments", [[], ["--force-limit", 0.05]], ids=["default", "the device's own"])
+def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], tmp_path: Path) -> None:
     """50000 uNm are 0.05 N*m, although 1e-6 * 50000 is slightly less; the usual limit is above that."""
     trace, out = tmp_path / "trace.csv", tmp_path / "a.csv"
-    probe = ["--probe", "--upper", 0.1, "--stiffness", 1, "--lowest-rate-share", 0, *words]
-    weak = ["--lock-step", "--no-hand", "--spring", 0.3, "--max-torque-uNm", 50000, "--trace", trace]
-    answer = recorded(out, *probe, device=weak)
-    assert answer.returncode == 0, answer.stderr
+    probe = ["--probe", "--upper", 0.1, "--stiffness", 1, "--lowest-rate-share", 0, *arguments]
+    weak_device = ["--lock-step", "--no-hand", "--spring", 0.3, "--max-torque-uNm", 50000, "--trace", trace]
+    completed = run_record(out, *probe, device=weak_device)
+    assert completed.returncode == 0, completed.stderr
     assert 0.02 < max(abs(frame.torque) for frame in frames(trace)) <= 0.05
     assert len(read_recording(out)) > 1000
 
 
 @needs_emulation
 @pytest.mark.parametrize(
-    ("words", "device", "reason"),
+    ("arguments", "device", "reason"),
     [
         ([], ["--no-transducer"], "EMU-1 has no force transducer"),
         (["--probe"], [], "a probe on a real device needs upper"),
         (["--probe", "--upper", 0.3, "--force-limit", 6], [], "force_limit is 6, the device makes 5"),
-        (["--object", OBJECT], [], "an object is mounted on the simulated device only; usb has its own"),
-        ([], ["--no-device"], "no USB device 1209:0001 of this protocol is plugged in"),
+        (["--object", OBJECT], [], "an object needs device simulated; usb has a real one"),
+        ([], ["--no-device"], "no USB device 1209:0001 with this protocol is connected"),
     ],
 )
-def test_what_cannot_be_recorded_is_refused_before_anything_moves(
-    words: list[Any], device: list[str], reason: str, tmp_path: Path
+def test_an_impossible_recording_is_refused_before_the_device_moves(
+    arguments: list[Any], device: list[str], reason: str, tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace.csv"
-    answer = recorded(tmp_path / "a.csv", *words, device=["--lock-step", *device, "--trace", str(trace)])
-    assert answer.returncode == 2, answer.stderr
-    assert reason in answer.stderr
+    completed = run_record(
+        tmp_path / "a.csv", *arguments, device=["--lock-step", *device, "--trace", str(trace)]
+    )
+    assert completed.returncode == 2, completed.stderr
+    assert reason in completed.stderr
     assert not list(tmp_path.glob("a.csv*"))
     assert all(frame.torque == 0.0 for frame in frames(trace))
 
 
 @needs_emulation
-def test_a_device_that_is_unplugged_leaves_what_was_recorded(tmp_path: Path) -> None:
+def test_rows_recorded_before_an_unplug_are_kept(tmp_path: Path) -> None:
     out, trace = tmp_path / "a.csv", tmp_path / "t.csv"
-    unplugged = [*SPRING, "--fault", "unplug@4000", "--trace", str(trace)]
+    unplugged_device = [*SPRING, "--fault", "unplug@4000", "--trace", str(trace)]
     for _ in range(3):
-        answer = recorded(out, "--force", "--json", "--duration-s", "inf", device=unplugged)
-        if "uevent_sender" not in answer.stderr:
+        completed = run_record(out, "--force", "--json", "--duration-s", "inf", device=unplugged_device)
+        if "uevent_sender" not in completed.stderr:
             break  # umockdev aborts if the program closes its socket while the removal is announced
-    assert answer.returncode == 1
-    assert "a fault of the device" in answer.stderr
-    summary = json.loads(answer.stdout)
+    assert completed.returncode == 1
+    assert "a fault of the device" in completed.stderr
+    summary = json.loads(completed.stdout)
     rows = every_row(out)
     assert len(rows) == summary["recorded"] == summary["ticks"]
     assert summary["lost_records"] == 0
@@ -157,12 +160,12 @@ def test_a_device_that_is_unplugged_leaves_what_was_recorded(tmp_path: Path) -> 
     assert lost.sum() == summary["lost_samples"]
     last = frames(trace)[-1]
     assert last.unplugged
-    assert (last.sequence - samples[-1]) % 0x10000 <= MOST_BEHIND
+    assert (last.sequence - samples[-1]) % 0x10000 <= MOST_PACKETS_IN_FLIGHT
     assert list(rows["status"])[-1] == "Fault"
     assert len(read_recording(out)) > 100
 
 
-def test_a_simulated_object_is_recorded_and_found_again(tmp_path: Path) -> None:
+def test_verify_confirms_a_recording_of_the_simulated_object(tmp_path: Path) -> None:
     knob = load_model(OBJECT)
     ticks: list[int] = []
     summary = record(
@@ -179,7 +182,7 @@ def test_a_simulated_object_is_recorded_and_found_again(tmp_path: Path) -> None:
     assert len(ticks) > 5
     recording = read_recording(tmp_path / "a.csv")
     assert recording.metadata["simulated"].startswith("yes")
-    assert recording.metadata["moved_by"].startswith("the device itself: a sweep from ")
+    assert recording.metadata["moved_by"].startswith("the device: a sweep from ")
     assert palpate.verify(knob, recording).nrmse < 0.01
 
 
@@ -198,25 +201,25 @@ def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path
 
 
 @needs_emulation
-def test_a_handle_that_nobody_moves_is_no_recording(tmp_path: Path) -> None:
-    answer = recorded(tmp_path / "a.csv", "--json", device=["--lock-step", "--no-hand"])
-    assert answer.returncode == 1
-    verdict = json.loads(answer.stdout)["verdict"]
+def test_a_handle_without_motion_gives_the_verdict_no(tmp_path: Path) -> None:
+    completed = run_record(tmp_path / "a.csv", "--json", device=["--lock-step", "--no-hand"])
+    assert completed.returncode == 1
+    verdict = json.loads(completed.stdout)["verdict"]
     assert verdict.startswith("no: ")
-    assert "so no force over position is known: move it over the whole object" in verdict
+    assert "so the force over position is unknown: move it over the whole object" in verdict
 
 
-def test_without_an_object_or_a_way_to_see_its_force_nothing_is_recorded(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="nothing is mounted on the simulated device"):
+def test_a_recording_without_object_or_force_measurement_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the simulated device has no object"):
         record(tmp_path / "a.csv")
-    with pytest.raises(InputError, match=r"simulated-knob.* has no force transducer, and its motor"):
+    with pytest.raises(InputError, match=r"simulated-knob.* has no force transducer, so it cannot"):
         record(tmp_path / "a.csv", object=load_model(OBJECT), transducer=False)
     with pytest.raises(InputError, match=r"device is 'knob', must be simulated or usb\[:SERIAL\]"):
         record(tmp_path / "a.csv", device="knob")
     assert not list(tmp_path.iterdir())
 
 
-def test_the_line_that_is_alive_tells_of_lost_samples(
+def test_the_live_line_reports_lost_samples(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)

@@ -32,33 +32,33 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     """Runs a function with a terminal of some width as standard output and error; returns the output."""
 
     def run(work: Callable[[], object], columns: int = 80) -> str:
-        keyboard, screen = pty.openpty()
-        got = bytearray()
+        reading_end, terminal_end = pty.openpty()
+        output = bytearray()
 
-        def read() -> None:
+        def read_output() -> None:
             while True:
                 try:
-                    part = os.read(keyboard, 65536)
+                    received = os.read(reading_end, 65536)
                 except OSError:  # the other end is closed
                     return
-                got.extend(part)
+                output.extend(received)
 
-        reading = threading.Thread(target=read)
-        reading.start()
-        with os.fdopen(screen, "w") as stream, monkeypatch.context() as patched:
-            patched.setenv("COLUMNS", str(columns))
-            patched.setattr(sys, "stdout", stream)
-            patched.setattr(sys, "stderr", stream)
+        reader = threading.Thread(target=read_output)
+        reader.start()
+        with os.fdopen(terminal_end, "w") as stream, monkeypatch.context() as context:
+            context.setenv("COLUMNS", str(columns))
+            context.setattr(sys, "stdout", stream)
+            context.setattr(sys, "stderr", stream)
             work()
-        reading.join()
-        os.close(keyboard)
-        return got.decode().replace("\r\n", "\n")
+        reader.join()
+        os.close(reading_end)
+        return output.decode().replace("\r\n", "\n")
 
     return run
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     spring(tmp_path / "a.csv")
     model_by_hand().save("m.json")
@@ -86,50 +86,50 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ids=" ".join,
 )
 def test_no_word_is_broken_at_the_edge_of_a_terminal(
-    arguments: list[str], columns: int, here: Path, terminal: Terminal
+    arguments: list[str], columns: int, folder: Path, terminal: Terminal
 ) -> None:
-    shown = terminal(lambda: main(arguments), columns)
-    assert "Traceback" not in shown
+    output = terminal(lambda: main(arguments), columns)
+    assert "Traceback" not in output
     # Only a word that is longer than the width of the terminal may exceed it.
-    assert [line for line in shown.splitlines() if len(line) > columns and len(line.split()) > 1] == []
+    assert [line for line in output.splitlines() if len(line) > columns and len(line.split()) > 1] == []
 
 
-def test_a_message_is_one_line_where_there_is_no_terminal(
-    here: Path, capsys: pytest.CaptureFixture[str]
+def test_a_message_is_not_wrapped_without_a_terminal(
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     name = "a rather long name of a file that is not there, " * 3 + ".json"
     assert main(["show", name]) == 2
     assert capsys.readouterr().err == f"error: there is no file {name}\n"
 
 
-EVIL = "\x1b[2J\x1b]0;owned\x07\u202e\x9b31m"
+ESCAPES = "\x1b[2J\x1b]0;owned\x07\u202e\x9b31m"
 """Clears a screen, names its window, reverses the direction of writing."""
 
 
-def forbidden(text: str) -> list[str]:
+def control_characters_of(text: str) -> list[str]:
     return [c for c in text if not c.isprintable() and c not in "\n"]
 
 
-@pytest.mark.parametrize("arguments", [["-o", "o.json"], ["-o", f"o{EVIL}.json"]], ids=["column", "file"])
+@pytest.mark.parametrize("arguments", [["-o", "o.json"], ["-o", f"o{ESCAPES}.json"]], ids=["column", "file"])
 def test_control_characters_of_names_do_not_reach_the_terminal(
-    arguments: list[str], here: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("evil.csv").write_text(
-        f"position{EVIL}_rad,torque{EVIL}_Nm\n" + "".join(f"{k},{2 * k}\n" for k in range(40)),
+        f"position{ESCAPES}_rad,torque{ESCAPES}_Nm\n" + "".join(f"{k},{2 * k}\n" for k in range(40)),
         encoding="utf-8",
     )
-    main(["identify", "evil.csv", "--position", f"position{EVIL}_rad", *arguments])
-    main(["identify", f"{EVIL}.csv", "-o", "x.json"])
-    main(["identify", "a.csv", "-o", "x.json", "--force", EVIL])
-    main([f"sh{EVIL}ow"])
-    main(["show", f"{EVIL}.json", "--json"])
-    shown = capsys.readouterr()
-    assert "\\x1b[2J" in shown.err
-    assert forbidden(shown.out + shown.err) == []
+    main(["identify", "evil.csv", "--position", f"position{ESCAPES}_rad", *arguments])
+    main(["identify", f"{ESCAPES}.csv", "-o", "x.json"])
+    main(["identify", "a.csv", "-o", "x.json", "--force", ESCAPES])
+    main([f"sh{ESCAPES}ow"])
+    main(["show", f"{ESCAPES}.json", "--json"])
+    captured = capsys.readouterr()
+    assert "\\x1b[2J" in captured.err
+    assert control_characters_of(captured.out + captured.err) == []
 
 
 def test_control_characters_of_a_model_do_not_reach_the_terminal(
-    here: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     content = json.loads(Path("m.json").read_text(encoding="utf-8"))
     content["data"]["files"] = ["by-\x1b[2J\nverdict: good-hand.csv"]
@@ -137,12 +137,12 @@ def test_control_characters_of_a_model_do_not_reach_the_terminal(
     assert load_model("m.json").data.files[0].startswith("by-\x1b")
     main(["show", "m.json"])
     main(["show", "m.json", "--json"])
-    shown = capsys.readouterr()
-    assert "by-\\x1b[2J\\nverdict" in shown.out
-    assert forbidden(shown.out + shown.err) == []
+    captured = capsys.readouterr()
+    assert "by-\\x1b[2J\\nverdict" in captured.out
+    assert control_characters_of(captured.out + captured.err) == []
 
 
-def test_printable_text_of_any_language_is_left_alone() -> None:
+def test_printable_text_of_any_language_is_not_changed() -> None:
     for text in ("Größe.csv", "力_N", "0.1 µm ± 3 %", "Ω·m²"):
         assert visible(text) == text
 
@@ -160,33 +160,35 @@ def test_only_constant_text_is_printed_without_being_escaped() -> None:
 
 def test_progress_overwrites_one_line_of_a_terminal_and_removes_it(terminal: Terminal) -> None:
     def work() -> None:
-        shown = Progress("identifying")
+        progress = Progress("identifying")
         for n in range(3):
             time.sleep(0.11)
-            shown(f"position, {n} wavelets")
-        shown.clear()
+            progress(f"position, {n} wavelets")
+        progress.clear()
 
-    got = terminal(work)
-    assert "\n" not in got
-    assert [f"position, {n} wavelets" in got for n in range(3)] == [True] * 3
-    assert got.endswith(f"\r{'':<79}\r")
+    output = terminal(work)
+    assert "\n" not in output
+    assert [f"position, {n} wavelets" in output for n in range(3)] == [True] * 3
+    assert output.endswith(f"\r{'':<79}\r")
 
 
-def test_progress_prints_nothing_soon_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    shown = Progress("identifying")
-    shown("position, 1 wavelets")
+def test_progress_prints_nothing_in_its_first_moments_without_a_terminal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    progress = Progress("identifying")
+    progress("position, 1 wavelets")
     assert capsys.readouterr().err == ""
 
 
-def test_identification_reports_every_network_that_it_tries(here: Path) -> None:
-    tried: list[tuple[str, int]] = []
-    with reporting_to(lambda name, n: tried.append((name, n))):
+def test_identification_reports_every_network_that_it_tries(folder: Path) -> None:
+    tried_networks: list[tuple[str, int]] = []
+    with reporting_to(lambda name, n: tried_networks.append((name, n))):
         identify(Recording.from_arrays([0.1 * k for k in range(100)], [abs(k - 50.0) for k in range(100)]))
-    assert ("position", 0) in tried
-    assert ("position", 1) in tried
+    assert ("position", 0) in tried_networks
+    assert ("position", 1) in tried_networks
 
 
-def test_ctrl_c_ends_a_long_computation_of_a_library_at_once() -> None:
+def test_ctrl_c_ends_a_long_library_computation_within_3_s() -> None:
     code = (
         "import click, numpy as np\n"
         "from palpate.cli.exit_status import interrupted_at_once\n"
@@ -201,10 +203,10 @@ def test_ctrl_c_ends_a_long_computation_of_a_library_at_once() -> None:
         assert process.stdout is not None
         assert process.stdout.readline() == "begins\n"
         time.sleep(0.5)
-        began = time.monotonic()
+        sent_at_s = time.monotonic()
         process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=60)
+        _, messages = process.communicate(timeout=60)
         # The computation alone takes a minute; 0.2 s are intended, but other tests run at the same time.
-        assert time.monotonic() - began < 3.0
+        assert time.monotonic() - sent_at_s < 3.0
     assert process.returncode == 130
-    assert told == "error: interrupted; nothing was written\n"
+    assert messages == "error: interrupted; nothing was written\n"

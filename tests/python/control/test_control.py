@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control as a program: output, refusals, and endings."""
+"""palpate-control as a program: output, refusals, exit codes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from conftest import ROOT
-from control_program import MODEL, PATIENT, control, every_row, needs_program, started, wait_for_rows
+from control_program import ANY_RATE, MODEL, control, every_row, needs_program, start_control, wait_for_rows
 from palpate import read_recording
 from palpate._core.rendering import structure_names
 
@@ -32,9 +32,9 @@ def rows_of(recording: Path) -> list[str]:
 
 
 def test_help_shows_defaults_units_exit_codes_and_an_example() -> None:
-    answer = control("--help")
-    assert answer.returncode == 0
-    assert answer.stderr == ""
+    completed = control("--help")
+    assert completed.returncode == 0
+    assert completed.stderr == ""
     for word in (
         "--rate-hz",
         "=1000",
@@ -44,23 +44,23 @@ def test_help_shows_defaults_units_exit_codes_and_an_example() -> None:
         "Exit code",
         "Example: palpate-control",
     ):
-        assert word in answer.stdout
+        assert word in completed.stdout
 
 
-def test_no_arguments_are_answered_with_the_help() -> None:
-    answer = control()
-    assert answer.returncode == 2
-    assert "Usage: palpate-control" in answer.stderr
+def test_no_arguments_print_the_help_and_exit_with_code_2() -> None:
+    completed = control()
+    assert completed.returncode == 2
+    assert "Usage: palpate-control" in completed.stderr
 
 
-def test_the_version_is_that_of_the_package() -> None:
+def test_the_version_equals_the_version_of_the_package() -> None:
     import palpate
 
     assert control("--version").stdout == f"palpate-control {palpate.__version__}\n"
 
 
 @pytest.mark.parametrize(
-    ("words", "sentence"),
+    ("arguments", "sentence"),
     [
         (["nothing.json"], "nothing.json: there is no such file"),
         ([ROOT], "there is no such file"),
@@ -80,15 +80,15 @@ def test_the_version_is_that_of_the_package() -> None:
         ([MODEL, "--device", "knob"], "must be simulated, usb[:SERIAL] or inverse3"),
         ([MODEL, "--record", "/no/such/folder/out.csv"], "cannot be written: No such file or directory"),
         ([MODEL, "--record", "/tmp"], "cannot be written: it is not an ordinary file"),
-        ([MODEL, "--record", MODEL], ", the model; writing there would destroy it"),
+        ([MODEL, "--record", MODEL], ", the model file: choose another name"),
         ([MODEL, "--coupling-stiffness", "-1"], "--coupling-stiffness: must be a number above 0, not -1"),
         ([MODEL, "--coupling-stiffness", "hard"], "--coupling-stiffness: must be a number above 0, not hard"),
-        ([MODEL, "--damping", "-1"], "--damping: must be a number of 0 or more, not -1"),
+        ([MODEL, "--object-damping", "-1"], "--object-damping: must be a number of 0 or more, not -1"),
         ([MODEL, "--tolerated-samples", "-1"], "must be a number from 0 to 1000000, not -1"),
         ([MODEL, "--cpu", "0.5"], "--cpu: must be a whole number, not 0.5"),
         ([MODEL, "--rate-hz"], "--rate-hz needs a value"),
         (["--rate-hz", "1000"], "MODEL.json is required"),
-        ([MODEL, "--structure", "direct", "--compensated"], "no coupling to compensate"),
+        ([MODEL, "--structure", "direct", "--compensated"], "direct structure, which has no coupling"),
         ([MODEL, "--force-limit", "9"], "force_limit is 9, the device makes 5"),
         ([MODEL, "--force-limit", "0"], "--force-limit: must be a number above 0, not 0"),
         ([MODEL, "--ramp-s", "1e300"], "ramp_s is 1e+300, must be 0 to 3600"),
@@ -98,13 +98,13 @@ def test_the_version_is_that_of_the_package() -> None:
         ([MODEL.parent / "two_inputs.json"], "has 2 inputs"),
     ],
 )
-def test_what_is_wrong_is_refused_with_one_sentence(words: list[Any], sentence: str) -> None:
-    answer = control(*words)
-    assert answer.returncode == 2
-    assert answer.stdout == ""
-    assert answer.stderr.startswith("error: ")
-    assert answer.stderr.count("\n") == 1
-    assert sentence in answer.stderr
+def test_wrong_arguments_are_refused_with_one_sentence(arguments: list[Any], sentence: str) -> None:
+    completed = control(*arguments)
+    assert completed.returncode == 2
+    assert completed.stdout == ""
+    assert completed.stderr.startswith("error: ")
+    assert completed.stderr.count("\n") == 1
+    assert sentence in completed.stderr
 
 
 @pytest.mark.parametrize(
@@ -114,45 +114,47 @@ def test_what_is_wrong_is_refused_with_one_sentence(words: list[Any], sentence: 
 def test_a_bad_model_is_refused_with_one_sentence(tmp_path: Path, old: str, new: str, sentence: str) -> None:
     path = tmp_path / "bad.json"
     path.write_text(MODEL.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
-    answer = control(path)
-    assert answer.returncode == 2
-    assert answer.stderr.startswith(f"error: {path}: {sentence}")
-    assert answer.stderr.count("\n") == 1
+    completed = control(path)
+    assert completed.returncode == 2
+    assert completed.stderr.startswith(f"error: {path}: {sentence}")
+    assert completed.stderr.count("\n") == 1
 
 
-def test_a_usb_device_is_refused_for_what_is_missing() -> None:
+def test_a_missing_usb_device_or_library_is_named() -> None:
     without = "built without libusb" in control("--help").stdout
-    answer = control(MODEL, "--device", "usb:NOBODY")
-    assert answer.returncode == 2
-    assert answer.stderr.startswith("error: device usb:NOBODY: ")
-    assert answer.stderr.count("\n") == 1
-    assert ("built without libusb" in answer.stderr) == without
+    completed = control(MODEL, "--device", "usb:MISSING")
+    assert completed.returncode == 2
+    assert completed.stderr.startswith("error: device usb:MISSING: ")
+    assert completed.stderr.count("\n") == 1
+    assert ("built without libusb" in completed.stderr) == without
 
 
-def test_a_motor_current_is_no_force(tmp_path: Path) -> None:
-    answer = control(changed_model(tmp_path, units={"position": "rad", "force": "A"}))
-    assert answer.returncode == 2
-    assert "--torque-constant-Nm-per-A" in answer.stderr
+def test_a_model_in_ampere_is_refused(tmp_path: Path) -> None:
+    completed = control(changed_model(tmp_path, units={"position": "rad", "force": "A"}))
+    assert completed.returncode == 2
+    assert "--torque-constant-Nm-per-A" in completed.stderr
 
 
-def test_other_units_name_other_columns(tmp_path: Path) -> None:
-    out = tmp_path / "felt.csv"
+def test_column_names_contain_the_units_of_the_model(tmp_path: Path) -> None:
+    out = tmp_path / "rendered.csv"
     model = changed_model(tmp_path, units={"position": "m", "force": "N"})
-    assert control(model, "--duration-s", 0.3, "--record", out, *PATIENT).returncode == 0
+    assert control(model, "--duration-s", 0.3, "--record", out, *ANY_RATE).returncode == 0
     assert read_recording(out).units == {"position": "m", "force": "N"}
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_asked_to_stop_it_ends_in_an_orderly_way(tmp_path: Path, number: signal.Signals) -> None:
-    out = tmp_path / "felt.csv"
-    process = started(MODEL, "--duration-s", "inf", "--record", out, "--json", *PATIENT)
-    wait_for_rows(tmp_path / "felt.csv.part", process)
+@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_run_with_exit_code_0_and_a_complete_recording(
+    tmp_path: Path, signal_number: signal.Signals
+) -> None:
+    out = tmp_path / "rendered.csv"
+    process = start_control(MODEL, "--duration-s", "inf", "--record", out, "--json", *ANY_RATE)
+    wait_for_rows(tmp_path / "rendered.csv.part", process)
     time.sleep(0.8)  # longer than the ramp, which has no usable row
-    process.send_signal(number)
-    told, talk = process.communicate(timeout=20)
-    assert process.returncode == 0, talk
-    assert json.loads(told)["ended"] == "stopped on request"
-    assert len(every_row(out)) == json.loads(told)["ticks"]
+    process.send_signal(signal_number)
+    output, messages = process.communicate(timeout=20)
+    assert process.returncode == 0, messages
+    assert json.loads(output)["ended"] == "stopped on request"
+    assert len(every_row(out)) == json.loads(output)["ticks"]
 
 
 @pytest.mark.parametrize(
@@ -166,38 +168,42 @@ def test_asked_to_stop_it_ends_in_an_orderly_way(tmp_path: Path, number: signal.
         ("repeated@0.3x50", "Lost"),
     ],
 )
-def test_a_fault_ends_the_run_with_zero_force_and_its_story(tmp_path: Path, fault: str, status: str) -> None:
-    out = tmp_path / "felt.csv"
-    answer = control(MODEL, "--duration-s", 3, "--record", out, "--json", "--fault", fault, *PATIENT)
-    assert answer.returncode == 1, answer.stderr
-    assert f": {status}, " in answer.stderr
-    assert "the last 8 ticks" in answer.stderr
-    summary = json.loads(answer.stdout)
+def test_a_fault_ends_the_run_with_zero_force_and_a_fault_record(
+    tmp_path: Path, fault: str, status: str
+) -> None:
+    out = tmp_path / "rendered.csv"
+    completed = control(MODEL, "--duration-s", 3, "--record", out, "--json", "--fault", fault, *ANY_RATE)
+    assert completed.returncode == 1, completed.stderr
+    assert f": {status}, " in completed.stderr
+    assert "the last 8 ticks" in completed.stderr
+    summary = json.loads(completed.stdout)
     assert summary["status"] == status
     rows = rows_of(out)
     assert len(rows) == summary["ticks"]
     last = rows[-1].split(",")
     assert last[-1] == status
     assert float(last[2]) == 0.0
-    story = rows_of(tmp_path / "felt.fault.csv")
-    assert story == rows[-len(story) :]
+    fault_rows = rows_of(tmp_path / "rendered.fault.csv")
+    assert fault_rows == rows[-len(fault_rows) :]
 
 
 @pytest.mark.parametrize("fault", ["late@0.2", "lost@0.2", "repeated@0.2", "nan@0.2", "saturated@0.2x100"])
-def test_a_passing_fault_is_counted_and_the_run_goes_on(fault: str) -> None:
-    answer = control(MODEL, "--duration-s", 0.5, "--json", "--fault", fault, *PATIENT)
-    assert answer.returncode == 0, answer.stderr
-    assert sum(json.loads(answer.stdout)["ticks_by_status"].values()) == json.loads(answer.stdout)["ticks"]
-    assert len(json.loads(answer.stdout)["ticks_by_status"]) == 3  # Ok, Ramp and that of the fault
+def test_a_short_fault_is_counted_and_the_run_continues(fault: str) -> None:
+    completed = control(MODEL, "--duration-s", 0.5, "--json", "--fault", fault, *ANY_RATE)
+    assert completed.returncode == 0, completed.stderr
+    assert (
+        sum(json.loads(completed.stdout)["ticks_by_status"].values()) == json.loads(completed.stdout)["ticks"]
+    )
+    assert len(json.loads(completed.stdout)["ticks_by_status"]) == 3  # Ok, Ramp and that of the fault
 
 
-def test_a_rate_too_low_is_said_and_ends_the_run(tmp_path: Path) -> None:
-    process = started(MODEL, "--duration-s", 20, "--record", tmp_path / "felt.csv", "--json")
-    wait_for_rows(tmp_path / "felt.csv.part", process)
+def test_a_rate_too_low_is_reported_and_ends_the_run(tmp_path: Path) -> None:
+    process = start_control(MODEL, "--duration-s", 20, "--record", tmp_path / "rendered.csv", "--json")
+    wait_for_rows(tmp_path / "rendered.csv.part", process)
     process.send_signal(signal.SIGSTOP)
     time.sleep(2.0)
     process.send_signal(signal.SIGCONT)
-    told, talk = process.communicate(timeout=30)
+    output, messages = process.communicate(timeout=30)
     assert process.returncode == 1
-    assert "the loop did not hold its rate" in talk
-    assert json.loads(told)["missed_deadlines"] > 1000
+    assert "the rate was too low" in messages
+    assert json.loads(output)["missed_deadlines"] > 1000

@@ -18,15 +18,15 @@ from palpate.planning import Plan
 pytestmark = needs_program
 
 # Certificate that holds on a busy machine: its longest period is a tenth of a second.
-PATIENT_KNOB = DeviceProfile(id="knob", inertia=0.05, viscous_damping=50.0, coulomb_friction=0.01)
+SLOW_PERIOD_KNOB = DeviceProfile(id="knob", inertia=0.05, viscous_damping=50.0, coulomb_friction=0.01)
 
 
 @pytest.fixture
 def planned(tmp_path: Path) -> Path:
-    return plan(model_by_hand(), PATIENT_KNOB).stored().save(tmp_path / "planned.json")
+    return plan(model_by_hand(), SLOW_PERIOD_KNOB).stored().save(tmp_path / "planned.json")
 
 
-def changed(path: Path, **certificate: Any) -> Path:
+def with_changed_certificate(path: Path, **certificate: Any) -> Path:
     content = json.loads(path.read_text(encoding="utf-8"))
     content["certificate"].update(certificate)
     path.write_text(json.dumps(content), encoding="utf-8")
@@ -37,15 +37,15 @@ def metadata(record: Path) -> str:
     return "\n".join(line for line in record.read_text(encoding="utf-8").splitlines() if line.startswith("#"))
 
 
-def test_the_plan_of_the_file_is_what_is_rendered(tmp_path: Path) -> None:
+def test_the_stored_plan_is_rendered(tmp_path: Path) -> None:
     scheme = Scheme(structure="massless", coupling_stiffness=70.0, coupling_damping=0.0)
     path = Plan(model_by_hand(), scheme).stored().save(tmp_path / "planned.json")
     # A limit of the user does not replace the plan.
-    for others in ([], ["--uncertified"], ["--slew-s", 0.1]):
-        answer = control(path, "--duration-s", 0.2, "--lowest-rate-share", 0, *others)
-        assert answer.returncode == 0, answer.stderr
-        assert "massless, K_c = 70, B_c = 0" in answer.stderr
-        assert "no plan" not in answer.stderr
+    for options in ([], ["--uncertified"], ["--slew-s", 0.1]):
+        completed = control(path, "--duration-s", 0.2, "--lowest-rate-share", 0, *options)
+        assert completed.returncode == 0, completed.stderr
+        assert "massless, K_c = 70, B_c = 0" in completed.stderr
+        assert "no plan" not in completed.stderr
 
 
 @pytest.fixture
@@ -64,75 +64,82 @@ def limited(tmp_path: Path) -> Path:
     return chosen.stored().save(tmp_path / "limited.json")
 
 
-def test_the_network_of_the_plan_is_rendered_and_the_identified_one_with_a_structure_of_one_s_own(
+def test_the_planned_network_is_rendered_and_with_a_chosen_structure_the_identified_one(
     limited: Path, tmp_path: Path
 ) -> None:
     stored = load_model(limited)
-    words = ["--duration-s", 3, "--lowest-rate-share", 0, "--slew-s", 0, "--no-energy-tank"]
-    for others, rendered in (([], stored.planned), (["--structure", "direct", "--rate-hz", 100], stored)):
-        record = tmp_path / f"felt{len(others)}.csv"
-        answer = control(limited, *words, *others, "--record", record)
-        assert answer.returncode == 0, answer.stderr
-        assert f"{rendered.n_wavelets} wavelets" in answer.stderr
-        felt = read_recording(record)
-        assert np.ptp(felt.force) > 0.0
-        np.testing.assert_allclose(felt.force, rendered.force(felt.position), atol=1e-6)
+    arguments = ["--duration-s", 3, "--lowest-rate-share", 0, "--slew-s", 0, "--no-energy-tank"]
+    for options, rendered in (([], stored.planned), (["--structure", "direct", "--rate-hz", 100], stored)):
+        record = tmp_path / f"rendered{len(options)}.csv"
+        completed = control(limited, *arguments, *options, "--record", record)
+        assert completed.returncode == 0, completed.stderr
+        assert f"{rendered.n_wavelets} wavelets" in completed.stderr
+        recording = read_recording(record)
+        assert np.ptp(recording.force) > 0.0
+        np.testing.assert_allclose(recording.force, rendered.force(recording.position), atol=1e-6)
 
 
-def test_a_certificate_that_does_not_fit_the_network_of_the_plan_moves_nothing(limited: Path) -> None:
+def test_a_certificate_of_another_network_is_refused(limited: Path) -> None:
     content = json.loads(limited.read_text(encoding="utf-8"))
     content["plan"]["network"] = None
     limited.write_text(json.dumps(content), encoding="utf-8")
-    answer = control(limited, "--duration-s", 0.2)
-    assert answer.returncode == 2
-    assert "certificate.model is " in answer.stderr
-    assert "changed after it was certified" in answer.stderr
+    completed = control(limited, "--duration-s", 0.2)
+    assert completed.returncode == 2
+    assert "certificate.model is " in completed.stderr
+    assert "changed after it was certified" in completed.stderr
 
 
-def test_without_a_plan_the_default_coupling_is_told_unless_it_was_chosen(tmp_path: Path) -> None:
+def test_the_default_coupling_is_reported_without_plan_and_structure(tmp_path: Path) -> None:
     path = model_by_hand().save(tmp_path / "unplanned.json")
-    words = [path, "--duration-s", 0.1, "--lowest-rate-share", 0]
-    assert "no plan in the model: rendered behind the default coupling" in control(*words).stderr
-    assert "no plan" not in control(*words, "--structure", "massless").stderr
+    arguments = [path, "--duration-s", 0.1, "--lowest-rate-share", 0]
+    assert "the model has no plan: rendered behind the default coupling" in control(*arguments).stderr
+    assert "no plan" not in control(*arguments, "--structure", "massless").stderr
 
 
-def test_a_certified_run_takes_rate_and_device_of_its_certificate_and_says_so(
-    planned: Path, tmp_path: Path
-) -> None:
-    record = tmp_path / "felt.csv"
-    answer = control(planned, "--duration-s", 0.6, "--record", record)
-    assert answer.returncode == 0, answer.stderr
-    assert "uncertified" not in answer.stderr
+def test_a_certified_run_uses_the_rate_and_device_of_its_certificate(planned: Path, tmp_path: Path) -> None:
+    record = tmp_path / "rendered.csv"
+    completed = control(planned, "--duration-s", 0.6, "--record", record)
+    assert completed.returncode == 0, completed.stderr
+    assert "uncertified" not in completed.stderr
     assert "certified: certified" in metadata(record)
 
 
-def test_another_rate_than_the_certificate_s_is_refused(planned: Path) -> None:
-    answer = control(planned, "--rate-hz", 500)
-    assert answer.returncode == 2
-    assert "rate_hz is 500, and the certificate is for 1000 Hz" in answer.stderr
+def test_a_rate_that_differs_from_the_certificate_is_refused(planned: Path) -> None:
+    completed = control(planned, "--rate-hz", 500)
+    assert completed.returncode == 2
+    assert "rate_hz is 500, but the certificate is for 1000 Hz" in completed.stderr
 
 
 @pytest.mark.parametrize(
-    "words", [["--structure", "implicit"], ["--slew-s", "0.1"], ["--tolerated-samples", "3"]]
+    "arguments", [["--structure", "implicit"], ["--slew-s", "0.1"], ["--tolerated-samples", "3"]]
 )
-def test_what_the_certificate_does_not_cover_is_rendered_uncertified(
-    planned: Path, tmp_path: Path, words: list[str]
+def test_options_outside_the_certificate_make_the_run_uncertified(
+    planned: Path, tmp_path: Path, arguments: list[str]
 ) -> None:
-    record = tmp_path / "felt.csv"
-    answer = control(
-        planned, *words, "--duration-s", 0.6, "--record", record, "--lowest-rate-share", 0, "--rate-hz", 500
+    record = tmp_path / "rendered.csv"
+    completed = control(
+        planned,
+        *arguments,
+        "--duration-s",
+        0.6,
+        "--record",
+        record,
+        "--lowest-rate-share",
+        0,
+        "--rate-hz",
+        500,
     )
-    assert answer.returncode == 0, answer.stderr
-    assert "uncertified: the options change the planned rendering" in answer.stderr
+    assert completed.returncode == 0, completed.stderr
+    assert "uncertified: the options change the plan" in completed.stderr
     assert "certified: no: the options" in metadata(record)
 
 
-def test_one_unsound_sample_ends_a_certified_run(planned: Path) -> None:
-    words = ["--duration-s", 0.4, "--fault", "lost@0.1", "--json"]
-    answer = control(planned, *words)
-    assert answer.returncode == 1
-    assert "zero force sent, device closed" in answer.stderr
-    assert control(planned, "--uncertified", "--lowest-rate-share", 0, *words).returncode == 0
+def test_one_lost_sample_ends_a_certified_run(planned: Path) -> None:
+    arguments = ["--duration-s", 0.4, "--fault", "lost@0.1", "--json"]
+    completed = control(planned, *arguments)
+    assert completed.returncode == 1
+    assert "zero force sent, device closed" in completed.stderr
+    assert control(planned, "--uncertified", "--lowest-rate-share", 0, *arguments).returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -144,9 +151,7 @@ def test_one_unsound_sample_ends_a_certified_run(planned: Path) -> None:
         ({"bounds": None}, "certificate.bounds"),
     ],
 )
-def test_a_certificate_that_was_tampered_with_moves_nothing(
-    planned: Path, change: dict[str, Any], field: str
-) -> None:
-    answer = control(changed(planned, **change), "--uncertified")
-    assert answer.returncode == 2
-    assert f": {field} " in answer.stderr
+def test_a_changed_certificate_is_refused(planned: Path, change: dict[str, Any], field: str) -> None:
+    completed = control(with_changed_certificate(planned, **change), "--uncertified")
+    assert completed.returncode == 2
+    assert f": {field} " in completed.stderr

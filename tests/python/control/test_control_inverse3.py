@@ -16,7 +16,7 @@ import pytest
 pytest.importorskip("websockets")
 
 from conftest import ROOT
-from control_program import PATIENT, control, needs_program
+from control_program import ANY_RATE, control, needs_program
 from inverse3_service import Service, serving
 from palpate import read_recording
 
@@ -40,30 +40,37 @@ def spring(tmp_path: Path) -> Path:
 
 
 @contextmanager
-def rendered(
-    model: Path, *words: Any, axis: str = ":z", service: Service | None = None
+def render_on_service(
+    model: Path, *arguments: Any, axis: str = ":z", service: Service | None = None
 ) -> Iterator[tuple[subprocess.CompletedProcess[str], Service]]:
-    with serving(service or Service()) as served:
-        device = ["--device", f"inverse3{axis}@{served.port}", "--uncertified", *PATIENT, "--priority", 0]
+    with serving(service or Service()) as running_service:
+        device = [
+            "--device",
+            f"inverse3{axis}@{running_service.port}",
+            "--uncertified",
+            *ANY_RATE,
+            "--priority",
+            0,
+        ]
         device += ["--wait-ms", 200]  # the service shares a busy machine
-        yield control(model, *device, *words), served
+        yield control(model, *device, *arguments), running_service
 
 
-def test_a_spring_is_rendered_along_one_axis_and_pushes_back(spring: Path, tmp_path: Path) -> None:
-    out = tmp_path / "felt.csv"
-    words = ["--structure", "direct", "--duration-s", 1, "--record", out, "--json"]
-    with rendered(spring, *words) as (answer, service):
-        assert answer.returncode == 0, answer.stderr
-    summary = json.loads(answer.stdout)
+def test_a_spring_is_rendered_along_one_axis_against_the_displacement(spring: Path, tmp_path: Path) -> None:
+    out = tmp_path / "rendered.csv"
+    arguments = ["--structure", "direct", "--duration-s", 1, "--record", out, "--json"]
+    with render_on_service(spring, *arguments) as (completed, service):
+        assert completed.returncode == 0, completed.stderr
+    summary = json.loads(completed.stdout)
     assert summary["inverse3"] == {"force_gate": 0.3, "damping": 0.5}
-    assert "(the service's force gate 0.3, damping 0.5), uncertified, at 1000 Hz" in answer.stderr
+    assert "(the service's force gate 0.3, damping 0.5), uncertified, at 1000 Hz" in completed.stderr
     recording = read_recording(out)
     assert recording.units == {"position": "m", "force": "N"}
     assert recording.metadata["service"] == "force gate 0.3, damping 0.5"
     assert recording.position.max() > 0.003
-    late = slice(300, None)
-    felt = STIFFNESS * np.maximum(recording.position[late], 0.0)  # no contact below zero
-    assert recording.force[late] == pytest.approx(felt, abs=1e-6)
+    after_ramp = slice(300, None)
+    expected_force = STIFFNESS * np.maximum(recording.position[after_ramp], 0.0)  # no contact below zero
+    assert recording.force[after_ramp] == pytest.approx(expected_force, abs=1e-6)
     # The force is along the axis only, out of the object, and zero at the end.
     assert all(force["x"] == force["y"] == 0.0 for force in service.forces)
     assert min(force["z"] for force in service.forces) < -0.2
@@ -71,28 +78,31 @@ def test_a_spring_is_rendered_along_one_axis_and_pushes_back(spring: Path, tmp_p
     assert service.closed
 
 
-def test_the_first_message_alone_names_the_program_and_sends_no_force(spring: Path) -> None:
-    with rendered(spring, "--duration-s", 0.1, "--json") as (answer, service):
-        assert answer.returncode == 0, answer.stderr
-    ticks = json.loads(answer.stdout)["ticks"]
-    first, *others = service.messages
-    assert first["session"] == {"configure": {"profile": {"name": "palpate"}}}
-    assert first["inverse3"][0]["device_id"] == "049D"
+def test_only_the_first_message_names_the_program_and_it_sends_zero_force(spring: Path) -> None:
+    with render_on_service(spring, "--duration-s", 0.1, "--json") as (completed, service):
+        assert completed.returncode == 0, completed.stderr
+    ticks = json.loads(completed.stdout)["ticks"]
+    first_message, *later_messages = service.messages
+    assert first_message["session"] == {"configure": {"profile": {"name": "palpate"}}}
+    assert first_message["inverse3"][0]["device_id"] == "049D"
     assert service.forces[0] == {"x": 0.0, "y": 0.0, "z": 0.0}
-    assert all(set(message) == {"inverse3"} for message in others)
+    assert all(set(message) == {"inverse3"} for message in later_messages)
     assert (
-        ticks <= len(others) <= ticks + 2
+        ticks <= len(later_messages) <= ticks + 2
     )  # one message a tick, since the host paces; the last ones are zero
 
 
-def test_an_axis_may_point_the_other_way(spring: Path) -> None:
-    with rendered(spring, "--duration-s", 0.6, axis=":-z", service=Service(sweep=-0.01)) as (answer, service):
-        assert answer.returncode == 0, answer.stderr
+def test_a_negative_axis_reverses_the_force(spring: Path) -> None:
+    with render_on_service(spring, "--duration-s", 0.6, axis=":-z", service=Service(sweep=-0.01)) as (
+        completed,
+        service,
+    ):
+        assert completed.returncode == 0, completed.stderr
     assert max(force["z"] for force in service.forces) > 0.2
 
 
 @pytest.mark.parametrize(
-    ("service", "ended"),
+    ("service", "reason"),
     [
         (Service(unplug_after=300), "fault of the device"),
         (Service(close_after=300), "fault of the device"),
@@ -103,13 +113,13 @@ def test_an_axis_may_point_the_other_way(spring: Path) -> None:
     ids=["unplugged", "closed", "garbage", "silent", "force unheeded"],
 )
 def test_a_fault_ends_the_run_with_a_record(
-    spring: Path, tmp_path: Path, service: Service, ended: str
+    spring: Path, tmp_path: Path, service: Service, reason: str
 ) -> None:
-    out = tmp_path / "felt.csv"
-    with rendered(spring, "--duration-s", 2, "--record", out, service=service) as (answer, _):
-        assert answer.returncode == 1, answer.stderr
-    assert ended in answer.stderr
-    assert "zero force sent, device closed" in answer.stderr
+    out = tmp_path / "rendered.csv"
+    with render_on_service(spring, "--duration-s", 2, "--record", out, service=service) as (completed, _):
+        assert completed.returncode == 1, completed.stderr
+    assert reason in completed.stderr
+    assert "zero force sent, device closed" in completed.stderr
     assert out.exists()
     assert service.closed
 
@@ -117,15 +127,17 @@ def test_a_fault_ends_the_run_with_a_record(
 @pytest.mark.parametrize(
     ("service", "reason"),
     [
-        (Service(devices=0), "sees no Inverse3: plug it in"),
+        (Service(devices=0), "detects no Inverse3: plug it in"),
         (Service(calibrated=False), "Inverse3 049D is not calibrated"),
     ],
     ids=["no device", "not calibrated"],
 )
-def test_what_cannot_be_used_is_refused_with_its_cure(spring: Path, service: Service, reason: str) -> None:
-    with rendered(spring, service=service) as (answer, _):
-        assert answer.returncode == 2
-    assert reason in answer.stderr
+def test_a_missing_or_uncalibrated_device_is_refused_with_the_cure(
+    spring: Path, service: Service, reason: str
+) -> None:
+    with render_on_service(spring, service=service) as (completed, _):
+        assert completed.returncode == 2
+    assert reason in completed.stderr
     assert not service.messages
 
 
@@ -138,21 +150,21 @@ def test_what_cannot_be_used_is_refused_with_its_cure(spring: Path, service: Ser
         ("inverse3:z@1", "no Haply Inverse Service answers at 127.0.0.1:1 (Connection refused)"),
     ],
 )
-def test_a_device_that_is_not_there_is_refused(spring: Path, device: str, reason: str) -> None:
-    answer = control(spring, "--device", device, "--uncertified")
-    assert answer.returncode == 2
-    assert reason in answer.stderr
+def test_a_wrong_axis_or_port_is_refused(spring: Path, device: str, reason: str) -> None:
+    completed = control(spring, "--device", device, "--uncertified")
+    assert completed.returncode == 2
+    assert reason in completed.stderr
 
 
-def test_a_certificate_or_the_risk_typed_in_full_is_needed(spring: Path) -> None:
+def test_a_certificate_or_the_full_option_uncertified_is_required(spring: Path) -> None:
     with serving(Service()) as service:
-        answer = control(spring, "--device", f"inverse3@{service.port}")
-        assert answer.returncode == 2
-        assert "or inverse3[:AXIS[@PORT]]" in answer.stderr
-        answer = control(spring, "--device", f"inverse3:z@{service.port}")
-        assert answer.returncode == 2
-        assert "has no certificate" in answer.stderr
-        answer = control(MODEL, "--device", f"inverse3:z@{service.port}", "--uncertified")
-        assert answer.returncode == 2
-        assert "an Inverse3 moves along a line: it takes models in m and N" in answer.stderr
+        completed = control(spring, "--device", f"inverse3@{service.port}")
+        assert completed.returncode == 2
+        assert "or inverse3[:AXIS[@PORT]]" in completed.stderr
+        completed = control(spring, "--device", f"inverse3:z@{service.port}")
+        assert completed.returncode == 2
+        assert "has no certificate" in completed.stderr
+        completed = control(MODEL, "--device", f"inverse3:z@{service.port}", "--uncertified")
+        assert completed.returncode == 2
+        assert "an Inverse3 moves along a line and needs a model in m and N" in completed.stderr
     assert all(force == {"x": 0.0, "y": 0.0, "z": 0.0} for force in service.forces)

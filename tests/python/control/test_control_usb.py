@@ -28,7 +28,7 @@ SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
 
 # The transfers are the clock: the speed and the rate of this machine have no effect.
 LOCK_STEP = ["--lock-step"]
-PATIENT = ["--wait-ms", "10000", "--lowest-rate-share", "0", "--priority", "0"]
+ANY_RATE = ["--wait-ms", "10000", "--lowest-rate-share", "0", "--priority", "0"]
 
 pytestmark = [
     needs_emulation,
@@ -36,9 +36,9 @@ pytestmark = [
 ]
 
 
-def control(*words: Any, device: list[str], model: Path = SPRING) -> subprocess.CompletedProcess[str]:
-    named = [] if "--device" in words else ["--device", "usb"]
-    return emulated(PROGRAM, model, *named, *words, device=device)
+def control(*arguments: Any, device: list[str], model: Path = SPRING) -> subprocess.CompletedProcess[str]:
+    named = [] if "--device" in arguments else ["--device", "usb"]
+    return emulated(PROGRAM, model, *named, *arguments, device=device)
 
 
 def rows(record: Path) -> int:
@@ -50,38 +50,40 @@ def wait_for_rows(part: Path) -> None:
         time.sleep(0.01)
 
 
-def uncertified(*words: Any, device: list[str]) -> subprocess.CompletedProcess[str]:
-    return control("--uncertified", *PATIENT, *words, device=[*LOCK_STEP, *device])
+def uncertified(*arguments: Any, device: list[str]) -> subprocess.CompletedProcess[str]:
+    return control("--uncertified", *ANY_RATE, *arguments, device=[*LOCK_STEP, *device])
 
 
-def test_a_model_without_certificate_is_refused_unless_the_risk_is_typed_in_full() -> None:
-    for words in ([], ["--uncert"], ["--unc"]):
-        answer = control(*words, device=LOCK_STEP)
-        assert answer.returncode == 2
-        assert "certificate" in answer.stderr or "--unc" in answer.stderr
+def test_a_model_without_certificate_requires_the_full_option_uncertified() -> None:
+    for arguments in ([], ["--uncert"], ["--unc"]):
+        completed = control(*arguments, device=LOCK_STEP)
+        assert completed.returncode == 2
+        assert "certificate" in completed.stderr or "--unc" in completed.stderr
     assert "set uncertified to render without" in control(device=LOCK_STEP).stderr
 
 
-def certified_for(folder: Path, **known: Any) -> Path:
+def certified_for(folder: Path, **profile: Any) -> Path:
     chosen = Plan(load_model(SPRING), Scheme(structure="direct"))
-    return chosen.certified_for(DeviceProfile(**known)).stored().save(folder / "certified.json")
+    return chosen.certified_for(DeviceProfile(**profile)).stored().save(folder / "certified.json")
 
 
-def test_what_is_only_stable_is_refused(tmp_path: Path) -> None:
+def test_a_certificate_of_stability_without_passivity_is_refused(tmp_path: Path) -> None:
     stable = plan(load_model(SPRING), DeviceProfile(id="EMU-1")).stored().save(tmp_path / "stable.json")
-    answer = control(device=LOCK_STEP, model=stable)
-    assert answer.returncode == 2
-    assert "is not certified: the linearised system is stable" in answer.stderr
+    completed = control(device=LOCK_STEP, model=stable)
+    assert completed.returncode == 2
+    assert "is not certified: the linearised system is stable" in completed.stderr
 
 
-def test_a_model_that_is_certified_for_this_device_needs_no_more_words(tmp_path: Path) -> None:
+def test_a_model_certified_for_this_device_requires_no_option(tmp_path: Path) -> None:
     certified = certified_for(tmp_path, id="EMU-1", delay_s=1.25e-3, coulomb_friction=1e-3)
-    answer = control("--wait-ms", "10000", "--duration-s", 0.2, "--json", device=LOCK_STEP, model=certified)
-    assert answer.returncode in (0, 1), answer.stderr  # a busy machine may end it
-    assert json.loads(answer.stdout)["ticks"] > 0
+    completed = control(
+        "--wait-ms", "10000", "--duration-s", 0.2, "--json", device=LOCK_STEP, model=certified
+    )
+    assert completed.returncode in (0, 1), completed.stderr  # a busy machine may end it
+    assert json.loads(completed.stdout)["ticks"] > 0
     refused = control("--structure", "massless", device=LOCK_STEP, model=certified)
     assert refused.returncode == 2
-    assert "is certified as it was planned: leave out structure and its numbers" in refused.stderr
+    assert "is certified for its plan only: do not set structure" in refused.stderr
 
 
 def planned(folder: Path, **device: Any) -> Path:
@@ -92,24 +94,24 @@ def planned(folder: Path, **device: Any) -> Path:
 
 
 def test_a_certified_model_is_rendered_as_planned(tmp_path: Path) -> None:
-    record = tmp_path / "felt.csv"
-    words = ["--wait-ms", 500, "--duration-s", 0.6, "--record", record]
-    answer = control(*words, device=LOCK_STEP, model=planned(tmp_path))
+    record = tmp_path / "rendered.csv"
+    arguments = ["--wait-ms", 500, "--duration-s", 0.6, "--record", record]
+    completed = control(*arguments, device=LOCK_STEP, model=planned(tmp_path))
     # On a busy machine the first late packet ends the run: a later one is not certified.
-    assert answer.returncode == 0 or "zero force sent" in answer.stderr, answer.stderr
-    assert "direct, predict 1; emulated knob EMU-1" in answer.stderr
-    assert "uncertified" not in answer.stderr
+    assert completed.returncode == 0 or "zero force sent" in completed.stderr, completed.stderr
+    assert "direct, predict 1; emulated knob EMU-1" in completed.stderr
+    assert "uncertified" not in completed.stderr
     assert "# certified: yes" in record.read_text(encoding="utf-8")
 
 
 def test_a_certified_run_has_the_certified_force_limit_and_no_slew_limit(tmp_path: Path) -> None:
-    record = tmp_path / "felt.csv"
-    words = ["--wait-ms", 500, "--duration-s", 0.1, "--record", record]
-    control(*words, device=LOCK_STEP, model=planned(tmp_path, force_limit=3.0))
+    record = tmp_path / "rendered.csv"
+    arguments = ["--wait-ms", 500, "--duration-s", 0.1, "--record", record]
+    control(*arguments, device=LOCK_STEP, model=planned(tmp_path, force_limit=3.0))
     assert "# guards: force limit 3, no slew limit, ramp 0.2 s" in record.read_text(encoding="utf-8")
     refused = control("--force-limit", 2, device=LOCK_STEP, model=planned(tmp_path))
     assert refused.returncode == 2
-    assert "leave out structure and its numbers, force_limit" in refused.stderr
+    assert "do not set structure, its numbers, force_limit" in refused.stderr
 
 
 @pytest.mark.parametrize(
@@ -121,92 +123,94 @@ def test_a_certified_run_has_the_certified_force_limit_and_no_slew_limit(tmp_pat
         ({"force_limit": 6.0}, "is certified for 6 N*m, the device makes 5"),
     ],
 )
-def test_a_certificate_of_another_device_moves_nothing(
+def test_a_certificate_of_another_device_is_refused(
     device: dict[str, Any], reason: str, tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace.csv"
     model = planned(tmp_path, **device)
-    answer = control("--wait-ms", 500, device=[*LOCK_STEP, "--trace", str(trace)], model=model)
-    assert answer.returncode == 2
-    assert reason in answer.stderr
+    completed = control("--wait-ms", 500, device=[*LOCK_STEP, "--trace", str(trace)], model=model)
+    assert completed.returncode == 2
+    assert reason in completed.stderr
     assert all(frame.torque == 0.0 for frame in frames(trace))
 
 
 def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: Path) -> None:
     trace = tmp_path / "trace.csv"
     model = planned(tmp_path, delay_s=0.25e-3)
-    words = ["--wait-ms", 500, "--duration-s", 0.3]
+    arguments = ["--wait-ms", 500, "--duration-s", 0.3]
     for _ in range(20):  # on a busy machine a lost packet may end the run before
-        answer = control(*words, device=[*LOCK_STEP, "--trace", str(trace)], model=model)
-        if "stopped by a fault of the device: Lost" not in answer.stderr:
+        completed = control(*arguments, device=[*LOCK_STEP, "--trace", str(trace)], model=model)
+        if "stopped by a fault of the device: Lost" not in completed.stderr:
             break
-    assert answer.returncode == 1
-    assert "stopped by a fault of the device: Timeout" in answer.stderr
-    assert " later than certified" in answer.stdout
+    assert completed.returncode == 1
+    assert "stopped by a fault of the device: Timeout" in completed.stderr
+    assert " later than certified" in completed.stdout
     assert frames(trace)[-1].torque == 0.0
     assert not frames(trace)[-1].enabled
 
 
 @pytest.mark.parametrize(
-    ("words", "device", "reason"),
+    ("arguments", "device", "reason"),
     [
-        ([], ["--no-device"], "no USB device 1209:0001 of this protocol is plugged in"),
-        ([], ["--serial", "A", "--serial", "B"], "2 USB devices could be meant (A, B)"),
-        (["--device", "usb:OTHER"], [], "no USB device has the serial number OTHER; there is EMU-1"),
+        ([], ["--no-device"], "no USB device 1209:0001 with this protocol is connected"),
+        ([], ["--serial", "A", "--serial", "B"], "2 suitable USB devices are connected (A, B)"),
+        (["--device", "usb:OTHER"], [], "no USB device has the serial number OTHER; connected: EMU-1"),
         (["--device", "usb:"], [], "device is 'usb:', must be simulated, usb[:SERIAL] or inverse3"),
-        ([], ["--somebody-elses"], "is 1209:0001 but not of this protocol"),
+        ([], ["--wrong-magic"], "is 1209:0001 with another protocol"),
         ([], ["--info-bytes", "31"], "the answer to GET_INFO has 31 bytes, must have 32"),
         ([], ["--info-bytes", "33"], "the answer to GET_INFO has 33 bytes, must have 32"),
         ([], ["--denied"], "sudo palpate devices --install-udev-rule"),
-        (["--rate-hz", "500"], [], "sends 1000 packets a second and paces the loop: choose 1000"),
+        (["--rate-hz", "500"], [], "sends 1000 packets a second and paces the loop: must be 1000"),
         (["--force-limit", "6"], [], "force_limit is 6, the device makes 5"),
-        (["--fault", "late@1"], [], "faults are for the simulated device"),
+        (["--fault", "late@1"], [], "faults is set: must be empty for a real device"),
     ],
 )
-def test_what_cannot_be_is_refused_before_anything_moves(
-    words: list[str], device: list[str], reason: str, tmp_path: Path
+def test_impossible_arguments_are_refused_before_the_device_moves(
+    arguments: list[str], device: list[str], reason: str, tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace.csv"
-    answer = uncertified(*words, device=[*device, "--trace", str(trace)])
-    assert answer.returncode == 2, answer.stderr
-    assert reason in answer.stderr
+    completed = uncertified(*arguments, device=[*device, "--trace", str(trace)])
+    assert completed.returncode == 2, completed.stderr
+    assert reason in completed.stderr
     assert all(frame.torque == 0.0 for frame in frames(trace))
 
 
-def test_a_model_in_metres_is_refused_by_a_device_that_turns(tmp_path: Path) -> None:
+def test_a_model_in_metres_is_refused_by_a_rotary_device(tmp_path: Path) -> None:
     model = json.loads(SPRING.read_text(encoding="utf-8"))
     model["units"] = {"position": "m", "force": "N"}
     linear = tmp_path / "linear.json"
     linear.write_text(json.dumps(model), encoding="utf-8")
-    answer = control("--uncertified", *PATIENT, device=LOCK_STEP, model=linear)
-    assert answer.returncode == 2
-    assert "is in m and N; emulated knob EMU-1" in answer.stderr
+    completed = control("--uncertified", *ANY_RATE, device=LOCK_STEP, model=linear)
+    assert completed.returncode == 2
+    assert "is in m and N; emulated knob EMU-1" in completed.stderr
 
 
 def test_a_run_is_recorded_and_ends_with_zero_torque_and_a_disabled_device(tmp_path: Path) -> None:
-    record, trace = tmp_path / "felt.csv", tmp_path / "trace.csv"
-    answer = uncertified("--duration-s", 1, "--record", record, "--json", device=["--trace", str(trace)])
-    assert answer.returncode == 0, answer.stderr
-    summary = json.loads(answer.stdout)
+    record, trace = tmp_path / "rendered.csv", tmp_path / "trace.csv"
+    completed = uncertified("--duration-s", 1, "--record", record, "--json", device=["--trace", str(trace)])
+    assert completed.returncode == 0, completed.stderr
+    summary = json.loads(completed.stdout)
     assert summary["ticks"] == summary["recorded"] == 1000
     assert summary["usb"]["round_trip"]["p50_us"] > 0.0
     assert summary["usb"]["delay_samples"]["p50"] == pytest.approx(1.0, abs=0.01)
     recording = read_recording(record)
     assert recording.force.max() > 0.02
     # The object pushes back: the device receives a torque against the position.
-    felt = frames(trace)
-    strongest = min(felt, key=lambda frame: frame.torque)
+    sent_frames = frames(trace)
+    strongest = min(sent_frames, key=lambda frame: frame.torque)
     assert strongest.torque == pytest.approx(-2.0 * strongest.position, rel=0.2)
-    assert felt[-1].torque == 0.0
-    assert not felt[-1].enabled
+    assert sent_frames[-1].torque == 0.0
+    assert not sent_frames[-1].enabled
     # The sent force is applied two rows later: one sample of delay, and the latch.
     force, applied = recording.force, recording.columns["applied_Nm"]
     assert abs(force[300:-2] - applied[302:]).max() < 2e-6
 
 
-@pytest.mark.parametrize("ask", [signal.SIGINT, signal.SIGTERM])
-def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp_path: Path) -> None:
-    trace, part = tmp_path / "trace.csv", tmp_path / "felt.csv"
+@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_sends_zero_torque_disables_the_device_and_is_reported(
+    signal_number: signal.Signals, tmp_path: Path
+) -> None:
+    trace, part = tmp_path / "trace.csv", tmp_path / "rendered.csv"
     command = [
         RUNNER,
         *LOCK_STEP,
@@ -219,111 +223,111 @@ def test_asked_to_stop_it_sends_zero_disables_and_tells(ask: signal.Signals, tmp
         "usb",
         "--uncertified",
     ]
-    words = [*command, *PATIENT, "--ramp-s", 0, "--duration-s", "inf", "--record", part]
+    arguments = [*command, *ANY_RATE, "--ramp-s", 0, "--duration-s", "inf", "--record", part]
     process = subprocess.Popen(
-        [sys.executable, *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stderr is not None
     assert "emulated knob" in process.stderr.readline()
     wait_for_rows(Path(f"{part}.part"))
     time.sleep(0.8)  # so that the handle moves
-    process.send_signal(ask)  # the emulator passes it on
-    out, _ = process.communicate(timeout=60)
+    process.send_signal(signal_number)  # the emulator passes it on
+    output, _ = process.communicate(timeout=60)
     assert process.returncode == 0
-    assert "stopped on request" in out
+    assert "stopped on request" in output
     assert frames(trace)[-1].torque == 0.0
     assert not frames(trace)[-1].enabled
 
 
-def test_killed_it_leaves_the_device_to_its_watchdog(tmp_path: Path) -> None:
-    trace, record = tmp_path / "trace.csv", tmp_path / "felt.csv"
-    words = [PROGRAM, SPRING, "--device", "usb", "--uncertified", *PATIENT]
-    rendering = shlex.join(map(str, [*words, "--duration-s", "inf", "--record", record]))
+def test_after_kill_the_watchdog_of_the_device_sets_zero_torque(tmp_path: Path) -> None:
+    trace, record = tmp_path / "trace.csv", tmp_path / "rendered.csv"
+    arguments = [PROGRAM, SPRING, "--device", "usb", "--uncertified", *ANY_RATE]
+    rendering = shlex.join(map(str, [*arguments, "--duration-s", "inf", "--record", record]))
     script = f"""
         {rendering} 2> /dev/null &
         until [ "$(wc -l < '{record}.part' 2> /dev/null)" -gt 300 ] 2> /dev/null; do sleep 0.05; done
         kill -9 $!
         sleep 1
     """
-    answer = emulated("sh", "-c", script, device=[*LOCK_STEP, "--trace", str(trace)])
-    assert answer.returncode == 0, answer.stderr
-    felt = frames(trace)
-    assert min(frame.torque for frame in felt) < -0.01
-    assert felt[-1].torque == 0.0
-    assert felt[-1].status & 2  # the watchdog
+    completed = emulated("sh", "-c", script, device=[*LOCK_STEP, "--trace", str(trace)])
+    assert completed.returncode == 0, completed.stderr
+    sent_frames = frames(trace)
+    assert min(frame.torque for frame in sent_frames) < -0.01
+    assert sent_frames[-1].torque == 0.0
+    assert sent_frames[-1].status & 2  # the watchdog
 
 
 # Kind -> number of frames of the fault, True if nothing can follow it, frames until the torque is zero. The
 # response to a fault in a packet is immediate and acts one frame later; a lost packet is seen in the next
 # frame. Otherwise the watchdog of the device acts when the time of the last command is over. On a busy
 # machine it also acts before a halted OUT endpoint is cleared.
-SHOWN = 1
-TAKEN = 2
-WATCHDOG = 10
-UNSOUND = {"Timeout", "Lost", "Fault", "NonFinite", "Jump", "Frozen"}
+SAME_FRAME = 1
+NEXT_FRAME = 2
+WATCHDOG_FRAMES = 10
+FAULT_STATUSES = {"Timeout", "Lost", "Fault", "NonFinite", "Jump", "Frozen"}
 FAULTS: dict[str, tuple[int, bool, int]] = {
-    "stall-in": (1, False, TAKEN),
-    "stall-out": (1, False, WATCHDOG),
-    "short": (1, False, TAKEN),
-    "magic": (1, False, TAKEN),
-    "version": (1, False, TAKEN),
-    "long": (1, False, TAKEN),
-    "skip": (3, False, SHOWN),
-    "repeat": (1, False, SHOWN),
-    "freeze": (15, False, WATCHDOG),
-    "mute": (15, False, WATCHDOG),
-    "deaf": (12, False, WATCHDOG),
-    "encoder": (1, True, SHOWN),
-    "over-temperature": (1, True, SHOWN),
-    "emergency-stop": (1, True, SHOWN),
-    "reset": (1, True, SHOWN),
-    "jump": (1, True, SHOWN),
-    "unplug": (2, True, TAKEN),
+    "stall-in": (1, False, NEXT_FRAME),
+    "stall-out": (1, False, WATCHDOG_FRAMES),
+    "short": (1, False, NEXT_FRAME),
+    "magic": (1, False, NEXT_FRAME),
+    "version": (1, False, NEXT_FRAME),
+    "long": (1, False, NEXT_FRAME),
+    "skip": (3, False, SAME_FRAME),
+    "repeat": (1, False, SAME_FRAME),
+    "freeze": (15, False, WATCHDOG_FRAMES),
+    "mute": (15, False, WATCHDOG_FRAMES),
+    "deaf": (12, False, WATCHDOG_FRAMES),
+    "encoder": (1, True, SAME_FRAME),
+    "over-temperature": (1, True, SAME_FRAME),
+    "emergency-stop": (1, True, SAME_FRAME),
+    "reset": (1, True, SAME_FRAME),
+    "jump": (1, True, SAME_FRAME),
+    "unplug": (2, True, NEXT_FRAME),
 }
 
 
 def test_faults_in_random_order_end_in_zero_torque_with_a_complete_record(tmp_path: Path) -> None:
     seed = int(os.environ.get("PALPATE_TEST_SEED", "7"))
     generator = random.Random(seed)
-    passing = [kind for kind, (_, final, _) in FAULTS.items() if not final]
-    final = [kind for kind in FAULTS if kind not in passing]
-    done = 0
+    recoverable = [kind for kind, (_, unrecoverable, _) in FAULTS.items() if not unrecoverable]
+    unrecoverable = [kind for kind in FAULTS if kind not in recoverable]
+    n_faults = 0
     run = 0
-    while done < 100 * SCALE:
+    while n_faults < 100 * SCALE:
         run += 1
-        kinds = generator.choices(passing, k=29)
+        kinds = generator.choices(recoverable, k=29)
         if run % 3:
-            kinds.append(generator.choice(final))
-        at, script = 260, []
+            kinds.append(generator.choice(unrecoverable))
+        next_frame, script = 260, []
         for kind in kinds:
-            script.append((kind, at))
-            at += generator.randrange(25, 40)
-        where = f"seed {seed}, run {run}: {script}"
+            script.append((kind, next_frame))
+            next_frame += generator.randrange(25, 40)
+        context = f"seed {seed}, run {run}: {script}"
         faults = [word for kind, frame in script for word in ("--fault", f"{kind}@{frame}x{FAULTS[kind][0]}")]
-        record, trace = tmp_path / f"felt{run}.csv", tmp_path / "trace.csv"
-        answer = uncertified(
+        record, trace = tmp_path / f"rendered{run}.csv", tmp_path / "trace.csv"
+        completed = uncertified(
             "--duration-s", 1.5, "--record", record, "--json", device=[*faults, "--trace", str(trace)]
         )
-        ends = kinds[-1] in final
-        assert answer.returncode == int(ends), f"{where}\n{answer.stderr}"
-        summary = json.loads(answer.stdout)
-        assert rows(record) == summary["ticks"], where
-        assert summary["lost_records"] == 0, where
+        is_stopped = kinds[-1] in unrecoverable
+        assert completed.returncode == int(is_stopped), f"{context}\n{completed.stderr}"
+        summary = json.loads(completed.stdout)
+        assert rows(record) == summary["ticks"], context
+        assert summary["lost_records"] == 0, context
         for row in record.read_text(encoding="utf-8").splitlines():
             cells = row.split(",")
-            if cells[-1] in UNSOUND:
-                assert float(cells[2]) == 0.0, where  # in the tick that detected it
-        behind = round(summary["usb"]["delay_samples"]["p50"]) - 1  # in packets; on a busy machine
-        felt = frames(trace)
-        by_start = {frame.started: index for index, frame in enumerate(felt)}
+            if cells[-1] in FAULT_STATUSES:
+                assert float(cells[2]) == 0.0, context  # in the tick that detected it
+        packets_in_flight = round(summary["usb"]["delay_samples"]["p50"]) - 1  # in packets; on a busy machine
+        sent_frames = frames(trace)
+        by_start = {frame.started: index for index, frame in enumerate(sent_frames)}
         for kind, frame in script:
             index = by_start[frame]
-            assert felt[index - 1].torque != 0.0, f"{where}: {kind} at {frame}"
-            after = felt[index : index + FAULTS[kind][2] + behind + 1]
-            assert any(one.torque == 0.0 for one in after) or after[-1].unplugged, (
-                f"{where}: {kind} at {frame}"
+            assert sent_frames[index - 1].torque != 0.0, f"{context}: {kind} at {frame}"
+            following_frames = sent_frames[index : index + FAULTS[kind][2] + packets_in_flight + 1]
+            assert any(each.torque == 0.0 for each in following_frames) or following_frames[-1].unplugged, (
+                f"{context}: {kind} at {frame}"
             )
-            done += 1
-        assert felt[-1].torque == 0.0 or felt[-1].unplugged, where
-        assert not felt[-1].enabled or felt[-1].unplugged, where
+            n_faults += 1
+        assert sent_frames[-1].torque == 0.0 or sent_frames[-1].unplugged, context
+        assert not sent_frames[-1].enabled or sent_frames[-1].unplugged, context
         record.unlink()

@@ -24,13 +24,13 @@ from palpate._core.simulation import Hand, force_driven, motion_driven, simulate
 CASES = 100 * max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 
 
-def hat(u: NDArray[np.float64]) -> NDArray[np.float64]:
+def mexican_hat(u: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the radial Mexican hat over the last axis."""
     square = np.sum(u * u, axis=-1)
     return (square - u.shape[-1]) * np.exp(-0.5 * square)
 
 
-def network(rng: np.random.Generator, size: int, dimension: int = 1) -> dict[str, object]:
+def random_network(rng: np.random.Generator, size: int, dimension: int = 1) -> dict[str, object]:
     return {
         "alpha": np.exp(rng.uniform(0, 4, (size, dimension))),
         "beta": rng.uniform(-0.1, 1.1, (size, dimension)),
@@ -43,28 +43,28 @@ def network(rng: np.random.Generator, size: int, dimension: int = 1) -> dict[str
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_force_agrees_with_a_numpy_reference(dimension: int) -> None:
+def test_force_equals_a_numpy_reference(dimension: int) -> None:
     rng = np.random.default_rng(dimension)
     for _ in range(CASES):
-        given = network(rng, int(rng.integers(0, 12)), dimension)
-        model = ForceModel(**given)
+        arguments = random_network(rng, int(rng.integers(0, 12)), dimension)
+        model = ForceModel(**arguments)
         x = rng.uniform(0, 1, (7, dimension))
-        scaled = given["alpha"] * (x[:, None, :] - given["beta"])
-        expected = hat(scaled) @ given["weight"] + x @ given["linear"] + given["bias"]
+        scaled = arguments["alpha"] * (x[:, None, :] - arguments["beta"])
+        expected = mexican_hat(scaled) @ arguments["weight"] + x @ arguments["linear"] + arguments["bias"]
         assert model.predict(x) == pytest.approx(expected, rel=1e-12, abs=1e-12)
         if dimension == 1:
             assert model.force(x[:, 0]) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize("dimension", [1, 2])
-def test_columns_and_jacobian_agree_with_differences(dimension: int) -> None:
+def test_columns_and_jacobian_equal_finite_differences(dimension: int) -> None:
     rng = np.random.default_rng(10 + dimension)
     x = rng.uniform(0, 1, (20, dimension))
     alpha = rng.uniform(1, 9, (5, dimension))
     beta = rng.uniform(0, 1, (5, dimension))
     columns = wavelet_columns(x, alpha, beta)
     assert columns.flags.f_contiguous
-    assert columns == pytest.approx(hat(alpha * (x[:, None, :] - beta)), abs=1e-14)
+    assert columns == pytest.approx(mexican_hat(alpha * (x[:, None, :] - beta)), abs=1e-14)
     value, by_alpha, by_beta = wavelet_jacobian(x, alpha, beta)
     assert np.array_equal(value, columns)
     h = 1e-6
@@ -82,24 +82,24 @@ def test_columns_and_jacobian_agree_with_differences(dimension: int) -> None:
     assert wavelet_steps(x, alpha, beta) == pytest.approx(np.concatenate(steps, axis=1), abs=1e-13)
 
 
-def test_columns_are_safe_for_every_number_and_any_length() -> None:
+def test_columns_are_correct_for_extreme_positions_and_any_length() -> None:
     rng = np.random.default_rng(12)
     alpha, beta = rng.uniform(1, 50, 6), rng.uniform(0, 1, 6)
     for n in (0, 1, 7, 255, 256, 257, 1000):
         x = rng.uniform(-1, 2, n)
-        expected = hat((alpha * (x[:, None] - beta))[:, :, None])
+        expected = mexican_hat((alpha * (x[:, None] - beta))[:, :, None])
         assert wavelet_columns(x, alpha, beta) == pytest.approx(expected, abs=1e-13)
-    far = np.array([1e300, -1e300, np.inf, -np.inf, 1e10])
-    value, by_alpha, by_beta = wavelet_jacobian(far, alpha, beta)
+    far_positions = np.array([1e300, -1e300, np.inf, -np.inf, 1e10])
+    value, by_alpha, by_beta = wavelet_jacobian(far_positions, alpha, beta)
     for columns in (value, by_alpha[0], by_beta[0]):
         assert np.all(np.abs(columns) < 1e-280)
     assert np.all(np.isnan(wavelet_columns(np.array([np.nan]), alpha, beta)))
 
 
-def test_a_batch_is_its_single_positions() -> None:
+def test_a_batch_equals_the_results_of_single_positions() -> None:
     rng = np.random.default_rng(13)
     for size in (0, 1, 5, 16, 33):
-        model = ForceModel(**network(rng, size))
+        model = ForceModel(**random_network(rng, size))
         x = np.concatenate([rng.uniform(-0.5, 1.5, 1001), [0.0, 1.0, 1e10, -1e10]])
         for quantity in (model.force, model.slope, model.energy):
             assert quantity(x) == pytest.approx(
@@ -107,15 +107,15 @@ def test_a_batch_is_its_single_positions() -> None:
             )
 
 
-def test_slope_columns_belong_to_the_wavelets() -> None:
+def test_slope_columns_equal_finite_differences_of_the_wavelets() -> None:
     rng = np.random.default_rng(3)
     x, alpha, beta, h = rng.uniform(0, 1, 30), rng.uniform(1, 9, 4), rng.uniform(0, 1, 4), 1e-6
     slope = (wavelet_columns(x + h, alpha, beta) - wavelet_columns(x - h, alpha, beta)) / (2 * h)
     assert wavelet_slope_columns(x, alpha, beta) == pytest.approx(slope, abs=1e-7)
 
 
-def test_a_number_in_is_a_number_out_and_shapes_are_kept() -> None:
-    model = ForceModel(**network(np.random.default_rng(4), 3))
+def test_a_float_gives_a_float_and_an_array_keeps_its_shape() -> None:
+    model = ForceModel(**random_network(np.random.default_rng(4), 3))
     assert type(model.force(0.3)) is float
     assert model.force(1) == model.force(1.0)
     grid = np.linspace(-0.5, 1.5, 12).reshape(3, 4)
@@ -128,17 +128,19 @@ def test_a_number_in_is_a_number_out_and_shapes_are_kept() -> None:
     assert model.extrapolated(0.5) is False
 
 
-def test_hysteresis_needs_a_direction_and_says_so() -> None:
-    given = network(np.random.default_rng(5), 3)
-    loss = {"weight_hysteresis": [0.0, 0.0, 0.0], "linear_hysteresis": [0.0], "bias_hysteresis": 0.25}
-    model = ForceModel(**given, **loss)
-    single = ForceModel(**given)
+def test_a_model_with_hysteresis_requires_a_direction() -> None:
+    arguments = random_network(np.random.default_rng(5), 3)
+    hysteresis = {"weight_hysteresis": [0.0, 0.0, 0.0], "linear_hysteresis": [0.0], "bias_hysteresis": 0.25}
+    model = ForceModel(**arguments, **hysteresis)
+    without_hysteresis = ForceModel(**arguments)
     x = np.linspace(0, 1, 5)
-    assert model.force(x, direction=1) == pytest.approx(single.force(x) + 0.25, abs=1e-14)
+    assert model.force(x, direction=1) == pytest.approx(without_hysteresis.force(x) + 0.25, abs=1e-14)
     assert model.force(x, direction=np.full(5, -1, np.int8)) == pytest.approx(
-        single.force(x) - 0.25, abs=1e-14
+        without_hysteresis.force(x) - 0.25, abs=1e-14
     )
-    assert model.predict(np.column_stack([x, np.zeros(5)])) == pytest.approx(single.force(x), abs=1e-14)
+    assert model.predict(np.column_stack([x, np.zeros(5)])) == pytest.approx(
+        without_hysteresis.force(x), abs=1e-14
+    )
     with pytest.raises(ValueError, match="give direction="):
         model.force(0.3)
     with pytest.raises(ValueError, match="no play radius"):
@@ -148,15 +150,20 @@ def test_hysteresis_needs_a_direction_and_says_so() -> None:
 
 
 def test_play_state_follows_the_motion() -> None:
-    loss = {"weight_hysteresis": [], "linear_hysteresis": [0.0], "bias_hysteresis": 0.2, "play_radius": 0.1}
-    flat = {"alpha": np.empty((0, 1)), "beta": np.empty((0, 1)), "weight": [], "linear": [5.0], "bias": 0.0}
-    model = ForceModel(**flat, **loss, lower=[0.0], upper=[1.0])
-    motion = np.array([0.2, 0.5, 0.45, 0.2])
-    play = model.play(motion)
+    hysteresis = {
+        "weight_hysteresis": [],
+        "linear_hysteresis": [0.0],
+        "bias_hysteresis": 0.2,
+        "play_radius": 0.1,
+    }
+    line = {"alpha": np.empty((0, 1)), "beta": np.empty((0, 1)), "weight": [], "linear": [5.0], "bias": 0.0}
+    model = ForceModel(**line, **hysteresis, lower=[0.0], upper=[1.0])
+    position = np.array([0.2, 0.5, 0.45, 0.2])
+    play = model.play(position)
     assert play == pytest.approx([0.2, 0.4, 0.4, 0.3])
-    assert np.array_equal(_core.model.play(motion, 0.1), play)
-    assert _core.model.play(motion, 0.1, start=0.25)[0] == 0.25
-    assert model.force(motion, play=play) == pytest.approx(5 * motion + 0.2 * np.array([0, 1, 0.5, -1]))
+    assert np.array_equal(_core.model.play(position, 0.1), play)
+    assert _core.model.play(position, 0.1, start=0.25)[0] == 0.25
+    assert model.force(position, play=play) == pytest.approx(5 * position + 0.2 * np.array([0, 1, 0.5, -1]))
 
 
 @pytest.mark.parametrize(
@@ -173,19 +180,19 @@ def test_play_state_follows_the_motion() -> None:
 )
 def test_impossible_models_are_refused_by_field(change: dict[str, object], sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
-        ForceModel(**{**network(np.random.default_rng(6), 3), **change})
+        ForceModel(**{**random_network(np.random.default_rng(6), 3), **change})
 
 
-def test_simulation_returns_one_row_a_tick() -> None:
-    model = ForceModel(**network(np.random.default_rng(7), 0))
+def test_simulation_returns_one_row_per_tick_and_the_same_rows_again() -> None:
+    model = ForceModel(**random_network(np.random.default_rng(7), 0))
     trace = simulate(model, Scheme(), DeviceProfile(), Hand(), 0.25)
     assert {len(column) for column in trace.values()} == {250}
     assert set(trace["status"]) <= {int(_core.status.Status.Ok), int(_core.status.Status.Limited)}
-    again = simulate(model, Scheme(), DeviceProfile(), Hand(), 0.25)
-    assert all(np.array_equal(trace[name], again[name]) for name in trace)
+    second_trace = simulate(model, Scheme(), DeviceProfile(), Hand(), 0.25)
+    assert all(np.array_equal(trace[name], second_trace[name]) for name in trace)
 
 
-def test_recorded_motion_and_force_are_each_others_inverse_on_a_spring() -> None:
+def test_motion_driven_and_force_driven_simulations_are_inverse_for_a_spring() -> None:
     spring = ForceModel(
         alpha=np.empty((0, 1)),
         beta=np.empty((0, 1)),
@@ -195,16 +202,16 @@ def test_recorded_motion_and_force_are_each_others_inverse_on_a_spring() -> None
         lower=[0.0],
         upper=[1.0],
     )
-    slow = 0.5 - 0.4 * np.cos(np.linspace(0, 2 * np.pi, 8000))
-    force = motion_driven(spring, Scheme(structure="direct"), slow, 1e-3)["force"]
-    assert force == pytest.approx(5 * slow, abs=1e-12)
+    position = 0.5 - 0.4 * np.cos(np.linspace(0, 2 * np.pi, 8000))
+    force = motion_driven(spring, Scheme(structure="direct"), position, 1e-3)["force"]
+    assert force == pytest.approx(5 * position, abs=1e-12)
     for structure in ("implicit", "explicit"):
-        scheme = Scheme(structure=structure, damping=0.05)
-        moved = force_driven(spring, scheme, force, 1e-3, start_position=float(slow[0]))
-        assert moved["environment_position"] == pytest.approx(slow, abs=5e-3)
+        scheme = Scheme(structure=structure, object_damping=0.05)
+        simulated = force_driven(spring, scheme, force, 1e-3, start_position=float(position[0]))
+        assert simulated["environment_position"] == pytest.approx(position, abs=5e-3)
 
 
-def test_defaults_and_words_are_those_of_the_core() -> None:
+def test_defaults_and_names_equal_those_of_the_core() -> None:
     assert [status.name for status in _core.status.Status.__members__.values()] == list(
         _core.status.status_meanings
     )
@@ -216,13 +223,13 @@ def test_defaults_and_words_are_those_of_the_core() -> None:
         "energy-consistent",
     )
     scheme = Scheme()
-    assert (scheme.structure, scheme.mass, scheme.damping) == ("massless", 0.001, 0.5)
+    assert (scheme.structure, scheme.mass, scheme.object_damping) == ("massless", 0.001, 0.5)
     profile = DeviceProfile()
     assert (profile.inertia, profile.viscous_damping, profile.force_limit) == (2e-4, 0.06, 5.0)
     assert profile.encoder_step == pytest.approx(2 * np.pi / 65536)
 
 
-def test_filters_are_those_of_the_core() -> None:
+def test_filters_equal_scipy_filters() -> None:
     filters = environment_filters("explicit")
     signal = np.sin(0.05 * np.arange(400))
     b, a = filters.g1.numerator, filters.g1.denominator

@@ -44,8 +44,8 @@ class Case:
 
     def stream(self) -> bytes:
         """Returns the input of forces.cpp."""
-        head = [len(self.alpha), len(self.x), self.linear, self.bias, self.lower, self.upper]
-        parts = [[*head, self.below, self.above], self.alpha, self.beta, self.weight, self.x]
+        header = [len(self.alpha), len(self.x), self.linear, self.bias, self.lower, self.upper]
+        parts = [[*header, self.below, self.above], self.alpha, self.beta, self.weight, self.x]
         return np.concatenate(parts).astype(np.float64).tobytes()
 
     def model(self) -> ForceModel:
@@ -99,42 +99,44 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def sizes(case: Case) -> Array:
+def magnitudes(case: Case) -> Array:
     """Returns the scale of a rounding error: sums of absolute terms of force, slope and energy, (3,)."""
     weight, c = np.abs(case.weight), abs(case.linear)
-    reach = max(abs(case.lower), abs(case.upper))
+    largest_position = max(abs(case.lower), abs(case.upper))
     return np.array(
         [
-            2.0 * weight.sum() + c * reach + abs(case.bias),
+            2.0 * weight.sum() + c * largest_position + abs(case.bias),
             2.0 * (weight * case.alpha).sum() + c,
-            (weight / case.alpha).sum() + (c * reach + abs(case.bias)) * reach,
+            (weight / case.alpha).sum() + (c * largest_position + abs(case.bias)) * largest_position,
         ]
     )
 
 
-def test_force_slope_and_energy_are_the_same_in_cpp_and_python(program: Path) -> None:
-    given = list(cases())
-    stream = b"".join(case.stream() for case in given)
+def test_force_slope_and_energy_are_equal_in_cpp_and_python(program: Path) -> None:
+    all_cases = list(cases())
+    stream = b"".join(case.stream() for case in all_cases)
     out = subprocess.run([program], input=stream, stdout=subprocess.PIPE, check=True).stdout
-    rows = iter(np.split(np.frombuffer(out).reshape(-1, 3), np.cumsum([len(case.x) for case in given])[:-1]))
-    for case in given:
-        expected, model, size = next(rows), case.model(), sizes(case)
+    rows = iter(
+        np.split(np.frombuffer(out).reshape(-1, 3), np.cumsum([len(case.x) for case in all_cases])[:-1])
+    )
+    for case in all_cases:
+        expected, model, magnitude = next(rows), case.model(), magnitudes(case)
         quantities = (model.force, model.slope, model.energy)
         batch = np.stack([quantity(case.x) for quantity in quantities], axis=1)
         single = np.array([[quantity(float(x)) for quantity in quantities] for x in case.x])
         for python in (batch, single):
             with np.errstate(invalid="ignore", over="ignore"):
-                near = np.abs(python - expected) <= TOLERANCE * np.maximum(size, np.abs(expected))
-            same = near | (python == expected) | (np.isnan(python) & np.isnan(expected))
-            assert same.all(), (case, python[~same], expected[~same])
+                is_near = np.abs(python - expected) <= TOLERANCE * np.maximum(magnitude, np.abs(expected))
+            is_equal = is_near | (python == expected) | (np.isnan(python) & np.isnan(expected))
+            assert is_equal.all(), (case, python[~is_equal], expected[~is_equal])
 
 
-def test_inside_the_domain_both_are_equation_4(program: Path) -> None:
+def test_inside_the_domain_the_force_is_equation_4(program: Path) -> None:
     for case in list(cases())[: NETWORKS // 4]:
         x = case.x[(case.x >= case.lower) & (case.x <= case.upper)]
         u = case.alpha * (x[:, None] - case.beta)
-        plain = ((u**2 - 1.0) * np.exp(-0.5 * u**2)) @ case.weight + case.linear * x + case.bias
+        expected = ((u**2 - 1.0) * np.exp(-0.5 * u**2)) @ case.weight + case.linear * x + case.bias
         # a rounding error in u corresponds to alpha eps |x| in the argument
-        reach = max(abs(case.lower), abs(case.upper))
-        size = sizes(case)[0] + sizes(case)[1] * reach
-        assert np.abs(case.model().force(x) - plain).max(initial=0.0) <= TOLERANCE * size
+        largest_position = max(abs(case.lower), abs(case.upper))
+        magnitude = magnitudes(case)[0] + magnitudes(case)[1] * largest_position
+        assert np.abs(case.model().force(x) - expected).max(initial=0.0) <= TOLERANCE * magnitude

@@ -27,7 +27,7 @@ STEP = 2 * np.pi / 65536
 SHARE_OF_FORCE = 0.005
 
 
-def heard(**changed: Any) -> dict[str, Any]:
+def summary_without_force(**changed: Any) -> dict[str, Any]:
     """Returns a summary of `measure` for a faultless device in a hand against a spring, for `judge`."""
     time = 1e-3 * np.arange(2000)
     moves = np.where(time > 0.5, 0.2 * (1.0 - np.cos(2 * np.pi * (time - 0.5))), 0.0)
@@ -53,7 +53,7 @@ def heard(**changed: Any) -> dict[str, Any]:
         "lost_samples": 0,
         "repeated_samples": 0,
         "orderly": True,
-        "ended": "ran its time",
+        "ended": "the duration ended",
         "transducer": True,
         "round_trip": percentiles,
         "delay": percentiles,
@@ -66,8 +66,8 @@ def observed(found: Check, name: str) -> Any:
     return next(one for one in found.observations if one.name == name)
 
 
-def test_a_faultless_device_is_ok_and_all_numbers_are_told() -> None:
-    found = judge(heard())
+def test_a_faultless_device_has_the_verdict_good_and_all_numbers() -> None:
+    found = judge(summary_without_force())
     assert str(found.verdict) == "good"
     assert found.may_push
     assert {one.name for one in found.observations} >= {
@@ -87,16 +87,16 @@ def test_a_faultless_device_is_ok_and_all_numbers_are_told() -> None:
     [
         ({"rate_hz": 480.0}, "rate", False),
         ({"period": {"p50_us": 1e3, "p99_us": 2e3, "p999_us": 5e3, "max_us": 9e3}}, "period", False),
-        ({"device_time": 2.08e-3 * np.arange(2000)}, "clock of the device", False),
+        ({"device_time": 2.08e-3 * np.arange(2000)}, "device clock", False),
         ({"lost_samples": 30}, "samples", False),
         ({"repeated_samples": 30}, "samples", False),
-        ({"stalls": 1}, "wire", False),
-        ({"orderly": False, "ended": "stopped by a fault"}, "stream", True),
-        ({"measured": -3.0 * heard()["kept"]["position"]}, "sign of the transducer", True),
-        ({"velocity": -heard()["kept"]["velocity"]}, "sign of the velocity", True),
+        ({"stalls": 1}, "USB errors", False),
+        ({"orderly": False, "ended": "stopped by a fault"}, "connection", True),
+        ({"measured": -3.0 * summary_without_force()["kept"]["position"]}, "sign of the transducer", True),
+        ({"velocity": -summary_without_force()["kept"]["velocity"]}, "velocity", True),
         (
             {
-                "position": heard()["kept"]["position"]
+                "position": summary_without_force()["kept"]["position"]
                 + STEP * np.random.default_rng(1).normal(0.0, 9.0, 2000)
             },
             "encoder",
@@ -104,10 +104,10 @@ def test_a_faultless_device_is_ok_and_all_numbers_are_told() -> None:
         ),
     ],
 )
-def test_what_is_wrong_is_named_and_forbids_force_where_it_must(
+def test_a_wrong_property_is_named_and_forbids_force_if_it_is_unsafe(
     changed: dict[str, Any], name: str, forbids: bool
 ) -> None:
-    found = judge(heard(**changed))
+    found = judge(summary_without_force(**changed))
     wrong = observed(found, name)
     assert wrong.right is False
     assert str(found.verdict).startswith("no: ")
@@ -116,39 +116,39 @@ def test_what_is_wrong_is_named_and_forbids_force_where_it_must(
     assert found.may_push is not forbids
 
 
-def test_a_device_that_must_not_make_force_has_no_profile() -> None:
-    found = judge(heard(velocity=-heard()["kept"]["velocity"]))
-    with pytest.raises(InputError, match="no profile of a device that must not make force"):
+def test_a_device_whose_check_forbids_force_has_no_profile() -> None:
+    found = judge(summary_without_force(velocity=-summary_without_force()["kept"]["velocity"]))
+    with pytest.raises(InputError, match="a wrong result of its check forbids force"):
         found.profile()
 
 
-def test_a_device_that_echoes_nothing_while_it_is_disabled_has_no_delay_of_zero() -> None:
-    silent = heard()
+def test_without_echoes_of_a_disabled_device_the_delay_is_unknown_until_a_push() -> None:
+    silent = summary_without_force()
     del silent["round_trip"], silent["delay"]
     found = judge(silent)
     assert found.suitable
     assert found.numbers["delay_s"] is None
-    assert check.with_pushes(found, push_response(pushed())).numbers["delay_s"] == 0
+    assert check.with_pushes(found, push_response(push_ticks())).numbers["delay_s"] == 0
 
 
-@pytest.mark.parametrize("what", ["measured", "velocity"])
-def test_a_flipped_sign_is_caught_before_any_force(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("quantity", ["measured", "velocity"])
+def test_a_reversed_sign_is_detected_before_any_force(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[dict[str, Any]] = []
 
     def measured(device: str, **settings: Any) -> dict[str, Any]:
         calls.append(settings)
-        return heard(**{what: -heard()["kept"][what]})
+        return summary_without_force(**{quantity: -summary_without_force()["kept"][quantity]})
 
     monkeypatch.setattr(check, "measure", measured)
     found = check_device(push=True)
     assert not found.suitable
     assert all("push" not in settings for settings in calls)
-    assert observed(found, "sign of the force").text == "not looked at: what was heard forbids any force"
+    assert observed(found, "sign of the force").text == "not measured: a wrong result forbids force"
 
 
-def pushed(
-    obeys: float = 1.0,
-    says: float = 1.0,
+def push_ticks(
+    motor_sign: float = 1.0,
+    reported_sign: float = 1.0,
     moves: Callable[[np.ndarray], np.ndarray] | None = None,
     friction: float = 0.0,
     smaller: float = 0.6,
@@ -161,7 +161,7 @@ def pushed(
     x = 0.0
     for k in range(1, 2000):
         for _ in range(20):
-            free = speed + 5e-5 / 2e-4 * (-obeys * sent[k - 1] - 0.06 * speed)
+            free = speed + 5e-5 / 2e-4 * (-motor_sign * sent[k - 1] - 0.06 * speed)
             speed = np.copysign(max(0.0, abs(free) - 5e-5 / 2e-4 * friction), free)
             x += 5e-5 * speed
         position[k] = x
@@ -169,7 +169,7 @@ def pushed(
     position += moves(time) if moves is not None else 0.0
     return {
         "force": sent,
-        "applied": says * np.concatenate(([0.0], sent[:-1])),
+        "applied": reported_sign * np.concatenate(([0.0], sent[:-1])),
         "position": STEP * np.round(position / STEP),
         "device_time": time,
         "sequence": np.arange(2000, dtype=np.uint64),
@@ -177,88 +177,92 @@ def pushed(
 
 
 def test_pushes_show_sign_delay_and_mechanics() -> None:
-    push = push_response(pushed(), STEP)
-    assert push.moved > 10 * push.unsure
-    assert push.obeyed
+    push = push_response(push_ticks(), STEP)
+    assert push.displacement > 10 * push.standard_error
+    assert push.reported_sign_agrees
     assert push.delay_samples == 0
     assert push.mechanics is not None
     assert push.mechanics.inertia == pytest.approx(2e-4, rel=0.02)
     assert push.mechanics.damping == pytest.approx(0.06, rel=0.02)
-    assert push.mechanics.friction_at_least == 0.0
+    assert push.mechanics.friction_lower_bound == 0.0
 
 
 @pytest.mark.parametrize("friction", [0.001, 0.003, 0.006, 0.01, 0.012])
 def test_pushes_of_two_sizes_separate_friction_from_damping(friction: float) -> None:
-    mechanics = push_response(pushed(friction=friction), STEP).mechanics
+    mechanics = push_response(push_ticks(friction=friction), STEP).mechanics
     assert mechanics is not None
     assert mechanics.friction == pytest.approx(friction, rel=0.05)
-    assert 0.85 * friction < mechanics.friction_at_least <= friction
+    assert 0.85 * friction < mechanics.friction_lower_bound <= friction
     assert mechanics.damping == pytest.approx(0.06, rel=0.02)
 
 
-def test_friction_that_only_the_larger_pushes_overcome_is_not_measured_but_can_be_stated() -> None:
-    ticks = pushed(friction=0.018)
+def test_friction_above_the_smaller_pushes_is_not_measured_but_can_be_stated() -> None:
+    ticks = push_ticks(friction=0.018)
     push = push_response(ticks, STEP)
     assert push.mechanics is None
-    found = check.with_pushes(judge(heard()), push)
-    assert "friction: not measured: no two sizes of push moved the handle" in str(found.verdict)
+    found = check.with_pushes(judge(summary_without_force()), push)
+    assert "friction: not measured: pushes of two sizes must move the handle" in str(found.verdict)
     assert "--coulomb-friction" in str(found.verdict)
     with pytest.raises(InputError, match="a profile needs inertia, damping and friction"):
         found.profile()
     stated = push_response(ticks, STEP, 0.018)
     assert stated.mechanics is not None
     assert stated.mechanics.damping == pytest.approx(0.06, rel=0.1)
-    stating = check.with_pushes(replace(judge(heard()), coulomb_friction=0.018), stated)
-    assert stating.profile().coulomb_friction == 0.018
-    assert "coulomb_friction: stated, not measured." in stating.profile_notes()
+    check_with_friction = check.with_pushes(
+        replace(judge(summary_without_force()), coulomb_friction=0.018), stated
+    )
+    assert check_with_friction.profile().coulomb_friction == 0.018
+    assert "coulomb_friction: stated, not measured." in check_with_friction.profile_notes()
 
 
-def test_a_device_without_friction_is_usable_and_says_what_that_costs() -> None:
-    found = check.with_pushes(judge(heard()), push_response(pushed(), STEP))
+def test_a_device_without_friction_is_usable_and_the_verdict_gives_the_reason() -> None:
+    found = check.with_pushes(judge(summary_without_force()), push_response(push_ticks(), STEP))
     assert found.verdict.level == "usable"
-    assert "friction: none was found" in str(found.verdict)
+    assert "friction: not found" in str(found.verdict)
     assert found.profile().coulomb_friction == 0.0
 
 
 @pytest.mark.parametrize(
-    ("ticks", "told"),
+    ("ticks", "start"),
     [
-        (pushed(), "right: "),
-        (pushed(obeys=-1.0), "flipped: a push moved the handle by -"),
-        (pushed(obeys=-1.0, says=-1.0), "flipped: a push moved the handle by -"),
-        (pushed(says=-1.0), "flipped: the device says that it makes the opposite"),
-        (pushed(obeys=0.0), "not seen: "),
+        (push_ticks(), "correct: "),
+        (push_ticks(motor_sign=-1.0), "reversed: a push moved the handle by -"),
+        (push_ticks(motor_sign=-1.0, reported_sign=-1.0), "reversed: a push moved the handle by -"),
+        (push_ticks(reported_sign=-1.0), "reversed: the device reports a force of the opposite sign"),
+        (push_ticks(motor_sign=0.0), "not clear: "),
         (
-            pushed(moves=lambda t: 0.3 * np.sin(2 * np.pi * 4.0 * t) * np.sin(2 * np.pi * 1.3 * t)),
-            "not seen: ",
+            push_ticks(moves=lambda t: 0.3 * np.sin(2 * np.pi * 4.0 * t) * np.sin(2 * np.pi * 1.3 * t)),
+            "not clear: ",
         ),
-        (pushed(moves=lambda t: 0.5 * t), "right: "),
+        (push_ticks(moves=lambda t: 0.5 * t), "correct: "),
     ],
     ids=["right", "motor", "firmware", "report", "no motor", "a hand", "drift"],
 )
-def test_the_sign_of_the_force_is_what_moved_the_handle(ticks: dict[str, np.ndarray], told: str) -> None:
-    found = check.with_pushes(judge(heard()), push_response(ticks))
-    assert observed(found, "sign of the force").text.startswith(told)
-    assert found.suitable is not told.startswith("flipped")
+def test_the_motion_of_the_handle_gives_the_sign_of_the_force(
+    ticks: dict[str, np.ndarray], start: str
+) -> None:
+    found = check.with_pushes(judge(summary_without_force()), push_response(ticks))
+    assert observed(found, "sign of the force").text.startswith(start)
+    assert found.suitable is not start.startswith("reversed")
 
 
 @pytest.fixture
 def faultless(monkeypatch: pytest.MonkeyPatch) -> None:
     """Replaces every measurement by that of a faultless device."""
-    push = {"kept": pushed(friction=0.01)}
-    monkeypatch.setattr(check, "measure", lambda device, **settings: push if "push" in settings else heard())
-
-
-@pytest.mark.usefixtures("faultless")
-def test_a_check_without_pushes_says_that_the_sign_of_the_force_was_not_seen() -> None:
-    found = check_device()
-    assert observed(found, "sign of the force").right is None
-    assert str(found.verdict) == (
-        "usable: sign of the force: not looked at (let it push a free handle: --push)"
+    push = {"kept": push_ticks(friction=0.01)}
+    monkeypatch.setattr(
+        check, "measure", lambda device, **settings: push if "push" in settings else summary_without_force()
     )
 
 
-def test_the_simulated_device_is_what_its_profile_says(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("faultless")
+def test_a_check_without_pushes_reports_the_unknown_sign_of_the_force() -> None:
+    found = check_device()
+    assert observed(found, "sign of the force").right is None
+    assert str(found.verdict) == ("usable: sign of the force: not measured (check a free handle with --push)")
+
+
+def test_the_simulated_device_agrees_with_its_profile(tmp_path: Path) -> None:
     profile = DeviceProfile()
     found = check_device(duration_s=4.0, push=True, profile=profile)
     assert observed(found, "sign of the force").right
@@ -271,18 +275,18 @@ def test_the_simulated_device_is_what_its_profile_says(tmp_path: Path) -> None:
     assert DeviceProfile.load(path).encoder_step == measured.encoder_step
 
 
-def test_the_profile_of_the_simulated_device_is_enough_for_a_certified_direct_plan(
+def test_the_measured_profile_of_the_simulated_device_gives_a_certified_direct_plan(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "knob.toml"
     words = ["--push", "--duration-s", "5", "--write-profile", str(path), "--json"]
     assert main(["check-device", *words]) in (0, 1)  # a busy machine may be too late for its rate
-    told = json.loads(capsys.readouterr().out)
-    assert told["written"] == str(path)
-    assert told["coulomb_friction"] == pytest.approx(0.01, rel=0.1)
+    result = json.loads(capsys.readouterr().out)
+    assert result["written"] == str(path)
+    assert result["coulomb_friction"] == pytest.approx(0.01, rel=0.1)
     text = path.read_text(encoding="utf-8")
-    assert "# coulomb_friction: measured, less its uncertainty: a lower bound." in text
-    assert "# encoder_step, force_step, force_limit: said by the device, not measured." in text
+    assert "# coulomb_friction: measured minus its uncertainty, a lower bound." in text
+    assert "# encoder_step, force_step, force_limit: stated by the device, not measured." in text
     measured = DeviceProfile.load(path)
     assert 0.008 < measured.coulomb_friction <= 0.01
     chosen = plan(load_model(SPRING), measured)
@@ -291,7 +295,7 @@ def test_the_profile_of_the_simulated_device_is_enough_for_a_certified_direct_pl
     assert chosen.certificate.certified
 
 
-def test_a_friction_that_cannot_be_is_refused_by_name() -> None:
+def test_a_negative_friction_is_refused_by_name() -> None:
     with pytest.raises(InputError, match=r"coulomb_friction is -1, must be a finite number >= 0"):
         check_device(duration_s=2.0, push=True, coulomb_friction=-1.0)
 
@@ -299,34 +303,32 @@ def test_a_friction_that_cannot_be_is_refused_by_name() -> None:
 @pytest.mark.parametrize(
     ("changed", "wrong"),
     [
-        ({"period_s": 0.5e-3}, "its period gets "),
-        ({"encoder_step": 1e-5}, "its encoder step is "),
-        ({"force_limit": 9.0}, "its largest force is 5, 9 is counted on"),
-        ({"coulomb_friction": 0.02}, "its friction is 0.00994, 0.02 is counted on"),
+        ({"period_s": 0.5e-3}, "longest period "),
+        ({"encoder_step": 1e-5}, "encoder step "),
+        ({"force_limit": 9.0}, "largest force 5, expected at least 9"),
+        ({"coulomb_friction": 0.02}, "friction 0.00994, expected at least 0.02"),
     ],
 )
 @pytest.mark.usefixtures("faultless")
-def test_a_profile_that_promises_more_than_the_device_keeps_does_not_hold(
-    changed: dict[str, float], wrong: str
-) -> None:
+def test_a_profile_better_than_the_device_is_reported_as_wrong(changed: dict[str, float], wrong: str) -> None:
     found = check_device(profile=DeviceProfile(**changed), push=True)
     assert observed(found, "profile").right is False
     assert wrong in observed(found, "profile").text
 
 
-def test_a_model_without_a_certificate_cannot_be_held_against_a_device() -> None:
+def test_a_model_without_a_certificate_is_refused() -> None:
     with pytest.raises(InputError, match="the model has no certificate; make one with `palpate plan`"):
         check_device(duration_s=2.0, model=load_model(SPRING))
     with pytest.raises(InputError, match=r"duration_s is 1, must be at least 2"):
         check_device(duration_s=1.0)
 
 
-def checked(*words: Any, device: list[str], seconds: float = 3.0) -> subprocess.CompletedProcess[str]:
+def run_check(*words: Any, device: list[str], seconds: float = 3.0) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "palpate", "check-device", "--device", "usb", "--duration-s", seconds]
     return emulated(*command, "--wait-ms", 2000, "--json", *words, device=["--lock-step", *device])
 
 
-def told_of(answer: subprocess.CompletedProcess[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+def findings_of_answer(answer: subprocess.CompletedProcess[str]) -> tuple[dict[str, Any], dict[str, Any]]:
     assert answer.returncode in (0, 1), answer.stderr
     result = json.loads(answer.stdout)
     return result, {one["name"]: one for one in result["findings"]}
@@ -335,10 +337,10 @@ def told_of(answer: subprocess.CompletedProcess[str]) -> tuple[dict[str, Any], d
 @needs_emulation
 def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> None:
     profile, trace = tmp_path / "knob.toml", tmp_path / "trace.csv"
-    answer = checked(
+    answer = run_check(
         "--push", "--yes", "--write-profile", profile, device=["--no-hand", "--trace", str(trace)]
     )
-    result, findings = told_of(answer)
+    result, findings = findings_of_answer(answer)
     assert findings["sign of the force"]["right"], answer.stdout
     assert result["inertia"] == pytest.approx(2e-4, rel=0.05)
     assert result["viscous_damping"] == pytest.approx(0.06, rel=0.05)
@@ -349,17 +351,17 @@ def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> Non
     written = DeviceProfile.load(profile)
     assert (written.id, written.force_limit) == ("EMU-1", 5.0)
     assert written.delay_s == result["delay_s"]
-    felt = frames(trace)
-    assert max(abs(frame.torque) for frame in felt) <= 1.001 * SHARE_OF_FORCE * 5.0
-    assert felt[-1].torque == 0.0
-    assert not felt[-1].enabled
+    emulated_frames = frames(trace)
+    assert max(abs(frame.torque) for frame in emulated_frames) <= 1.001 * SHARE_OF_FORCE * 5.0
+    assert emulated_frames[-1].torque == 0.0
+    assert not emulated_frames[-1].enabled
 
 
 @needs_emulation
 def test_the_friction_of_a_usb_device_is_measured(tmp_path: Path) -> None:
     profile = tmp_path / "knob.toml"
     words = ["--push", "--yes", "--write-profile", profile]
-    result, _ = told_of(checked(*words, device=["--no-hand", "--friction", "0.01"], seconds=5.0))
+    result, _ = findings_of_answer(run_check(*words, device=["--no-hand", "--friction", "0.01"], seconds=5.0))
     assert result["coulomb_friction"] == pytest.approx(0.01, rel=0.1)
     assert result["viscous_damping"] == pytest.approx(0.06, rel=0.05)
     assert 0.008 < DeviceProfile.load(profile).coulomb_friction <= 0.01
@@ -367,48 +369,48 @@ def test_the_friction_of_a_usb_device_is_measured(tmp_path: Path) -> None:
 
 @needs_emulation
 @pytest.mark.parametrize(("hand", "seconds"), [(["--no-hand"], 2.0), ([], 6.0)], ids=["free", "held"])
-def test_a_motor_of_the_wrong_sign_is_caught_by_a_push_that_nobody_feels(
+def test_a_reversed_motor_is_detected_by_a_push_of_half_a_percent_of_its_force(
     hand: list[str], seconds: float, tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace.csv"
     profile = tmp_path / "knob.toml"
     words = ["--push", "--yes", "--write-profile", profile]
-    answer = checked(*words, device=["--flipped", *hand, "--trace", str(trace)], seconds=seconds)
-    result, findings = told_of(answer)
+    answer = run_check(*words, device=["--reversed", *hand, "--trace", str(trace)], seconds=seconds)
+    result, findings = findings_of_answer(answer)
     assert answer.returncode == 1
     assert findings["sign of the force"]["right"] is False
-    assert "sign of the force: flipped" in result["verdict"]
+    assert "sign of the force: reversed" in result["verdict"]
     assert "do not enable force" in result["verdict"]
     assert not profile.exists()  # so nothing is certified for it
     assert max(abs(frame.torque) for frame in frames(trace)) <= 1.001 * SHARE_OF_FORCE * 5.0
 
 
 @needs_emulation
-def test_a_device_that_is_only_listened_to_is_never_enabled(tmp_path: Path) -> None:
+def test_a_check_without_pushes_never_enables_the_device(tmp_path: Path) -> None:
     trace = tmp_path / "trace.csv"
-    answer = checked(device=["--spring", "3", "--flipped", "--trace", str(trace)])
-    _, findings = told_of(answer)
+    answer = run_check(device=["--spring", "3", "--reversed", "--trace", str(trace)])
+    _, findings = findings_of_answer(answer)
     assert findings["sign of the transducer"]["right"]
-    assert findings["sign of the velocity"]["right"]
+    assert findings["velocity"]["right"]
     assert findings["sign of the force"]["right"] is None
     assert not any(frame.enabled for frame in frames(trace))
 
 
 @needs_emulation
-def test_pushing_asks_first() -> None:
-    answer = checked("--push", device=["--no-hand"])
+def test_pushing_without_a_terminal_requires_yes() -> None:
+    answer = run_check("--push", device=["--no-hand"])
     assert answer.returncode == 2
-    assert "--push moves the handle; at no terminal it needs --yes" in answer.stdout
+    assert "--push moves the handle; without a terminal it needs --yes" in answer.stdout
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_check_that_is_asked_to_end_tells_what_it_has_seen(number: signal.Signals) -> None:
+def test_an_interrupted_check_reports_its_findings(number: signal.Signals) -> None:
     command = [sys.executable, "-m", "palpate", "check-device", "--duration-s", "60", "--json"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
     assert process.stderr.readline().startswith("checking simulated for 60 s")
     time.sleep(1.0)
     process.send_signal(number)
-    told, talk = process.communicate(timeout=30)
-    assert told, talk
-    assert "samples" in {finding["name"] for finding in json.loads(told)["findings"]}
+    output, errors = process.communicate(timeout=30)
+    assert output, errors
+    assert "samples" in {finding["name"] for finding in json.loads(output)["findings"]}

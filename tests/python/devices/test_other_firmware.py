@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from conftest import ROOT
-from control_program import PATIENT, PROGRAM, needs_program
+from control_program import ANY_RATE, PROGRAM, needs_program
 from palpate import read_recording
 from usb_emulation import emulated, frames, needs_emulation
 
@@ -24,25 +24,25 @@ PALPATE = [sys.executable, "-m", "palpate"]
 pytestmark = [needs_emulation, pytest.mark.parametrize("seed", range(1, 1 + 3 * SCALE))]
 
 
-def other(seed: int, *words: Any) -> list[str]:
-    return ["--lock-step", "--chosen-by", str(seed), *map(str, words)]
+def firmware_of(seed: int, *words: Any) -> list[str]:
+    return ["--lock-step", "--seed", str(seed), *map(str, words)]
 
 
 @needs_program
-def test_it_is_zeroed_found_by_its_serial_number_and_rendered_on(seed: int, tmp_path: Path) -> None:
-    trace, record, listed = (tmp_path / name for name in ("trace.csv", "felt.csv", "devices.json"))
+def test_the_device_is_zeroed_found_by_serial_number_and_rendered_on(seed: int, tmp_path: Path) -> None:
+    trace, record, listed = (tmp_path / name for name in ("trace.csv", "rendered.csv", "devices.json"))
     model = json.loads(SPRING.read_text(encoding="utf-8"))
     model["continuation"] = {**model["continuation"], "below": "linear"}  # for any zero of the hand
     both_ways = tmp_path / "spring.json"
     both_ways.write_text(json.dumps(model), encoding="utf-8")
-    control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified", *PATIENT, "--wait-ms", 10_000]))
+    control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified", *ANY_RATE, "--wait-ms", 10_000]))
     name = [sys.executable, "-c", 'import json, sys; print(json.load(sys.stdin)["devices"][0]["serial"])']
     script = f"""
         {shlex.join(PALPATE)} devices --zero --json > '{listed}' &&
         serial=$({shlex.join(name)} < '{listed}') &&
         {control} --device "usb:$serial" --priority 0 --json --duration-s 0.5 --record '{record}'
     """
-    answer = emulated("sh", "-c", script, device=other(seed, "--trace", trace))
+    answer = emulated("sh", "-c", script, device=firmware_of(seed, "--trace", trace))
     assert answer.returncode == 0, answer.stderr
     assert json.loads(listed.read_text(encoding="utf-8"))["devices"][0]["problem"] == ""
     summary = json.loads(answer.stdout)
@@ -50,20 +50,20 @@ def test_it_is_zeroed_found_by_its_serial_number_and_rendered_on(seed: int, tmp_
     assert summary["usb"]["malformed"] == 0
     assert summary["usb"]["late_echoes"] == 0
     assert summary["usb"]["watchdog_trips"] == 0
-    felt = frames(trace)
-    assert max(abs(frame.torque) for frame in felt) > 1e-3  # the spring made force
-    assert felt[-1].torque == 0.0
-    assert not felt[-1].enabled
+    emulated_frames = frames(trace)
+    assert max(abs(frame.torque) for frame in emulated_frames) > 1e-3  # the spring made force
+    assert emulated_frames[-1].torque == 0.0
+    assert not emulated_frames[-1].enabled
     assert abs(read_recording(record).force).max() > 1e-3
 
 
-def test_its_sign_and_mechanics_are_measured(seed: int) -> None:
+def test_the_sign_and_mechanics_of_the_device_are_measured(seed: int) -> None:
     words = [*PALPATE, "check-device", "--device", "usb", "--duration-s", 2, "--wait-ms", 2000, "--json"]
-    answer = emulated(*words, "--push", "--yes", device=other(seed, "--no-hand"))
+    answer = emulated(*words, "--push", "--yes", device=firmware_of(seed, "--no-hand"))
     assert answer.returncode in (0, 1), answer.stderr  # this machine may be late
-    told = json.loads(answer.stdout)
-    findings = {one["name"]: one for one in told["findings"]}
+    result = json.loads(answer.stdout)
+    findings = {one["name"]: one for one in result["findings"]}
     # A coarse encoder cannot detect such a push.
-    assert findings["sign of the force"]["right"] or told["encoder_step"] > 1e-3, answer.stdout
-    assert 0.0 <= told["delay_s"] < 4e-3
-    assert findings["wire"]["right"]
+    assert findings["sign of the force"]["right"] or result["encoder_step"] > 1e-3, answer.stdout
+    assert 0.0 <= result["delay_s"] < 4e-3
+    assert findings["USB errors"]["right"]

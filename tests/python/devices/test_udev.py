@@ -14,7 +14,7 @@ from palpate.devices import DeviceError, install_rule, usb
 
 
 @pytest.fixture
-def ran(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
+def commands_run(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
     """Returns the commands that would run."""
     commands: list[tuple[str, ...]] = []
 
@@ -27,41 +27,41 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
     return commands
 
 
-def test_one_call_writes_the_rule_and_asks_udev_to_read_it(
-    tmp_path: Path, ran: list[tuple[str, ...]]
+def test_one_call_writes_the_rule_and_makes_udev_read_it(
+    tmp_path: Path, commands_run: list[tuple[str, ...]]
 ) -> None:
-    told: list[str] = []
-    install_rule(told.append, folder=tmp_path)
+    steps: list[str] = []
+    install_rule(steps.append, folder=tmp_path)
     (rule,) = tmp_path.iterdir()
     assert rule.name == "60-palpate.rules"
     text = rule.read_text(encoding="utf-8")
     assert f'ATTR{{idVendor}}=="{usb_vendor:04x}", ATTR{{idProduct}}=="{usb_product:04x}"' in text
     assert 'TAG+="uaccess"' in text
-    assert ran == [
+    assert commands_run == [
         ("udevadm", "control", "--reload-rules"),
         ("udevadm", "trigger", "--subsystem-match=usb"),
     ]
-    assert told[0] == f"wrote {rule}:"
-    assert told[-1] == "plug the device in again"
+    assert steps[0] == f"wrote {rule}:"
+    assert steps[-1] == "plug the device in again"
 
 
-def test_a_rule_that_is_there_is_written_again(tmp_path: Path, ran: list[tuple[str, ...]]) -> None:
+def test_an_existing_rule_is_replaced(tmp_path: Path, commands_run: list[tuple[str, ...]]) -> None:
     (tmp_path / "60-palpate.rules").write_text("of an older version", encoding="utf-8")
     install_rule(lambda _: None, folder=tmp_path)
     assert "1209" in (tmp_path / "60-palpate.rules").read_text(encoding="utf-8")
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def test_a_machine_without_udev_is_told_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_udev_the_report_names_the_next_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(usb.shutil, "which", lambda name: None)
-    told: list[str] = []
-    install_rule(told.append, folder=tmp_path)
-    assert told[-1] == "there is no udevadm here: plug the device in again, or restart the machine"
+    steps: list[str] = []
+    install_rule(steps.append, folder=tmp_path)
+    assert steps[-1] == "udevadm is not installed: plug the device in again, or restart the machine"
     with pytest.raises(DeviceError, match="has no folder"):
-        install_rule(told.append, folder=tmp_path / "none")
+        install_rule(steps.append, folder=tmp_path / "none")
 
 
-def test_without_root_it_says_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_root_the_error_names_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(usb.os, "access", lambda path, mode: False)
     with pytest.raises(DeviceError, match=r"needs root; run: sudo .*-m palpate devices --install-udev-rule"):
         install_rule(lambda _: None, folder=tmp_path)

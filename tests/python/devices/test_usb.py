@@ -22,7 +22,7 @@ USBError = pytest.importorskip("usb.core", reason="needs pyusb").USBError
 
 pytestmark = needs_emulation
 
-COUNTS_A_TURN = 65536
+COUNTS_PER_TURN = 65536
 
 
 @pytest.fixture(scope="module")
@@ -38,19 +38,20 @@ def devices(*words: str, device: list[str]) -> subprocess.CompletedProcess[str]:
     return emulated(sys.executable, "-m", "palpate", "devices", *words, device=device)
 
 
-def test_a_device_is_found_and_says_who_it_is(reported: dict[str, Any]) -> None:
+def test_a_device_is_found_with_its_identity(reported: dict[str, Any]) -> None:
     (found,) = reported["found"]
     assert (found["product"], found["serial"], found["problem"]) == ("emulated knob", "EMU-1", "")
-    assert found["info"]["counts_per_rev"] == COUNTS_A_TURN
+    assert found["info"]["counts_per_rev"] == COUNTS_PER_TURN
     assert found["info"]["max_torque"] == pytest.approx(5.0)
     assert found["info"]["rate_hz"] == 1000
     assert found["info"]["transducer"]
     assert reported["name"].startswith("emulated knob EMU-1 (USB bus ")
 
 
-def test_a_serial_number_that_nobody_has_is_refused_by_name(reported: dict[str, Any]) -> None:
+def test_an_unknown_serial_number_is_refused_by_name(reported: dict[str, Any]) -> None:
     assert reported["another serial"] == (
-        "no haptic USB device with serial number OTHER is plugged in; `palpate devices` lists what there is"
+        "no haptic USB device with serial number OTHER is plugged in; "
+        "`palpate devices` lists the connected devices"
     )
 
 
@@ -60,9 +61,9 @@ def test_the_watchdog_is_set_and_read_back(reported: dict[str, Any]) -> None:
     assert reported["watchdog out of range"] == "watchdog is 1 ms, must be 2 to 1000"
 
 
-def test_the_present_position_becomes_zero(reported: dict[str, Any]) -> None:
-    few_ms_of_motion = 0.03 * COUNTS_A_TURN / 6.28
-    assert reported["count before"] > 0.15 * COUNTS_A_TURN / 6.28
+def test_the_current_position_becomes_zero(reported: dict[str, Any]) -> None:
+    few_ms_of_motion = 0.03 * COUNTS_PER_TURN / 6.28
+    assert reported["count before"] > 0.15 * COUNTS_PER_TURN / 6.28
     assert abs(reported["count after"]) < few_ms_of_motion
 
 
@@ -86,18 +87,16 @@ def test_a_halted_endpoint_stalls_until_it_is_cleared(reported: dict[str, Any]) 
     assert reported["bytes after the stall"] == 32
 
 
-def test_a_device_that_is_unplugged_is_gone_and_one_that_comes_back_is_found(
+def test_an_unplugged_device_is_not_found_until_it_is_plugged_in_again(
     reported: dict[str, Any],
 ) -> None:
-    assert reported["unplugged"].endswith(
-        "asking who it is: it was unplugged meanwhile; plug it in and try again"
-    )
+    assert reported["unplugged"].endswith("reading its identity: it was unplugged; plug it in and try again")
     assert reported["found without it"] == 0
     assert reported["opened without it"].startswith("no haptic USB device is plugged in")
     assert reported["found again"] == "EMU-1"
 
 
-def test_devices_lists_what_is_plugged_in() -> None:
+def test_devices_lists_every_connected_device() -> None:
     answer = devices(device=["--serial", "A", "--serial", "B", "--no-transducer"])
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout.startswith("verdict: good\n")
@@ -112,10 +111,10 @@ def test_devices_lists_what_is_plugged_in() -> None:
     [
         (["--no-device"], "usable", "no haptic USB device is plugged in; --device simulated needs none"),
         (["--info-bytes", "33"], "no", "the answer to GET_INFO has 33 bytes, must have 32"),
-        (["--somebody-elses"], "no", "the answer to GET_INFO begins with 0x58, must begin with 'I'"),
+        (["--wrong-magic"], "no", "the answer to GET_INFO begins with 0x58, must begin with 'I'"),
     ],
 )
-def test_devices_says_what_keeps_it_from_a_device(device: list[str], level: str, sentence: str) -> None:
+def test_devices_reports_why_a_device_cannot_be_used(device: list[str], level: str, sentence: str) -> None:
     for as_json in ([], ["--json"]):
         answer = devices(*as_json, device=device)
         assert answer.returncode == (1 if level == "no" else 0), answer.stderr
@@ -124,14 +123,14 @@ def test_devices_says_what_keeps_it_from_a_device(device: list[str], level: str,
         assert verdict.startswith(level)
 
 
-def nobody_may_run(program: Path) -> bool:
+def only_root_may_run(program: Path) -> bool:
     return os.getuid() == 0 and any(not folder.stat().st_mode & stat.S_IXOTH for folder in program.parents)
 
 
 @pytest.mark.skipif(
-    nobody_may_run(Path(sys.executable).resolve()), reason="needs a Python that nobody may run"
+    only_root_may_run(Path(sys.executable).resolve()), reason="needs a Python that other users may run"
 )
-def test_without_permission_the_command_that_gives_it_is_said() -> None:
+def test_without_permission_the_message_names_the_command() -> None:
     answer = devices(device=["--denied"])
     assert "permission denied; run 'sudo palpate devices --install-udev-rule' once" in answer.stdout
 
@@ -139,18 +138,23 @@ def test_without_permission_the_command_that_gives_it_is_said() -> None:
 @pytest.mark.parametrize(
     ("code", "sentence"),
     [
-        (-3, "knob, asking: permission denied; run 'sudo palpate devices --install-udev-rule' once"),
-        (-6, "knob, asking: another program uses it; end that program, then try again"),
-        (-7, "knob, asking: it does not answer; unplug it and plug it in again"),
-        (-1, "knob, asking: the transfer failed on the bus; try another cable or port"),
-        (None, "knob, asking: Other error; plug it in again"),
+        (
+            -3,
+            "knob, zeroing it: permission denied; run 'sudo palpate devices --install-udev-rule' once",
+        ),
+        (-6, "knob, zeroing it: another program uses it; end that program, then try again"),
+        (-7, "knob, zeroing it: it does not answer; unplug it and plug it in again"),
+        (-1, "knob, zeroing it: the transfer failed on the bus; try another cable or port"),
+        (None, "knob, zeroing it: Other error; plug it in again"),
     ],
 )
 def test_an_error_of_libusb_becomes_device_reason_and_cure(code: int | None, sentence: str) -> None:
-    assert str(device_error("knob", "asking", USBError("Other error", error_code=code))).startswith(sentence)
+    assert str(device_error("knob", "zeroing it", USBError("Other error", error_code=code))).startswith(
+        sentence
+    )
 
 
-def test_devices_sets_one_up() -> None:
+def test_devices_sets_up_one_device() -> None:
     answer = devices("--clear", "--zero", "--disable", "--watchdog-ms", "50", "--json", device=[])
     assert answer.returncode == 0, answer.stderr
     assert "emulated knob EMU-1" in answer.stderr
@@ -158,7 +162,7 @@ def test_devices_sets_one_up() -> None:
     assert json.loads(answer.stdout)["devices"][0]["info"]["watchdog_ms"] == 50
 
 
-def test_what_is_set_needs_one_device_to_be_meant() -> None:
+def test_a_setting_requires_exactly_one_device() -> None:
     answer = devices("--zero", device=["--serial", "A", "--serial", "B"])
     assert answer.returncode == 1
     assert "there are 2 USB devices (A, B); choose with usb:SERIAL" in answer.stderr

@@ -11,7 +11,7 @@ import pytest
 from palpate import InputError
 from palpate._core.device import decode_info
 
-RIGHT: dict[str, Any] = {
+VALID_FIELDS: dict[str, Any] = {
     "magic": ord("I"),
     "version": 1,
     "firmware": 0x0203,
@@ -29,10 +29,10 @@ RIGHT: dict[str, Any] = {
 
 
 def info(**changed: Any) -> bytes:
-    return struct.pack("<BBHIiHHIBBBBQ", *{**RIGHT, **changed}.values())
+    return struct.pack("<BBHIiHHIBBBBQ", *{**VALID_FIELDS, **changed}.values())
 
 
-def test_what_a_device_says_comes_in_si_units() -> None:
+def test_the_identity_of_a_device_is_decoded_in_si_units() -> None:
     read = decode_info(info())
     assert (read["max_torque"], read["rate_hz"], read["watchdog_ms"]) == (0.25, 1000, 20)
     assert read["encoder_step"] == pytest.approx(2 * 3.14159265358979 / 4096)
@@ -40,7 +40,7 @@ def test_what_a_device_says_comes_in_si_units() -> None:
 
 
 @pytest.mark.parametrize("size", [0, 31, 33])
-def test_another_size_is_refused(size: int) -> None:
+def test_an_answer_of_another_size_is_refused(size: int) -> None:
     with pytest.raises(InputError, match=f"has {size} bytes, must have 32"):
         decode_info(bytes(size))
 
@@ -61,7 +61,7 @@ def test_another_size_is_refused(size: int) -> None:
         ({"watchdog": 0}, "watchdog_ms is 0, must be > 0"),
     ],
 )
-def test_what_no_device_of_this_protocol_says_is_refused(changed: dict[str, int], sentence: str) -> None:
+def test_an_invalid_field_is_refused_by_name(changed: dict[str, int], sentence: str) -> None:
     with pytest.raises(InputError, match="the answer to GET_INFO") as caught:
         decode_info(info(**changed))
     assert sentence in str(caught.value)

@@ -442,7 +442,7 @@ def test_rows_with_a_force_not_from_the_model_are_dropped_and_counted(tmp_path: 
     assert model.data.rows == 979
     assert model.fit.nrmse < 1e-3
     assert model.notes["identification"][0] == (
-        "21 rows whose force was not the model's alone are left out (21 Starting)"
+        "left out 21 rows whose force is not the model's force (21 Starting)"
     )
 
 

@@ -51,7 +51,7 @@ def test_quantities_are_bound_directly() -> None:
         assert getattr(Model, name) is getattr(ForceModel, name)
 
 
-def test_force_and_slope_are_equation_four() -> None:
+def test_force_and_slope_follow_equation_four() -> None:
     given = content()
     model = Model(**given)
     x = np.linspace(0.0, 0.6, 201)
@@ -70,7 +70,7 @@ def test_force_and_slope_are_equation_four() -> None:
 
 @pytest.mark.parametrize("hysteresis", [False, True], ids=["position", "hysteresis"])
 @pytest.mark.parametrize("wavelets", [0, 1, N])
-def test_a_saved_model_is_the_same_to_the_last_bit(tmp_path: Path, hysteresis: bool, wavelets: int) -> None:
+def test_a_saved_model_is_loaded_exactly(tmp_path: Path, hysteresis: bool, wavelets: int) -> None:
     model = Model(**content(hysteresis, wavelets))
     again = load_model(model.save(tmp_path / "a.json"))
     assert again.to_dict() == model.to_dict()
@@ -104,7 +104,7 @@ PLAN = {
 }
 
 
-def test_everything_that_a_model_carries_comes_back(tmp_path: Path) -> None:
+def test_every_field_of_a_model_is_saved_and_loaded(tmp_path: Path) -> None:
     step = {"n_wavelets": 0, "rmse": 0.25, "criterion": None, "model_class": "linear"}
     model = Model(
         **content(
@@ -151,7 +151,7 @@ def test_numpy_numbers_are_saved_like_any_other(tmp_path: Path) -> None:
     assert load_model(model.save(tmp_path / "a.json")).to_dict() == model.to_dict()
 
 
-def test_the_slope_bounds_are_measured_over_the_domain() -> None:
+def test_the_slope_bounds_enclose_the_slopes_over_the_domain() -> None:
     model = Model(**content())
     slopes = model.slope(np.linspace(0.0, 0.6, 20_001))
     assert model.slope_bounds is not None
@@ -223,7 +223,7 @@ def test_a_failed_save_leaves_the_old_file(tmp_path: Path) -> None:
         Model(**content()).save(tmp_path / "nowhere" / "a.json")
 
 
-def test_a_saved_model_has_the_permissions_of_any_file(tmp_path: Path) -> None:
+def test_a_saved_model_has_the_permissions_of_a_new_file(tmp_path: Path) -> None:
     plain = tmp_path / "plain"
     plain.touch()
     saved = Model(**content()).save(tmp_path / "a.json")
@@ -237,7 +237,7 @@ def test_the_file_has_a_line_for_each_field(tmp_path: Path) -> None:
     assert len(text.splitlines()) < 50
 
 
-def test_a_model_can_be_read_by_a_person() -> None:
+def test_the_text_of_a_model_names_terms_domain_and_error() -> None:
     text = str(Model(**content(hysteresis=True, play_radius=1e-4, wavelets=2)))
     assert "hysteresis model: 2 wavelets, 8 parameters (model class network, stopped by bic)" in text
     assert "NRMSE 0.001 on 100 rows of a.csv" in text

@@ -36,9 +36,9 @@ def good_text(name: str) -> str:
 def patched(content: Any, patch: list[dict[str, Any]]) -> Any:
     """Returns the content after a JSON patch of add, replace and remove."""
     for change in patch:
-        *way, last = change["path"].split("/")[1:]
+        *parents, last = change["path"].split("/")[1:]
         parent = content
-        for key in way:
+        for key in parents:
             parent = parent[int(key) if isinstance(parent, list) else key]
         place = int(last) if isinstance(parent, list) else last
         if change["op"] == "remove":
@@ -78,7 +78,7 @@ def refused(path: Path) -> str | None:
     return None
 
 
-def test_the_list_names_every_good_file() -> None:
+def test_the_list_of_the_corpus_names_every_good_file() -> None:
     assert {entry["file"] for entry in GOOD} == {f"good/{path.name}" for path in CORPUS.glob("good/*.json")}
 
 
@@ -113,15 +113,15 @@ def test_a_bad_file_is_refused_with_its_name_and_field(name: str, tmp_path: Path
         ("n_wavelets_other", "fit.n_wavelets is 3: must be 2, the wavelets of the network"),
     ],
 )
-def test_errors_say_path_value_and_what_would_be_right(name: str, sentence: str, tmp_path: Path) -> None:
+def test_errors_state_path_value_and_bound(name: str, sentence: str, tmp_path: Path) -> None:
     assert refusal(tmp_path / "bad.json", bad_bytes(BAD[name])) == sentence
 
 
-def test_what_is_not_json_is_refused_with_its_line(tmp_path: Path) -> None:
+def test_text_that_is_not_json_is_refused_with_its_line(tmp_path: Path) -> None:
     assert re.match(r"this is not JSON: .*line 2, column", refusal(tmp_path / "a", bad_bytes(BAD["comment"])))
 
 
-def test_a_model_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_a_missing_model_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"^there is no file .*none\.json$"):
         load_model(tmp_path / "none.json")
 
@@ -149,7 +149,7 @@ def objects(schema: dict[str, Any], content: Any, path: str) -> Iterator[tuple[s
                 yield from objects(part, content[name], f"{path}/{name}")
 
 
-def spoiled(schema: dict[str, Any], content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+def violations(schema: dict[str, Any], content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yields changes of an object that its schema forbids: JSON patches without the path of the object."""
     yield "unknown_key", {"op": "add", "value": 0}
     for name in schema["required"]:
@@ -169,11 +169,11 @@ def spoiled(schema: dict[str, Any], content: dict[str, Any]) -> Iterator[tuple[s
 
 
 @pytest.mark.parametrize("file", ["plan_network_hysteresis", "certificate_massless", "position", "periodic"])
-def test_the_reader_refuses_what_the_schema_forbids(file: str) -> None:
+def test_the_reader_refuses_every_violation_of_the_schema(file: str) -> None:
     content = json.loads(good_text(file))
     for path, schema, part in objects(SCHEMA, content, ""):
         assert schema["additionalProperties"] is False
-        for name, change in spoiled(schema, part):
+        for name, change in violations(schema, part):
             wrong = patched(copy.deepcopy(content), [{"path": f"{path}/{name}", **change}])
             with pytest.raises(InputError):
                 check_model(wrong)
@@ -190,9 +190,9 @@ def test_the_schema_has_the_fields_that_are_written() -> None:
 
 TEXT = good_text("position")
 MUTATIONS = 60 * int(os.environ.get("PALPATE_TEST_SCALE", "1"))
-NUMBERS_REFUSED = ["1e400", "-1e400", "1" + "0" * 400, "9" * 5000, "01", "+1", ".5", "1.", "0x10", "Infinity"]
-NUMBERS_REFUSED += ["-Infinity", "NaN", "true", '"1"', "[1]", "{}", "null", "1.7976931348623159e308"]
-NUMBERS_TAKEN = ["-0", "-0.0", "1e-400", "1E+2", "18446744073709551616", "9007199254740993", "4.9e-324"]
+INVALID_NUMBERS = ["1e400", "-1e400", "1" + "0" * 400, "9" * 5000, "01", "+1", ".5", "1.", "0x10", "Infinity"]
+INVALID_NUMBERS += ["-Infinity", "NaN", "true", '"1"', "[1]", "{}", "null", "1.7976931348623159e308"]
+VALID_NUMBERS = ["-0", "-0.0", "1e-400", "1E+2", "18446744073709551616", "9007199254740993", "4.9e-324"]
 
 
 def with_bias(number: str) -> bytes:
@@ -217,10 +217,10 @@ def in_text(inside: bytes) -> bytes:
         in_text(b"\x7f"),
         with_notes("[" * 98 + "]" * 98),
         with_notes('[{"a": 1}, {"a": 2}]'),
-        *(with_bias(number) for number in NUMBERS_TAKEN),
+        *(with_bias(number) for number in VALID_NUMBERS),
     ],
 )
-def test_unusual_json_is_read(content: bytes, tmp_path: Path) -> None:
+def test_unusual_but_valid_json_is_read(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "a.json").write_bytes(content)
     load_model(tmp_path / "a.json")
 
@@ -234,18 +234,18 @@ def test_unusual_json_is_read(content: bytes, tmp_path: Path) -> None:
         (TEXT.encode("utf-16"), "NUL byte"),
         (b"\xef\xbb\xbf" + TEXT.encode(), "begins with a byte order mark: save it as UTF-8 without one"),
         (TEXT.encode() * 2, "this is not JSON"),
-        (TEXT.encode() + b"\0", "holds a NUL byte"),
+        (TEXT.encode() + b"\0", "contains a NUL byte"),
         (TEXT.encode() + b"\f", "this is not JSON"),
-        (b'{"a": 1, "\\u0061": 1}', 'the key "a" stands twice in one object'),
-        (with_notes('{"a": 1, "a": 2}'), 'the key "a" stands twice in one object'),
+        (b'{"a": 1, "\\u0061": 1}', 'the key "a" occurs twice in one object'),
+        (with_notes('{"a": 1, "a": 2}'), 'the key "a" occurs twice in one object'),
         (with_notes("[" * 99 + "]" * 99), "nested more than 100 levels deep"),
         (b"[" * 100_000, "nested more than 100 levels deep"),
         *((in_text(inside), "this is not JSON") for inside in (b"\t", b"\\ud800", b"\\udc00", b"\\x")),
         *((in_text(inside), "this is not JSON") for inside in (b"\xed\xa0\x80", b"\xe9", b"\xc0\xaf")),
-        *((with_bias(number), ": ") for number in NUMBERS_REFUSED),
+        *((with_bias(number), ": ") for number in INVALID_NUMBERS),
     ],
 )
-def test_what_readers_read_differently_is_refused(content: bytes, sentence: str, tmp_path: Path) -> None:
+def test_ambiguous_json_is_refused(content: bytes, sentence: str, tmp_path: Path) -> None:
     (tmp_path / "a.json").write_bytes(content)
     with pytest.raises(InputError, match=re.escape(sentence)) as refused:
         load_model(tmp_path / "a.json")

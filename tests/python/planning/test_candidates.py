@@ -10,7 +10,7 @@ import pytest
 
 from models_by_hand import model_by_hand
 from palpate import DeviceProfile, Model, Scheme, plan
-from palpate._core.stability import balancing_shift, certify
+from palpate._core.stability import certify, passive_shift
 from palpate.planning import profile_file
 from palpate.planning.limited_network import limit_slopes, renderable_slopes
 from palpate.planning.plan import static_force_error
@@ -29,7 +29,7 @@ def wheel() -> Model:
         upper=[TURN],
         period=TURN,
     )
-    return model.with_network(bias=model.bias + balancing_shift(model, math.inf))
+    return model.with_network(bias=model.bias + passive_shift(model, math.inf))
 
 
 def given_in_a_turn(model: Model, force_limit: float) -> float:

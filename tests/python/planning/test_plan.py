@@ -248,7 +248,7 @@ def test_a_falling_object_with_mass_is_stepped_energy_consistently_because_of_th
     assert chosen.structure == "energy-consistent"
     reasons = {sentence.split(": ", 1)[0]: sentence for sentence in chosen.refused}
     assert "use the energy-consistent structure" in reasons["implicit"]
-    damped = plan(falling, SMOOTH, mass=1e-3, damping=0.01)
+    damped = plan(falling, SMOOTH, mass=1e-3, object_damping=0.01)
     assert damped.structure == "implicit", "2 B_o / T = 20 is above its steepest fall"
 
 
@@ -309,7 +309,7 @@ def test_the_verb_writes_the_plan_into_the_model(here: Path, capsys: pytest.Capt
     assert printed["force_error_share"] == 0.0
     assert printed["written"] == "m.json"
     assert (printed["plan"], printed["certificate"]) == (stored["plan"], stored["certificate"])
-    assert printed["felt_slope"] == printed["steepest_slope"]
+    assert printed["slope_behind_coupling"] == printed["steepest_slope"]
     for stored_line, line in zip(
         printed["certificate"]["inequalities"], printed["inequalities"], strict=True
     ):
@@ -335,7 +335,9 @@ def test_force_error_of_a_soft_coupling_is_reported(here: Path, capsys: pytest.C
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     stiffness = printed["plan"]["coupling"]["stiffness"]
-    assert 1.0 / printed["felt_slope"] == pytest.approx(1.0 / printed["steepest_slope"] + 1.0 / stiffness)
+    assert 1.0 / printed["slope_behind_coupling"] == pytest.approx(
+        1.0 / printed["steepest_slope"] + 1.0 / stiffness
+    )
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3"]) == 0
     assert f"slopes up to {printed['steepest_slope']:.4g} are felt as up to " in capsys.readouterr().out
 
@@ -382,7 +384,7 @@ def test_unsuitable_device_is_refused_and_no_file_is_written(
         (["--device", "m.json"], "m.json is not TOML"),
         ([], "Missing option '--device'"),
         (["--device", "knob.toml", "-o", "knob.toml"], "is an input as well"),
-        (["--device", "knob.toml", "--plot", "locus.txt"], "is no figure file"),
+        (["--device", "knob.toml", "--plot", "locus.txt"], "locus.txt is not a figure file"),
         (["--device", "knob.toml", "--coupling-stiffness", "-1"], "coupling_stiffness is -1"),
     ],
 )

@@ -163,7 +163,7 @@ def test_friction_and_encoder_are_named_where_they_are_the_limit() -> None:
 @pytest.mark.parametrize("stiffness", [5.0, 50.0, 500.0])
 def test_the_softness_of_a_coupling_is_a_force_error(structure: str, stiffness: float) -> None:
     model = model_by_hand()
-    scheme = Scheme(structure=structure, coupling_stiffness=stiffness, mass=1e-3, damping=0.1)
+    scheme = Scheme(structure=structure, coupling_stiffness=stiffness, mass=1e-3, object_damping=0.1)
     x = np.linspace(0.0, 0.6, 200_001)  # of the object; its handle is further by the spring's deflection
     handle = x + model.force(x) / stiffness
     inside = handle <= 0.5

@@ -69,7 +69,7 @@ def test_device_too_weak_for_the_velocity_slope_is_refused_with_its_need() -> No
 
 
 @pytest.mark.parametrize(
-    "requirement", [{"coupling": True}, {"coupling_stiffness": 50.0}, {"mass": 1e-3}, {"damping": 0.1}]
+    "requirement", [{"coupling": True}, {"coupling_stiffness": 50.0}, {"mass": 1e-3}, {"object_damping": 0.1}]
 )
 def test_force_of_velocity_with_coupling_or_mass_is_refused_in_one_sentence(
     requirement: dict[str, Any],

@@ -72,7 +72,7 @@ def test_a_force_in_ampere_is_not_rendered() -> None:
 
 def test_the_explicit_limit_is_the_paper_scene_s() -> None:
     # Without a coupling: (4 m - 2 B_o T) / T^2 = 3000 at m = 0.001, B_o = 0.5, T = 1 ms.
-    scheme = Scheme(structure="explicit", mass=0.001, damping=0.5)
+    scheme = Scheme(structure="explicit", mass=0.001, object_damping=0.5)
     assert explicit_slope_limit(scheme, 1e-3, coupled=False) == pytest.approx(3000.0, rel=1e-12)
     assert explicit_slope_limit(scheme, 1e-3) == pytest.approx(3000.0 - 40.0 - 100.0, rel=1e-12)
 

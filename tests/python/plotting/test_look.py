@@ -16,9 +16,9 @@ def test_number_of_drawn_points_is_limited(n: int) -> None:
 
 def test_pauses_belong_to_no_stroke() -> None:
     direction = np.array([1, 0, -1, 0], dtype=np.int8)
-    told_apart = dict(strokes(direction, 4))
-    np.testing.assert_array_equal(told_apart["press"], [True, False, False, False])
-    np.testing.assert_array_equal(told_apart["release"], [False, False, True, False])
+    by_name = dict(strokes(direction, 4))
+    np.testing.assert_array_equal(by_name["press"], [True, False, False, False])
+    np.testing.assert_array_equal(by_name["release"], [False, False, True, False])
     assert [name for name, _ in strokes(np.array([1, 0], dtype=np.int8), 2)] == [""]
 
 

@@ -38,7 +38,7 @@ def test_structures_are_drawn_from_top_to_bottom_with_both_errors() -> None:
 def test_poles_are_those_of_the_step_and_leave_the_circle_at_the_certificate_limit() -> None:
     T = 1e-3
     scheme = Scheme(
-        structure="explicit", coupling_stiffness=60.0, coupling_damping=0.01, mass=1e-3, damping=0.5
+        structure="explicit", coupling_stiffness=60.0, coupling_damping=0.01, mass=1e-3, object_damping=0.5
     )
     limit = (4.0 * 1e-3 - 2.0 * 0.51 * T) / T**2 - 60.0
     locus = root_locus(scheme, np.array([0.5 * limit, limit, 1.001 * limit]), T)

@@ -14,22 +14,22 @@ def choose(header: str, **named: object) -> Choice:
     return choose_columns("press.csv", header.split(","), **named)  # type: ignore[arg-type]
 
 
-def test_a_named_column_wins_over_every_rule() -> None:
+def test_an_explicitly_named_column_overrides_every_rule() -> None:
     choice = choose("position_mm,depth_mm,force_N,torque_Nm", position="depth_mm", force="torque_Nm")
     assert (choice.position.name, choice.force.name) == ("depth_mm", "torque_Nm")
 
 
-def test_si_wins_over_counts_in_one_stem() -> None:
+def test_si_is_preferred_to_counts_of_one_stem() -> None:
     choice = choose("angle_counts,angle_rad,hold_current_A")
     assert choice.position.name == "angle_rad"
-    assert "angle_rad is used in place of angle_counts (SI wins)" in choice.notes
+    assert "angle_rad is used in place of angle_counts (SI units are preferred)" in choice.notes
 
 
-def test_si_wins_over_converted_units_in_one_stem() -> None:
+def test_si_is_preferred_to_converted_units_of_one_stem() -> None:
     assert choose("angle_deg,angle_rad,torque_Nm").position.name == "angle_rad"
 
 
-def test_the_only_candidate_is_taken_whatever_it_is_called() -> None:
+def test_the_only_candidate_is_chosen_for_any_name() -> None:
     choice = choose("knob_deg,load_cell_mN,label")
     assert (choice.position.name, choice.force.name, choice.time) == ("knob_deg", "load_cell_mN", None)
     assert choice.notes == ()
@@ -67,13 +67,13 @@ def test_the_first_preferred_stem_is_the_force(header: str, force: str) -> None:
     assert choose(header).force.name == force
 
 
-def test_a_preferred_stem_in_two_equal_units_does_not_choose() -> None:
+def test_a_preferred_stem_in_two_non_si_units_is_refused() -> None:
     with pytest.raises(InputError, match=r"position_mm, position_um.*--position position_mm$"):
         choose("position_mm,position_um,force_N")
 
 
-M = "m, mm, um, nm, cm, in, rad, deg, count, counts"
-N = "N, mN, uN, nN, kN, gf, kgf, lbf, ozf, Nm, mNm, uNm, kNm, N*mm, N*cm, A, mA"
+POSITION_SYMBOLS = "m, mm, um, nm, cm, in, rad, deg, count, counts"
+FORCE_SYMBOLS = "N, mN, uN, nN, kN, gf, kgf, lbf, ozf, Nm, mNm, uNm, kNm, N*mm, N*cm, A, mA"
 
 
 @pytest.mark.parametrize(
@@ -81,34 +81,35 @@ N = "N, mN, uN, nN, kN, gf, kgf, lbf, ozf, Nm, mNm, uNm, kNm, N*mm, N*cm, A, mA"
     [
         (
             "back_angle_rad,front_angle_rad,torque_Nm",
-            "press.csv: two columns could be the position (back_angle_rad, front_angle_rad); "
-            "for example add: --position back_angle_rad",
+            "press.csv: two columns could be the position (back_angle_rad, front_angle_rad). "
+            "For example, add: --position back_angle_rad",
         ),
         (
             "depth_mm,force_x_N,force_y_N,force_z_N",
-            "press.csv: three columns could be the force (force_x_N, force_y_N, force_z_N); "
-            "for example add: --force force_x_N",
+            "press.csv: three columns could be the force (force_x_N, force_y_N, force_z_N). "
+            "For example, add: --force force_x_N",
         ),
         (
             "start_s,stop_s,depth_mm,force_N",
-            "press.csv: two columns could be the time (start_s, stop_s); for example add: --time start_s",
+            "press.csv: two columns could be the time (start_s, stop_s). For example, add: --time start_s",
         ),
         (
             "x,y",
-            f"press.csv: no column name has a unit of position ({M}); "
-            f"no column name has a unit of force ({N}); its columns are x, y; "
-            "if x is in mm and y is in N, add: --position x --units x=mm --force y --units y=N",
+            f"press.csv: no column name has a unit of position ({POSITION_SYMBOLS}); "
+            f"no column name has a unit of force ({FORCE_SYMBOLS}). Its columns are x, y. "
+            "If x is in mm and y is in N, add: --position x --units x=mm --force y --units y=N",
         ),
         (
             "depth_mm,y",
-            f"press.csv: no column name has a unit of force ({N}); its columns are depth_mm, y; "
-            "if y is in N, add: --force y --units y=N",
+            f"press.csv: no column name has a unit of force ({FORCE_SYMBOLS}). Its columns are depth_mm, y. "
+            "If y is in N, add: --force y --units y=N",
         ),
         (
             "a_mm,b_mm,load cell,start_s,stop_s",
             "press.csv: two columns could be the position (a_mm, b_mm); "
-            f"no column name has a unit of force ({N}); two columns could be the time (start_s, stop_s); "
-            "its columns are a_mm, b_mm, load cell, start_s, stop_s; if load cell is in N, add: "
+            f"no column name has a unit of force ({FORCE_SYMBOLS}); "
+            "two columns could be the time (start_s, stop_s). "
+            "Its columns are a_mm, b_mm, load cell, start_s, stop_s. If load cell is in N, add: "
             "--position a_mm --force 'load cell' --units 'load cell=N' --time start_s",
         ),
     ],
@@ -119,7 +120,7 @@ def test_a_refusal_names_all_problems_and_one_command(header: str, sentence: str
         choose(header)
 
 
-def test_a_cure_takes_the_likely_columns() -> None:
+def test_a_cure_suggests_the_likely_columns() -> None:
     def cure(header: str, **named: object) -> str:
         with pytest.raises(InputError) as refused:
             choose(header, **named)
@@ -135,7 +136,7 @@ def test_a_cure_takes_the_likely_columns() -> None:
     assert cure("probe,x,y", text={"probe"}).startswith("--position x --units x=mm --force y")
 
 
-def test_a_stated_unit_makes_a_candidate() -> None:
+def test_a_column_with_a_stated_unit_is_a_candidate() -> None:
     choice = choose("x,y", units={"x": "rad", "y": "Nm"})
     assert (choice.position.name, choice.force.name) == ("x", "y")
 
@@ -147,15 +148,18 @@ def test_a_unit_may_be_stated_by_the_role_of_a_named_column() -> None:
     assert (choice.position.unit.symbol, choice.force.unit.symbol) == ("deg", "gf")
 
 
-def test_a_stated_unit_wins_over_the_name() -> None:
+def test_a_stated_unit_overrides_the_unit_in_the_name() -> None:
     choice = choose("depth_mm,force_N", units={"depth_mm": "um"})
     assert choice.position.unit is not None
     assert choice.position.unit.symbol == "um"
 
 
-def test_a_column_in_an_unknown_unit_takes_the_stated_one() -> None:
+def test_a_column_with_an_unknown_unit_is_read_in_the_stated_unit() -> None:
     choice = choose(
-        "input_V,output_V", position="input_V", force="output_V", units={"input_V": "m", "output_V": "N"}
+        "input_V,output_V",
+        position="input_V",
+        force="output_V",
+        units={"input_V": "m", "output_V": "N"},
     )
     assert (choice.position.name, choice.force.name) == ("input_V", "output_V")
 
@@ -169,28 +173,40 @@ def test_a_column_in_an_unknown_unit_takes_the_stated_one() -> None:
         ),
         (
             {"position": "deep_mm"},
-            "its columns are depth_mm, y; if y is in N, add: --position depth_mm --force y",
+            "Its columns are depth_mm, y. If y is in N, add: --position depth_mm --force y",
         ),
         ({"direction": "stroke"}, "has no column 'stroke' for --direction"),
         ({"inputs": ("load",)}, "has no column 'load' for inputs"),
         ({"units": {"z": "N"}}, "has no column 'z' for --units"),
-        ({"units": {"force": "N"}}, "--units force=N also needs --force NAME, which names its column"),
-        ({"units": {"y": "lb"}}, "--units y=lb: 'lb' is no unit; use one of m, mm"),
+        (
+            {"units": {"force": "N"}},
+            "--units force=N also needs --force NAME, which names its column",
+        ),
+        ({"units": {"y": "lb"}}, "--units y=lb: 'lb' is not a unit; use one of m, mm"),
         ({"units": {"y": "lb"}, "force": "y"}, "add: --units y=lbf"),
-        ({"force": "y"}, f"column y has no known unit ({N}); if y is in N, add: --units y=N"),
-        ({"force": "depth_mm"}, "column depth_mm is in mm, which is no unit of force"),
-        ({"force": "y", "units": {"y": "mm"}}, "column y is in mm, which is no unit of force"),
+        (
+            {"force": "y"},
+            f"column y has no known unit ({FORCE_SYMBOLS}). If y is in N, add: --units y=N",
+        ),
+        ({"force": "depth_mm"}, "column depth_mm is in mm, which is not a unit of force"),
+        ({"force": "y", "units": {"y": "mm"}}, "column y is in mm, which is not a unit of force"),
     ],
 )
-def test_wrong_hints_are_refused_by_name(named: dict[str, object], sentence: str) -> None:
+def test_wrong_options_are_refused_with_the_option_and_value(named: dict[str, object], sentence: str) -> None:
     with pytest.raises(InputError, match=re.escape(sentence)):
         choose("depth_mm,y", **named)
 
 
 @pytest.mark.parametrize(
-    "header", ["Depth [mm],Load (N)", "Weg / mm,Kraft / N", "depth, mm;force, N", "depth_mm,force_N"]
+    "header",
+    [
+        "Depth [mm],Load (N)",
+        "Weg / mm,Kraft / N",
+        "depth, mm;force, N",
+        "depth_mm,force_N",
+    ],
 )
-def test_units_stand_in_brackets_after_a_slash_or_a_comma(header: str) -> None:
+def test_units_are_read_in_brackets_after_a_slash_and_after_a_comma(header: str) -> None:
     names = header.split(";" if ";" in header else ",")
     choice = choose_columns("press.csv", names)
     assert (choice.position.name, choice.force.name) == tuple(names)
@@ -200,12 +216,12 @@ def test_a_stem_is_compared_without_case_and_spaces() -> None:
     assert choose("Tip position (um),Height (um),X (um),Force (nN)").position.name == "Tip position (um)"
 
 
-def test_an_input_beside_an_output_is_not_in_inches() -> None:
+def test_a_name_ending_in_in_with_a_counterpart_in_out_is_not_in_inches() -> None:
     assert choose("pos_in,pos_out,depth_mm,force_N").position.name == "depth_mm"
     assert choose("depth_in,force_N").position.unit == UNITS["in"]
 
 
-def test_one_column_cannot_play_two_parts() -> None:
+def test_one_column_cannot_be_both_position_and_force() -> None:
     with pytest.raises(InputError, match="column p cannot be both the position and the force"):
         choose("p,q", position="p", force="p", unstated=("p",))
 

@@ -28,14 +28,14 @@ def write(path: Path, text: str, *, replace: bool = True) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-@pytest.mark.parametrize("kept", [0o600, 0o640, 0o444, 0o666, 0o755])
-def test_an_existing_file_keeps_its_mode(tmp_path: Path, kept: int) -> None:
+@pytest.mark.parametrize("existing_mode", [0o600, 0o640, 0o444, 0o666, 0o755])
+def test_an_existing_file_keeps_its_mode(tmp_path: Path, existing_mode: int) -> None:
     path = tmp_path / "model.json"
     path.write_text("old", encoding="utf-8")
-    path.chmod(kept)
+    path.chmod(existing_mode)
     write(path, "new")
     assert path.read_text(encoding="utf-8") == "new"
-    assert mode(path) == kept
+    assert mode(path) == existing_mode
 
 
 def test_a_saved_model_keeps_its_mode(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_the_temporary_name_differs_every_time_and_is_readable_by_its_owner_alon
     assert os.listdir(tmp_path) == ["m.json"]
 
 
-def test_a_link_planted_at_the_old_temporary_name_is_not_followed(tmp_path: Path) -> None:
+def test_a_symbolic_link_at_a_predictable_temporary_name_is_not_followed(tmp_path: Path) -> None:
     victim = tmp_path / "victim"
     victim.write_text("precious", encoding="utf-8")
     (tmp_path / f".m.json.{os.getpid()}.tmp").symlink_to(victim)
@@ -79,7 +79,7 @@ def test_a_link_planted_at_the_old_temporary_name_is_not_followed(tmp_path: Path
     assert not (tmp_path / "m.json").is_symlink()
 
 
-def test_a_symbolic_link_stays_and_its_target_is_replaced(tmp_path: Path) -> None:
+def test_a_symbolic_link_is_kept_and_its_target_is_replaced(tmp_path: Path) -> None:
     (tmp_path / "store").mkdir()
     target = tmp_path / "store" / "real.json"
     target.write_text("old", encoding="utf-8")
@@ -93,7 +93,7 @@ def test_a_symbolic_link_stays_and_its_target_is_replaced(tmp_path: Path) -> Non
     assert os.listdir(target.parent) == ["real.json"]
 
 
-def test_a_link_to_a_file_that_is_not_there_makes_that_file(tmp_path: Path) -> None:
+def test_a_link_to_a_missing_file_creates_that_file(tmp_path: Path) -> None:
     link = tmp_path / "link.json"
     link.symlink_to(tmp_path / "real.json")
     write(link, "new")
@@ -101,7 +101,7 @@ def test_a_link_to_a_file_that_is_not_there_makes_that_file(tmp_path: Path) -> N
     assert (tmp_path / "real.json").read_text(encoding="utf-8") == "new"
 
 
-def test_a_pipe_is_refused_and_stays(tmp_path: Path) -> None:
+def test_a_pipe_is_refused_and_kept(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     with pytest.raises(InputError, match="it is not an ordinary file"):
@@ -109,7 +109,7 @@ def test_a_pipe_is_refused_and_stays(tmp_path: Path) -> None:
     assert pipe.is_fifo()
 
 
-def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+def test_a_failed_write_keeps_the_old_file_and_leaves_no_temporary_file(tmp_path: Path) -> None:
     path = tmp_path / "m.json"
     path.write_text("old", encoding="utf-8")
     with pytest.raises(UnicodeEncodeError):
@@ -126,7 +126,7 @@ def save(model: Model, path: Path, start: threading.Barrier, errors: list[BaseEx
         errors.append(error)
 
 
-def test_six_threads_that_save_one_path_leave_a_whole_file_every_time(tmp_path: Path) -> None:
+def test_six_threads_that_save_one_path_always_leave_a_complete_file(tmp_path: Path) -> None:
     path = tmp_path / "m.json"
     models = [load_model(MODEL) for _ in range(6)]
     for k, model in enumerate(models):
@@ -145,16 +145,16 @@ def test_six_threads_that_save_one_path_leave_a_whole_file_every_time(tmp_path: 
         assert os.listdir(tmp_path) == ["m.json"]
 
 
-def test_without_replace_an_existing_file_is_refused_and_stays(tmp_path: Path) -> None:
-    path = tmp_path / "felt.csv"
+def test_without_replace_an_existing_file_is_refused_and_kept(tmp_path: Path) -> None:
+    path = tmp_path / "rendered.csv"
     path.write_text("precious", encoding="utf-8")
-    with pytest.raises(InputError, match=r"felt.csv exists already; choose another name, or .* --force"):
+    with pytest.raises(InputError, match=r"rendered.csv exists already; choose another name, or .* --force"):
         write(path, "new", replace=False)
     assert path.read_text(encoding="utf-8") == "precious"
 
 
-def test_without_replace_a_file_that_appears_meanwhile_is_refused_and_stays(tmp_path: Path) -> None:
-    path = tmp_path / "felt.csv"
+def test_without_replace_a_file_created_during_the_write_is_refused_and_kept(tmp_path: Path) -> None:
+    path = tmp_path / "rendered.csv"
 
     def write_while_it_appears() -> None:
         with replacing(path, replace=False) as temporary:
@@ -164,17 +164,17 @@ def test_without_replace_a_file_that_appears_meanwhile_is_refused_and_stays(tmp_
     with pytest.raises(InputError, match="exists already"):
         write_while_it_appears()
     assert path.read_text(encoding="utf-8") == "precious"
-    assert os.listdir(tmp_path) == ["felt.csv"]
+    assert os.listdir(tmp_path) == ["rendered.csv"]
 
 
-def test_a_broken_link_counts_as_a_recording(tmp_path: Path) -> None:
-    link = tmp_path / "felt.csv"
+def test_a_broken_link_counts_as_an_existing_file(tmp_path: Path) -> None:
+    link = tmp_path / "rendered.csv"
     link.symlink_to(tmp_path / "gone.csv")
     with pytest.raises(InputError, match="exists already"):
         write(link, "new", replace=False)
 
 
-def test_a_recording_is_written_to_a_free_name_only(tmp_path: Path) -> None:
+def test_without_replace_a_recording_is_not_overwritten(tmp_path: Path) -> None:
     from palpate.recording.sample import sample_recording
 
     recording = sample_recording(seed=1)

@@ -16,7 +16,7 @@ def noise(deviation: float, n: int) -> np.ndarray:
 
 @pytest.mark.parametrize("scale", [1e-12, 1e-3, 1e6])
 @pytest.mark.parametrize("step", [0.0, 0.001, 0.01, 0.05], ids=lambda step: f"step_{step}")
-def test_strokes_of_a_quantised_position_end_where_it_turns_back(scale: float, step: float) -> None:
+def test_strokes_of_a_quantised_position_end_at_its_reversal(scale: float, step: float) -> None:
     position = np.round(IN_AND_OUT / step) * step if step else IN_AND_OUT
     found = strokes_from_order(scale * position)
     assert found is not None
@@ -26,7 +26,7 @@ def test_strokes_of_a_quantised_position_end_where_it_turns_back(scale: float, s
 
 
 @pytest.mark.parametrize("deviation", [0.001, 0.005, 0.02, 0.04])
-def test_noise_of_the_position_is_no_turn(deviation: float) -> None:
+def test_position_noise_is_not_counted_as_a_reversal(deviation: float) -> None:
     found = strokes_from_order(IN_AND_OUT + noise(deviation, 400))
     assert found is not None
     assert turns_of(found) == 1
@@ -66,7 +66,7 @@ def test_a_hold_at_the_end_of_a_stroke_has_no_direction() -> None:
 
 
 @pytest.mark.parametrize("strokes", [2, 5])
-def test_strokes_that_begin_anew_keep_their_direction(strokes: int) -> None:
+def test_repeated_strokes_in_one_direction_keep_that_direction(strokes: int) -> None:
     for sign in (1, -1):
         found = strokes_from_order(sign * np.tile(np.linspace(0.0, 1.0, 100), strokes))
         assert found is not None
@@ -74,7 +74,7 @@ def test_strokes_that_begin_anew_keep_their_direction(strokes: int) -> None:
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_position_that_never_turns_back_has_one_direction(sign: int) -> None:
+def test_a_position_without_a_reversal_has_one_direction(sign: int) -> None:
     found = strokes_from_order(sign * np.sort(np.random.default_rng(2).uniform(0, 1, 500)))
     assert found is not None
     assert (found == sign).all()
@@ -103,5 +103,5 @@ def test_a_position_that_never_turns_back_has_one_direction(sign: int) -> None:
         "empty",
     ],
 )
-def test_rows_in_no_order_have_no_direction(position: np.ndarray) -> None:
+def test_unordered_rows_have_no_direction(position: np.ndarray) -> None:
     assert strokes_from_order(position) is None

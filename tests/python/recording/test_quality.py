@@ -23,7 +23,7 @@ def sentences(*rows: Rows) -> list[str]:
     return [finding.sentence for finding in findings_of([each.recording() for each in rows])]
 
 
-def only(*rows: Rows) -> str:
+def only_sentence(*rows: Rows) -> str:
     """Returns the only sentence on the recordings."""
     (sentence,) = sentences(*rows)
     return sentence
@@ -46,8 +46,8 @@ def test_clean_measured_files_have_no_finding(data: Path, folder: str) -> None:
 def test_a_clipped_force_is_reported_with_value_rows_and_cure() -> None:
     rows = rows_of("P1")
     limit = 5.0
-    sentence = only(replace(rows, f=np.minimum(rows.f, limit)))
-    assert f"the largest force, 5 N*m, stands in {np.count_nonzero(rows.f >= limit)} rows" in sentence
+    sentence = only_sentence(replace(rows, f=np.minimum(rows.f, limit)))
+    assert f"the largest force, 5 N*m, occurs in {np.count_nonzero(rows.f >= limit)} rows" in sentence
     assert "clipped" in sentence
     assert sentence.endswith("record with a larger force range or press less far")
 
@@ -55,7 +55,7 @@ def test_a_clipped_force_is_reported_with_value_rows_and_cure() -> None:
 def test_a_force_clipped_at_its_lower_end_is_reported() -> None:
     rows = rows_of("P1")
     both = replace(rows, f=np.clip(rows.f - 6.0, -5.0, 1e9))
-    assert "the least force, -5 N*m, stands in" in only(both)
+    assert "the least force, -5 N*m, occurs in" in only_sentence(both)
 
 
 def test_a_coarse_force_with_a_flat_maximum_is_not_clipped() -> None:
@@ -73,20 +73,20 @@ def test_a_force_of_zero_before_the_contact_is_not_clipped() -> None:
 def test_a_clipped_position_is_reported() -> None:
     rows = rows_of("P1")
     found = sentences(replace(rows, x=np.minimum(rows.x, 0.5)))
-    assert any("the largest position, 0.5 rad, stands in" in sentence for sentence in found)
+    assert any("the largest position, 0.5 rad, occurs in" in sentence for sentence in found)
 
 
-def test_a_stuck_position_is_reported_with_its_rows_and_the_rest_of_the_file_is_clean() -> None:
+def test_a_stuck_position_is_reported_with_its_rows() -> None:
     rows = rows_of("loop")
     x = rows.x.copy()
     x[300:400] = x[300]
     found = sentences(replace(rows, x=x))
-    (stuck,) = [sentence for sentence in found if "stands still" in sentence]
-    assert "stands still in rows 300 to 399, then jumps by" in stuck
+    (stuck,) = [sentence for sentence in found if "position is constant" in sentence]
+    assert "is constant in rows 300 to 399, then jumps by" in stuck
     assert "--rows 0:300 or --rows 400:1600" in stuck
 
 
-def test_a_pause_before_the_motion_turns_is_not_a_clipped_position() -> None:
+def test_a_pause_before_a_reversal_is_not_a_clipped_position() -> None:
     t = np.linspace(0.0, 1.0, 500)
     x = np.r_[t**0.5, np.ones(60), 1.0 - t**2]
     relaxing = np.linspace(1.0, 0.7, 60)
@@ -95,12 +95,14 @@ def test_a_pause_before_the_motion_turns_is_not_a_clipped_position() -> None:
 
 
 @pytest.mark.parametrize("name", ["P1", "P2", "loop", "sweeps", "sample"])
-@pytest.mark.parametrize("turned", ["force", "position", "direction"])
-def test_a_turned_sign_is_reported_and_turning_it_back_is_clean(name: str, turned: str) -> None:
+@pytest.mark.parametrize("reversed_role", ["force", "position", "direction"])
+def test_a_reversed_sign_is_reported_and_the_correct_sign_has_no_finding(
+    name: str, reversed_role: str
+) -> None:
     rows = rows_of(name)
-    if turned == "force":
+    if reversed_role == "force":
         wrong, right = replace(rows, f=-rows.f), rows
-    elif turned == "position":
+    elif reversed_role == "position":
         wrong, right = replace(rows, x=-rows.x), rows
     elif rows.d is None:
         pytest.skip("has no direction")
@@ -110,21 +112,21 @@ def test_a_turned_sign_is_reported_and_turning_it_back_is_clean(name: str, turne
     assert sentences(right) == []
 
 
-def test_a_delay_is_offered_as_a_cause_only_with_time() -> None:
+def test_a_delay_is_named_as_a_cause_only_with_time() -> None:
     with_time = rows_of("sweeps")
-    turned = replace(with_time, f=-with_time.f)
-    assert any("--force-late-s" in sentence for sentence in sentences(turned))
-    assert not any("--force-late-s" in sentence for sentence in sentences(replace(turned, t=None)))
+    reversed_force = replace(with_time, f=-with_time.f)
+    assert any("--force-late-s" in sentence for sentence in sentences(reversed_force))
+    assert not any("--force-late-s" in sentence for sentence in sentences(replace(reversed_force, t=None)))
 
 
 @pytest.mark.parametrize(("name", "factor"), [("P2", 1e3), ("P2", 1e-3), ("P1", 1e3), ("loop", 1e3)])
-def test_an_implausible_travel_names_the_unit(name: str, factor: float) -> None:
+def test_an_implausible_travel_is_reported_as_a_wrong_unit(name: str, factor: float) -> None:
     rows = rows_of(name)
     found = sentences(replace(rows, x=factor * rows.x))
     assert any("the unit of position or force is probably wrong" in sentence for sentence in found)
 
 
-def test_a_microscopes_recording_is_plausible() -> None:
+def test_the_ranges_of_a_microscope_recording_are_plausible() -> None:
     x = np.linspace(0.0, 3e-6, 500)
     assert sentences(Rows(x, 0.01 * x, None, None, {"position": "m", "force": "N"})) == []
 
@@ -146,20 +148,20 @@ def test_a_recording_in_another_unit_than_the_others_is_reported_with_the_ratio(
 
 def test_recordings_of_two_objects_are_reported() -> None:
     first, second = rows_of("P2", 0), rows_of("P2", 1)
-    sentence = only(first, replace(second, f=3.0 * second.f))
+    sentence = only_sentence(first, replace(second, f=3.0 * second.f))
     assert "recording 2 and recording 1 differ by" in sentence or "recording 1 and recording 2" in sentence
-    assert sentence.endswith("identify them one by one")
+    assert sentence.endswith("identify them separately")
 
 
 @pytest.mark.parametrize("name", SYNTHETIC)
-def test_two_objects_in_one_file_are_reported_and_each_part_alone_is_clean(name: str) -> None:
+def test_two_objects_in_one_file_are_reported_and_each_part_has_no_finding(name: str) -> None:
     rows = rows_of(name)
     n = len(rows)
     t = None if rows.t is None else np.r_[rows.t, rows.t + rows.t[-1] + rows.t[1]]
     d = None if rows.d is None else np.r_[rows.d, rows.d]
     both = Rows(np.r_[rows.x, rows.x], np.r_[rows.f, 2.0 * rows.f], t, d, rows.units)
-    sentence = only(both)
-    assert f"before and after about row {n} " in sentence
+    sentence = only_sentence(both)
+    assert f"near row {n} " in sentence
     assert f"--rows 0:{n} and --rows {n}:{2 * n}" in sentence
     assert sentences(both.take(np.arange(n))) == sentences(both.take(np.arange(n, 2 * n))) == []
 
@@ -167,21 +169,21 @@ def test_two_objects_in_one_file_are_reported_and_each_part_alone_is_clean(name:
 def test_a_file_appended_to_itself_is_reported_with_the_row() -> None:
     rows = rows_of("P1")
     twice = Rows(np.r_[rows.x, rows.x], np.r_[rows.f, rows.f], None, None, rows.units)
-    assert only(twice).endswith("give --rows 0:5000")
+    assert only_sentence(twice).endswith("give --rows 0:5000")
 
 
 def test_positions_without_rows_are_reported_for_the_whole_recording_and_for_one_stroke() -> None:
     rows = rows_of("loop")
     hole = (rows.x > 1e-3) & (rows.x < 1.5e-3)
-    assert "the recording has no rows from 0.00" in only(rows.take(~hole))
-    one = only(rows.take(~hole | (rows.d == -1)))
+    assert "the recording has no rows from 0.00" in only_sentence(rows.take(~hole))
+    one = only_sentence(rows.take(~hole | (rows.d == -1)))
     assert "the press stroke has no rows from 0.00" in one
     assert "13% of the travel" in one or "12% of the travel" in one
 
 
 def test_a_stroke_that_ends_early_is_reported() -> None:
     rows = rows_of("loop")
-    assert "the release stroke has no rows from 0 to 0.0005" in only(
+    assert "the release stroke has no rows from 0 to 0.0005" in only_sentence(
         rows.take((rows.d == 1) | (rows.x > 5e-4))
     )
 
@@ -190,7 +192,7 @@ def test_samples_missing_in_time_are_reported_with_count_and_longest_gap() -> No
     rows = rows_of("sample")
     kept = np.ones(len(rows), dtype=bool)
     kept[1000:1200], kept[3000:3400] = False, False
-    assert "time has 2 gaps, the longest 0.401 s" in only(rows.take(kept))
+    assert "time has 2 gaps, the longest 0.401 s" in only_sentence(rows.take(kept))
 
 
 @pytest.mark.parametrize("held", ["the force changes", "the position changes", "position and force change"])
@@ -212,14 +214,14 @@ def test_too_few_rows_for_the_parameters_are_reported_and_repetitions_do_not_cou
     model = palpate.identify(rows.recording())
     assert f"{len(rows)} rows determine {model.n_parameters} parameters" in str(model.verdict)
     repeated = rows.take(np.repeat(np.arange(len(rows)), 4))
-    told = str(palpate.identify(repeated.recording()).verdict)
-    assert f"{len(rows)} independent of {4 * len(rows)} rows (the others repeat them, " in told
-    assert "correlated noise) determine" in told
+    verdict = str(palpate.identify(repeated.recording()).verdict)
+    assert f"{len(rows)} independent of {4 * len(rows)} rows (the others repeat them, " in verdict
+    assert "correlated noise) determine" in verdict
 
 
 def test_findings_on_several_recordings_name_the_recording() -> None:
     first, second = rows_of("P1", 0), rows_of("P1", 1)
-    assert only(first, replace(second, f=np.minimum(second.f, 8.0))).startswith(
+    assert only_sentence(first, replace(second, f=np.minimum(second.f, 8.0))).startswith(
         "recording 2: the largest force"
     )
 
@@ -231,4 +233,4 @@ def test_a_clipped_file_gets_the_verdict_usable_on_the_command_line(
     path = replace(rows, f=np.minimum(rows.f, 5.0)).recording().write(tmp_path / "press.csv")
     assert main(["identify", str(path), "-o", str(tmp_path / "press.json"), "--json"]) == 0
     verdict = json.loads(capsys.readouterr().out)["verdict"]
-    assert verdict.startswith("usable: the largest force, 5 N*m, stands in")
+    assert verdict.startswith("usable: the largest force, 5 N*m, occurs in")

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from palpate import InputError, read_recording
-from small_files import HEADER, Write, refusal, rows, timed
+from small_files import HEADER, Write, refusal, rows, timed_rows
 
 
 def test_values_are_converted_to_si(csv_file: Write) -> None:
-    recording = read_recording(csv_file("time_ms,angle_deg,torque_mNm", timed()))
+    recording = read_recording(csv_file("time_ms,angle_deg,torque_mNm", timed_rows()))
     k = np.arange(12)
     assert recording.time is not None
     np.testing.assert_allclose(recording.time, 0.01 * k, rtol=1e-15)
@@ -21,14 +21,14 @@ def test_values_are_converted_to_si(csv_file: Write) -> None:
     assert recording.source.columns == {"position": "angle_deg", "force": "torque_mNm", "time": "time_ms"}
 
 
-def test_what_was_chosen_is_the_first_note(csv_file: Write) -> None:
+def test_the_first_note_names_the_chosen_columns(csv_file: Write) -> None:
     recording = read_recording(csv_file(HEADER, rows()))
     assert recording.notes == (
         "position is depth_mm, force is force_gf, there is no time, direction is direction",
     )
 
 
-def test_other_columns_are_kept_as_they_stand(csv_file: Write) -> None:
+def test_other_columns_are_kept_unconverted(csv_file: Write) -> None:
     path = csv_file(
         "depth_mm,force_gf,probe,grade,half_mm", [f"{k},{k},p{k % 2},{k % 3},{k}" for k in range(12)]
     )
@@ -44,17 +44,19 @@ def test_metadata_comes_before_the_header(csv_file: Write) -> None:
     assert read_recording(path).metadata == {"device": "bench 3", "": "", "remark": ""}
 
 
-@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+@pytest.mark.parametrize("line_end", ["\n", "\r\n"])
 @pytest.mark.parametrize("mark", ["", "\ufeff"], ids=["plain", "byte-order-mark"])
-def test_line_ends_and_byte_order_marks_do_not_matter(tmp_path: Path, ending: str, mark: str) -> None:
+def test_line_ends_and_byte_order_marks_do_not_change_the_data(
+    tmp_path: Path, line_end: str, mark: str
+) -> None:
     path = tmp_path / "a.csv"
-    path.write_bytes((mark + ending.join([HEADER, *rows()])).encode())
+    path.write_bytes((mark + line_end.join([HEADER, *rows()])).encode())
     recording = read_recording(path)
     assert len(recording) == 12
     assert recording.source.columns["position"] == "depth_mm"
 
 
-def test_blank_lines_do_not_matter_and_do_not_shift_line_numbers(csv_file: Write) -> None:
+def test_blank_lines_are_ignored_and_counted_in_line_numbers(csv_file: Write) -> None:
     lines = ["", *rows(6), "", "   ", *rows(6), ""]
     assert len(read_recording(csv_file(HEADER, lines))) == 12
     lines[10] = "nan,1,press"
@@ -70,7 +72,7 @@ def test_blank_lines_do_not_matter_and_do_not_shift_line_numbers(csv_file: Write
     ],
     ids=["into", "out", "neither"],
 )
-def test_direction_words(csv_file: Write, words: list[str], expected: int) -> None:
+def test_each_direction_word_gives_its_direction(csv_file: Write, words: list[str], expected: int) -> None:
     path = csv_file(HEADER, [f"{k},{k},{words[k % len(words)]}" for k in range(18)])
     direction = read_recording(path).direction
     assert direction is not None
@@ -94,7 +96,7 @@ def test_a_segment_column_of_numbers_is_not_the_direction(csv_file: Write) -> No
     assert recording.columns["segment"].tolist() == [0.0] * 6 + [1.0] * 6
 
 
-def test_current_stays_a_current_until_a_torque_constant_is_given(csv_file: Write) -> None:
+def test_a_current_is_converted_only_with_a_torque_constant(csv_file: Write) -> None:
     path = csv_file("angle_rad,hold_current_mA", [f"{k},{k}" for k in range(12)])
     recording = read_recording(path)
     assert recording.units["force"] == "A"
@@ -112,7 +114,7 @@ def test_further_inputs_are_converted_and_renamed(csv_file: Write) -> None:
     assert recording.columns == {}
 
 
-def test_signs_are_turned_on_request_only(csv_file: Write) -> None:
+def test_signs_are_reversed_only_with_negate(csv_file: Write) -> None:
     path = csv_file("depth_mm,force_N", [f"{-k},{k}" for k in range(12)])
     recording = read_recording(path)
     assert recording.position[11] == pytest.approx(-0.011)
@@ -122,16 +124,16 @@ def test_signs_are_turned_on_request_only(csv_file: Write) -> None:
         "if the force is positive when pulling give --negate force"
     ]
     for name in ("position", "depth_mm"):
-        turned = read_recording(path, negate=(name,))
-        assert turned.position[11] == pytest.approx(0.011)
-        assert turned.force[11] == 11
-        assert not [note for note in turned.notes if "--negate" in note]
+        negated = read_recording(path, negate=(name,))
+        assert negated.position[11] == pytest.approx(0.011)
+        assert negated.force[11] == 11
+        assert not [note for note in negated.notes if "--negate" in note]
     assert read_recording(path, negate=("force",)).force[11] == -11
 
 
-def test_a_direction_against_the_motion_is_noticed(csv_file: Write) -> None:
+def test_a_direction_opposite_to_the_motion_is_reported(csv_file: Write) -> None:
     path = csv_file(HEADER, [f"{-k},{k % 3},press" for k in range(12)])
-    assert "the position falls where the direction goes into the object" in read_recording(path).notes[-1]
+    assert "the position falls in rows whose direction is into the object" in read_recording(path).notes[-1]
 
 
 def test_rows_selects_a_half_open_range(csv_file: Write) -> None:
@@ -153,11 +155,11 @@ def test_rows_outside_the_selection_are_not_checked(csv_file: Write) -> None:
     assert "line 23" in refusal(path, rows=(2, 22))
 
 
-def test_ten_rows_are_enough(csv_file: Write) -> None:
+def test_a_recording_of_ten_rows_is_accepted(csv_file: Write) -> None:
     assert len(read_recording(csv_file(HEADER, rows(10)))) == 10
 
 
-def test_text_far_below_the_start_is_found(csv_file: Write) -> None:
+def test_text_below_the_examined_rows_is_found(csv_file: Write) -> None:
     lines = [f"{k},{k},{k}" for k in range(1500)]
     lines[1400] = "1,oops,1"
     assert "line 1402: column force_N holds 'oops'" in refusal(csv_file("depth_mm,force_N,grade", lines))
@@ -168,26 +170,26 @@ def test_text_far_below_the_start_is_found(csv_file: Write) -> None:
     assert grade[1400] == "oops"
 
 
-def test_numbers_are_read_to_the_last_bit(csv_file: Write) -> None:
+def test_numbers_are_read_exactly(csv_file: Write) -> None:
     random = np.random.default_rng(3)
     exact = random.normal(size=2000) * 10.0 ** random.integers(-100, 100, 2000)
     recording = read_recording(csv_file("depth_m,force_N", [f"{x!r},{x!r}" for x in exact.tolist()]))
     np.testing.assert_array_equal(recording.force, exact)
 
 
-def test_the_force_of_rows_that_touch_nothing_is_taken_off(csv_file: Write) -> None:
+def test_the_mean_force_of_rows_without_contact_is_subtracted(csv_file: Write) -> None:
     path = csv_file(
         "depth_mm,force_N", [f"{0.1 * k:.1f},{0.25 + max(0.0, 0.1 * k - 1.0):.6f}" for k in range(30)]
     )
     recording = read_recording(path, zero=(0, 10), rows=(2, None))
     assert recording.force[:8] == pytest.approx(np.zeros(8))
     assert recording.force[-1] == pytest.approx(1.9)
-    assert "0.25 N, the mean force of rows 0 to 9, is taken off" in recording.notes
-    with pytest.raises(InputError, match="--zero 0:2 holds none of the rows that are used"):
+    assert "0.25 N, the mean force of rows 0 to 9, is subtracted" in recording.notes
+    with pytest.raises(InputError, match="--zero 0:2 contains no row that is used"):
         read_recording(path, zero=(0, 2), rows=(2, None))
 
 
-def test_a_force_recorded_late_is_brought_back_while_reading(tmp_path: Path) -> None:
+def test_a_late_force_is_moved_to_its_position_while_reading(tmp_path: Path) -> None:
     file = tmp_path / "late.csv"
     rows = [f"{k / 100:g},{k / 10:g},{k}" for k in range(40)]
     file.write_text("\n".join(["time_s,position_m,force_N", *rows]) + "\n", encoding="utf-8")

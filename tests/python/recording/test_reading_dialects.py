@@ -10,7 +10,7 @@ from palpate import Recording, read_recording
 from palpate.recording import sample_recording
 from small_files import Write, refusal
 
-K = np.arange(12)
+ROW_NUMBERS = np.arange(12)
 
 
 def read_as(recording: Recording) -> str:
@@ -21,8 +21,8 @@ def comma(value: float) -> str:
     return f"{value:.2f}".replace(".", ",")
 
 
-ROWS = [f"{0.5 * k},{10 * k}" for k in K]
-SEMICOLONS = [f"{comma(0.5 * k)};{comma(10 * k)}" for k in K]
+ROWS = [f"{0.5 * k},{10 * k}" for k in ROW_NUMBERS]
+SEMICOLONS = [f"{comma(0.5 * k)};{comma(10 * k)}" for k in ROW_NUMBERS]
 
 # Program -> (its lines, the report of the first note, the metadata).
 FILES: dict[str, tuple[list[str], str, dict[str, str]]] = {
@@ -32,7 +32,7 @@ FILES: dict[str, tuple[list[str], str, dict[str, str]]] = {
         {"bench": "3"},
     ),
     "units in a second line, in brackets and quotes": (
-        ['"Depth","Load"', '"(mm)","(N)"', *(f'"{0.5 * k}","{10 * k}"' for k in K)],
+        ['"Depth","Load"', '"(mm)","(N)"', *(f'"{0.5 * k}","{10 * k}"' for k in ROW_NUMBERS)],
         "units in line 2",
         {},
     ),
@@ -47,7 +47,7 @@ FILES: dict[str, tuple[list[str], str, dict[str, str]]] = {
         {},
     ),
     "a column of words without a unit in the line of units": (
-        ["Depth\tLoad\tStroke\tRate", "mm\tN\t\tV", *(f"{0.5 * k}\t{10 * k}\tpress\t1" for k in K)],
+        ["Depth\tLoad\tStroke\tRate", "mm\tN\t\tV", *(f"{0.5 * k}\t{10 * k}\tpress\t1" for k in ROW_NUMBERS)],
         "separated by tabs, units in line 2",
         {},
     ),
@@ -62,7 +62,7 @@ FILES: dict[str, tuple[list[str], str, dict[str, str]]] = {
         {},
     ),
     "decimal commas in quotes": (
-        ["Depth [mm],Load [N]", *(f'"{comma(0.5 * k)}","{comma(10 * k)}"' for k in K)],
+        ["Depth [mm],Load [N]", *(f'"{comma(0.5 * k)}","{comma(10 * k)}"' for k in ROW_NUMBERS)],
         "decimal comma",
         {},
     ),
@@ -76,23 +76,23 @@ FILES: dict[str, tuple[list[str], str, dict[str, str]]] = {
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
 @pytest.mark.parametrize("case", FILES)
-def test_a_file_of_another_program_is_read_and_its_form_reported(
+def test_a_file_of_another_program_is_read_and_its_dialect_reported(
     tmp_path: Path, case: str, encoding: str
 ) -> None:
-    lines, told, metadata = FILES[case]
+    lines, dialect_note, metadata = FILES[case]
     path = tmp_path / "press.csv"
     path.write_bytes("\n".join(lines).encode(encoding))
     recording = read_recording(path)
-    np.testing.assert_allclose(recording.position, 0.5e-3 * K, rtol=1e-15)
-    np.testing.assert_array_equal(recording.force, 10.0 * K)
+    np.testing.assert_allclose(recording.position, 0.5e-3 * ROW_NUMBERS, rtol=1e-15)
+    np.testing.assert_array_equal(recording.force, 10.0 * ROW_NUMBERS)
     assert recording.metadata == metadata
     if not encoding.startswith("utf-16"):
-        assert read_as(recording) == told
+        assert read_as(recording) == dialect_note
     assert read_recording(recording.write(tmp_path / "again.csv")).metadata == metadata
 
 
 @pytest.mark.parametrize("row", [3, 200_000], ids=["at the start", "far below"])
-def test_a_byte_that_is_not_utf_8_is_latin_1_or_names_the_command(tmp_path: Path, row: int) -> None:
+def test_a_byte_outside_utf_8_is_read_as_latin_1_or_refused_with_a_command(tmp_path: Path, row: int) -> None:
     lines = [f"{0.5 * k},{10 * k},ok".encode() for k in range(row + 20)]
     lines[row] = f"{0.5 * row},{10 * row},weiß".encode("latin-1")
     path = tmp_path / "press.csv"
@@ -103,7 +103,7 @@ def test_a_byte_that_is_not_utf_8_is_latin_1_or_names_the_command(tmp_path: Path
         assert recording.columns["remark"][3] == "weiß"
     else:
         assert refusal(path) == (
-            "press.csv begins as UTF-8 and later holds bytes that are not; if they are Latin-1, "
+            "press.csv begins as UTF-8 and later has other bytes; if they are Latin-1, "
             "convert the file: iconv -f LATIN1 -t UTF-8 OLD.csv > NEW.csv"
         )
 
@@ -121,6 +121,6 @@ def test_a_cell_after_the_last_separator_is_refused_with_its_line(csv_file: Writ
     )
 
 
-def test_a_plain_file_of_the_package_is_read_without_remarks(tmp_path: Path) -> None:
+def test_a_file_of_the_package_is_read_without_a_dialect_note(tmp_path: Path) -> None:
     recording = read_recording(sample_recording(1, 1.0).write(tmp_path / "press.csv"))
     assert read_as(recording) == ""

@@ -20,14 +20,14 @@ def test_a_torn_last_line_of_a_growing_file_is_left_out(csv_file: Write, torn: s
     assert "1 torn line at the end is left out" in recording.notes
 
 
-def test_a_growing_file_that_ends_with_its_line_is_whole(csv_file: Write) -> None:
+def test_a_growing_file_that_ends_with_a_line_feed_keeps_every_row(csv_file: Write) -> None:
     recording = read_recording(csv_file(HEADER, rows(12), name="press.csv.part"))
     assert len(recording) == 12
     assert not any("torn" in note for note in recording.notes)
 
 
 def test_a_growing_file_of_one_torn_line_is_refused(csv_file: Write) -> None:
-    assert "holds no header" in refusal(csv_file("depth_mm,for", name="press.csv.part"))
+    assert "has no header" in refusal(csv_file("depth_mm,for", name="press.csv.part"))
 
 
 def test_a_finished_file_keeps_its_last_line_without_a_line_feed(csv_file: Write) -> None:
@@ -69,7 +69,7 @@ def test_parquet_rows_are_named_by_number(tmp_path: Path) -> None:
     assert refusal(text).startswith("b.parquet, row 1: column force_N holds 'x'")
 
 
-def test_what_is_not_parquet_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_not_parquet_is_refused(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     path = tmp_path / "a.parquet"
     path.write_text("depth_mm,force_N\n", encoding="utf-8")
@@ -79,7 +79,7 @@ def test_what_is_not_parquet_is_refused(tmp_path: Path) -> None:
     )
 
 
-def test_parquet_without_pyarrow_says_what_to_install(
+def test_parquet_without_pyarrow_is_refused_with_the_install_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "a.parquet"

@@ -17,8 +17,8 @@ import palpate
 from palpate import read_recording
 from small_files import options_in, refusal
 
-K = np.arange(30)
-X, F = K / 3, np.sin(K / 9) + 2.0
+ROW_NUMBERS = np.arange(30)
+X, F = ROW_NUMBERS / 3, np.sin(ROW_NUMBERS / 9) + 2.0
 
 
 def check(path: Path, note: str = "", **options: Any) -> None:
@@ -79,7 +79,7 @@ def test_numpy_arrays_are_read(tmp_path: Path) -> None:
     np.savez(tmp_path / "b.npz", x=X, y=F, image=np.ones((3, 4)))
     sentence = refusal(tmp_path / "b.npz")
     check(tmp_path / "b.npz", "left out image, not vectors of 30 values", **options_in(sentence))
-    np.savez(tmp_path / "c.npz", depth_mm=np.where(K == 4, np.nan, X), force_N=F)
+    np.savez(tmp_path / "c.npz", depth_mm=np.where(ROW_NUMBERS == 4, np.nan, X), force_N=F)
     assert refusal(tmp_path / "c.npz").startswith("c.npz, row 4: column depth_mm holds nothing")
 
 
@@ -146,10 +146,10 @@ def test_mcap_messages_are_read(tmp_path: Path) -> None:
     two = {"/pose": [{"depth_mm": 1.0, "n": 1}], "/wrench": [{"force_N": 1.0, "n": 1}]}
     assert "2 topics hold two values or more (/pose, /wrench)" in refusal(mcap(tmp_path / "b.mcap", two))
     ros = mcap(tmp_path / "c.mcap", {"/pose": [{}]}, encoding="cdr")
-    assert refusal(ros).startswith("c.mcap holds only messages in cdr; JSON messages are read")
+    assert refusal(ros).startswith("c.mcap holds only messages in cdr; it must hold JSON messages")
 
 
-MADE = {
+WRITERS = {
     "xlsx": lambda path: workbook(path, ("Data", [["Depth (mm)", "Force [N]"], *numbers()])),
     "npz": lambda path: np.savez(path, depth_mm=X, force_N=F),
     "mat": lambda path: savemat(path, {"depth_mm": X, "force_N": F}),
@@ -158,10 +158,10 @@ MADE = {
 }
 
 
-@pytest.mark.parametrize("kind", MADE)
+@pytest.mark.parametrize("kind", WRITERS)
 def test_a_broken_file_is_refused_by_its_name(tmp_path: Path, kind: str) -> None:
     path = tmp_path / f"a.{kind}"
-    MADE[kind](path)
+    WRITERS[kind](path)
     whole = path.read_bytes()
     random = np.random.default_rng(5)
     sentences = []
@@ -184,20 +184,20 @@ def test_a_broken_file_is_refused_by_its_name(tmp_path: Path, kind: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("at", "value", "element"),
+    ("offset", "value", "element"),
     [(5, 0xFF, 128), (8, 200, 136), (17, 0x08, 128), (56, 200, 184), (61, 0xFF, 184)],
     ids=["size_of_array", "type_of_flags", "complex", "type_of_values", "size_of_values"],
 )
 def test_a_damaged_matlab_file_is_refused_with_the_byte(
-    tmp_path: Path, at: int, value: int, element: int
+    tmp_path: Path, offset: int, value: int, element: int
 ) -> None:
     path = tmp_path / "a.mat"
-    MADE["mat"](path)
+    WRITERS["mat"](path)
     broken = bytearray(path.read_bytes())
-    broken[128 + at] = value
+    broken[128 + offset] = value
     path.write_bytes(bytes(broken))
-    told = f"a.mat is not readable as MATLAB (.mat): the element at byte {element} is damaged"
-    assert refusal(path) == told
+    expected = f"a.mat is not readable as MATLAB (.mat): the element at byte {element} is damaged"
+    assert refusal(path) == expected
 
 
 @pytest.mark.parametrize(
@@ -231,8 +231,8 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(
 
 
 @pytest.mark.parametrize("kind", ["xlsx", "npz", "mat", "mcap"])
-def test_a_file_that_is_read_as_a_whole_is_refused_part_by_part(tmp_path: Path, kind: str) -> None:
+def test_a_format_without_parts_is_refused_out_of_core(tmp_path: Path, kind: str) -> None:
     path = tmp_path / f"a.{kind}"
-    MADE[kind](path)
+    WRITERS[kind](path)
     with pytest.raises(palpate.InputError, match="cannot be read part by part; leave out --out-of-core"):
         palpate.identify_files(path)

@@ -11,7 +11,7 @@ from small_files import options_in, refusal
 
 # Sets whose files are read without an option. A file of any other set is read, or its refusal names options
 # that work: a new set needs no change here.
-RESOLVES = {
+READ_WITHOUT_OPTIONS = {
     "afm_indentation",
     "keyswitches",
     "magnet_attraction",
@@ -23,10 +23,14 @@ RESOLVES = {
     "vhb4910_viscoelastic",
 }
 
-VOLTS = {"position": "speed_out", "force": "input_V", "units": {"speed_out": "rad", "input_V": "Nm"}}
+VOLTAGE_OPTIONS = {
+    "position": "speed_out",
+    "force": "input_V",
+    "units": {"speed_out": "rad", "input_V": "Nm"},
+}
 
 # File or set -> the main columns of the set.
-HINTS: dict[str, dict[str, object]] = {
+OPTIONS: dict[str, dict[str, object]] = {
     "davinci_grip": {"position": "back_angle_rad", "force": "back_torque_Nm"},
     "palpation_continuous": {"position": "pos_z_mm", "force": "force_z_N"},
     "silverbox": {
@@ -45,8 +49,8 @@ HINTS: dict[str, dict[str, object]] = {
         "units": {"pump_voltage_V": "m", "level_sensor_V": "N"},
         "rows": (0, 1024),
     },
-    "sysid_benchmarks/coupled_drives_prbs_amp0p5.csv": VOLTS,
-    "sysid_benchmarks/coupled_drives_prbs_amp1.csv": VOLTS,
+    "sysid_benchmarks/coupled_drives_prbs_amp0p5.csv": VOLTAGE_OPTIONS,
+    "sysid_benchmarks/coupled_drives_prbs_amp1.csv": VOLTAGE_OPTIONS,
     "sysid_benchmarks/emps_validation_pulses_250hz.csv": {"force": "motor_force_N"},
     "sysid_benchmarks/f16_sysidentpy_subset_16384.csv": {
         "position": "x1",
@@ -77,7 +81,7 @@ HINTS: dict[str, dict[str, object]] = {
 }
 
 # Table of published figures in the folder of the recordings: text, not a recording.
-NO_RECORDING = "sysid_benchmarks/published_results.csv"
+TEXT_TABLE = "sysid_benchmarks/published_results.csv"
 
 MOST_REFUSALS = 3
 """Largest number of successive refusals: the header, then rows that cannot be used."""
@@ -91,12 +95,12 @@ def measured_files() -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*.csv"))
 
 
-def hint_for(file: str) -> dict[str, object]:
-    return HINTS.get(file) or HINTS[file.split("/")[0]]
+def options_of(file: str) -> dict[str, object]:
+    return OPTIONS.get(file) or OPTIONS[file.split("/")[0]]
 
 
-@pytest.mark.parametrize("file", [file for file in measured_files() if file != NO_RECORDING])
-def test_a_measured_file_resolves_or_the_cures_of_its_refusals_work(data: Path, file: str) -> None:
+@pytest.mark.parametrize("file", [file for file in measured_files() if file != TEXT_TABLE])
+def test_a_measured_file_is_read_directly_or_with_the_cures_of_its_refusals(data: Path, file: str) -> None:
     options: dict[str, object] = {}
     recording, refusals = None, 0
     while recording is None and refusals < MOST_REFUSALS:
@@ -106,12 +110,14 @@ def test_a_measured_file_resolves_or_the_cures_of_its_refusals_work(data: Path, 
             options, refusals = options_in(str(refused), options), refusals + 1
     assert recording is not None
     assert len(recording) >= 100
-    if file.split("/")[0] in RESOLVES or file == "sysid_benchmarks/emps_estimation_250hz.csv":
+    if file.split("/")[0] in READ_WITHOUT_OPTIONS or file == "sysid_benchmarks/emps_estimation_250hz.csv":
         assert refusals == 0
 
 
-@pytest.mark.parametrize("file", [file for file in measured_files() if file.split("/")[0] in RESOLVES])
-def test_a_measured_file_is_read_whole_in_si(data: Path, file: str) -> None:
+@pytest.mark.parametrize(
+    "file", [file for file in measured_files() if file.split("/")[0] in READ_WITHOUT_OPTIONS]
+)
+def test_every_row_of_a_measured_file_is_read_in_si(data: Path, file: str) -> None:
     recording = read_recording(data / file)
     lines = (data / file).read_text(encoding="utf-8").splitlines()
     header = next(line for line in lines if "," in line)
@@ -124,7 +130,7 @@ def test_a_measured_file_is_read_whole_in_si(data: Path, file: str) -> None:
     assert (recording.time is not None) == header.startswith(("time_", "Time"))
 
 
-def test_the_first_note_of_a_measured_file_says_what_was_recognised(data: Path) -> None:
+def test_the_first_note_of_a_measured_file_reports_columns_and_dialect(data: Path) -> None:
     recording = read_recording(data / "silicone_compression" / "EF10_0T_A1.csv")
     assert recording.notes[0] == (
         "position is Compression (mm), force is Load (N), time is Time (s), there is no direction; "
@@ -133,21 +139,23 @@ def test_the_first_note_of_a_measured_file_says_what_was_recognised(data: Path) 
     assert recording.metadata["Cylinder Diameter"] == "50mm"
 
 
-@pytest.mark.parametrize("file", [file for file in measured_files() if {file, file.split("/")[0]} & {*HINTS}])
+@pytest.mark.parametrize(
+    "file", [file for file in measured_files() if {file, file.split("/")[0]} & {*OPTIONS}]
+)
 def test_a_measured_file_is_read_with_stated_columns(data: Path, file: str) -> None:
-    assert len(read_recording(data / file, **hint_for(file))) >= 200  # type: ignore[arg-type]
+    assert len(read_recording(data / file, **options_of(file))) >= 200  # type: ignore[arg-type]
 
 
-def test_a_table_of_text_is_not_taken_for_a_recording(data: Path) -> None:
-    sentence = refusal(data / NO_RECORDING)
-    assert sentence.endswith("a recording needs two columns of numbers, a position and a force")
+def test_a_table_of_text_is_refused(data: Path) -> None:
+    sentence = refusal(data / TEXT_TABLE)
+    assert sentence.endswith("A recording needs two columns of numbers, a position and a force")
 
 
-def test_time_that_starts_again_is_refused_with_its_line(data: Path) -> None:
-    hint = {
+def test_time_that_restarts_is_refused_with_its_line(data: Path) -> None:
+    options = {
         name: value
-        for name, value in hint_for("sysid_benchmarks/cascaded_tanks.csv").items()
+        for name, value in options_of("sysid_benchmarks/cascaded_tanks.csv").items()
         if name != "rows"
     }
-    sentence = refusal(data / "sysid_benchmarks/cascaded_tanks.csv", **hint)
-    assert sentence.startswith("cascaded_tanks.csv, line 1026: column time_s holds '0', no later than")
+    sentence = refusal(data / "sysid_benchmarks/cascaded_tanks.csv", **options)
+    assert sentence.startswith("cascaded_tanks.csv, line 1026: column time_s holds '0', must be later than")

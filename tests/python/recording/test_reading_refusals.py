@@ -13,7 +13,7 @@ import pytest
 
 from palpate import identify, read_recording
 from palpate.recording import sample_recording
-from small_files import HEADER, Write, options_in, refusal, rows, timed
+from small_files import HEADER, Write, options_in, refusal, rows, timed_rows
 
 
 def lines(*parts: str | list[str]) -> str:
@@ -29,7 +29,7 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "metadata only": (
         "# only: metadata\n",
         {},
-        "press.csv holds no header: the first line must name the columns",
+        "press.csv has no header: the first line must name the columns",
     ),
     "header only": (HEADER, {}, "press.csv has 0 usable rows; a recording needs at least 10"),
     "3 rows": (lines(HEADER, rows(3)), {}, "press.csv has 3 usable rows; a recording needs at least 10"),
@@ -71,7 +71,7 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "name twice": (
         "depth_mm,force_N,depth_mm\n",
         {},
-        "press.csv, line 1: column name depth_mm stands 2 times; rename these columns in the file",
+        "press.csv, line 1: column name depth_mm occurs 2 times; rename these columns in the file",
     ),
     "too many cells": (
         lines(HEADER, rows(5), "1,2,press,4", rows(5)),
@@ -87,7 +87,7 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
         f"{word} as a direction, {invalid} invalid rows": (
             lines(HEADER, rows(10), f"5,100,{word}", rows(3)),
             {"invalid": invalid},
-            f"press.csv, line 12: column direction holds '{word}', which is no direction; known words are "
+            f"press.csv, line 12: column direction holds '{word}', which is not a direction; use one of "
             "press, approach, load, loading, forward, +1, release, retract, unload, unloading, back, -1, "
             "pause, hold, extra, 0",
         )
@@ -97,19 +97,19 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "rows beyond the end": (
         lines("depth_mm,force_N", PLAIN),
         {"rows": (30, 41)},
-        "press.csv: rows 30:41 were asked for; it has 40 rows, and START must be below STOP",
+        "press.csv: rows 30:41 are outside the 40 rows of the file, or START is not below STOP",
     ),
     "no rows": (
         lines("depth_mm,force_N", PLAIN),
         {"rows": (9, 9)},
-        "press.csv: rows 9:9 were asked for; it has 40 rows, and START must be below STOP",
+        "press.csv: rows 9:9 are outside the 40 rows of the file, or START is not below STOP",
     ),
-    "a sign of nothing": (
+    "a sign of an unknown column": (
         lines("depth_mm,force_N", PLAIN),
         {"negate": ("z",)},
-        "press.csv: --negate z names no column that is used (depth_mm, force_N)",
+        "press.csv: --negate is z, must be position, force or a used column (depth_mm, force_N)",
     ),
-    "a treatment that is none": (
+    "an unknown treatment": (
         lines("depth_mm,force_N", PLAIN),
         {"invalid": "ignore"},
         "invalid is 'ignore'; it must be 'refuse' or 'drop'",
@@ -125,10 +125,10 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "a torque constant for a torque": (
         lines("angle_rad,torque_Nm", PLAIN),
         {"torque_constant": 0.0075},
-        "press.csv: --torque-constant-Nm-per-A turns a current into a torque, but the force is torque_Nm, "
+        "press.csv: --torque-constant-Nm-per-A converts a current to a torque, but the force is torque_Nm, "
         "which is not in A",
     ),
-    "a status column that is not there": (
+    "a missing status column": (
         lines('# palpate-columns: {"status": "status"}', "depth_mm,force_N", PLAIN),
         {},
         "press.csv has no column 'status', which its metadata names as the status",
@@ -137,12 +137,12 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_read_is_refused_in_one_sentence(csv_file: Write, case: str) -> None:
+def test_an_unreadable_file_is_refused_in_one_sentence(csv_file: Write, case: str) -> None:
     text, options, sentence = REFUSED[case]
     assert refusal(csv_file(text), **options) == sentence
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
     assert refusal(tmp_path / "none.csv") == "there is no file none.csv"
     (tmp_path / "folder.csv").mkdir()
     assert refusal(tmp_path / "folder.csv") == "folder.csv is a folder, not a file"
@@ -165,7 +165,7 @@ def test_json_is_refused_in_a_short_sentence(tmp_path: Path) -> None:
     assert refusal(tmp_path / "other.txt") == f"other.txt looks like JSON; {FORMATS}"
 
 
-def test_a_message_is_short_whatever_the_header_holds(csv_file: Write) -> None:
+def test_a_message_is_short_for_a_long_header(csv_file: Write) -> None:
     header = ",".join(f"{'column' * 300}{k}" for k in range(200))
     assert len(refusal(csv_file(header, [",".join(["1.5"] * 200)] * 12))) < 2000
 
@@ -183,7 +183,7 @@ def test_control_characters_of_a_header_are_escaped(csv_file: Write) -> None:
 
 
 @pytest.mark.parametrize("kind", ["pipe", "socket", "device"])
-def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path: Path, kind: str) -> None:
+def test_a_pipe_socket_or_device_is_refused_without_waiting(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "press.csv"
     if kind == "pipe":
         os.mkfifo(path)
@@ -196,7 +196,7 @@ def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path: Path, kind
     assert refusal(path) == ("press.csv is a pipe, a device or a socket; save its contents to a file first")
 
 
-THOUSANDS = {
+THOUSANDS_SEPARATED = {
     "points and a decimal comma": (";", "1.234,5"),
     "commas and a decimal point": ("\t", "1,234.5"),
     "repeated commas": (";", "1,234,500"),
@@ -207,11 +207,11 @@ THOUSANDS = {
 
 
 @pytest.mark.parametrize("row", [0, 1500], ids=["at the start", "far below"])
-@pytest.mark.parametrize("case", THOUSANDS)
+@pytest.mark.parametrize("case", THOUSANDS_SEPARATED)
 def test_thousands_separators_are_refused_and_the_command_removes_them(
     csv_file: Write, case: str, row: int
 ) -> None:
-    separator, cell = THOUSANDS[case]
+    separator, cell = THOUSANDS_SEPARATED[case]
     decimal = "," if cell.endswith(",5") else "."
     lines = [f"{k}{decimal}5{separator}{k}{decimal}25" for k in range(1510)]
     lines[row] = f"2{decimal}5{separator}{cell}"
@@ -219,7 +219,7 @@ def test_thousands_separators_are_refused_and_the_command_removes_them(
     assert_sed_cures(path, row, 1234500.0 if case == "repeated commas" else 1234.5)
 
 
-def test_commas_that_may_be_either_are_refused_with_both_cures(csv_file: Write) -> None:
+def test_ambiguous_commas_are_refused_with_both_cures(csv_file: Write) -> None:
     path = csv_file("depth_mm;force_N", [f"{k};{k},500" for k in range(1, 13)])
     sentence = refusal(path)
     assert "may be a decimal comma or a thousands separator" in sentence
@@ -227,7 +227,7 @@ def test_commas_that_may_be_either_are_refused_with_both_cures(csv_file: Write) 
     assert_sed_cures(path, 1, 2500.0, "remove it: ")
 
 
-def test_a_decimal_comma_far_below_is_refused_with_the_cure(csv_file: Write) -> None:
+def test_a_decimal_comma_below_the_examined_rows_is_refused_with_the_cure(csv_file: Write) -> None:
     lines = [f"{k};{k}" for k in range(1500)]
     path = csv_file("depth_mm;force_N", [*lines, "1500;7,25"])
     assert refusal(path).startswith(
@@ -248,23 +248,23 @@ def assert_sed_cures(path: Path, row: int, force: float, before: str = ": ") -> 
 
 # Case of a bad row: (header, bad row, its name).
 BAD_ROWS = {
-    "not a number": (HEADER, "nan,1,press", "column depth_mm holds 'nan', which is no finite number"),
-    "infinity": (HEADER, "1,-inf,press", "column force_gf holds '-inf', which is no finite number"),
-    "overflow": (HEADER, "1,1e999,press", "column force_gf holds '1e999', which is no finite number"),
-    "empty": (HEADER, ",1,press", "column depth_mm holds nothing, which is no finite number"),
-    "text": (HEADER, "1,12 gf,press", "column force_gf holds '12 gf', which is no finite number"),
-    "underscore": (HEADER, "1,1_2,press", "column force_gf holds '1_2', which is no finite number"),
-    "short": (HEADER, "1", "column force_gf holds nothing, which is no finite number"),
-    "no direction": (HEADER, "1,1,", "column direction says no direction"),
-    "repeated time": ("time_ms,depth_mm,force_N", "50,1,1", "column time_ms holds '50', no later than"),
-    "backward time": ("time_ms,depth_mm,force_N", "49,1,1", "column time_ms holds '49', no later than"),
-    "no time": ("time_ms,depth_mm,force_N", ",1,1", "column time_ms holds nothing, which is no finite"),
+    "not a number": (HEADER, "nan,1,press", "column depth_mm holds 'nan', which is not a finite number"),
+    "infinity": (HEADER, "1,-inf,press", "column force_gf holds '-inf', which is not a finite number"),
+    "overflow": (HEADER, "1,1e999,press", "column force_gf holds '1e999', which is not a finite number"),
+    "empty": (HEADER, ",1,press", "column depth_mm holds nothing, which is not a finite number"),
+    "text": (HEADER, "1,12 gf,press", "column force_gf holds '12 gf', which is not a finite number"),
+    "underscore": (HEADER, "1,1_2,press", "column force_gf holds '1_2', which is not a finite number"),
+    "short": (HEADER, "1", "column force_gf holds nothing, which is not a finite number"),
+    "no direction": (HEADER, "1,1,", "column direction has no direction"),
+    "repeated time": ("time_ms,depth_mm,force_N", "50,1,1", "column time_ms holds '50', must be later than"),
+    "backward time": ("time_ms,depth_mm,force_N", "49,1,1", "column time_ms holds '49', must be later than"),
+    "no time": ("time_ms,depth_mm,force_N", ",1,1", "column time_ms holds nothing, which is not a finite"),
 }
 
 
 def with_bad_row(write: Write, case: str, count: int = 1) -> Path:
     header, bad, _ = BAD_ROWS[case]
-    good = rows(20) if header == HEADER else timed(20)
+    good = rows(20) if header == HEADER else timed_rows(20)
     return write(header, good[:6] + [bad] * count + good[6:])
 
 
@@ -284,13 +284,13 @@ def test_bad_rows_are_dropped_and_counted_on_request(csv_file: Write, case: str)
     assert re.fullmatch(r"dropped 3 rows .* \(first: line 8\)", recording.notes[1])
 
 
-def test_a_row_that_is_bad_twice_is_counted_once(csv_file: Write) -> None:
+def test_a_row_with_two_defects_is_counted_once(csv_file: Write) -> None:
     recording = read_recording(csv_file(HEADER, [*rows(12), "nan,inf,"]), invalid="drop")
     assert recording.notes[1:] == ("dropped 1 row without a finite number in depth_mm (first: line 14)",)
 
 
-def test_time_must_pass_the_latest_time_before_it(csv_file: Write) -> None:
-    lines = [*timed(12), "50,90,1", "60,91,1", "nan,92,1", "120,93,1"]
+def test_time_must_be_later_than_all_times_before_it(csv_file: Write) -> None:
+    lines = [*timed_rows(12), "50,90,1", "60,91,1", "nan,92,1", "120,93,1"]
     recording = read_recording(csv_file("time_ms,depth_mm,force_N", lines), invalid="drop")
     np.testing.assert_allclose(recording.position[11:], [5.5e-3, 93e-3])
-    assert recording.notes[2] == "dropped 2 rows whose time repeats or runs backward (first: line 14)"
+    assert recording.notes[2] == "dropped 2 rows with a time that repeats or decreases (first: line 14)"

@@ -18,7 +18,7 @@ from palpate.recording.units import unit_of
 from small_files import options_in
 
 VARIANTS = 200
-IDENTIFIED = 6
+IDENTIFIED_VARIANTS = 6
 MOST_ROWS = 300
 
 MEASURED = (
@@ -74,7 +74,7 @@ class Variant:
 
     data: bytes
     clean: Recording
-    told: tuple[str, ...]
+    dialect_parts: tuple[str, ...]
     """Reports of the first note"""
 
 
@@ -84,11 +84,11 @@ def variant(clean: Recording, random: np.random.Generator) -> Variant:
     def pick(*choices: str) -> str:
         return str(random.choice(np.array(choices)))
 
-    def chance(share: float) -> bool:
+    def happens(share: float) -> bool:
         return bool(random.random() < share)
 
     separator = pick(",", ";", "\t")
-    decimal = "," if chance(0.5) and (separator != "," or chance(0.3)) else "."
+    decimal = "," if happens(0.5) and (separator != "," or happens(0.3)) else "."
     notation = pick(*NOTATIONS)
     encoding = pick("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1")
     rad = clean.units["position"] == "rad"
@@ -99,7 +99,7 @@ def variant(clean: Recording, random: np.random.Generator) -> Variant:
     )
     usual = ("rad", "Nm") if rad else ("mm", "N")
     units = [
-        usual[k] if notation == "none" or chance(0.4) else pick(*table[clean.units[role]])
+        usual[k] if notation == "none" or happens(0.4) else pick(*table[clean.units[role]])
         for k, (role, table) in enumerate((("position", POSITION_UNITS), ("force", FORCE_UNITS)))
     ]
     columns: list[tuple[str, str, list[str]]] = []
@@ -108,27 +108,27 @@ def variant(clean: Recording, random: np.random.Generator) -> Variant:
         assert known is not None
         columns.append((stem, unit, [repr(value) for value in (values / known.factor).tolist()]))
     time, direction = clean.time, clean.direction
-    if time is not None and chance(0.6):
-        unit, factor = ("ms", 1e-3) if chance(0.5) and notation != "none" else ("s", 1.0)
+    if time is not None and happens(0.6):
+        unit, factor = ("ms", 1e-3) if happens(0.5) and notation != "none" else ("s", 1.0)
         columns.append(("Time", unit, [repr(value) for value in (time / factor).tolist()]))
     else:
         time = None
-    if direction is not None and chance(0.6):
+    if direction is not None and happens(0.6):
         words = {1: pick("press", "loading", "+1"), -1: pick("release", "unload", "-1"), 0: "hold"}
         columns.append(("direction", "", [words[int(value)] for value in direction]))
     else:
         direction = None
-    if chance(0.3):
+    if happens(0.3):
         columns.append(("Strain", "-" if notation == "line" else "%", ["0.5"] * len(clean)))
     columns = [columns[k] for k in random.permutation(len(columns))]
     names = [NOTATIONS[notation].format(stem=stem, unit=unit) if unit else stem for stem, unit, _ in columns]
     header = [names, *([[unit for _, unit, _ in columns]] if notation == "line" else [])]
     cells = [[cell.replace(".", decimal) for cell in values] for _, _, values in columns]
     rows = [list(row) for row in zip(*cells, strict=True)]
-    if chance(0.25):
+    if happens(0.25):
         header = [["", *row] for row in header]
         rows = [[str(k), *row] for k, row in enumerate(rows)]
-    if chance(0.1):
+    if happens(0.1):
         header, rows = [[*row, ""] for row in header], [[*row, ""] for row in rows]
     lines = [separator.join(quoted(cell, separator) for cell in row) for row in (*header, *rows)]
     preamble = {
@@ -137,19 +137,19 @@ def variant(clean: Recording, random: np.random.Generator) -> Variant:
         "text": ["Compression test;", "Speed (mm/min): 10;", "Load cell: 1kN; ä", ""],
         "pairs": [f"Operator{separator}Müller", f"Sample{separator}7", ""],
     }[kind := pick("none", "comments", "text", "pairs")]
-    ending = pick("\n", "\r\n")
-    text = ending.join([*preamble, *lines]) + pick("", ending)
-    told = ("units in line",) if notation == "line" else ()
+    line_end = pick("\n", "\r\n")
+    text = line_end.join([*preamble, *lines]) + pick("", line_end)
+    dialect_parts = ("units in line",) if notation == "line" else ()
     if kind in ("text", "pairs"):
-        told += ("before the header",)
+        dialect_parts += ("before the header",)
     if decimal == ",":
-        told += ("decimal comma",)
+        dialect_parts += ("decimal comma",)
     if separator != ",":
-        told += ("separated by",)
+        dialect_parts += ("separated by",)
     latin = encoding == "latin-1" and not text.isascii()
-    told += ("Latin-1",) if latin else ("UTF-16",) if encoding.startswith("utf-16") else ()
+    dialect_parts += ("Latin-1",) if latin else ("UTF-16",) if encoding.startswith("utf-16") else ()
     used = Recording.from_arrays(clean.position, clean.force, time, direction, units=clean.units)
-    return Variant(text.encode(encoding), used, told)
+    return Variant(text.encode(encoding), used, dialect_parts)
 
 
 def quoted(cell: str, separator: str) -> str:
@@ -160,8 +160,8 @@ def read(path: Path) -> Recording:
     """Returns the recording, after at most one refusal whose cure is applied literally."""
     with contextlib.suppress(InputError):
         recording = read_recording(path)
-        silent = [note for note in recording.notes if "has no unit and is not used" in note]
-        return read_recording(path, **options_in(silent[0])) if silent else recording  # type: ignore[arg-type]
+        unitless = [note for note in recording.notes if "has no unit and is not used" in note]
+        return read_recording(path, **options_in(unitless[0])) if unitless else recording  # type: ignore[arg-type]
     with pytest.raises(InputError) as refused:
         read_recording(path)
     return read_recording(path, **options_in(str(refused.value)))  # type: ignore[arg-type]
@@ -185,9 +185,9 @@ def test_a_variant_is_read_as_the_clean_recording(tmp_path: Path, seed: int) -> 
     assert (recording.direction is None) == (clean.direction is None)
     if recording.direction is not None and clean.direction is not None:
         np.testing.assert_array_equal(recording.direction, clean.direction)
-    for part in found.told:
+    for part in found.dialect_parts:
         assert part in recording.notes[0]
-    if seed < IDENTIFIED:
+    if seed < IDENTIFIED_VARIANTS:
         same_model(palpate.identify(recording), palpate.identify(clean), clean)
 
 

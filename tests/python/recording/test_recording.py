@@ -60,7 +60,7 @@ def assert_same(a: Recording, b: Recording) -> None:
     assert dict(a.units) == dict(b.units)
 
 
-def test_a_written_recording_is_read_back_to_the_last_bit(tmp_path: Path) -> None:
+def test_a_written_recording_is_read_back_exactly(tmp_path: Path) -> None:
     recording = full_recording()
     assert_same(read_recording(recording.write(tmp_path / "full.csv")), recording)
 
@@ -72,7 +72,7 @@ def test_arrays_without_units_are_read_back_without_units(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(("position", "force"), [("rad", "N*m"), ("m", "N"), ("count", "A"), ("rad", "")])
-def test_column_names_carry_the_unit(tmp_path: Path, position: str, force: str) -> None:
+def test_column_names_contain_the_unit(tmp_path: Path, position: str, force: str) -> None:
     units = {"position": position, "force": force}
     path = Recording.from_arrays(awkward_numbers(1), awkward_numbers(2), units=units).write(
         tmp_path / "u.csv"
@@ -92,7 +92,7 @@ def test_a_written_recording_opens_without_its_metadata(tmp_path: Path) -> None:
     assert_same(read_recording(path), read_recording(bare))
 
 
-def test_an_option_wins_over_what_a_written_file_says(tmp_path: Path) -> None:
+def test_an_option_overrides_the_layout_of_a_written_file(tmp_path: Path) -> None:
     recording = full_recording()
     path = recording.write(tmp_path / "full.csv")
     np.testing.assert_array_equal(read_recording(path, force="force_N").force, recording.columns["force_N"])
@@ -105,7 +105,7 @@ def test_a_damaged_layout_line_is_refused(tmp_path: Path) -> None:
         read_recording(path)
 
 
-def test_nothing_is_left_behind_when_writing_fails(tmp_path: Path) -> None:
+def test_a_failed_write_keeps_the_old_file_and_leaves_no_other(tmp_path: Path) -> None:
     recording = Recording.from_arrays(awkward_numbers(1), awkward_numbers(2), metadata={"a": "two\nlines"})
     target = tmp_path / "a.csv"
     target.write_text("before", encoding="utf-8")
@@ -125,7 +125,7 @@ def test_a_metadata_key_with_a_colon_is_refused(tmp_path: Path) -> None:
     ("target", "sentence"),
     [("nowhere/a.csv", "there is no folder"), (".", "it is a folder")],
 )
-def test_where_nothing_can_be_written_is_told(tmp_path: Path, target: str, sentence: str) -> None:
+def test_an_unwritable_target_is_refused_with_the_reason(tmp_path: Path, target: str, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         full_recording().write(tmp_path / target)
 
@@ -145,7 +145,7 @@ def test_split_holds_out_the_last_of_every_k_rows(every: int) -> None:
 
 
 @pytest.mark.parametrize("every", [1, 0, -3, N + 1])
-def test_a_split_that_holds_out_nothing_or_all_is_refused(every: int) -> None:
+def test_a_split_that_holds_out_no_row_or_every_row_is_refused(every: int) -> None:
     with pytest.raises(InputError, match=f"every is {every};"):
         full_recording().split(every)
 
@@ -167,7 +167,7 @@ def test_wrong_arrays_are_refused_by_name(change: dict[str, object], sentence: s
         Recording.from_arrays(**({"position": [1.0, 2.0, 3.0], "force": [1.0, 2.0, 3.0]} | change))  # type: ignore[arg-type]
 
 
-def test_a_recording_does_not_change() -> None:
+def test_a_recording_is_immutable() -> None:
     given = np.arange(12.0)
     recording = Recording.from_arrays(given, given)
     with pytest.raises(FrozenInstanceError):
@@ -192,7 +192,7 @@ def test_the_fingerprint_of_a_file_is_its_sha256(tmp_path: Path) -> None:
     assert source.rows == N
 
 
-def test_the_fingerprint_of_arrays_tells_other_arrays_apart() -> None:
+def test_different_arrays_have_different_fingerprints() -> None:
     a = Recording.from_arrays([0.0, 1.0], [0.0, 1.0])
     b = Recording.from_arrays([0.0, 1.0], [0.0, 1.0])
     c = Recording.from_arrays([0.0, 1.0], [0.0, 1.5])
@@ -208,7 +208,7 @@ def test_merged_sources_keep_every_fingerprint() -> None:
     assert (merged.files, merged.sha256, merged.rows) == (("a.csv", "b.csv"), "aa bb", 30)
 
 
-def test_a_late_force_comes_back_to_the_position_it_belongs_to() -> None:
+def test_a_late_force_is_moved_to_its_position() -> None:
     t = np.linspace(0.0, 2.0, 2001)
     x, late = np.sin(np.pi * t) ** 2, 0.025
     measured = np.sin(np.pi * (t - late)) ** 2
@@ -223,9 +223,9 @@ def test_a_late_force_comes_back_to_the_position_it_belongs_to() -> None:
 
 
 @pytest.mark.parametrize("late", [-0.1, 3.0, float("nan")])
-def test_a_force_cannot_be_later_than_the_recording_is_long(late: float) -> None:
+def test_a_delay_that_is_negative_or_longer_than_the_recording_is_refused(late: float) -> None:
     recording = Recording.from_arrays([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], time=[0.0, 1.0, 2.0])
-    with pytest.raises(InputError, match=r"the force is late by .* it must be a number from 0 to 2 s"):
+    with pytest.raises(InputError, match=r"late_s is .* it must be a number from 0 to 2 s"):
         recording.with_force_earlier(late)
     with pytest.raises(InputError, match="column of time"):
         replace(recording, time=None).with_force_earlier(0.5)

@@ -8,7 +8,7 @@ from palpate import InputError
 from palpate.recording import sample_force, sample_recording
 
 
-def test_the_force_is_the_formula() -> None:
+def test_the_force_follows_the_formula() -> None:
     # f(x) = 2x + 58*0.01*softplus((x - 0.4)/0.01), by hand: softplus(0) = ln 2.
     assert sample_force(0.4) == pytest.approx(0.8 + 0.58 * np.log(2), rel=1e-15)
     assert sample_force(-0.2) == pytest.approx(-0.4, rel=1e-12)
@@ -32,7 +32,7 @@ def test_the_recording_is_sampled_as_described() -> None:
     assert recording.units == {"position": "rad", "force": "N*m"}
 
 
-def test_the_noise_is_that_of_the_sensor() -> None:
+def test_the_force_noise_has_the_stated_deviation() -> None:
     recording = sample_recording(1)
     # The encoder adds 28e-6 rad of noise times a slope of up to 60 N*m/rad: at most 0.002 N*m.
     assert np.std(recording.force - sample_force(recording.position)) == pytest.approx(0.02, rel=0.02)
@@ -45,7 +45,7 @@ def test_the_encoder_rounds_to_the_nearest_count() -> None:
     assert abs(np.mean((recording.force - sample_force(recording.position))[wall])) < 1e-3
 
 
-def test_the_hand_sweeps_at_a_wandering_frequency_of_fifth_to_two_hertz() -> None:
+def test_the_hand_sweeps_at_a_varying_frequency_of_0_2_to_2_hz() -> None:
     recording = sample_recording(1)
     assert recording.time is not None
     middle = recording.position - (0.469 - 0.2) / 2
@@ -56,17 +56,17 @@ def test_the_hand_sweeps_at_a_wandering_frequency_of_fifth_to_two_hertz() -> Non
     assert frequencies.max() > 3 * frequencies.min()
 
 
-def test_a_seed_gives_one_recording_and_another_seed_another() -> None:
+def test_a_seed_determines_the_recording() -> None:
     a, b, c = sample_recording(1, 1.0), sample_recording(1, 1.0), sample_recording(2, 1.0)
     np.testing.assert_array_equal(a.force, b.force)
     assert not np.array_equal(a.force, c.force)
     assert not np.array_equal(a.position, c.position)
 
 
-def test_it_says_that_it_is_simulated() -> None:
+def test_the_metadata_state_that_it_is_simulated() -> None:
     assert "nothing here was measured" in sample_recording(2, 0.1).metadata["simulated"]
 
 
-def test_a_recording_of_no_length_is_refused() -> None:
+def test_a_duration_of_zero_is_refused() -> None:
     with pytest.raises(InputError, match=r"duration_s is 0\.0"):
         sample_recording(1, 0.0)

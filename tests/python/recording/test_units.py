@@ -44,7 +44,7 @@ EXPECTED = {
 }
 
 
-def test_the_table_is_closed() -> None:
+def test_the_table_has_exactly_the_expected_units() -> None:
     assert UNITS.keys() == EXPECTED.keys()
 
 
@@ -91,7 +91,7 @@ def test_a_name_without_a_unit_of_the_table_has_none(name: str) -> None:
     assert split_name(name) == (name, None)
 
 
-def test_units_are_listed_by_what_they_measure() -> None:
+def test_units_are_listed_by_quantity() -> None:
     assert symbols_of(("m", "rad")) == "m, mm, um, nm, cm, in, rad, deg"
 
 
@@ -120,5 +120,5 @@ def test_the_unit_of_a_name_is_read_in_each_notation(name: str, stem: str, symbo
 
 
 @pytest.mark.parametrize("symbol", ["N/m", "MM", "n", "N m", "lb", "%", "-", "", ".", "m."])
-def test_a_symbol_that_is_not_in_the_table_is_no_unit(symbol: str) -> None:
+def test_a_symbol_outside_the_table_has_no_unit(symbol: str) -> None:
     assert unit_of(symbol) is None

@@ -65,11 +65,11 @@ def test_a_recorded_force_moves_the_environment_to_the_recorded_position() -> No
     gain = 1 / abs(1 + 0.5j * w / 2.0 - 1e-3 * w**2 / 2.0)
     late = loop.rendered_position[2000:]
     assert np.ptp(late) == pytest.approx(0.5 * gain, rel=2e-3)
-    assert (loop.scheme.structure, loop.scheme.mass, loop.scheme.damping) == ("explicit", 0.001, 0.5)
+    assert (loop.scheme.structure, loop.scheme.mass, loop.scheme.object_damping) == ("explicit", 0.001, 0.5)
 
 
 def test_the_error_of_a_force_driven_loop_is_that_of_the_position() -> None:
-    loop = force_driven(spring(), sweep(), Scheme(structure="implicit", damping=0.0, mass=1e-4))
+    loop = force_driven(spring(), sweep(), Scheme(structure="implicit", object_damping=0.0, mass=1e-4))
     difference = loop.rendered_position - loop.recorded_position
     assert loop.rmse == pytest.approx(np.sqrt(np.mean(difference**2)), rel=1e-12)
     assert loop.nrmse == pytest.approx(loop.rmse / np.std(loop.recorded_position), rel=1e-12)

@@ -68,26 +68,28 @@ inline constexpr std::array<std::string_view, 2> position_units{"rad", "m"};
 template <>
 inline constexpr auto fields_of<DeviceProfile> = std::tuple{
     Field<&DeviceProfile::id>{"id",
-                              "Its name; a certificate holds for the device of this name and these numbers."},
+                              "Name; a certificate holds for the device with this name and these numbers."},
     Field<&DeviceProfile::position_unit>{"position_unit",
                                          "\"rad\", with forces in N*m, or \"m\", with forces in N.",
                                          Rule::Any, true, detail::position_units},
     Field<&DeviceProfile::period_s>{"period_s", "T, time between two samples [s].", Rule::Positive},
-    Field<&DeviceProfile::inertia>{"inertia", "Of handle and motor [kg or kg*m^2].", Rule::Positive},
+    Field<&DeviceProfile::inertia>{"inertia", "Inertia of handle and motor [kg or kg*m^2].", Rule::Positive},
     Field<&DeviceProfile::viscous_damping>{
-        "viscous_damping", "b, physical [N*s/m or N*m*s/rad]; at most the true one.", Rule::NotNegative},
+        "viscous_damping", "b, damping without control [N*s/m or N*m*s/rad]; at most the true value.",
+        Rule::NotNegative},
     Field<&DeviceProfile::coulomb_friction>{
-        "coulomb_friction", "f_c, physical [N or N*m]; at most the true one.", Rule::NotNegative},
-    Field<&DeviceProfile::encoder_step>{"encoder_step", "Delta [m or rad]; 0 = not quantised.",
-                                        Rule::NotNegative},
-    Field<&DeviceProfile::force_step>{"force_step", "Delta_F, of the command [N or N*m]; 0 = not quantised.",
-                                      Rule::NotNegative},
+        "coulomb_friction", "f_c, friction without control [N or N*m]; at most the true value.",
+        Rule::NotNegative},
+    Field<&DeviceProfile::encoder_step>{
+        "encoder_step", "Delta, step of the encoder [m or rad]; 0 = not quantised.", Rule::NotNegative},
+    Field<&DeviceProfile::force_step>{
+        "force_step", "Delta_F, step of the command [N or N*m]; 0 = not quantised.", Rule::NotNegative},
     Field<&DeviceProfile::delay_s>{
         "delay_s", "t_d, time from a sample to the force that is computed from it [s]; 0 to 16 periods.",
         Rule::NotNegative},
     Field<&DeviceProfile::force_limit>{"force_limit", "Largest force [N or N*m].", Rule::Positive},
-    Field<&DeviceProfile::jitter_s>{
-        "jitter_s", "How much longer than T the time between two samples can get [s].", Rule::NotNegative}};
+    Field<&DeviceProfile::jitter_s>{"jitter_s", "Largest excess of the time between two samples over T [s].",
+                                    Rule::NotNegative}};
 
 /// Returns the profile without damping and friction, because values that were not measured must not be credited.
 [[nodiscard]] inline DeviceProfile unmeasured(DeviceProfile profile) {

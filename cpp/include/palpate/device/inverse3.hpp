@@ -29,10 +29,10 @@ namespace palpate {
 struct Inverse3Settings {
     std::string host = "127.0.0.1";
     std::uint16_t port = 10001;
-    int axis = 2;                                    ///< 0 = x, 1 = y, 2 = z
-    double direction = 1.0;                          ///< +1 or -1: sign of the direction into the object
-    std::chrono::milliseconds connect_within{2000};  ///< for each step of opening
-    std::chrono::milliseconds answer_within{20};     ///< then the exchange is a Timeout
+    int axis = 2;                                  ///< 0 = x, 1 = y, 2 = z
+    double direction = 1.0;                        ///< +1 or -1: sign of the direction into the object
+    std::chrono::milliseconds step_timeout{2000};  ///< for each step of opening
+    std::chrono::milliseconds answer_timeout{20};  ///< then the exchange is a Timeout
 };
 
 /// Properties of the device that the service stated on opening.
@@ -71,12 +71,12 @@ class Inverse3Device {
         const std::string service = settings_.host + ":" + std::to_string(settings_.port);
         try {
             connect(service);
-            const Json inventory = Json::parse(received(service, "told of no device"));
+            const Json inventory = Json::parse(received(service, "reports no device"));
             read_inventory(inventory, service);
             begin_session(service);
         } catch (const Json::exception& error) {
             link_.reset();
-            return {"what answers at " + service + " is no Haply Inverse Service: " + error.what()};
+            return {"the program at " + service + " is not a Haply Inverse Service: " + error.what()};
         } catch (const std::exception& error) {
             link_.reset();
             return {error.what()};
@@ -87,7 +87,7 @@ class Inverse3Device {
     /// Sends the command and waits for the state that answers it. A late answer is read by the next exchange, together
     /// with the next one.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
-        if (!link_ || link_->gone) {
+        if (!link_ || link_->disconnected) {
             last_.status = Status::Fault;
             last_.applied = 0.0;
             return last_;
@@ -95,7 +95,7 @@ class Inverse3Device {
         try {
             last_.status = exchanged(std::isfinite(command.force) ? command.force : 0.0);
         } catch (const std::exception&) {
-            link_->gone = true;
+            link_->disconnected = true;
             last_.status = Status::Fault;
         }
         return last_;
@@ -107,14 +107,14 @@ class Inverse3Device {
             return;
         }
         try {
-            if (!link_->gone) {
+            if (!link_->disconnected) {
                 bool closed = false;
                 link_->stream.async_close(boost::beast::websocket::close_code::normal,
                                           [&closed](const Error& /*any*/) { closed = true; });
                 link_->run(std::chrono::milliseconds{200}, [&closed] { return closed; });
             }
         } catch (const std::exception&) {
-            link_->gone =
+            link_->disconnected =
                 true;  // the force command ended before: the service sets a device without messages to idle
         }
         link_.reset();
@@ -136,14 +136,14 @@ class Inverse3Device {
         std::string command_head;  ///< of every message after the first, up to the numbers
         bool sending = false;
         bool reading = false;
-        bool gone = false;
+        bool disconnected = false;
         int unanswered = 0;     ///< messages without a state so far
         double position = 0.0;  ///< of the axis, as the service states it [m]
         double origin = 0.0;
         double velocity = 0.0;
         double echoed = 0.0;  ///< current force along the axis, as the service states it [N]
         std::uint64_t sequence = 0;
-        int unheeded = 0;  ///< consecutive states without an effect of the force
+        int states_without_effect = 0;  ///< consecutive states without an effect of the force
         std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 
         /// Runs handlers, which run only here. Returns true if `done` became true in time.
@@ -157,13 +157,13 @@ class Inverse3Device {
         }
     };
 
-    static constexpr double noticed_force = 0.05;  ///< least force whose effect the state must show [N]
-    static constexpr int most_unheeded = 200;
+    static constexpr double least_visible_force = 0.05;  ///< least force whose effect the state must show [N]
+    static constexpr int most_states_without_effect = 200;
 
     /// Connects to the service. Throws with the likely cure.
     void connect(const std::string& service) {
-        const auto refuse = [&](const std::string& why) {
-            throw std::runtime_error("no Haply Inverse Service answers at " + service + " (" + why +
+        const auto refuse = [&](const std::string& reason) {
+            throw std::runtime_error("no Haply Inverse Service answers at " + service + " (" + reason +
                                      "): start Haply Hub, or the service itself");
         };
         Error error;
@@ -172,13 +172,13 @@ class Inverse3Device {
             refuse("'" + settings_.host + "' is not an address");
         }
         bool done = false;
-        const auto finished = [&](const Error& how) {
-            error = how;
+        const auto finished = [&](const Error& result) {
+            error = result;
             done = true;
         };
         const auto await = [&] {
-            if (!link_->run(settings_.connect_within, [&done] { return done; })) {
-                refuse("it is silent");
+            if (!link_->run(settings_.step_timeout, [&done] { return done; })) {
+                refuse("no answer");
             }
             if (error) {
                 refuse(error.message());
@@ -195,15 +195,15 @@ class Inverse3Device {
     }
 
     /// Returns the next message during opening.
-    [[nodiscard]] std::string received(const std::string& service, const char* otherwise) {
+    [[nodiscard]] std::string received(const std::string& service, const char* failure) {
         bool done = false;
         Error error;
-        link_->stream.async_read(link_->buffer, [&](const Error& how, std::size_t /*size*/) {
-            error = how;
+        link_->stream.async_read(link_->buffer, [&](const Error& result, std::size_t /*size*/) {
+            error = result;
             done = true;
         });
-        if (!link_->run(settings_.connect_within, [&done] { return done; }) || error) {
-            throw std::runtime_error("the Haply Inverse Service at " + service + " " + otherwise +
+        if (!link_->run(settings_.step_timeout, [&done] { return done; }) || error) {
+            throw std::runtime_error("the Haply Inverse Service at " + service + " " + failure +
                                      (error ? ": " + error.message() : ""));
         }
         std::string text = boost::beast::buffers_to_string(link_->buffer.data());
@@ -217,7 +217,7 @@ class Inverse3Device {
         const Json& devices = inventory.contains("inverse3") ? inventory.at("inverse3") : none;
         if (devices.empty()) {
             throw std::runtime_error("the Haply Inverse Service at " + service +
-                                     " sees no Inverse3: plug it in, and look whether Haply Hub shows it");
+                                     " detects no Inverse3: plug it in, and check that Haply Hub shows it");
         }
         const Json& device = devices.at(0);
         info_.id = device.at("device_id").get<std::string>();
@@ -227,8 +227,9 @@ class Inverse3Device {
         info_.force_gate = filters.value(Json::json_pointer{"/force_gate/gain"}, 0.0);
         info_.damping = filters.value(Json::json_pointer{"/damping/scalar"}, 0.0);
         if (!device.value(Json::json_pointer{"/status/calibrated"}, true)) {
-            throw std::runtime_error("Inverse3 " + info_.id +
-                                     " is not calibrated: follow the light on it, or Haply Hub");
+            throw std::runtime_error(
+                "Inverse3 " + info_.id +
+                " is not calibrated: follow the instructions of its light or of Haply Hub");
         }
         link_->command_head = R"("inverse3":[{"device_id":)" + Json(info_.id).dump() +
                               R"(,"commands":{"set_cursor_force":{"vector":{)";
@@ -271,14 +272,14 @@ class Inverse3Device {
             link.stream.async_write(boost::asio::buffer(link.message),
                                     [&link](const Error& error, std::size_t /*size*/) {
                                         link.sending = false;
-                                        link.gone = link.gone || error;
+                                        link.disconnected = link.disconnected || error;
                                     });
         }
         read_next();
-        const bool answered = link.run(settings_.answer_within, [&link] {
-            return link.gone || (!link.sending && link.unanswered == 0);
+        const bool answered = link.run(settings_.answer_timeout, [&link] {
+            return link.disconnected || (!link.sending && link.unanswered == 0);
         });
-        if (link.gone) {
+        if (link.disconnected) {
             return Status::Fault;
         }
         last_.position = settings_.direction * (link.position - link.origin);
@@ -287,8 +288,9 @@ class Inverse3Device {
         last_.device_time =
             std::chrono::duration<double>(std::chrono::steady_clock::now() - link.start).count();
         last_.sequence = link.sequence;
-        link.unheeded = std::abs(force) > noticed_force && link.echoed == 0.0 ? link.unheeded + 1 : 0;
-        if (link.unheeded > most_unheeded) {
+        link.states_without_effect =
+            std::abs(force) > least_visible_force && link.echoed == 0.0 ? link.states_without_effect + 1 : 0;
+        if (link.states_without_effect > most_states_without_effect) {
             return Status::Fault;
         }
         return answered ? Status::Ok : Status::Timeout;
@@ -297,14 +299,14 @@ class Inverse3Device {
     /// Starts reading the next message, until all messages have their state.
     void read_next() {
         Link& link = *link_;
-        if (link.reading || link.gone || link.unanswered == 0) {
+        if (link.reading || link.disconnected || link.unanswered == 0) {
             return;
         }
         link.reading = true;
         link.stream.async_read(link.buffer, [this, &link](const Error& error, std::size_t /*size*/) {
             link.reading = false;
-            link.gone = link.gone || error;
-            if (link.gone) {
+            link.disconnected = link.disconnected || error;
+            if (link.disconnected) {
                 return;
             }
             take_state(boost::beast::buffers_to_string(link.buffer.data()));
@@ -328,7 +330,7 @@ class Inverse3Device {
                 return;
             }
         }
-        throw std::runtime_error("Inverse3 " + info_.id + " is gone");
+        throw std::runtime_error("Inverse3 " + info_.id + " is missing in the state");
     }
 
     static constexpr std::string_view axis_names = "xyz";
@@ -349,20 +351,21 @@ static_assert(Device<Inverse3Device>);
     const std::size_t at = text.find('@');
     const std::string axis = text.empty() ? "z" : text.substr(1, at == std::string::npos ? at : at - 1);
     const std::string letter = axis.starts_with('-') ? axis.substr(1) : axis;
-    const std::size_t named = std::string_view{"xyz"}.find(letter);
+    const std::size_t axis_index = std::string_view{"xyz"}.find(letter);
     int port = settings.port;
-    bool sound = (text.empty() || text.front() == ':') && letter.size() == 1 && named != std::string::npos;
-    if (sound && at != std::string::npos) {
+    bool is_valid =
+        (text.empty() || text.front() == ':') && letter.size() == 1 && axis_index != std::string::npos;
+    if (is_valid && at != std::string::npos) {
         const char* first = text.data() + at + 1;
         const char* last = text.data() + text.size();
         const auto [end, error] = std::from_chars(first, last, port);
-        sound = end == last && error == std::errc{} && port > 0 && port < 65536;
+        is_valid = end == last && error == std::errc{} && port > 0 && port < 65536;
     }
-    if (!sound) {
+    if (!is_valid) {
         throw std::invalid_argument("device is 'inverse3" + text +
                                     "', must be inverse3[:AXIS[@PORT]], AXIS of x, y, z, -x, -y, -z");
     }
-    settings.axis = static_cast<int>(named);
+    settings.axis = static_cast<int>(axis_index);
     settings.direction = axis.starts_with('-') ? -1.0 : 1.0;
     settings.port = static_cast<std::uint16_t>(port);
     return settings;

@@ -83,7 +83,8 @@ class PacketStream {
     void sent(const wire::OutPacket& command, Nanoseconds now) noexcept {
         has_sent_ = true;
         sent_ = command.sequence;
-        flights_[sent_ % flights_.size()] = {sent_, now, follows_ ? clock_us_.value() : Flight{}.sample_us};
+        sent_commands_[sent_ % sent_commands_.size()] = {
+            sent_, now, follows_ ? clock_us_.value() : SentCommand{}.sample_us};
     }
 
     [[nodiscard]] const Reading& reading() const noexcept { return reading_; }
@@ -93,7 +94,7 @@ class PacketStream {
 
   private:
     /// A command that was sent, with the time of its sample.
-    struct Flight {
+    struct SentCommand {
         std::uint16_t sequence = 0;
         Nanoseconds sent = 0;
         std::int64_t sample_us =
@@ -114,14 +115,14 @@ class PacketStream {
         }
         echoed_ = packet.out_sequence;
         is_acknowledged_ = true;
-        const Flight& flight = flights_[echoed_ % flights_.size()];
-        if (flight.sequence != echoed_) {
+        const SentCommand& command = sent_commands_[echoed_ % sent_commands_.size()];
+        if (command.sequence != echoed_) {
             return;
         }
-        health_.round_trip.add(now - flight.sent);
-        if (flight.sample_us != Flight{}.sample_us &&
+        health_.round_trip.add(now - command.sent);
+        if (command.sample_us != SentCommand{}.sample_us &&
             packet.out_age_us < std::numeric_limits<std::uint16_t>::max()) {
-            const Nanoseconds delay = 1000 * (clock_us_.value() - packet.out_age_us - flight.sample_us);
+            const Nanoseconds delay = 1000 * (clock_us_.value() - packet.out_age_us - command.sample_us);
             health_.delay.add(delay);
             is_late_ = delay > longest_delay_;
             health_.late_commands += is_late_ ? 1 : 0;
@@ -149,9 +150,9 @@ class PacketStream {
         if ((info_.capabilities & wire::measures_velocity) != 0) {
             return wire::position_of(packet.velocity_cps, info_.counts_per_rev);
         }
-        const double passed = now.device_time - reading_.device_time;
-        const bool follows = !first && step > 0 && passed > 0.0;
-        return follows ? (now.position - reading_.position) / passed : first ? 0.0 : reading_.velocity;
+        const double elapsed = now.device_time - reading_.device_time;
+        const bool follows = !first && step > 0 && elapsed > 0.0;
+        return follows ? (now.position - reading_.position) / elapsed : first ? 0.0 : reading_.velocity;
     }
 
     /// Returns the status of a packet. The watchdog counts only after this session's commands have reached the device,
@@ -189,7 +190,7 @@ class PacketStream {
     bool was_enabled_ = false;
     bool follows_ = false;  ///< true if the next packet follows the last one taken
     std::uint16_t status_bits_ = 0;
-    std::array<Flight, 64> flights_{};
+    std::array<SentCommand, 64> sent_commands_{};
     Reading reading_;
     StreamHealth health_;
 };

@@ -92,17 +92,17 @@ class UsbDevice {
         const Nanoseconds deadline = monotonic_now() + std::chrono::nanoseconds{options_.wait}.count();
         // A restarted stream is not a reference for a command. The exchange still sends one if no packet comes, because
         // a device may be silent until the first command.
-        const bool listened = begins_anew() && next_packet(monotonic_now() + 2 * open_->frame);
-        if (!listened) {
-            answer(command.force, deadline);
+        const bool is_reference = restarted() && next_packet(monotonic_now() + 2 * open_->frame);
+        if (!is_reference) {
+            send_or_skip(command.force, deadline);
         }
-        if (listened || next_packet(deadline)) {
-            const Reading reading = judged(open_->stream.reading());
-            open_->sound = sends_force(reading.status);
+        if (is_reference || next_packet(deadline)) {
+            const Reading reading = with_loss_status(open_->stream.reading());
+            open_->reading_is_valid = sends_force(reading.status);
             return reading;
         }
-        open_->sound = false;
-        if (open_->transfers->is_gone()) {
+        open_->reading_is_valid = false;
+        if (open_->transfers->has_failed()) {
             return failed(Status::Fault);
         }
         ++open_->timeouts;
@@ -115,8 +115,8 @@ class UsbDevice {
         if (open_ == nullptr) {
             return;
         }
-        if (open_->transfers != nullptr && !open_->transfers->is_gone()) {
-            last_word();
+        if (open_->transfers != nullptr && !open_->transfers->has_failed()) {
+            send_zero_and_disable();
         }
         last_name_ = name();
         last_info_ = info();
@@ -167,13 +167,13 @@ class UsbDevice {
     }
 
   private:
-    static constexpr std::size_t most_waiting = 4;  ///< packets; a later host restarts the stream
-    static constexpr int most_held =
+    static constexpr std::size_t most_waiting_packets = 4;  ///< packets; a later host restarts the stream
+    static constexpr int most_kept_packets =
         2;  ///< packets that a device may have kept from an earlier session, with another state
-    static constexpr Nanoseconds first_packet = nanoseconds_a_second;
-    static constexpr Nanoseconds one_write = nanoseconds_a_second / 50;
+    static constexpr Nanoseconds first_packet_timeout = nanoseconds_a_second;
+    static constexpr Nanoseconds write_timeout = nanoseconds_a_second / 50;
 
-    static constexpr const char* clear_it = "run 'palpate devices --clear', then try again";
+    static constexpr const char* clear_cure = "run 'palpate devices --clear', then try again";
 
     /// The state of an open device.
     struct OpenDevice {
@@ -182,9 +182,9 @@ class UsbDevice {
         std::unique_ptr<detail::UsbTransfers> transfers;
         Nanoseconds frame = 0;
         Nanoseconds arrived = 0;  ///< time of the last packet
-        bool catches_up = false;
+        bool skipped_last = false;
         bool sent_last = true;
-        bool sound = true;  ///< true if the last reading was valid
+        bool reading_is_valid = true;  ///< true if the last reading was valid
         std::uint64_t skipped_commands = 0;
         std::uint64_t lost_commands = 0;
         std::uint64_t timeouts = 0;
@@ -203,26 +203,27 @@ class UsbDevice {
         if (const int code = open_->transfers->start(); code != 0) {
             return "does not stream: " + detail::usb_reason(code);
         }
-        const Nanoseconds deadline = monotonic_now() + first_packet;
-        if (!throw_away(most_held, deadline) || !next_packet(deadline)) {
-            return open_->transfers->is_gone()
+        const Nanoseconds deadline = monotonic_now() + first_packet_timeout;
+        if (!discard_packets(most_kept_packets, deadline) || !next_packet(deadline)) {
+            return open_->transfers->has_failed()
                        ? "does not stream: " + detail::usb_reason(open_->transfers->error())
                        : "sends no packets; unplug it and plug it in again";
         }
         if ((open_->stream.status_bits() & wire::fault_bits) != 0) {
-            return "reports " + fault_text(open_->stream.status_bits()) + "; when its cause is gone, " +
-                   clear_it;
+            return "reports " + fault_text(open_->stream.status_bits()) + "; remove the cause, then " +
+                   clear_cure;
         }
         if (!options_.makes_force) {
             return "";
         }
         if (const int code = open_->transfers->request(wire::Request::Enable, 1); code != 0) {
-            return "cannot be enabled: " + (code == LIBUSB_ERROR_PIPE ? std::string("it refuses; ") + clear_it
-                                                                      : detail::usb_reason(code));
+            return "cannot be enabled: " + (code == LIBUSB_ERROR_PIPE
+                                                ? std::string("it refuses the request; ") + clear_cure
+                                                : detail::usb_reason(code));
         }
         while ((open_->stream.status_bits() & wire::enabled) == 0) {
             if (!next_packet(deadline)) {
-                return std::string("does not let itself be enabled; ") + clear_it;
+                return std::string("does not enable its torque; ") + clear_cure;
             }
         }
         open_->stream.pause();
@@ -255,7 +256,7 @@ class UsbDevice {
     }
 
     /// Discards packets. Returns false if they did not come before the deadline.
-    [[nodiscard]] bool throw_away(int packets, Nanoseconds deadline) noexcept {
+    [[nodiscard]] bool discard_packets(int packets, Nanoseconds deadline) noexcept {
         detail::UsbArrival old;
         for (int k = 0; k < packets; ++k) {
             if (!open_->transfers->wait_for_arrival(deadline)) {
@@ -267,8 +268,8 @@ class UsbDevice {
     }
 
     /// Returns true if the stream restarts: a packet was missing, or too many wait and are discarded.
-    [[nodiscard]] bool begins_anew() noexcept {
-        if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting) {
+    [[nodiscard]] bool restarted() noexcept {
+        if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting_packets) {
             return false;
         }
         detail::UsbArrival old;
@@ -276,17 +277,17 @@ class UsbDevice {
             ++open_->discarded;
         }
         open_->stream.pause();
-        open_->catches_up = false;
+        open_->skipped_last = false;
         return true;
     }
 
     /// Sends the command for the last packet. A late host skips it, takes the waiting packet first, and sends the next
     /// one. It does not skip twice in a row, and never after a reading without force.
-    void answer(double force, Nanoseconds deadline) noexcept {
-        const bool ended = last_has_ended(deadline);
-        const bool behind = !ended || (open_->sound && open_->transfers->arrived() > 0);
-        open_->catches_up = behind && !open_->catches_up;
-        if (open_->catches_up) {
+    void send_or_skip(double force, Nanoseconds deadline) noexcept {
+        const bool ended = wait_for_last_write(deadline);
+        const bool behind = !ended || (open_->reading_is_valid && open_->transfers->arrived() > 0);
+        open_->skipped_last = behind && !open_->skipped_last;
+        if (open_->skipped_last) {
             ++open_->skipped_commands;
             open_->sent_last = open_->sent_last && ended;
         } else {
@@ -297,7 +298,7 @@ class UsbDevice {
     /// Waits for the end of the last command. Its end and the packet that wakes the host come in the same frame, in any
     /// order. A command that ends much later has missed its frame and ends in the next one, close to a newer packet.
     /// Waiting for that packet keeps this and all later commands from being a frame late.
-    [[nodiscard]] bool last_has_ended(Nanoseconds deadline) noexcept {
+    [[nodiscard]] bool wait_for_last_write(Nanoseconds deadline) noexcept {
         detail::UsbTransfers& transfers = *open_->transfers;
         if (!transfers.writes()) {
             return true;
@@ -324,15 +325,15 @@ class UsbDevice {
     }
 
     /// Sends zero force and disables the device.
-    void last_word() noexcept {
-        (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
+    void send_zero_and_disable() noexcept {
+        (void)open_->transfers->wait_for_write(monotonic_now() + write_timeout);
         send(0.0);
-        (void)open_->transfers->wait_for_write(monotonic_now() + one_write);
+        (void)open_->transfers->wait_for_write(monotonic_now() + write_timeout);
         (void)open_->transfers->request(wire::Request::Enable, 0);  // otherwise the watchdog ends the torque
     }
 
     /// Sets the status Lost if a command was not sent or was lost, because an older force acts then.
-    [[nodiscard]] Reading judged(Reading reading) noexcept {
+    [[nodiscard]] Reading with_loss_status(Reading reading) noexcept {
         const std::uint64_t lost = open_->transfers->lost_writes();
         const bool arrived = std::exchange(open_->lost_commands, lost) == lost && open_->sent_last;
         if (!arrived && sends_force(reading.status)) {

@@ -46,13 +46,13 @@ enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog 
                    "again";
         case -4:  // LIBUSB_ERROR_NO_DEVICE
         case -5:  // LIBUSB_ERROR_NOT_FOUND
-            return "it was unplugged meanwhile; plug it in and try again";
+            return "it was unplugged; plug it in and try again";
         case -6:  // LIBUSB_ERROR_BUSY
             return "another program uses it; end that program, then try again";
         case -7:  // LIBUSB_ERROR_TIMEOUT
             return "it does not answer; unplug it and plug it in again";
         case -9:  // LIBUSB_ERROR_PIPE
-            return "it refused a request; its firmware may be of another version";
+            return "it refused a request; the version of its firmware may differ";
         case -11:  // LIBUSB_ERROR_NO_MEM
             return "the system has no memory left for USB; see "
                    "/sys/module/usbcore/parameters/usbfs_memory_mb";
@@ -121,9 +121,9 @@ struct Info {
 namespace detail {
 
 /// Reads integers from bytes, least byte first, one after the other.
-class Taking {
+class ByteReader {
   public:
-    explicit Taking(std::span<const std::uint8_t> bytes) noexcept : bytes_{bytes} {}
+    explicit ByteReader(std::span<const std::uint8_t> bytes) noexcept : bytes_{bytes} {}
 
     template <std::integral... Integer>
     void operator()(Integer&... values) noexcept {
@@ -145,9 +145,9 @@ class Taking {
 };
 
 /// Writes integers to bytes, least byte first, one after the other.
-class Putting {
+class ByteWriter {
   public:
-    explicit Putting(std::span<std::uint8_t> bytes) noexcept : bytes_{bytes} {}
+    explicit ByteWriter(std::span<std::uint8_t> bytes) noexcept : bytes_{bytes} {}
 
     template <std::integral... Integer>
     void operator()(Integer... values) noexcept {
@@ -174,9 +174,9 @@ class Putting {
     if (bytes.size() != in_size || bytes[0] != 'H' || bytes[1] != protocol_version) {
         return false;
     }
-    detail::Taking{bytes.subspan(2)}(packet.sequence, packet.clock_us, packet.count, packet.velocity_cps,
-                                     packet.torque_uNm, packet.status, packet.out_sequence, packet.out_age_us,
-                                     packet.temperature_dC, packet.sensor_uNm);
+    detail::ByteReader{bytes.subspan(2)}(packet.sequence, packet.clock_us, packet.count, packet.velocity_cps,
+                                         packet.torque_uNm, packet.status, packet.out_sequence,
+                                         packet.out_age_us, packet.temperature_dC, packet.sensor_uNm);
     return true;
 }
 
@@ -198,13 +198,14 @@ class Putting {
     std::uint8_t out_bytes = 0;
     std::uint8_t degrees_of_freedom = 0;
     std::uint8_t reserved = 0;
-    detail::Taking{bytes.subspan(1)}(version, info.firmware, info.counts_per_rev, info.max_torque_uNm,
-                                     info.rate_hz, info.watchdog_ms, info.capabilities, in_bytes, out_bytes,
-                                     degrees_of_freedom, reserved, info.uid);
-    const auto wrong = [&](const char* field, Number value, const std::string& right) {
-        return answer + ": " + field + " is " + std::to_string(value) + ", must be " + right;
+    detail::ByteReader{bytes.subspan(1)}(version, info.firmware, info.counts_per_rev, info.max_torque_uNm,
+                                         info.rate_hz, info.watchdog_ms, info.capabilities, in_bytes,
+                                         out_bytes, degrees_of_freedom, reserved, info.uid);
+    const auto refusal = [&](const char* field, Number value, const std::string& required) {
+        return answer + ": " + field + " is " + std::to_string(value) + ", must be " + required;
     };
-    for (const auto& [field, value, right] : std::initializer_list<std::tuple<const char*, Number, Number>>{
+    for (const auto& [field, value, required] :
+         std::initializer_list<std::tuple<const char*, Number, Number>>{
              {"version", version, protocol_version},
              {"in_size", in_bytes, in_size},
              {"out_size", out_bytes, out_size},
@@ -212,8 +213,8 @@ class Putting {
              {"the reserved byte", reserved, 0},
              {"capabilities beyond bits 0 and 1", info.capabilities & ~(has_transducer | measures_velocity),
               0}}) {
-        if (value != right) {
-            return wrong(field, value, std::to_string(right));
+        if (value != required) {
+            return refusal(field, value, std::to_string(required));
         }
     }
     for (const auto& [field, value] :
@@ -222,7 +223,7 @@ class Putting {
                                                                {"rate_hz", info.rate_hz},
                                                                {"watchdog_ms", info.watchdog_ms}}) {
         if (value <= 0) {
-            return wrong(field, value, "> 0");
+            return refusal(field, value, "> 0");
         }
     }
     return "";
@@ -232,8 +233,8 @@ class Putting {
 [[nodiscard]] inline std::array<std::uint8_t, out_size> encode(const OutPacket& packet) noexcept {
     constexpr std::uint16_t flags = 0;
     std::array<std::uint8_t, out_size> bytes{};
-    detail::Putting{bytes}(std::uint8_t{'T'}, protocol_version, packet.sequence, packet.torque_uNm, flags,
-                           packet.time_to_live_ms, packet.host_us);
+    detail::ByteWriter{bytes}(std::uint8_t{'T'}, protocol_version, packet.sequence, packet.torque_uNm, flags,
+                              packet.time_to_live_ms, packet.host_us);
     return bytes;
 }
 

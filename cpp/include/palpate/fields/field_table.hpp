@@ -29,7 +29,7 @@ enum class Rule : std::uint8_t { Any, Finite, NotNegative, Positive };
 }
 
 /// Returns true if a value satisfies a rule.
-[[nodiscard]] inline bool obeys(double value, Rule rule) noexcept {
+[[nodiscard]] inline bool satisfies(double value, Rule rule) noexcept {
     return rule == Rule::Any || (std::isfinite(value) && (rule == Rule::Finite || value > 0.0 ||
                                                           (rule == Rule::NotNegative && value == 0.0)));
 }
@@ -133,7 +133,7 @@ void check_value(const F& field, const V& value, const std::string& prefix) {
         }
     } else if constexpr (std::is_arithmetic_v<V>) {
         const auto number = static_cast<double>(value);
-        require_field(obeys(number, field.rule), prefix + field.name, number, text(field.rule));
+        require_field(satisfies(number, field.rule), prefix + field.name, number, text(field.rule));
     } else if constexpr (std::is_same_v<V, std::string>) {
         const auto& words = field.words;
         if (!words.empty() && std::find(words.begin(), words.end(), value) == words.end()) {

@@ -12,11 +12,11 @@ namespace palpate {
 
 /// Energy and losses that an energy tank may use.
 struct TankSettings {
-    StoredEnergySettings stored;  ///< bounds of the object's energy
-    double damping = 0.0;         ///< credited b of the device [N*s/m or N*m*s/rad]
-    double friction = 0.0;        ///< credited f_c of the device [N or N*m]
-    double unsure = 0.0;          ///< part of each motion without credit [m or rad]
-    double period_s = 1e-3;       ///< sample time [s]
+    StoredEnergySettings stored;     ///< bounds of the object's energy
+    double device_damping = 0.0;     ///< credited b of the device [N*s/m or N*m*s/rad]
+    double device_friction = 0.0;    ///< credited f_c of the device [N or N*m]
+    double uncredited_motion = 0.0;  ///< part of each motion without credit [m or rad]
+    double period_s = 1e-3;          ///< sample time [s]
 };
 
 /// Limits the energy that a rendering may give. The energy that it has given since the tank was last full is
@@ -46,9 +46,10 @@ class EnergyTank {
 
     /// Adds the work of `applied` over the motion `moved` of the handle.
     void book(double applied, double moved) noexcept {
-        const double surely = std::max(0.0, std::abs(moved) - settings_.unsure);
-        const double lost = surely * (settings_.damping * surely / settings_.period_s + settings_.friction);
-        given_ = std::max(0.0, given_ - applied * moved - lost);
+        const double credited = std::max(0.0, std::abs(moved) - settings_.uncredited_motion);
+        const double dissipated =
+            credited * (settings_.device_damping * credited / settings_.period_s + settings_.device_friction);
+        given_ = std::max(0.0, given_ - applied * moved - dissipated);
         most_given_ = std::max(most_given_, given_);
     }
     /// Updates the stored energy with the positions of handle and object.
@@ -56,12 +57,12 @@ class EnergyTank {
 
     /// Scales the force down if the energy is used up.
     [[nodiscard]] Status apply(double& force) const noexcept {
-        const double beyond = given_ - stored_.most();
-        if (!(beyond > 0.0) || force == 0.0) {
+        const double excess = given_ - stored_.most();
+        if (!(excess > 0.0) || force == 0.0) {
             return Status::Ok;
         }
-        force *= std::max(0.0, 1.0 - beyond / reserve_);
-        return Status::Drained;
+        force *= std::max(0.0, 1.0 - excess / reserve_);
+        return Status::EnergyLimited;
     }
 
     /// Return G now, and its largest value so far [J].

@@ -23,7 +23,7 @@ struct GuardSettings {
     double frozen_speed = 0.3;     ///< a faster handle cannot stop at once [m/s or rad/s]
     double frozen_s = 0.05;        ///< longest apparent rest; 0 = no check [s]
     bool energy_tank = true;       ///< true: an energy tank limits the energy
-    double buzz_force =
+    double limit_cycle_force =
         0.05;  ///< least force swing of a fast oscillation that is a limit cycle; 0 = no check [N or N*m]
     double device_damping = 0.0;   ///< known b [N*s/m or N*m*s/rad]
     double device_friction = 0.0;  ///< known f_c [N or N*m]
@@ -41,7 +41,7 @@ struct GuardSettings {
     // A slower motion can stay within one encoder step.
     guards.frozen_speed =
         std::max(guards.frozen_speed * scale.length, 3.0 * device.encoder_step / device.period_s);
-    guards.buzz_force *= scale.length * scale.stiffness();
+    guards.limit_cycle_force *= scale.length * scale.stiffness();
     guards.device_damping = device.viscous_damping;
     guards.device_friction = device.coulomb_friction;
     guards.encoder_step = device.encoder_step;
@@ -55,27 +55,27 @@ inline constexpr double longest_guard_s =
 inline constexpr double uncertified_credit = 0.9;
 
 /// Frequency above which an oscillation cannot come from a hand [Hz].
-inline constexpr double slowest_buzz_hz = 20.0;
+inline constexpr double lowest_limit_cycle_hz = 20.0;
 
 /// Throws std::invalid_argument with the field, its value and the rule.
 inline void validate(const GuardSettings& settings) {
-    const auto obey = [](const char* field, double value, Rule rule) {
-        require_field(obeys(value, rule), field, value, text(rule));
+    const auto require_rule = [](const char* field, double value, Rule rule) {
+        require_field(satisfies(value, rule), field, value, text(rule));
     };
-    const auto within_an_hour = [](const char* field, double value) {
+    const auto require_within_an_hour = [](const char* field, double value) {
         require_field(value >= 0.0 && value <= longest_guard_s, field, value,
                       "0 to " + readable(longest_guard_s));
     };
-    obey("force_limit", settings.force_limit, Rule::Positive);
-    obey("slew_s", settings.slew_s, Rule::NotNegative);
-    within_an_hour("ramp_s", settings.ramp_s);
+    require_rule("force_limit", settings.force_limit, Rule::Positive);
+    require_rule("slew_s", settings.slew_s, Rule::NotNegative);
+    require_within_an_hour("ramp_s", settings.ramp_s);
     require_field(settings.largest_speed > 0.0, "largest_speed", settings.largest_speed, "> 0");
-    obey("frozen_speed", settings.frozen_speed, Rule::NotNegative);
-    within_an_hour("frozen_s", settings.frozen_s);
-    obey("buzz_force", settings.buzz_force, Rule::NotNegative);
-    obey("device_damping", settings.device_damping, Rule::NotNegative);
-    obey("device_friction", settings.device_friction, Rule::NotNegative);
-    obey("encoder_step", settings.encoder_step, Rule::NotNegative);
+    require_rule("frozen_speed", settings.frozen_speed, Rule::NotNegative);
+    require_within_an_hour("frozen_s", settings.frozen_s);
+    require_rule("limit_cycle_force", settings.limit_cycle_force, Rule::NotNegative);
+    require_rule("device_damping", settings.device_damping, Rule::NotNegative);
+    require_rule("device_friction", settings.device_friction, Rule::NotNegative);
+    require_rule("encoder_step", settings.encoder_step, Rule::NotNegative);
 }
 
 /// Least number of equal samples that count as a frozen encoder.

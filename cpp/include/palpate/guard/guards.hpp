@@ -22,15 +22,15 @@ namespace palpate {
 /// Checks of each sample before it is used, and limits of each force before it is sent. With the force limit alone
 /// these are the guards of a simulation, because other faults cannot occur there.
 struct Guards {
-    ReadingGuard reading{};        ///< check of each sample
-    ForceLimit limit{};            ///< first limit
-    LimitCycleDetector buzz{};     ///< softens the object
-    ForceRamp ramp{};              ///< increase at the start
-    SlewLimit slew{};              ///< change of the force
-    EnergyTank tank{};             ///< energy that may be given
-    ReadMotion motion{};           ///< motion that the readings prove
-    PassivityObserver at_start{};  ///< observes during the ramp
-    PassivityObserver observer{};  ///< observes after the ramp
+    ReadingGuard reading{};             ///< check of each sample
+    ForceLimit limit{};                 ///< first limit
+    LimitCycleDetector limit_cycle{};   ///< scales all forces down after a limit cycle
+    ForceRamp ramp{};                   ///< increase at the start
+    SlewLimit slew{};                   ///< change of the force
+    EnergyTank tank{};                  ///< energy that may be given
+    ReadMotion motion{};                ///< motion that the readings prove
+    PassivityObserver ramp_observer{};  ///< observes during the ramp
+    PassivityObserver observer{};       ///< observes after the ramp
 };
 
 /// Returns an upper bound of the energy that a rendering stores within the domain of its model, at rest [J]. It is
@@ -41,26 +41,27 @@ struct Guards {
 /// force. Its force is c(f), and K_c e_k + (B_c/T) (e_k - e_{k-1}) = c(f) with e_0 = 0 gives |e_k| <= F / K_c for every
 /// k. A compensated object stores at y = x - f/K_c the energy C(x) - c(f)^2 / 2 K_c, so its minimum can be lower by
 /// F^2 / 2 K_c. `StoredEnergy` adds positions and speeds outside this range when they occur.
-[[nodiscard]] inline double most_energy(const ForceModel& given, const Scheme& scheme, double force_limit) {
+[[nodiscard]] inline double largest_stored_energy(const ForceModel& given, const Scheme& scheme,
+                                                  double force_limit) {
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
-    const double held = energy_range(model, force_limit).span();
+    const double object_energy = energy_range(model, force_limit).span();
     if (!has_coupling(scheme.structure)) {
-        return held;
+        return object_energy;
     }
-    const HysteresisNetwork* both = model.hysteresis();
-    const double force = both != nullptr
-                             ? both->force().value_bounds().largest() + both->loss().value_bounds().largest()
-                             : model.network()->curve().value_bounds().largest();
-    const double felt = std::min(force, force_limit);
-    const double stretched = 0.5 * felt * felt / scheme.coupling.stiffness;
-    return held + (scheme.compensated ? 2.0 : 1.0) * stretched;
+    const HysteresisNetwork* pair = model.hysteresis();
+    const double force = pair != nullptr ? pair->force().value_bounds().largest() +
+                                               pair->hysteresis_force().value_bounds().largest()
+                                         : model.network()->curve().value_bounds().largest();
+    const double largest_force = std::min(force, force_limit);
+    const double coupling_energy = 0.5 * largest_force * largest_force / scheme.coupling.stiffness;
+    return object_energy + (scheme.compensated ? 2.0 : 1.0) * coupling_energy;
 }
 
 /// Returns the numbers that bound the energy of a certified rendering at all positions.
 [[nodiscard]] inline StoredEnergySettings stored_energy(const ForceModel& model, const Scheme& scheme,
                                                         double force_limit, double period_s) {
     StoredEnergySettings stored;
-    stored.within = most_energy(model, scheme, force_limit);
+    stored.within = largest_stored_energy(model, scheme, force_limit);
     const Domain& domain = model.domain();
     if (!domain.period) {
         stored.lower = domain.lower[0];
@@ -78,7 +79,8 @@ struct Guards {
 /// Returns all guards of a live rendering.
 [[nodiscard]] inline Guards guards_of(const GuardSettings& settings, const ForceModel& model,
                                       const Scheme& scheme, double period_s) {
-    const auto longest_swing = static_cast<std::uint64_t>(std::llround(0.5 / (slowest_buzz_hz * period_s)));
+    const auto longest_swing =
+        static_cast<std::uint64_t>(std::llround(0.5 / (lowest_limit_cycle_hz * period_s)));
     Guards guards;
     guards.reading = reading_guard(settings, period_s);
     guards.limit = force_limit(settings);
@@ -92,13 +94,14 @@ struct Guards {
         }
         const double share = settings.certified ? 1.0 : uncertified_credit;
         guards.tank = EnergyTank{{.stored = stored,
-                                  .damping = share * settings.device_damping,
-                                  .friction = share * settings.device_friction,
-                                  .unsure = settings.certified ? 0.0 : settings.encoder_step,
+                                  .device_damping = share * settings.device_damping,
+                                  .device_friction = share * settings.device_friction,
+                                  .uncredited_motion = settings.certified ? 0.0 : settings.encoder_step,
                                   .period_s = period_s}};
     }
-    if (settings.buzz_force > 0.0) {
-        guards.buzz = LimitCycleDetector{{settings.buzz_force, longest_swing, settings.encoder_step}};
+    if (settings.limit_cycle_force > 0.0) {
+        guards.limit_cycle =
+            LimitCycleDetector{{settings.limit_cycle_force, longest_swing, settings.encoder_step}};
     }
     return guards;
 }

@@ -18,7 +18,7 @@ struct LimitCycleSettings {
     double encoder_step = 0.0;  ///< a motion back of at most this length is not a reversal [m or rad]
 };
 
-/// Detects a limit cycle of the handle and makes the object softer. A limit cycle is ten consecutive swings between
+/// Detects a limit cycle of the handle and scales all forces down. A limit cycle is ten consecutive swings between
 /// reversals of the handle. Each is fast and has a large change of force, and they do not decay: the longest of the
 /// last five is at least 0.8 of the longest of the first five. A knob turned over its detents makes forces of the same
 /// frequency, but does not reverse.
@@ -40,36 +40,37 @@ class LimitCycleDetector {
         if (ahead >= 0.0 || std::isnan(extreme_)) {
             extreme_ = position;
         } else if (-ahead > settings_.encoder_step) {
-            turn();
+            end_swing();
             extreme_ = position;
             least_force_ = largest_force_ = force;
         }
     }
 
-    /// Scales the force; returns `Softened` if the scale is below 1.
+    /// Scales the force; returns `LimitCycleScaled` if the scale is below 1.
     [[nodiscard]] Status apply(double& force) const noexcept {
         force *= scale_;
-        return scale_ < 1.0 ? Status::Softened : Status::Ok;
+        return scale_ < 1.0 ? Status::LimitCycleScaled : Status::Ok;
     }
 
     /// Returns the factor of all forces.
     [[nodiscard]] double scale() const noexcept { return scale_; }
     /// Returns the number of limit cycles detected.
-    [[nodiscard]] std::uint64_t buzzes() const noexcept { return buzzes_; }
+    [[nodiscard]] std::uint64_t limit_cycles() const noexcept { return limit_cycles_; }
 
   private:
-    static constexpr std::uint64_t half = 5;  ///< swings of each half
-    static constexpr double still_alive = 0.8;
-    static constexpr double softer = 0.7;
+    static constexpr std::uint64_t swings_in_half = 5;  ///< swings in each half of a limit cycle
+    static constexpr double least_last_to_first =
+        0.8;                                     ///< longest swing of the second half / of the first half
+    static constexpr double force_factor = 0.7;  ///< of all forces, after each limit cycle
 
-    void turn() noexcept {
-        const double swing = std::abs(extreme_ - last_turn_);
-        const bool buzzes =
+    void end_swing() noexcept {
+        const double swing = std::abs(extreme_ - last_reversal_);
+        const bool is_fast_swing =
             ticks_ <= settings_.longest_swing && largest_force_ - least_force_ >= settings_.force_swing;
-        last_turn_ = extreme_;
+        last_reversal_ = extreme_;
         direction_ = -direction_;
         ticks_ = 0;
-        if (!buzzes) {
+        if (!is_fast_swing) {
             swings_ = 0;
         } else {
             ++swings_;
@@ -77,23 +78,23 @@ class LimitCycleDetector {
         if (swings_ <= 1) {
             first_ = last_ = 0.0;
         }
-        double& reached = swings_ <= half ? first_ : last_;
-        reached = std::max(reached, swing);
-        if (swings_ == 2 * half) {
+        double& longest = swings_ <= swings_in_half ? first_ : last_;
+        longest = std::max(longest, swing);
+        if (swings_ == 2 * swings_in_half) {
             swings_ = 0;
-            if (last_ >= still_alive * first_) {
-                scale_ *= softer;
-                ++buzzes_;
+            if (last_ >= least_last_to_first * first_) {
+                scale_ *= force_factor;
+                ++limit_cycles_;
             }
         }
     }
 
     LimitCycleSettings settings_;
     double scale_ = 1.0;
-    std::uint64_t buzzes_ = 0;
+    std::uint64_t limit_cycles_ = 0;
     double direction_ = 1.0;
     double extreme_ = std::numeric_limits<double>::quiet_NaN();  ///< of the current swing
-    double last_turn_ = 0.0;
+    double last_reversal_ = 0.0;
     double least_force_ = std::numeric_limits<double>::infinity();  ///< of the current swing
     double largest_force_ = -std::numeric_limits<double>::infinity();
     double first_ = 0.0;  ///< longest of the first five swings

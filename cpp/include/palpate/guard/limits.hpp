@@ -21,9 +21,9 @@ struct ForceLimit {
             force = 0.0;
             return Status::NonFinite;
         }
-        const double wanted = force;
+        const double unlimited = force;
         force = std::clamp(force, -largest, largest);
-        return force == wanted ? Status::Ok : Status::Limited;
+        return force == unlimited ? Status::Ok : Status::Limited;
     }
 };
 
@@ -34,9 +34,9 @@ struct SlewLimit {
 
     /// Limits the force.
     [[nodiscard]] Status apply(double& force) noexcept {
-        const double wanted = force;
+        const double unlimited = force;
         force = std::clamp(force, last - largest_step, last + largest_step);
-        return force == wanted ? Status::Ok : Status::Limited;
+        return force == unlimited ? Status::Ok : Status::Limited;
     }
 
     /// Sets the force that was sent, after all guards.

@@ -45,11 +45,11 @@ class ReadingGuard {
         const bool lost = started_ && advanced > expected;
         lost_ += lost ? advanced - expected : 0;
         last_sequence_ = sequence;
-        exchanges_ = advanced < expected ? std::min(expected - advanced, most_late) : 0;
+        exchanges_ = advanced < expected ? std::min(expected - advanced, most_late_samples) : 0;
         if (!std::isfinite(position)) {
             return Status::NonFinite;
         }
-        const Status moved = followed(position, static_cast<double>(started_ ? advanced : 1));
+        const Status moved = motion_status(position, static_cast<double>(started_ ? advanced : 1));
         started_ = true;
         if (moved != Status::Ok) {
             return moved;
@@ -62,9 +62,10 @@ class ReadingGuard {
     [[nodiscard]] std::uint64_t repeated() const noexcept { return repeated_; }
 
   private:
-    static constexpr std::uint64_t most_late = 2;  ///< samples that may arrive later than their exchange
+    static constexpr std::uint64_t most_late_samples =
+        2;  ///< samples that may arrive later than their exchange
 
-    [[nodiscard]] Status followed(double position, double samples) noexcept {
+    [[nodiscard]] Status motion_status(double position, double samples) noexcept {
         const double step = std::isnan(last_position_) ? 0.0 : std::abs(position - last_position_);
         last_position_ = position;
         if (step > limits_.largest_step * samples) {
@@ -72,20 +73,21 @@ class ReadingGuard {
         }
         if (step > 0.0) {
             was_fast_ = step >= limits_.frozen_step * samples;
-            still_ = 0;
+            resting_samples_ = 0;
             return Status::Ok;
         }
-        ++still_;
-        const bool died = limits_.frozen_samples > 0 && was_fast_ && still_ >= limits_.frozen_samples;
-        return died ? Status::Frozen : Status::Ok;
+        ++resting_samples_;
+        const bool is_frozen =
+            limits_.frozen_samples > 0 && was_fast_ && resting_samples_ >= limits_.frozen_samples;
+        return is_frozen ? Status::Frozen : Status::Ok;
     }
 
     Limits limits_;
     bool started_ = false;
     bool was_fast_ = false;
     std::uint64_t last_sequence_ = 0;
-    std::uint64_t exchanges_ = 0;  ///< exchanges without a sample so far
-    std::uint64_t still_ = 0;      ///< samples without motion
+    std::uint64_t exchanges_ = 0;        ///< exchanges without a sample so far
+    std::uint64_t resting_samples_ = 0;  ///< samples without motion
     std::uint64_t lost_ = 0;
     std::uint64_t repeated_ = 0;
     double last_position_ = std::numeric_limits<double>::quiet_NaN();

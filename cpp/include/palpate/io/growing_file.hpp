@@ -36,7 +36,7 @@ namespace detail {
 }
 
 /// Returns true if the path is that of the open file.
-[[nodiscard]] inline bool names(const std::string& path, int descriptor) noexcept {
+[[nodiscard]] inline bool is_path_of(const std::string& path, int descriptor) noexcept {
     struct stat named{};
     struct stat open{};
     return ::lstat(path.c_str(), &named) == 0 && ::fstat(descriptor, &open) == 0 &&
@@ -68,24 +68,24 @@ class GrowingFile {
     [[nodiscard]] std::string open(const std::string& name, bool force = false) {
         force_ = force;
         name_ = name;
-        std::error_code none;
-        if (force && std::filesystem::is_symlink(name, none)) {
-            name_ = std::filesystem::canonical(name, none);
-            if (none) {
-                return name + " cannot be written: it is a symbolic link to a file that is not there";
+        std::error_code error;
+        if (force && std::filesystem::is_symlink(name, error)) {
+            name_ = std::filesystem::canonical(name, error);
+            if (error) {
+                return name + " cannot be written: it is a symbolic link to a missing file";
             }
         }
-        if (std::string reason = taken(); !reason.empty()) {
+        if (std::string reason = name_conflict(); !reason.empty()) {
             return reason;
         }
         // If another run finishes its recording meanwhile, the second try succeeds.
-        for (int tries = 2; descriptor_ < 0; --tries) {
+        for (int retries = 2; descriptor_ < 0; --retries) {
             descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-            if (descriptor_ < 0 && (errno != EEXIST || tries == 0)) {
+            if (descriptor_ < 0 && (errno != EEXIST || retries == 0)) {
                 return name_ + " cannot be written: " + detail::reason_of(errno);
             }
             if (descriptor_ < 0) {
-                if (std::string reason = set_aside(); !reason.empty()) {
+                if (std::string reason = rename_interrupted(); !reason.empty()) {
                     return reason;
                 }
             }
@@ -93,7 +93,7 @@ class GrowingFile {
         // Waits at most for a program that only reads the new file. Without locks (some network file systems) no other
         // program writes the recording, because O_EXCL created it.
         (void)::flock(descriptor_, LOCK_EX);
-        std::string reason = taken();
+        std::string reason = name_conflict();
         if (!reason.empty()) {
             discard();
         }
@@ -104,7 +104,7 @@ class GrowingFile {
     /// Returns NAME.part.
     [[nodiscard]] std::string part() const { return name_ + ".part"; }
     /// Returns the new name of an interrupted recording; empty without one.
-    [[nodiscard]] const std::string& set_aside_as() const noexcept { return set_aside_as_; }
+    [[nodiscard]] const std::string& interrupted_name() const noexcept { return interrupted_name_; }
     /// Returns 0, or the errno of the write after which writing stopped. Any thread may call it.
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_relaxed); }
 
@@ -146,10 +146,11 @@ class GrowingFile {
     [[nodiscard]] std::string finish() {
         (void)::fsync(descriptor_);
         std::string reason;
-        if (!detail::names(part(), descriptor_)) {
+        if (!detail::is_path_of(part(), descriptor_)) {
             reason = part() + " was moved or replaced by another program while it was written";
-        } else if (const int error = give_name(); error == EEXIST) {
-            reason = name_ + " appeared while this was recorded and is not replaced; the recording is " +
+        } else if (const int error = rename_to_final_name(); error == EEXIST) {
+            reason = name_ +
+                     " was created by another program meanwhile and is not replaced; the recording is " +
                      part() + ": rename it";
         } else if (error != 0) {
             reason = "the recording keeps the name " + part() + ": " + detail::reason_of(error);
@@ -162,7 +163,7 @@ class GrowingFile {
 
     /// Removes NAME.part.
     void discard() noexcept {
-        if (detail::names(part(), descriptor_)) {
+        if (detail::is_path_of(part(), descriptor_)) {
             (void)std::remove(part().c_str());
         }
         close();
@@ -175,7 +176,7 @@ class GrowingFile {
         }
     }
 
-    [[nodiscard]] int give_name() const noexcept {
+    [[nodiscard]] int rename_to_final_name() const noexcept {
         if (!force_) {
             return detail::rename_to_free_name(part(), name_);
         }
@@ -193,7 +194,7 @@ class GrowingFile {
     }
 
     /// Returns the reason why NAME must not be used; empty if it may.
-    [[nodiscard]] std::string taken() const {
+    [[nodiscard]] std::string name_conflict() const {
         struct stat there{};
         if (::lstat(name_.c_str(), &there) != 0) {
             return "";
@@ -211,7 +212,7 @@ class GrowingFile {
     }
 
     /// Renames a NAME.part without a writer to a free name. Returns the reason if that is not allowed or not possible.
-    [[nodiscard]] std::string set_aside() {
+    [[nodiscard]] std::string rename_interrupted() {
         const int there = ::open(part().c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
         if (there < 0) {
             return errno == ENOENT ? "" : part() + " cannot be replaced: " + detail::reason_of(errno);
@@ -225,12 +226,13 @@ class GrowingFile {
                     : part() +
                           " may belong to another run, because this file system has no locks; choose "
                           "another name, or rename it";
-        } else if (detail::names(part(), there)) {  // else its writer has just renamed it
+        } else if (detail::is_path_of(part(), there)) {  // else its writer has just renamed it
             if (::fstat(there, &about) == 0 && about.st_size == 0) {
                 reason =
-                    part() + " is empty and may belong to a run that just starts; remove it if none does";
+                    part() +
+                    " is empty and may belong to a run that is starting; remove it if no run is starting";
             } else {
-                reason = move_aside();
+                reason = rename_to_first_free_name();
             }
         }
         ::close(there);
@@ -238,11 +240,11 @@ class GrowingFile {
     }
 
     /// Renames NAME.part to the first free name.
-    [[nodiscard]] std::string move_aside() {
+    [[nodiscard]] std::string rename_to_first_free_name() {
         int error = EEXIST;
         for (int k = 1; error == EEXIST; ++k) {
-            set_aside_as_ = name_ + "." + std::to_string(k) + ".part";
-            error = detail::rename_to_free_name(part(), set_aside_as_);
+            interrupted_name_ = name_ + "." + std::to_string(k) + ".part";
+            error = detail::rename_to_free_name(part(), interrupted_name_);
         }
         return error == 0
                    ? ""
@@ -250,7 +252,7 @@ class GrowingFile {
     }
 
     std::string name_;
-    std::string set_aside_as_;
+    std::string interrupted_name_;
     bool force_ = false;
     int descriptor_ = -1;
     std::atomic<int> error_{0};

@@ -30,7 +30,7 @@ class JsonField {
                                 ? readable(value_.get<double>())  // not valid JSON
                                 : value_.dump();
         shown = shown.size() > 40 ? shown.substr(0, 37) + "..." : shown;
-        throw std::invalid_argument((path_.empty() ? "the file holds " : path_ + " is ") + shown +
+        throw std::invalid_argument((path_.empty() ? "the file contains " : path_ + " is ") + shown +
                                     ": must be " + right);
     }
     /// Throws unless the condition holds.
@@ -87,7 +87,7 @@ class JsonField {
         require(value_.is_number(), "a number");
         const auto number = value_.get<double>();
         require(std::isfinite(number), "a finite number");
-        require(obeys(number, rule), text(rule));
+        require(satisfies(number, rule), text(rule));
         return number;
     }
     [[nodiscard]] double positive() const { return number(Rule::Positive); }
@@ -104,7 +104,7 @@ class JsonField {
         return value_.get<bool>();
     }
     /// Returns a text.
-    [[nodiscard]] std::string words() const {
+    [[nodiscard]] std::string string() const {
         require(value_.is_string(), "text");
         return value_.get<std::string>();
     }
@@ -183,7 +183,7 @@ class JsonField {
         } else if constexpr (std::is_arithmetic_v<T>) {
             return static_cast<T>(number(rule));
         } else {
-            return choices.empty() ? words() : std::string(choices[one_of(choices)]);
+            return choices.empty() ? string() : std::string(choices[one_of(choices)]);
         }
     }
 

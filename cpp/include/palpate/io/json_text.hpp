@@ -29,7 +29,7 @@ inline constexpr int deepest_json = 100;  ///< depth of nested lists and objects
         throw std::invalid_argument("the file begins with a byte order mark: save it as UTF-8 without one");
     }
     if (text.find('\0') != std::string_view::npos) {
-        throw std::invalid_argument("the file holds a NUL byte: it is damaged, or not UTF-8");
+        throw std::invalid_argument("the file contains a NUL byte: it is damaged, or not UTF-8");
     }
     std::vector<std::set<std::string>> keys;
     const Json::parser_callback_t check = [&](int depth, Json::parse_event_t event, Json& parsed) {
@@ -45,7 +45,7 @@ inline constexpr int deepest_json = 100;  ///< depth of nested lists and objects
             keys.pop_back();
         } else if (event == Json::parse_event_t::key) {
             if (const auto key = parsed.get<std::string>(); !keys.back().insert(key).second) {
-                throw std::invalid_argument("the key " + Json(key).dump() + " stands twice in one object");
+                throw std::invalid_argument("the key " + Json(key).dump() + " occurs twice in one object");
             }
         }
         return true;

@@ -47,8 +47,8 @@ namespace detail {
 /// Checks the member `fit`.
 inline void check_fit(const JsonField& fit, std::size_t wavelets) {
     fit.require_keys({"model_class", "stop_reason", "nrmse", "n_wavelets", "n_parameters", "path"});
-    (void)fit["model_class"].words();
-    (void)fit["stop_reason"].words();
+    (void)fit["model_class"].string();
+    (void)fit["stop_reason"].string();
     (void)fit["nrmse"].not_negative();
     (void)fit["n_parameters"].count(0);
     for (const JsonField& step : fit["path"].items()) {
@@ -56,7 +56,7 @@ inline void check_fit(const JsonField& fit, std::size_t wavelets) {
         (void)step["n_wavelets"].count(0);
         (void)step["rmse"].not_negative();
         (void)(step["criterion"].is_null() ? 0.0 : step["criterion"].number());
-        (void)step["model_class"].words();
+        (void)step["model_class"].string();
     }
     fit["n_wavelets"].require(fit["n_wavelets"].count(0) == wavelets,
                               std::to_string(wavelets) + ", the wavelets of the network");
@@ -65,14 +65,14 @@ inline void check_fit(const JsonField& fit, std::size_t wavelets) {
 /// Checks the member `data`.
 inline void check_data(const JsonField& data) {
     data.require_keys({"sha256", "files", "rows", "columns"});
-    (void)data["sha256"].words();
+    (void)data["sha256"].string();
     (void)data["rows"].count(0);
     for (const JsonField& file : data["files"].items()) {
-        (void)file.words();
+        (void)file.string();
     }
     data["columns"].require_object();
     for (const auto& column : data["columns"].value().items()) {
-        (void)data["columns"][column.key().c_str()].words();
+        (void)data["columns"][column.key().c_str()].string();
     }
 }
 
@@ -116,30 +116,33 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
     network["beta"].require_length(n, "one for each wavelet of alpha");
     network["weight"].require_length(n, "one for each wavelet of alpha");
     network["linear"].require_length(d, "one for each dimension");
-    const JsonField loss = network["weight_hysteresis"];
+    const JsonField hysteresis = network["weight_hysteresis"];
     for (const char* name : {"linear_hysteresis", "bias_hysteresis"}) {
-        network[name].require(
-            network[name].is_null() == loss.is_null(),
-            loss.is_null() ? "null, because weight_hysteresis is" : "given, because weight_hysteresis is");
+        network[name].require(network[name].is_null() == hysteresis.is_null(),
+                              hysteresis.is_null() ? "null, because weight_hysteresis is"
+                                                   : "given, because weight_hysteresis is");
     }
     const std::string kind = file["kind"].one_of({"position", "hysteresis", "position_velocity", "general"});
-    file["kind"].require(kind != "hysteresis" || !loss.is_null(), "another kind: weight_hysteresis is null");
-    file["kind"].require(kind != "position" || loss.is_null(), "hysteresis: weight_hysteresis is given");
+    file["kind"].require(kind != "hysteresis" || !hysteresis.is_null(),
+                         "another kind: weight_hysteresis is null");
+    file["kind"].require(kind != "position" || hysteresis.is_null(),
+                         "hysteresis: weight_hysteresis is given");
     const JsonField radius = file["play_radius"];
     const std::optional<double> play_radius =
         radius.is_null() ? std::nullopt : std::optional{radius.positive()};
-    radius.require(radius.is_null() || !loss.is_null(), "null in a model without hysteresis");
-    network["dimension"].require(loss.is_null() || d == 1, "1 in a model with hysteresis");
+    radius.require(radius.is_null() || !hysteresis.is_null(), "null in a model without hysteresis");
+    network["dimension"].require(hysteresis.is_null() || d == 1, "1 in a model with hysteresis");
     const Domain domain = read_domain(file, d);
-    if (loss.is_null()) {
+    if (hysteresis.is_null()) {
         return kind == "position_velocity" && d == 2 ? ForceModel::of_velocity(read, domain)
                                                      : ForceModel{read, domain};
     }
     const std::vector<double> linear = network["linear_hysteresis"].numbers();
-    loss.require(loss.value().is_array(), "a list");
-    loss.require_length(n, "one for each wavelet of alpha");
+    hysteresis.require(hysteresis.value().is_array(), "a list");
+    hysteresis.require_length(n, "one for each wavelet of alpha");
     network["linear_hysteresis"].require_length(d, "one for each dimension");
-    return {read, {loss.numbers(), linear[0], network["bias_hysteresis"].number()}, domain, play_radius};
+    return {
+        read, {hysteresis.numbers(), linear[0], network["bias_hysteresis"].number()}, domain, play_radius};
 }
 
 /// Returns the network that a plan renders instead of the identified one. It has the same inputs and the same
@@ -175,7 +178,7 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
          "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan", "certificate", "notes"},
         " (free keys go under notes)");
     (void)file["format"].one_of({"palpate-model"});
-    (void)file["created_by"].words();
+    (void)file["created_by"].string();
     const detail::JsonField units = file["units"];
     units.require_keys({"position", "force"});
     ModelFile read{detail::read_network(file["network"], file),
@@ -186,7 +189,7 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
                    {},
                    {}};
     for (const detail::JsonField& input : file["inputs"].items()) {
-        read.inputs.push_back(input.words());
+        read.inputs.push_back(input.string());
     }
     file["inputs"].require_length(read.model.parameters().dimension, "one for each dimension");
     for (const char* name : {"mass", "damping"}) {

@@ -35,7 +35,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     Scheme scheme;
     scheme.structure = plan["structure"].as<StructureKind>();
     if (const JsonField solver = plan["solver"]; !solver.is_null()) {
-        (void)solver.words();
+        (void)solver.string();
     }
     const JsonField coupling = plan["coupling"];
     if (!coupling.is_null()) {
@@ -57,7 +57,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
         predict.require(scheme.predict <= most_prediction_taps, "<= " + std::to_string(most_prediction_taps));
     }
     for (const JsonField& sentence : plan["refused"].items()) {
-        (void)sentence.words();
+        (void)sentence.string();
     }
     (void)plan["accepted_force_error"].not_negative();
     return scheme;
@@ -76,8 +76,8 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     file.require(plan.has_value(), "null, because plan is");
     Certificate read;
     read.scheme = *plan;
-    read.fingerprint = file["fingerprint"].words();
-    read.model = file["model"].words();
+    read.fingerprint = file["fingerprint"].string();
+    read.model = file["model"].string();
     file["structure"].require(file["structure"].as<StructureKind>() == plan->structure, "that of the plan");
     const JsonField device = file["device"];
     read.device = device.as<DeviceProfile>();

@@ -38,10 +38,10 @@ class RecordingFile {
         head += line("palpate-columns", R"({"time": "time_s", "position": "position)" +
                                             suffix_of(units_.position) + R"(", "force": "force)" +
                                             suffix_of(units_.force) + R"(", "status": "status"})");
-        ending_at_ = static_cast<off_t>(head.size());
-        head += padded(line("ended", "not yet: the recording was cut off, or is still growing"));
-        timing_at_ = static_cast<off_t>(head.size());
-        head += padded(line("timing", "not known"));
+        ended_offset_ = static_cast<off_t>(head.size());
+        head += padded(line("ended", "not yet: the recording was interrupted, or is still being written"));
+        timing_offset_ = static_cast<off_t>(head.size());
+        head += padded(line("timing", "unknown"));
         head += column_names(units_) + "\n";
         if (file_.append(head) < head.size()) {
             const int error = file_.error();
@@ -65,9 +65,9 @@ class RecordingFile {
     }
 
     /// Writes the end of the run and renames the file. Returns a sentence if that is not possible.
-    [[nodiscard]] std::string finish(const std::string& ending, const std::string& timing) {
-        file_.overwrite(ending_at_, padded(line("ended", ending)));
-        file_.overwrite(timing_at_, padded(line("timing", timing)));
+    [[nodiscard]] std::string finish(const std::string& ended, const std::string& timing) {
+        file_.overwrite(ended_offset_, padded(line("ended", ended)));
+        file_.overwrite(timing_offset_, padded(line("timing", timing)));
         return file_.finish();
     }
 
@@ -81,7 +81,7 @@ class RecordingFile {
     [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
   private:
-    static constexpr std::size_t room = 512;  ///< bytes for each line that is written at the end
+    static constexpr std::size_t reserved_bytes = 512;  ///< bytes for each line that is written at the end
 
     [[nodiscard]] static std::string line(const std::string& key, std::string value) {
         for (char& letter : value) {
@@ -91,9 +91,9 @@ class RecordingFile {
     }
 
     [[nodiscard]] static std::string padded(std::string whole) {
-        whole.resize(room, ' ');
-        whole[room - 1] = '\n';
-        if (const std::size_t end = whole.find('\n'); end < room - 1) {
+        whole.resize(reserved_bytes, ' ');
+        whole[reserved_bytes - 1] = '\n';
+        if (const std::size_t end = whole.find('\n'); end < reserved_bytes - 1) {
             whole[end] = ' ';
         }
         return whole;
@@ -102,8 +102,8 @@ class RecordingFile {
     RecordUnits units_;
     GrowingFile file_;
     std::string rows_;
-    off_t ending_at_ = 0;
-    off_t timing_at_ = 0;
+    off_t ended_offset_ = 0;
+    off_t timing_offset_ = 0;
     std::uint64_t written_ = 0;
     std::uint64_t refused_ = 0;
 };

@@ -68,9 +68,9 @@ class Telemetry {
         line_.clear();
         append_json(line_, tick, units_);
         const auto* address = reinterpret_cast<const sockaddr*>(&target_);
-        const ssize_t took = ::sendto(socket_, line_.data(), line_.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
-                                      address, sizeof target_);
-        ++(took == static_cast<ssize_t>(line_.size()) ? sent_ : dropped_);
+        const ssize_t sent_bytes = ::sendto(socket_, line_.data(), line_.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
+                                            address, sizeof target_);
+        ++(sent_bytes == static_cast<ssize_t>(line_.size()) ? sent_ : dropped_);
     }
 
     int socket_ = -1;

@@ -86,14 +86,14 @@ template <std::size_t terms>
     for (const auto& [network, order] : sum) {
         add(rounding, derivatives_rounding(network, reach), order);
     }
-    Interval seen{infinity, -infinity};
-    const auto look = [&](double x) {
-        Jet here{};
+    Interval sampled{infinity, -infinity};
+    const auto sample = [&](double x) {
+        Jet value{};
         for (const auto& [network, order] : sum) {
-            add(here, derivatives(network, x), order);
+            add(value, derivatives(network, x), order);
         }
-        seen = seen.with({here[0], here[0]});
-        return here;
+        sampled = sampled.with({value[0], value[0]});
+        return value;
     };
     const auto cell = [&](double left, double right, const Jet& at_left, const Jet& at_right) {
         const double h = right - left;
@@ -112,27 +112,27 @@ template <std::size_t terms>
     };
     std::priority_queue<BoundedCell> open;
     double left = from;
-    Jet at_left = look(from);
+    Jet at_left = sample(from);
     for (int k = 1; k <= first_cells; ++k) {
         const double right = k == first_cells ? to : from + (to - from) * k / first_cells;
-        const Jet at_right = look(right);
+        const Jet at_right = sample(right);
         open.push(cell(left, right, at_left, at_right));
         left = right;
         at_left = at_right;
     }
-    Interval enclosed{seen.lower - rounding[0], seen.upper + rounding[0]};
+    Interval enclosed{sampled.lower - rounding[0], sampled.upper + rounding[0]};
     for (int cells = first_cells; !open.empty(); ++cells) {
         const BoundedCell one = open.top();
         open.pop();
         const Interval possible = one.range;
-        const double slack = relative * seen.largest() + 4.0 * rounding[0];
+        const double slack = relative * sampled.largest() + 4.0 * rounding[0];
         const double middle = 0.5 * (one.from + one.to);
-        if ((possible.upper <= seen.upper + slack && possible.lower >= seen.lower - slack) ||
+        if ((possible.upper <= sampled.upper + slack && possible.lower >= sampled.lower - slack) ||
             cells >= budget || middle <= one.from || middle >= one.to) {
             enclosed = enclosed.with(possible);
             continue;
         }
-        const Jet at_middle = look(middle);
+        const Jet at_middle = sample(middle);
         open.push(cell(one.from, middle, one.at_from, at_middle));
         open.push(cell(middle, one.to, at_middle, one.at_to));
     }

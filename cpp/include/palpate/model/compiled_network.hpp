@@ -66,7 +66,7 @@ class CompiledCurve {
         if (x >= table_from_ && x <= table_to_) {
             return table_.at(x);
         }
-        return elsewhere(x);
+        return outside_table(x);
     }
 
     /// Returns true if x lies outside the domain of a curve that does not repeat.
@@ -74,7 +74,7 @@ class CompiledCurve {
 
   private:
     /// Evaluates positions outside the domain, and every position if the curve is not compiled.
-    [[nodiscard, gnu::noinline]] Curve elsewhere(double x) const noexcept {
+    [[nodiscard, gnu::noinline]] Curve outside_table(double x) const noexcept {
         if (!compiled() || !std::isfinite(x)) {
             return curve_.at(x);
         }
@@ -91,10 +91,10 @@ class CompiledCurve {
             return;
         }
         const double reach = 2.0 * std::max(std::abs(lower_), std::abs(upper_));
-        const double asked = options.relative_error * largest_force();
+        const double largest_error = options.relative_error * largest_force();
         const double eighth = largest_eighth_derivative();
         // The polynomials may use a tenth of the required error; the rest is for rounding.
-        const double width = std::pow(0.1 * asked * 256.0 * 40320.0 / eighth, 0.125);
+        const double width = std::pow(0.1 * largest_error * 256.0 * 40320.0 / eighth, 0.125);
         const double widest = (upper_ - lower_) / 32.0;
         const int fineness = -static_cast<int>(std::floor(std::log2(std::min(width, widest))));
         // With more than 2^40 cells from zero to x, rounding of x removes its place in the cell.
@@ -107,13 +107,13 @@ class CompiledCurve {
         PiecewiseSeptic table{PiecewiseSeptic::cell(lower_, h) - 1, PiecewiseSeptic::cell(upper_, h) + 1, h,
                               [&](double x) noexcept { return jet(network, x); }};
         certify(table, eighth, jet_rounding(network, reach));
-        if (!(value_error_ <= asked)) {
+        if (!(value_error_ <= largest_error)) {
             value_error_ = slope_error_ = 0.0;
             return;
         }
         table.integrate([this](double x) noexcept {
-            const Curve here = curve_.inside(x);
-            return std::array{here.integral, here.double_integral};
+            const Curve curve = curve_.inside(x);
+            return std::array{curve.integral, curve.double_integral};
         });
         table_ = std::move(table);
         if (!curve_.periodic()) {
@@ -193,8 +193,8 @@ class CompiledNetwork {
     /// Returns force, slope and energy at x.
     [[nodiscard, gnu::always_inline]] inline EnvironmentSample at(double x,
                                                                   const State& /*stateless*/) const noexcept {
-        const Curve here = curve_.at(x);
-        return {here.value, here.slope, here.integral, curve_.extrapolated(x)};
+        const Curve curve = curve_.at(x);
+        return {curve.value, curve.slope, curve.integral, curve_.extrapolated(x)};
     }
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
@@ -209,8 +209,8 @@ static_assert(Environment<CompiledNetwork>);
 class CompiledHysteresis : public HysteresisPair<CompiledCurve> {
   public:
     explicit CompiledHysteresis(const HysteresisNetwork& network, const CompileOptions& options = {})
-        : HysteresisPair{CompiledCurve{network.force(), options}, CompiledCurve{network.loss(), options},
-                         network.play_radius()} {}
+        : HysteresisPair{CompiledCurve{network.force(), options},
+                         CompiledCurve{network.hysteresis_force(), options}, network.play_radius()} {}
 };
 
 static_assert(Environment<CompiledHysteresis>);

@@ -68,15 +68,15 @@ struct CurveExtent {
 [[nodiscard]] inline EdgeLine continue_force(double edge, const Curve& at_edge, double outward,
                                              Continuation continuation, const CurveExtent& extent) noexcept {
     EdgeLine line{edge, at_edge};
-    const double gentle = extent.largest_force / extent.travel;
+    const double mean_slope = extent.largest_force / extent.travel;
     const double outward_force = -outward * at_edge.value;  // > 0: pushes the tool out of the domain
     line.at_edge.slope = std::clamp(at_edge.slope, 0.0, extent.slope_cap);
     if (outward_force > 0.0) {
-        line.at_edge.slope = std::max(line.at_edge.slope, gentle);
+        line.at_edge.slope = std::max(line.at_edge.slope, mean_slope);
     }
     if (continuation == Continuation::Free) {
         if (outward_force < 0.0) {
-            line.at_edge.slope = -gentle;
+            line.at_edge.slope = -mean_slope;
         }
         line.reach = at_edge.value == 0.0 ? 0.0 : std::abs(at_edge.value / line.at_edge.slope);
     }
@@ -85,8 +85,8 @@ struct CurveExtent {
 
 /// Returns the line that continues a dissipated force h >= 0 beyond an edge. It is constant, or with `Free` it falls to
 /// zero over `reach`. It never becomes negative, so no loop beyond the edge generates energy.
-[[nodiscard]] inline EdgeLine continue_loss(double edge, const Curve& at_edge, double outward,
-                                            Continuation continuation, double reach) noexcept {
+[[nodiscard]] inline EdgeLine continue_hysteresis(double edge, const Curve& at_edge, double outward,
+                                                  Continuation continuation, double reach) noexcept {
     EdgeLine line{edge, at_edge};
     line.at_edge.slope = 0.0;
     if (continuation == Continuation::Free) {

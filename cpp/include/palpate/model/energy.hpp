@@ -52,7 +52,7 @@ template <class At>
 
 /// Returns the decrease of the energy of c(f) beyond an edge [J]. It is the work of a force that pushes the tool
 /// outward, until the force has become zero along the edge line.
-[[nodiscard]] inline double fall_beyond(const EdgeLine& line, double outward, double limit) noexcept {
+[[nodiscard]] inline double decrease_beyond(const EdgeLine& line, double outward, double limit) noexcept {
     const double force = std::abs(line.at_edge.value);
     if (!(-outward * line.at_edge.value > 0.0)) {
         return 0.0;
@@ -77,10 +77,11 @@ template <class At>
 [[nodiscard]] LimitedEnergy limited_energy(const At& at, double lower, double upper, std::size_t cells,
                                            double steepest, double limit) noexcept {
     const double width = (upper - lower) / static_cast<double>(cells);
-    const double unseen = 0.25 * steepest * width * width;
+    const double missed_between_samples = 0.25 * steepest * width * width;
     double from = lower;
     Curve at_from = at(lower);
-    LimitedEnergy energy{{at_from.integral, at_from.integral, unseen}, at_from.integral, at_from.integral};
+    LimitedEnergy energy{
+        {at_from.integral, at_from.integral, missed_between_samples}, at_from.integral, at_from.integral};
     double beyond = 0.0;
     for (std::size_t k = 1; k <= cells; ++k) {
         const double to = lower + (upper - lower) * static_cast<double>(k) / static_cast<double>(cells);
@@ -88,14 +89,14 @@ template <class At>
         if (at_from.value < 0.0 && at_to.value >= 0.0) {
             const double rest = rest_between(at, from, to);
             const Curve at_rest = at(rest);
-            const double here =
+            const double energy_at_rest =
                 at_rest.integral - beyond - work_beyond(at, from, at_from, rest, at_rest, limit);
-            energy.range.least = std::min(energy.range.least, here);
+            energy.range.least = std::min(energy.range.least, energy_at_rest);
         }
         const auto is_near = [&](const Curve& end) noexcept {
             return std::abs(std::abs(end.value) - limit) <= 0.5 * steepest * width;
         };
-        energy.range.missed += is_near(at_from) || is_near(at_to) ? unseen : 0.0;
+        energy.range.missed += is_near(at_from) || is_near(at_to) ? missed_between_samples : 0.0;
         beyond += work_beyond(at, from, at_from, to, at_to, limit);
         energy.at_upper = at_to.integral - beyond;
         energy.range.least = std::min(energy.range.least, energy.at_upper);
@@ -143,8 +144,8 @@ template <class At>
         from = to;
         at_from = at_to;
     }
-    range.least = std::min({range.least, -detail::fall_beyond(force.below(), -1.0, force_limit),
-                            energy - detail::fall_beyond(force.above(), +1.0, force_limit)});
+    range.least = std::min({range.least, -detail::decrease_beyond(force.below(), -1.0, force_limit),
+                            energy - detail::decrease_beyond(force.above(), +1.0, force_limit)});
     return range;
 }
 
@@ -155,16 +156,17 @@ template <class At>
     if (const VelocityNetwork* of_velocity = model.velocity()) {
         return energy_range(*of_velocity, force_limit);
     }
-    const HysteresisNetwork* both = model.hysteresis();
-    const NetworkCurve& force = both != nullptr ? both->force() : model.network()->curve();
+    const HysteresisNetwork* pair = model.hysteresis();
+    const NetworkCurve& force = pair != nullptr ? pair->force() : model.network()->curve();
     const std::size_t cells = detail::energy_cells(force.upper() - force.lower(), model.finest_width());
     const detail::LimitedEnergy energy =
         detail::limited_energy([&](double x) noexcept { return force.inside(x); }, force.lower(),
                                force.upper(), cells, force.slope_bounds().largest(), force_limit);
     EnergyRange range = energy.range;
-    if (both != nullptr) {
+    if (pair != nullptr) {
         // S - C(x) is the work of c(g + (xi - pi) h / r) - c(g) from pi to x, and |x - pi| <= r.
-        range.largest += 0.5 * both->play_radius() * std::max(0.0, both->loss().value_bounds().upper);
+        range.largest +=
+            0.5 * pair->play_radius() * std::max(0.0, pair->hysteresis_force().value_bounds().upper);
     }
     if (force.periodic()) {
         if (std::abs(energy.at_upper - energy.at_lower) > 1e-9 * (range.largest - range.least)) {
@@ -173,8 +175,8 @@ template <class At>
         return range;
     }
     range.least =
-        std::min({range.least, energy.at_lower - detail::fall_beyond(force.below(), -1.0, force_limit),
-                  energy.at_upper - detail::fall_beyond(force.above(), +1.0, force_limit)});
+        std::min({range.least, energy.at_lower - detail::decrease_beyond(force.below(), -1.0, force_limit),
+                  energy.at_upper - detail::decrease_beyond(force.above(), +1.0, force_limit)});
     return range;
 }
 

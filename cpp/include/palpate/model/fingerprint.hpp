@@ -63,10 +63,10 @@ class NumberHash {
     hash.add(network.linear);
     hash.add(network.bias);
     if (const HysteresisNetwork* pair = model.hysteresis()) {
-        const NetworkParameters& loss = pair->loss().parameters();
-        hash.add(loss.weight);
-        hash.add(loss.linear);
-        hash.add(loss.bias);
+        const NetworkParameters& hysteresis = pair->hysteresis_force().parameters();
+        hash.add(hysteresis.weight);
+        hash.add(hysteresis.linear);
+        hash.add(hysteresis.bias);
     }
     const Domain& domain = model.domain();
     hash.add(domain.lower);

@@ -27,9 +27,9 @@ class ForceModel {
     ForceModel(NetworkParameters network, Domain domain)
         : kind_{make_network(std::move(network), std::move(domain))} {}
 
-    ForceModel(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
+    ForceModel(const NetworkParameters& network, const HysteresisParameters& hysteresis, const Domain& domain,
                std::optional<double> play_radius)
-        : kind_{make_hysteresis(network, loss, domain, play_radius)}, play_radius_{play_radius} {}
+        : kind_{make_hysteresis(network, hysteresis, domain, play_radius)}, play_radius_{play_radius} {}
 
     /// Makes a force whose second input is the velocity of the first.
     [[nodiscard]] static ForceModel of_velocity(NetworkParameters network, Domain domain) {
@@ -80,9 +80,10 @@ class ForceModel {
             return velocity()->resting_bounds(0.01).gradient[0];
         }
         const Interval common = hysteresis()->force().slope_bounds();
-        const double loss = hysteresis()->loss().slope_bounds().largest();
-        const double stuck = radius ? hysteresis()->loss().value_bounds().largest() / *radius : 0.0;
-        return {common.lower - loss, common.upper + loss + stuck};
+        const double hysteresis_slope = hysteresis()->hysteresis_force().slope_bounds().largest();
+        const double sticking_slope =
+            radius ? hysteresis()->hysteresis_force().value_bounds().largest() / *radius : 0.0;
+        return {common.lower - hysteresis_slope, common.upper + hysteresis_slope + sticking_slope};
     }
 
     /// Throws std::invalid_argument if stored bounds are narrower than the slopes of this model. Another release may
@@ -116,8 +117,8 @@ class ForceModel {
         if (both == nullptr) {
             return *this;
         }
-        const NetworkParameters& loss = both->loss().parameters();
-        return {both->parameters(), {loss.weight, loss.linear[0], loss.bias}, both->domain(), radius};
+        const NetworkParameters& h = both->hysteresis_force().parameters();
+        return {both->parameters(), {h.weight, h.linear[0], h.bias}, both->domain(), radius};
     }
 
   private:
@@ -130,13 +131,14 @@ class ForceModel {
         return RadialNetwork{std::move(network), std::move(domain)};
     }
 
-    static HysteresisNetwork make_hysteresis(const NetworkParameters& network, const LossParameters& loss,
-                                             const Domain& domain, std::optional<double> play_radius) {
+    static HysteresisNetwork make_hysteresis(const NetworkParameters& network,
+                                             const HysteresisParameters& hysteresis, const Domain& domain,
+                                             std::optional<double> play_radius) {
         detail::require(domain.lower.size() == 1 && domain.upper.size() == 1,
                         "a hysteresis network has one input");
         const double radius =
             play_radius.value_or(usual_play_radius(std::abs(domain.upper[0] - domain.lower[0])));
-        return {network, loss, domain, radius};
+        return {network, hysteresis, domain, radius};
     }
 
     Kind kind_;

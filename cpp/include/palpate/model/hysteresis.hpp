@@ -15,7 +15,7 @@
 namespace palpate {
 
 /// Second set of weights of a hysteresis network: h uses the wavelets of g.
-struct LossParameters {
+struct HysteresisParameters {
     std::vector<double> weight;  ///< weights [N]
     double linear = 0.0;         ///< slope [N/m]
     double bias = 0.0;           ///< constant [N]
@@ -51,8 +51,8 @@ class HysteresisPair {
         double play = 0.0;  ///< position of the play operator [m]
     };
 
-    HysteresisPair(C force, C loss, double play_radius)
-        : force_{std::move(force)}, loss_{std::move(loss)}, play_radius_{play_radius} {}
+    HysteresisPair(C force, C hysteresis, double play_radius)
+        : force_{std::move(force)}, hysteresis_force_{std::move(hysteresis)}, play_radius_{play_radius} {}
 
     /// Returns the play radius [m].
     [[nodiscard]] double play_radius() const noexcept { return play_radius_; }
@@ -60,12 +60,12 @@ class HysteresisPair {
     /// Returns g, the mean of press and release force.
     [[nodiscard]] const C& force() const noexcept { return force_; }
     /// Returns h, half the difference between press and release force.
-    [[nodiscard]] const C& loss() const noexcept { return loss_; }
+    [[nodiscard]] const C& hysteresis_force() const noexcept { return hysteresis_force_; }
 
     /// Returns force, slope and energy at x for a given s: +1 press, -1 release.
     [[nodiscard]] EnvironmentSample sliding(double x, double s) const noexcept {
         const Curve g = force_.at(x);
-        const Curve h = loss_.at(x);
+        const Curve h = hysteresis_force_.at(x);
         return {g.value + s * h.value, g.slope + s * h.slope, g.integral, force_.extrapolated(x)};
     }
 
@@ -74,10 +74,11 @@ class HysteresisPair {
         const double play = palpate::play(x, state.play, play_radius_);
         const double s = (x - play) / play_radius_;
         const Curve g = force_.at(x);
-        const Curve h = loss_.at(x);
+        const Curve h = hysteresis_force_.at(x);
         const bool sticks = play == state.play;
         // int_play^x (xi - play) h = (x - play) H(x) - int_play^x H
-        const double stored = (x - play) * h.integral - (h.double_integral - loss_.at(play).double_integral);
+        const double stored =
+            (x - play) * h.integral - (h.double_integral - hysteresis_force_.at(play).double_integral);
         return {g.value + s * h.value, g.slope + s * h.slope + (sticks ? h.value / play_radius_ : 0.0),
                 g.integral + stored / play_radius_, force_.extrapolated(x)};
     }
@@ -92,52 +93,54 @@ class HysteresisPair {
 
   private:
     C force_;
-    C loss_;
+    C hysteresis_force_;
     double play_radius_;
 };
 
 /// The hysteresis pair of two networks that share their wavelets and their domain.
 class HysteresisNetwork : public HysteresisPair<NetworkCurve> {
   public:
-    HysteresisNetwork(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
-                      double play_radius)
-        : HysteresisNetwork{network, loss, domain, play_radius,
-                            (check(network, loss, domain, play_radius), continued_force(network, domain))} {}
+    HysteresisNetwork(const NetworkParameters& network, const HysteresisParameters& hysteresis,
+                      const Domain& domain, double play_radius)
+        : HysteresisNetwork{
+              network, hysteresis, domain, play_radius,
+              (check(network, hysteresis, domain, play_radius), continued_force(network, domain))} {}
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept { return force().parameters(); }
     [[nodiscard]] const Domain& domain() const noexcept { return domain_; }
 
   private:
-    HysteresisNetwork(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
-                      double play_radius, const NetworkCurve& force)
-        : HysteresisPair{force, continued_loss(network, loss, domain, force), play_radius}, domain_{domain} {}
+    HysteresisNetwork(const NetworkParameters& network, const HysteresisParameters& hysteresis,
+                      const Domain& domain, double play_radius, const NetworkCurve& force)
+        : HysteresisPair{force, continued_hysteresis(network, hysteresis, domain, force), play_radius},
+          domain_{domain} {}
 
-    static void check(const NetworkParameters& network, const LossParameters& loss, const Domain& domain,
-                      double play_radius) {
+    static void check(const NetworkParameters& network, const HysteresisParameters& hysteresis,
+                      const Domain& domain, double play_radius) {
         validate(network, domain);
         require_one_input(network);
-        detail::require_size(loss.weight, network.weight.size(), "weight_hysteresis");
-        detail::require_finite(loss.weight, "weight_hysteresis");
-        detail::require(std::isfinite(loss.linear), "linear_hysteresis is not a finite number");
-        detail::require(std::isfinite(loss.bias), "bias_hysteresis is not a finite number");
+        detail::require_size(hysteresis.weight, network.weight.size(), "weight_hysteresis");
+        detail::require_finite(hysteresis.weight, "weight_hysteresis");
+        detail::require(std::isfinite(hysteresis.linear), "linear_hysteresis is not a finite number");
+        detail::require(std::isfinite(hysteresis.bias), "bias_hysteresis is not a finite number");
         detail::require(play_radius > 0.0 && std::isfinite(play_radius),
                         "play_radius is " + std::to_string(play_radius) + ", must be > 0");
     }
 
-    [[nodiscard]] static NetworkCurve continued_loss(const NetworkParameters& network,
-                                                     const LossParameters& loss, const Domain& domain,
-                                                     const NetworkCurve& force) {
+    [[nodiscard]] static NetworkCurve continued_hysteresis(const NetworkParameters& network,
+                                                           const HysteresisParameters& hysteresis,
+                                                           const Domain& domain, const NetworkCurve& force) {
         NetworkParameters h = network;
-        h.weight = loss.weight;
-        h.linear = {loss.linear};
-        h.bias = loss.bias;
+        h.weight = hysteresis.weight;
+        h.linear = {hysteresis.linear};
+        h.bias = hysteresis.bias;
         NetworkCurve curve{h, domain};
         const double travel = domain.upper[0] - domain.lower[0];
         // h decreases to zero together with g, but over at least 2 % of the travel, without a jump or a steep flank.
         const auto line = [&](const EdgeLine& g, const EdgeLine& edge, double outward,
                               Continuation continuation) {
-            return continue_loss(edge.edge, edge.at_edge, outward, continuation,
-                                 std::max(g.reach, 0.02 * travel));
+            return continue_hysteresis(edge.edge, edge.at_edge, outward, continuation,
+                                       std::max(g.reach, 0.02 * travel));
         };
         curve.continue_with(line(force.below(), curve.below(), -1.0, domain.below),
                             line(force.above(), curve.above(), +1.0, domain.above));

@@ -38,8 +38,8 @@ class WaveletNetwork {
 
     /// Returns force, slope and energy at x.
     [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
-        const Curve here = curve_.at(x);
-        return {here.value, here.slope, here.integral, curve_.extrapolated(x)};
+        const Curve curve = curve_.at(x);
+        return {curve.value, curve.slope, curve.integral, curve_.extrapolated(x)};
     }
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }

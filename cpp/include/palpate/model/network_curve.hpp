@@ -25,7 +25,7 @@ class NetworkCurve {
           upper_{domain.upper[0]},
           periodic_{domain.period.has_value()} {
         if (periodic_) {
-            close_the_seam();
+            remove_jump_between_ends();
         }
         continue_with({lower_, inside(lower_)}, {upper_, inside(upper_)});
     }
@@ -87,10 +87,10 @@ class NetworkCurve {
         hats_.add(quantity, x, result);
         for (std::size_t k = 0; k < x.size(); ++k) {
             if (!(x[k] >= lower_ && x[k] <= upper_) || periodic_) {
-                const Curve here = at(x[k]);
-                result[k] = quantity == HatQuantity::Value   ? here.value
-                            : quantity == HatQuantity::Slope ? here.slope
-                                                             : here.integral;
+                const Curve curve = at(x[k]);
+                result[k] = quantity == HatQuantity::Value   ? curve.value
+                            : quantity == HatQuantity::Slope ? curve.slope
+                                                             : curve.integral;
             }
         }
     }
@@ -119,16 +119,16 @@ class NetworkCurve {
         const Curve& last = above_.at_edge;
         const double turn = last.integral - first.integral;
         const double double_turn = last.double_integral - first.double_integral - first.integral * period;
-        Curve here = inside(lower_ + along);
-        here.double_integral += turns * (turn * along + double_turn + 0.5 * (turns - 1.0) * turn * period) -
-                                first.double_integral - first.integral * along;
-        here.integral += turns * turn - first.integral;
-        return here;
+        Curve curve = inside(lower_ + along);
+        curve.double_integral += turns * (turn * along + double_turn + 0.5 * (turns - 1.0) * turn * period) -
+                                 first.double_integral - first.integral * along;
+        curve.integral += turns * turn - first.integral;
+        return curve;
     }
 
     /// Makes a periodic force continuous: spreads the jump between the two ends of a period over it as a ramp. A jump
     /// of rounding size is ignored, so that a network that is already continuous keeps its numbers.
-    void close_the_seam() noexcept {
+    void remove_jump_between_ends() noexcept {
         double size = std::abs(network_.bias) +
                       std::abs(network_.linear[0]) * std::max(std::abs(lower_), std::abs(upper_));
         for (const double weight : network_.weight) {

@@ -69,9 +69,9 @@ class RadialEnclosure {
         }
         hats_.expand(middle_.data(), radius_.data(), sums_);
         value = sums_.value + network_.bias;
-        double twists = 0.0;
-        for (const double twist : sums_.twist) {
-            twists += std::abs(twist);
+        double third_derivatives = 0.0;
+        for (const double component : sums_.third_derivative) {
+            third_derivatives += std::abs(component);
         }
         // The factor covers the rounding of the remainder. If a box is wide for a wavelet, it also covers the rounding
         // of all its terms.
@@ -81,24 +81,24 @@ class RadialEnclosure {
             value += network_.linear[j] * middle_[j];
             sums_.gradient[j] += network_.linear[j] * radius_[j];
             gradient[j] = sums_.gradient[j] / radius_[j];
-            const Interval scaled =
-                quadratic_range(d, sums_.gradient[j], &sums_.bend[j * d], &sums_.twist[j * d * d],
-                                std::sqrt(rounded_up * sums_.rest[j] * fourth) / 6.0);
+            const Interval scaled = quadratic_range(d, sums_.gradient[j], &sums_.second_derivative[j * d],
+                                                    &sums_.third_derivative[j * d * d],
+                                                    std::sqrt(rounded_up * sums_.rest[j] * fourth) / 6.0);
             ranges.gradient[j] = {scaled.lower / radius_[j], scaled.upper / radius_[j]};
         }
-        ranges.value =
-            quadratic_range(d, value, sums_.gradient.data(), sums_.bend.data(), twists / 6.0 + fourth / 24.0);
+        ranges.value = quadratic_range(d, value, sums_.gradient.data(), sums_.second_derivative.data(),
+                                       third_derivatives / 6.0 + fourth / 24.0);
     }
 
     /// Returns the input along which the value can change most.
     [[nodiscard]] std::size_t widest() const noexcept {
         std::size_t widest = 0;
-        double most = 0.0;
+        double largest_change = 0.0;
         for (std::size_t j = 0; j < network_.dimension; ++j) {
             const double change = std::abs(sums_.gradient[j]) + sums_.rest[j];
-            if (change > most) {
+            if (change > largest_change) {
                 widest = j;
-                most = change;
+                largest_change = change;
             }
         }
         return widest;
@@ -117,12 +117,12 @@ class RadialEnclosure {
 };
 
 /// Largest and smallest sampled value, and the test for finished cells.
-struct Seen {
+struct SampledRange {
     Interval range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
 
     void add(double value) noexcept { range = range.with({value, value}); }
     /// Returns true if a cell with this range cannot change the sampled range by more than `slack`.
-    [[nodiscard]] bool settles(Interval possible, double slack) const noexcept {
+    [[nodiscard]] bool is_finished(Interval possible, double slack) const noexcept {
         return possible.upper <= range.upper + slack && possible.lower >= range.lower - slack;
     }
 };
@@ -159,8 +159,8 @@ struct RadialRounding {
 
 /// Calls visit(x) at likely positions of the largest value or gradient: at the wavelets' centres and on their flanks.
 template <class Visitor>
-void where_hats_are_steep(const NetworkParameters& network, std::span<const double> lower,
-                          std::span<const double> upper, Visitor visit) {
+void visit_steep_positions(const NetworkParameters& network, std::span<const double> lower,
+                           std::span<const double> upper, Visitor visit) {
     const std::size_t d = network.dimension;
     std::vector<double> x(d);
     for (std::size_t i = 0; i < network.weight.size(); ++i) {
@@ -192,9 +192,9 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
     const std::size_t d = network.dimension;
     const RadialSum hats{network, lower, upper, kernel};
     const detail::RadialRounding rounding{network, lower, upper};
-    detail::Seen value;
-    std::vector<detail::Seen> gradient(d);
-    const auto look = [&](double at, std::span<const double> slopes) {
+    detail::SampledRange value;
+    std::vector<detail::SampledRange> gradient(d);
+    const auto add_sample = [&](double at, std::span<const double> slopes) {
         value.add(at);
         for (std::size_t j = 0; j < d; ++j) {
             gradient[j].add(slopes[j]);
@@ -202,17 +202,17 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
     };
     // Likely positions of the largest values come first, because known large values finish the other boxes sooner.
     std::vector<double> slopes(d);
-    detail::where_hats_are_steep(network, lower, upper, [&](const std::vector<double>& x) {
+    detail::visit_steep_positions(network, lower, upper, [&](const std::vector<double>& x) {
         slopes = network.linear;
         double at = std::inner_product(x.begin(), x.end(), network.linear.begin(), network.bias);
         hats.add(x.data(), at, slopes.data());
-        look(at, slopes);
+        add_sample(at, slopes);
     });
-    const auto settled = [&](const RadialBounds& box) {
-        bool all = value.settles(box.value, relative * value.range.largest() + rounding.value);
+    const auto is_finished = [&](const RadialBounds& box) {
+        bool all = value.is_finished(box.value, relative * value.range.largest() + rounding.value);
         for (std::size_t j = 0; j < d && all; ++j) {
-            all = gradient[j].settles(box.gradient[j],
-                                      relative * gradient[j].range.largest() + rounding.gradient[j]);
+            all = gradient[j].is_finished(box.gradient[j],
+                                          relative * gradient[j].range.largest() + rounding.gradient[j]);
         }
         return all;
     };
@@ -225,12 +225,12 @@ void where_hats_are_steep(const NetworkParameters& network, std::span<const doub
     edges.reserve(4096);
     for (std::size_t next = 0; next < edges.size(); next += 2 * d) {
         box.over(&edges[next], &edges[next + d]);
-        look(box.value, box.gradient);
+        add_sample(box.value, box.gradient);
         const std::size_t widest = box.widest();
         const double from = edges[next + widest];
         const double to = edges[next + d + widest];
         const double cut = 0.5 * (from + to);
-        if (settled(box.ranges) || edges.size() >= 2 * d * budget || cut <= from || cut >= to) {
+        if (is_finished(box.ranges) || edges.size() >= 2 * d * budget || cut <= from || cut >= to) {
             if (bounds.gradient.empty()) {
                 bounds = box.ranges;
             }

@@ -128,14 +128,14 @@ class RadialNetwork {
     /// evenly over the box. The points are an additive recurrence: multiples of the powers of 1/g, g^(d+1) = g + 1.
     [[nodiscard]] std::vector<double> largest_gradient() const {
         const std::size_t d = dimension();
-        std::vector<double> cap(d, 0.0);
+        std::vector<double> largest(d, 0.0);
         std::vector<double> gradient;
         const auto visit = [&](std::span<const double> x) {
             double value = 0.0;
             gradient = network_.linear;
             hats_.add(x.data(), value, gradient.data());
             for (std::size_t j = 0; j < d; ++j) {
-                cap[j] = std::max(cap[j], gradient[j]);
+                largest[j] = std::max(largest[j], gradient[j]);
             }
         };
         for (std::size_t i = 0; i < size(); ++i) {
@@ -156,7 +156,7 @@ class RadialNetwork {
             }
             visit(x);
         }
-        return cap;
+        return largest;
     }
 
     NetworkParameters network_;

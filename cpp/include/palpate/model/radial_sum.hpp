@@ -26,40 +26,40 @@ inline constexpr double fourth_derivative_change = 16.8;
     constexpr double near = 0.02;
     constexpr double change = 1.11 * fourth_derivative_change;
     const std::size_t d = network.dimension;
-    std::vector<double> together = network.weight;
-    std::vector<double> apart(together.size(), 0.0);
+    std::vector<double> merged = network.weight;
+    std::vector<double> residual(merged.size(), 0.0);
     const auto distance = [&](std::size_t one, std::size_t other) {
         double by_alpha = 0.0;
         double by_beta = 0.0;
         for (std::size_t j = 0; j < d; ++j) {
             const double alpha = network.alpha[one * d + j];
-            const double beside = network.alpha[other * d + j];
-            by_alpha = std::max(by_alpha, std::abs(beside - alpha) / std::min(beside, alpha));
+            const double other_alpha = network.alpha[other * d + j];
+            by_alpha = std::max(by_alpha, std::abs(other_alpha - alpha) / std::min(other_alpha, alpha));
             by_beta += alpha * std::abs(network.beta[other * d + j] - network.beta[one * d + j]);
         }
         return by_alpha + by_beta;
     };
-    for (std::size_t i = 0; i < together.size(); ++i) {
-        const double weight = together[i];
-        for (std::size_t first = 0; first < i && together[i] != 0.0; ++first) {
-            const double opposed =
-                std::abs(together[first]) + std::abs(weight) - std::abs(together[first] + weight);
-            if (opposed <= 0.0) {
+    for (std::size_t i = 0; i < merged.size(); ++i) {
+        const double weight = merged[i];
+        for (std::size_t first = 0; first < i && merged[i] != 0.0; ++first) {
+            const double cancelled =
+                std::abs(merged[first]) + std::abs(weight) - std::abs(merged[first] + weight);
+            if (cancelled <= 0.0) {
                 continue;
             }
             const double delta = distance(first, i);
             const double left = change * std::abs(weight) * delta;
-            if (delta <= near && left < opposed) {
-                together[first] += weight;
-                apart[first] += left;
-                together[i] = 0.0;
+            if (delta <= near && left < cancelled) {
+                merged[first] += weight;
+                residual[first] += left;
+                merged[i] = 0.0;
             }
         }
     }
-    for (std::size_t i = 0; i < together.size(); ++i) {
-        together[i] = std::abs(together[i]) + apart[i];
+    for (std::size_t i = 0; i < merged.size(); ++i) {
+        merged[i] = std::abs(merged[i]) + residual[i];
     }
-    return together;
+    return merged;
 }
 
 }  // namespace detail

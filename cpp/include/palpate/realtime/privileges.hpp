@@ -47,20 +47,20 @@ class LockedMemory {
 /// Keeps the cores from sleeping deeply during the lifetime of this object. Waking up from a deep sleep takes longer
 /// than the rest of a tick, and on a virtual machine the host's scheduler controls even a shallow one. The kernel keeps
 /// the latency that is written in its file while the file is open (Documentation/power/pm_qos_interface.rst).
-class WakefulCores {
+class SleepInhibitor {
   public:
-    WakefulCores() noexcept : file_{open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC)} {
+    SleepInhibitor() noexcept : file_{open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC)} {
         constexpr std::int32_t latency_us = 0;
-        const bool kept = file_ >= 0 && write(file_, &latency_us, sizeof latency_us) == sizeof latency_us;
-        error_ = kept ? 0 : errno;
+        const bool is_set = file_ >= 0 && write(file_, &latency_us, sizeof latency_us) == sizeof latency_us;
+        error_ = is_set ? 0 : errno;
     }
-    ~WakefulCores() {
+    ~SleepInhibitor() {
         if (file_ >= 0) {
             close(file_);
         }
     }
-    WakefulCores(const WakefulCores&) = delete;
-    WakefulCores& operator=(const WakefulCores&) = delete;
+    SleepInhibitor(const SleepInhibitor&) = delete;
+    SleepInhibitor& operator=(const SleepInhibitor&) = delete;
 
     /// Returns 0, or the error number if the cores may sleep.
     [[nodiscard]] int error() const noexcept { return error_; }
@@ -85,7 +85,7 @@ namespace detail {
 }
 
 /// Touches the stack that a loop may use, so that its pages are present.
-inline void touch_stack() noexcept {
+inline void prefault_stack() noexcept {
     constexpr std::size_t bytes = 65'536;
     std::array<volatile char, bytes> page{};
     for (std::size_t k = 0; k < page.size(); k += 1024) {
@@ -99,7 +99,7 @@ inline void touch_stack() noexcept {
 /// stack in memory. Returns a sentence for each refused request.
 [[nodiscard]] inline std::vector<std::string> become_real_time(const RealTimeOptions& options,
                                                                const LockedMemory& memory,
-                                                               const WakefulCores& cores) {
+                                                               const SleepInhibitor& inhibitor) {
     std::vector<std::string> refused;
     sigset_t others;
     sigfillset(&others);
@@ -112,9 +112,9 @@ inline void touch_stack() noexcept {
                           std::generic_category().message(memory.error()) +
                           "): swapping can delay a tick; raise the limit with ulimit -l");
     }
-    if (cores.error() != 0) {
+    if (inhibitor.error() != 0) {
         refused.push_back(std::string("the cores may sleep deeply between ticks (") +
-                          std::generic_category().message(cores.error()) +
+                          std::generic_category().message(inhibitor.error()) +
                           "): waking up can delay a tick; allow writing to /dev/cpu_dma_latency");
     }
     if (options.cpu != -2) {
@@ -136,7 +136,7 @@ inline void touch_stack() noexcept {
                               "/etc/security/limits.conf");
         }
     }
-    detail::touch_stack();
+    detail::prefault_stack();
     return refused;
 }
 

@@ -34,8 +34,8 @@ class RingBuffer {
     /// Moves elements to `out`, oldest first, and returns their number; called by the reading thread.
     [[nodiscard]] std::size_t pop(std::span<T> out) noexcept {
         const std::size_t tail = tail_.load(std::memory_order_relaxed);
-        const std::size_t there = head_.load(std::memory_order_acquire) - tail;
-        const std::size_t count = there < out.size() ? there : out.size();
+        const std::size_t available = head_.load(std::memory_order_acquire) - tail;
+        const std::size_t count = available < out.size() ? available : out.size();
         for (std::size_t k = 0; k < count; ++k) {
             out[k] = slots_[(tail + k) & mask_];
         }

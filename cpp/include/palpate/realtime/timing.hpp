@@ -28,14 +28,14 @@ class DurationHistogram {
     /// Returns the duration that a share of all does not exceed [ns]: the middle of its cell, or the exact largest at
     /// share 1.
     [[nodiscard]] double quantile(double share) const noexcept {
-        const auto wanted = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_)));
-        if (wanted >= count_) {
+        const auto rank = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_)));
+        if (rank >= count_) {
             return static_cast<double>(largest_);
         }
-        std::uint64_t seen = 0;
+        std::uint64_t counted = 0;
         for (std::size_t cell = 0; cell < cells; ++cell) {
-            seen += cells_[cell];
-            if (seen >= std::max<std::uint64_t>(wanted, 1)) {
+            counted += cells_[cell];
+            if (counted >= std::max<std::uint64_t>(rank, 1)) {
                 return std::min(middle_of(cell), static_cast<double>(largest_));
             }
         }

@@ -18,7 +18,7 @@ namespace palpate {
 class WakeUp {
   public:
     /// Reports an event. The waiting thread sees all memory writes before it.
-    void happened() noexcept {
+    void notify() noexcept {
         events_.fetch_add(1, std::memory_order_seq_cst);
         if (waits_.load(std::memory_order_seq_cst)) {
             ::syscall(SYS_futex, word(), FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
@@ -28,17 +28,17 @@ class WakeUp {
     /// Returns the number of events; read it before checking the condition to wait for.
     [[nodiscard]] std::uint32_t events() const noexcept { return events_.load(std::memory_order_seq_cst); }
 
-    /// Waits until there were more than `seen` events. Returns false if the deadline passed.
-    [[nodiscard]] bool wait(std::uint32_t seen, Nanoseconds deadline) noexcept {
+    /// Waits until there were more than `known` events. Returns false if the deadline passed.
+    [[nodiscard]] bool wait(std::uint32_t known, Nanoseconds deadline) noexcept {
         const timespec until{deadline / nanoseconds_a_second, deadline % nanoseconds_a_second};
         waits_.store(true, std::memory_order_seq_cst);
-        while (events_.load(std::memory_order_seq_cst) == seen && monotonic_now() < deadline) {
+        while (events_.load(std::memory_order_seq_cst) == known && monotonic_now() < deadline) {
             // Returns at once if an event has happened meanwhile, because the kernel compares again.
-            ::syscall(SYS_futex, word(), FUTEX_WAIT_BITSET_PRIVATE, seen, &until, nullptr,
+            ::syscall(SYS_futex, word(), FUTEX_WAIT_BITSET_PRIVATE, known, &until, nullptr,
                       FUTEX_BITSET_MATCH_ANY);
         }
         waits_.store(false, std::memory_order_relaxed);
-        return events_.load(std::memory_order_acquire) != seen;
+        return events_.load(std::memory_order_acquire) != known;
     }
 
   private:

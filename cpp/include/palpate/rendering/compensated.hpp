@@ -42,7 +42,7 @@ class Compensated {
         : environment_{std::move(environment)}, stiffness_{coupling_stiffness} {}
 
     /// Returns the environment that the hand feels.
-    [[nodiscard]] const E& felt() const noexcept { return environment_; }
+    [[nodiscard]] const E& uncompensated() const noexcept { return environment_; }
     /// Returns K_c [N/m or N*m/rad].
     [[nodiscard]] double stiffness() const noexcept { return stiffness_; }
 
@@ -76,23 +76,24 @@ class CompensatedResolvent {
                          const ResolventOptions& options = {})
         : slope_{p},
           factor_{1.0 - p / coupling_stiffness},
-          felt_{scaled(std::move(force), factor_), p, options} {}
+          resolvent_{scaled(std::move(force), factor_), p, options} {}
 
     /// Returns true if the load line has a table.
-    [[nodiscard]] bool tabulated() const noexcept { return felt_.tabulated(); }
+    [[nodiscard]] bool tabulated() const noexcept { return resolvent_.tabulated(); }
     /// Returns true if every load line of this slope is certified to have one solution. f rises with the shifted
     /// position if it rises with x, because x - f(x)/K_c rises with x.
-    [[nodiscard]] bool unique(double p) const noexcept { return p == slope_ && felt_.unique(p); }
+    [[nodiscard]] bool unique(double p) const noexcept { return p == slope_ && resolvent_.unique(p); }
     /// Returns the search for a force without a certificate.
-    [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return felt_.uncertified(); }
+    [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return resolvent_.uncertified(); }
 
     /// Solves the load line and updates the memory.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const Compensated<E>& environment,
                                                             const Stateless& state, LoadLine line,
                                                             Memory& memory) const noexcept {
-        Solution solution = felt_.solve(Scaled<E>{environment.felt(), factor_}, state, line, memory);
-        solution.environment = environment.felt().at(solution.position, state);
+        Solution solution =
+            resolvent_.solve(Scaled<E>{environment.uncompensated(), factor_}, state, line, memory);
+        solution.environment = environment.uncompensated().at(solution.position, state);
         solution.position -= solution.environment.force / environment.stiffness();
         solution.evaluations += 1;
         return solution;
@@ -101,7 +102,7 @@ class CompensatedResolvent {
   private:
     double slope_;
     double factor_;
-    Resolvent felt_;
+    Resolvent resolvent_;
 };
 
 }  // namespace palpate

@@ -67,8 +67,8 @@ class EnergyConsistent {
     /// Returns the force on device and object for the device's measured position.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double device_velocity = (device - device_) / period_;
-        const double push = coupling_.force(device, device_velocity + position_ / period_);
-        const Solution solution = solve(coupling_, push);
+        const double driving_force = coupling_.force(device, device_velocity + position_ / period_);
+        const Solution solution = solve(coupling_, driving_force);
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);
         }
@@ -76,12 +76,12 @@ class EnergyConsistent {
                                              device_velocity - (solution.position - position_) / period_);
         if (std::abs(force) > force_limit_) {
             const double limited = std::copysign(force_limit_, force);
-            const Solution driven = search({0.0, 0.0}, limited, solution.position);
-            if (driven.status == Status::NonFinite) {
+            const Solution limited_solution = search({0.0, 0.0}, limited, solution.position);
+            if (limited_solution.status == Status::NonFinite) {
                 return detail::refused(position_);
             }
             device_ = device;
-            Rendered rendered = moved_to(driven, limited);
+            Rendered rendered = moved_to(limited_solution, limited);
             rendered.evaluations += solution.evaluations;
             rendered.status = rendered.status == Status::Ok ? Status::Limited : rendered.status;
             return rendered;
@@ -145,12 +145,12 @@ class EnergyConsistent {
         }
     };
 
-    /// Returns the load line. `push` is the force of the coupling on an environment at rest at 0, with the memory of
+    /// Returns the load line. `driving_force` is the force of the coupling on an environment at rest at 0, with the memory of
     /// its damper.
-    [[nodiscard]] LoadLine line_of(VirtualCoupling coupling, double push) const noexcept {
+    [[nodiscard]] LoadLine line_of(VirtualCoupling coupling, double driving_force) const noexcept {
         const double memory = load_line_slope(inertia_, {0.0, 0.0}, period_);
         return {load_line_slope(inertia_, coupling, period_),
-                memory * position_ + 2.0 * inertia_.mass / period_ * velocity_ + push};
+                memory * position_ + 2.0 * inertia_.mass / period_ * velocity_ + driving_force};
     }
 
     /// Returns f or D as the environment of the next step.
@@ -159,16 +159,17 @@ class EnergyConsistent {
     }
 
     /// Returns the first root of the step from `start`.
-    [[nodiscard]] Solution search(VirtualCoupling coupling, double push, double start) const noexcept {
+    [[nodiscard]] Solution search(VirtualCoupling coupling, double driving_force,
+                                  double start) const noexcept {
         Solution solution =
-            LoadLineSolver{}.solve(stepped(switched_), state_, line_of(coupling, push), start);
+            LoadLineSolver{}.solve(stepped(switched_), state_, line_of(coupling, driving_force), start);
         ++solution.evaluations;
         return solution;
     }
 
     /// Returns the end of the step.
-    [[nodiscard]] Solution solve(VirtualCoupling coupling, double push) const noexcept {
-        const LoadLine line = line_of(coupling, push);
+    [[nodiscard]] Solution solve(VirtualCoupling coupling, double driving_force) const noexcept {
+        const LoadLine line = line_of(coupling, driving_force);
         const Stepped quotient = stepped(false);
         const LoadLineSolver newton;
         int evaluations = 1;
@@ -176,7 +177,7 @@ class EnergyConsistent {
             evaluations += solution.evaluations + 1;
             return quotient.generates(solution.position, state_);
         };
-        const auto up_to = [&](double y) {
+        const auto bracket_to = [&](double y) {
             return Bracket{std::fmin(position_, y), std::fmax(position_, y)};
         };
         const auto end = [&](Solution solution, int more) {
@@ -191,7 +192,7 @@ class EnergyConsistent {
             }
             // The only root of the step is y_D, because it cannot be a root of f.
             const Solution by_energy =
-                newton.solve(quotient, state_, line, by_force.position, up_to(by_force.position));
+                newton.solve(quotient, state_, line, by_force.position, bracket_to(by_force.position));
             return end(by_energy, by_energy.evaluations);
         }
         const Solution by_energy = newton.solve(quotient, state_, line, position_);
@@ -201,7 +202,7 @@ class EnergyConsistent {
         if (generates(by_energy)) {
             return end(by_energy, 0);
         }
-        const Bracket between = up_to(by_energy.position);
+        const Bracket between = bracket_to(by_energy.position);
         if (solver_.tabulated()) {
             const Solution nearest = solver_.solve(environment_, state_, line, memory);
             if (nearest.status == Status::Ok && nearest.position >= between.low &&
@@ -238,8 +239,11 @@ class EnergyConsistent {
 
 /// Builds `EnergyConsistent`.
 struct EnergyConsistentStructure {
-    static constexpr StructureTraits traits{
-        .name = "energy-consistent", .coupling = true, .mass = true, .solved = true, .keeps_loss = true};
+    static constexpr StructureTraits traits{.name = "energy-consistent",
+                                            .coupling = true,
+                                            .mass = true,
+                                            .solved = true,
+                                            .may_reduce_hysteresis = true};
 
     template <Environment E, class SolverOf, class Visit>
     static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,

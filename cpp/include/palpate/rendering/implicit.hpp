@@ -31,21 +31,21 @@ class Implicit {
              double force_limit = std::numeric_limits<double>::infinity())
         : Implicit{std::move(environment), inertia, coupling, period, solver, force_limit, solver} {}
 
-    /// Makes the structure with two solvers: `solver` for the load line behind the coupling, `alone` for that of the
+    /// Makes the structure with two solvers: `solver` for the load line behind the coupling, `uncoupled` for that of the
     /// object alone.
     Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, Solver solver,
-             double force_limit, Solver alone)
+             double force_limit, Solver uncoupled)
         : environment_{std::move(environment)},
           coupling_{coupling},
           period_{period},
           force_limit_{force_limit},
           inertial_{inertia.mass / (period * period)},
           coupled_slope_{load_line_slope(inertia, coupling, period)},
-          alone_slope_{load_line_slope(inertia, {0.0, 0.0}, period)},
+          uncoupled_slope_{load_line_slope(inertia, {0.0, 0.0}, period)},
           coupled_factor_{inertial_ + coupled_slope_ - coupling.stiffness},
-          alone_factor_{inertial_ + alone_slope_},
+          uncoupled_factor_{inertial_ + uncoupled_slope_},
           coupled_{std::move(solver)},
-          alone_{std::move(alone)} {
+          uncoupled_{std::move(uncoupled)} {
         reset(0.0);
     }
 
@@ -97,9 +97,9 @@ class Implicit {
   private:
     /// Moves the object by a force alone, to the first root from `start`.
     [[nodiscard]] Rendered drive_from(double start, double force, int evaluations) noexcept {
-        const LoadLine line{alone_slope_, force - inertial_ * before_ + alone_factor_ * position_};
+        const LoadLine line{uncoupled_slope_, force - inertial_ * before_ + uncoupled_factor_ * position_};
         typename Solver::Memory from{start};
-        const Solution solution = alone_.solve(environment_, state_, line, from);
+        const Solution solution = uncoupled_.solve(environment_, state_, line, from);
         memory_ = typename Solver::Memory{position_};
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);
@@ -119,14 +119,14 @@ class Implicit {
     E environment_;
     VirtualCoupling coupling_;
     double period_;
-    double force_limit_;     ///< F_max [N or N*m]
-    double inertial_;        ///< m/T^2
-    double coupled_slope_;   ///< p behind the coupling
-    double alone_slope_;     ///< p without it
-    double coupled_factor_;  ///< factor of y_{k-1} in q: 2m/T^2 + B_o/T + B_c/T
-    double alone_factor_;    ///< the same without the coupling: 2m/T^2 + B_o/T
+    double force_limit_;       ///< F_max [N or N*m]
+    double inertial_;          ///< m/T^2
+    double coupled_slope_;     ///< p behind the coupling
+    double uncoupled_slope_;   ///< p without it
+    double coupled_factor_;    ///< factor of y_{k-1} in q: 2m/T^2 + B_o/T + B_c/T
+    double uncoupled_factor_;  ///< the same without the coupling: 2m/T^2 + B_o/T
     Solver coupled_;
-    Solver alone_;
+    Solver uncoupled_;
     typename E::State state_;
     typename Solver::Memory memory_;
     double device_ = 0.0;    ///< x_{k-1}
@@ -143,9 +143,9 @@ struct ImplicitStructure {
     static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,
                       Visit& visit) {
         const double p = Implicit<E>::load_line_slope(numbers.inertia, numbers.coupling, numbers.period_s);
-        const double alone = Implicit<E>::load_line_slope(numbers.inertia, {0.0, 0.0}, numbers.period_s);
+        const double uncoupled = Implicit<E>::load_line_slope(numbers.inertia, {0.0, 0.0}, numbers.period_s);
         return visit(Implicit{std::move(environment), numbers.inertia, numbers.coupling, numbers.period_s,
-                              solver_of(p), numbers.force_limit, solver_of(alone)});
+                              solver_of(p), numbers.force_limit, solver_of(uncoupled)});
     }
 };
 

@@ -39,15 +39,16 @@ struct ProbeSettings {
 
 template <>
 inline constexpr auto fields_of<ProbeSettings> = std::tuple{
-    Field<&ProbeSettings::lower>{"lower", "Where a sweep turns round [m or rad].", Rule::Finite},
-    Field<&ProbeSettings::upper>{"upper", "Where a sweep turns round [m or rad].", Rule::Finite},
-    Field<&ProbeSettings::speed>{"speed", "Of the sweep [m/s or rad/s].", Rule::Positive},
+    Field<&ProbeSettings::lower>{"lower", "Lower reversal point of the sweep [m or rad].", Rule::Finite},
+    Field<&ProbeSettings::upper>{"upper", "Upper reversal point of the sweep [m or rad].", Rule::Finite},
+    Field<&ProbeSettings::speed>{"speed", "Speed of the sweep [m/s or rad/s].", Rule::Positive},
     Field<&ProbeSettings::stiffness>{
-        "stiffness", "Of the spring that draws the handle along [N/m or N*m/rad].", Rule::Positive},
+        "stiffness", "Stiffness of the spring that moves the handle [N/m or N*m/rad].", Rule::Positive},
     Field<&ProbeSettings::damping>{
-        "damping", "Of the handle's motion against the sweep's [N*s/m or N*m*s/rad].", Rule::NotNegative},
-    Field<&ProbeSettings::force_limit>{
-        "force_limit", "Where an object holds this much, the sweep turns round [N or N*m].", Rule::Positive}};
+        "damping", "Damping of the handle's motion relative to the sweep [N*s/m or N*m*s/rad].",
+        Rule::NotNegative},
+    Field<&ProbeSettings::force_limit>{"force_limit", "Force at which the sweep reverses [N or N*m].",
+                                       Rule::Positive}};
 
 /// Throws std::invalid_argument with the field, its value and the rule.
 inline void validate(const ProbeSettings& settings) {

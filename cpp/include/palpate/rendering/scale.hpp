@@ -90,14 +90,14 @@ struct SchemeChoices {
     std::optional<double> coupling_stiffness;
     std::optional<double> coupling_damping;
     std::optional<double> mass;
-    std::optional<double> damping;
+    std::optional<double> object_damping;
     std::optional<double> play_radius;
     std::optional<int> predict;
 
     /// Returns true if a field is chosen. A flag that is false does not count.
     [[nodiscard]] bool any() const noexcept {
         return structure || compensated.value_or(false) || coupling_stiffness || coupling_damping || mass ||
-               damping || play_radius || predict;
+               object_damping || play_radius || predict;
     }
 };
 
@@ -108,7 +108,7 @@ inline constexpr auto fields_of<SchemeChoices> =
                Field<&SchemeChoices::coupling_stiffness>{"coupling_stiffness"},
                Field<&SchemeChoices::coupling_damping>{"coupling_damping"},
                Field<&SchemeChoices::mass>{"mass"},
-               Field<&SchemeChoices::damping>{"damping"},
+               Field<&SchemeChoices::object_damping>{"object_damping"},
                Field<&SchemeChoices::play_radius>{"play_radius"},
                Field<&SchemeChoices::predict>{"predict"}};
 
@@ -124,12 +124,12 @@ inline constexpr auto fields_of<SchemeChoices> =
 [[nodiscard]] inline Scheme scheme_for(const ForceModel& model, const ModelScale& scale,
                                        const DeviceProfile& device, const SchemeChoices& chosen = {}) {
     const Scheme standard;
-    const bool directly = model.velocity() != nullptr || chosen.predict.value_or(0) > 0;
-    return {chosen.structure.value_or(directly ? StructureKind::Direct : standard.structure),
+    const bool is_direct = model.velocity() != nullptr || chosen.predict.value_or(0) > 0;
+    return {chosen.structure.value_or(is_direct ? StructureKind::Direct : standard.structure),
             {chosen.coupling_stiffness.value_or(standard.coupling.stiffness * scale.stiffness()),
              chosen.coupling_damping.value_or(standard.coupling.damping * scale.stiffness())},
             {chosen.mass.value_or(standard.inertia.mass * scale.stiffness()),
-             chosen.damping.value_or(standard.inertia.damping * scale.stiffness())},
+             chosen.object_damping.value_or(standard.inertia.damping * scale.stiffness())},
             chosen.compensated.value_or(standard.compensated),
             chosen.play_radius.value_or(default_play_radius(model, device.encoder_step)),
             chosen.predict.value_or(standard.predict)};

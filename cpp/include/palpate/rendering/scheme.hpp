@@ -34,13 +34,14 @@ struct Scheme {
 
 template <>
 inline constexpr auto fields_of<Scheme> = std::tuple{
-    Field<&Scheme::structure>{"structure", "How the model is connected to the device."},
+    Field<&Scheme::structure>{"structure", "Connection of the model to the device."},
     within<&Scheme::coupling>(std::get<0>(fields_of<VirtualCoupling>), "coupling_stiffness"),
     within<&Scheme::coupling>(std::get<1>(fields_of<VirtualCoupling>), "coupling_damping"),
     within<&Scheme::inertia>(std::get<0>(fields_of<Inertia>), "mass"),
-    within<&Scheme::inertia>(std::get<1>(fields_of<Inertia>), "damping"),
-    Field<&Scheme::compensated>{"compensated", "The coupling's spring is taken out of the model beforehand."},
-    Field<&Scheme::play_radius>{"play_radius", "r of a hysteresis model [m or rad]; 0 = the model's own.",
+    within<&Scheme::inertia>(std::get<1>(fields_of<Inertia>), "object_damping"),
+    Field<&Scheme::compensated>{
+        "compensated", "True if the compliance of the coupling's spring is subtracted from the model."},
+    Field<&Scheme::play_radius>{"play_radius", "r of a hysteresis model [m or rad]; 0 = that of the model.",
                                 Rule::NotNegative},
     Field<&Scheme::predict>{"predict",
                             "m: samples used to predict the position half a sample ahead, 0 to 16; 0 = none.",
@@ -68,12 +69,13 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     detail::require(
         model.velocity() == nullptr || traits.velocity,
         "structure is " + structure +
-            ", must be direct: of a force of position and velocity no bound is known in another structure");
+            ", must be direct: for a force of position and velocity no bound is known in another structure");
     if (traits.coupling) {
         check_fields(scheme.coupling, "coupling_");
     }
     if (traits.mass) {
-        check_fields(scheme.inertia);
+        check_value(std::get<3>(fields_of<Scheme>), scheme.inertia.mass, "");
+        check_value(std::get<4>(fields_of<Scheme>), scheme.inertia.damping, "");
     }
     const std::string predict = "predict is " + std::to_string(scheme.predict);
     detail::require(scheme.predict >= 0 && scheme.predict <= most_prediction_taps,
@@ -82,13 +84,13 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
                     predict + ", must be 0 for the structure " + structure);
     detail::require(scheme.predict == 0 || model.velocity() == nullptr,
                     predict + ", must be 0 for a force of position and velocity");
-    detail::require(obeys(scheme.play_radius, Rule::NotNegative),
+    detail::require(satisfies(scheme.play_radius, Rule::NotNegative),
                     "play_radius is " + readable(scheme.play_radius) + ", must be >= 0");
     detail::require(!model.hysteresis() || model.play_radius() || scheme.play_radius > 0.0,
-                    "play_radius is 0, but the model leaves it to the rendering: must be > 0");
+                    "play_radius is 0, but the model does not define one: must be > 0");
     if (scheme.compensated) {
-        detail::require(traits.coupling, "compensated is set for the " + structure +
-                                             " structure, which has no coupling to compensate");
+        detail::require(traits.coupling,
+                        "compensated is set for the " + structure + " structure, which has no coupling");
         detail::require(
             !model.hysteresis(),
             "compensated is set for a hysteresis model, whose slope has no bound while it sticks");

@@ -30,13 +30,13 @@ concept Structure = requires(S& structure, double position) {
 
 /// Properties of a structure that do not depend on the model.
 struct StructureTraits {
-    std::string_view name;    ///< in options and files
-    bool coupling = false;    ///< a virtual coupling
-    bool mass = false;        ///< an object with mass and damping
-    bool solved = false;      ///< a load line in each step
-    bool velocity = false;    ///< a force of position and velocity
-    bool predicts = false;    ///< a force at a predicted position
-    bool keeps_loss = false;  ///< a loss that may be below the play's
+    std::string_view name;               ///< in options and files
+    bool coupling = false;               ///< a virtual coupling
+    bool mass = false;                   ///< an object with mass and damping
+    bool solved = false;                 ///< a load line in each step
+    bool velocity = false;               ///< a force of position and velocity
+    bool predicts = false;               ///< a force at a predicted position
+    bool may_reduce_hysteresis = false;  ///< hysteresis that may dissipate less than the play
 };
 
 /// Numbers from which a structure is built, without the environment.

@@ -39,12 +39,13 @@ class Controller {
 
     /// Computes the force for the last reading, sends it and takes the next one.
     [[nodiscard]] Tick tick() noexcept {
-        const Status believed = guards_.reading.check(reading_.position, reading_.sequence, reading_.status);
-        Tick tick{reading_, {}, {}, believed};
-        if (sends_force(believed)) {
+        const Status reading_status =
+            guards_.reading.check(reading_.position, reading_.sequence, reading_.status);
+        Tick tick{reading_, {}, {}, reading_status};
+        if (sends_force(reading_status)) {
             tick.rendered = structure_.step(reading_.position);
             observe(tick.rendered.environment_position);
-            tick.status = guarded(tick.rendered, tick.command.force, believed);
+            tick.status = limit_force(tick.rendered, tick.command.force, reading_status);
         } else {
             guards_.motion.interrupt();
         }
@@ -79,28 +80,29 @@ class Controller {
         guards_.tank.visit(reading_.position, object);
         if (std::isfinite(moved * reading_.applied)) {
             guards_.tank.book(reading_.applied, moved);
-            (guards_.ramp.is_over() ? guards_.observer : guards_.at_start).book(reading_.applied, moved);
+            (guards_.ramp.is_over() ? guards_.observer : guards_.ramp_observer).book(reading_.applied, moved);
         }
     }
 
-    /// Applies the limits in order: force limit, softening, ramp, slew limit, tank. The force limit comes first,
+    /// Applies the limits in order: force limit, limit cycle, ramp, slew limit, tank. The force limit comes first,
     /// because only a scaled clipped force is passive; a clipped scaled force of a periodic model can be active. It
     /// also replaces numbers that are not finite.
-    [[nodiscard]] Status guarded(const Rendered& rendered, double& force, Status believed) noexcept {
+    [[nodiscard]] Status limit_force(const Rendered& rendered, double& force,
+                                     Status reading_status) noexcept {
         force = rendered.force;
         const Status limited = guards_.limit.apply(force);
-        const Status softened = guards_.buzz.apply(force);
+        const Status cycle_scaled = guards_.limit_cycle.apply(force);
         const Status ramped = guards_.ramp.apply(force);
         const Status slewed = guards_.slew.apply(force);
-        const Status drained = guards_.tank.apply(force);
-        guards_.buzz.watch(reading_.position, force);
+        const Status energy_limited = guards_.tank.apply(force);
+        guards_.limit_cycle.watch(reading_.position, force);
         // A status about given energy comes before a status about a weak device.
-        for (const Status status : {rendered.status, ramped, drained, softened, limited, slewed}) {
+        for (const Status status : {rendered.status, ramped, energy_limited, cycle_scaled, limited, slewed}) {
             if (status != Status::Ok) {
                 return status;
             }
         }
-        return believed;
+        return reading_status;
     }
 
     D& device_;

@@ -77,10 +77,10 @@ struct LoopReport {
     std::array<std::uint64_t, status_texts.size()> ticks_by_status{};
     std::uint64_t lost_samples = 0;
     std::uint64_t repeated_samples = 0;
-    double given_in_ramp = 0.0;  ///< largest net energy from the motor during the ramp at the start [J]
-    double given = 0.0;          ///< the same after the ramp [J]
-    double most_stored = 0.0;    ///< upper bound of the stored energy above its least [J]
-    std::uint64_t buzzes = 0;    ///< limit cycles, each of which softened the object
+    double given_in_ramp = 0.0;      ///< largest net energy from the motor during the ramp at the start [J]
+    double given = 0.0;              ///< the same after the ramp [J]
+    double most_stored = 0.0;        ///< upper bound of the stored energy above its least [J]
+    std::uint64_t limit_cycles = 0;  ///< limit cycles, each of which scaled all forces down
 };
 
 /// Returns the record of a tick.
@@ -105,8 +105,8 @@ struct LoopReport {
 namespace detail {
 
 /// Returns true if the loop must stop after this number of consecutive bad ticks; sets `reason`.
-[[nodiscard]] inline bool ends(Status status, std::uint64_t bad_in_a_row, std::uint64_t tolerated,
-                               ExitReason& reason) noexcept {
+[[nodiscard]] inline bool must_stop(Status status, std::uint64_t bad_in_a_row, std::uint64_t tolerated,
+                                    ExitReason& reason) noexcept {
     if (!is_final(status) && bad_in_a_row <= tolerated) {
         return false;
     }
@@ -125,9 +125,9 @@ template <class Control, class Clock, class Sink>
 void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
               const std::atomic<bool>& stop_requested, Sink& sink, LoopProgress& progress,
               LoopReport& report) noexcept {
-    constexpr double centuries = 1e15;  // ticks of an infinite duration
+    constexpr double most_ticks = 1e15;  // ticks of an infinite duration
     const auto deadlines = static_cast<std::uint64_t>(
-        std::clamp(std::round(settings.duration_s * settings.rate_hz), 1.0, centuries));
+        std::clamp(std::round(settings.duration_s * settings.rate_hz), 1.0, most_ticks));
     std::uint64_t bad_in_a_row = 0;
     (void)controller.start();  // the first tick checks the first sample
     clock.start();
@@ -155,7 +155,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
         progress.object_force.store(object_force(record), std::memory_order_relaxed);
 
         const bool window_ended = progress.rate.add(wake.now);
-        if (detail::ends(tick.status, bad_in_a_row, settings.tolerated, report.exit_reason)) {
+        if (detail::must_stop(tick.status, bad_in_a_row, settings.tolerated, report.exit_reason)) {
             running = false;
         } else if (window_ended && progress.rate.rate_hz() < settings.lowest_rate_share * settings.rate_hz) {
             report.exit_reason = ExitReason::RateTooLow;
@@ -171,10 +171,10 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
     controller.stop();
     report.lost_samples = controller.reading_guard().lost();
     report.repeated_samples = controller.reading_guard().repeated();
-    report.given_in_ramp = 0.0 - controller.guards().at_start.least();  // not -0
+    report.given_in_ramp = 0.0 - controller.guards().ramp_observer.least();  // not -0
     report.given = 0.0 - controller.guards().observer.least();
     report.most_stored = controller.guards().tank.stored().most();
-    report.buzzes = controller.guards().buzz.buzzes();
+    report.limit_cycles = controller.guards().limit_cycle.limit_cycles();
 }
 
 }  // namespace palpate

@@ -71,11 +71,10 @@ namespace detail {
     SessionSettings session{.loop = options.loop, .real_time = options.real_time};
     session.loop.rate_hz = device.rate_hz;
     validate(session.loop);
-    detail::require(
-        device.transducer || options.probe || options.record.empty(),
-        device.profile.id +
-            " has no force transducer, and its motor does not show a force while a hand moves the handle: "
-            "probe instead");
+    detail::require(device.transducer || options.probe || options.record.empty(),
+                    device.profile.id +
+                        " has no force transducer, so it cannot measure a force while a hand moves the "
+                        "handle: set probe");
     const double period_s = 1.0 / device.rate_hz;
     GuardSettings guards = guards_for(device.scale, device.profile);
     std::string moved_by = "a hand";
@@ -83,8 +82,8 @@ namespace detail {
     if (options.probe) {
         probe = detail::chosen_probe(options, device);
         guards.force_limit = probe->force_limit;
-        moved_by = "the device itself: a sweep from " + readable(probe->lower) + " to " +
-                   readable(probe->upper) + " at " + readable(probe->speed) + " a second, no force above " +
+        moved_by = "the device: a sweep from " + readable(probe->lower) + " to " + readable(probe->upper) +
+                   " at " + readable(probe->speed) + " a second, with a force of at most " +
                    readable(probe->force_limit);
     }
     if (!options.moves()) {

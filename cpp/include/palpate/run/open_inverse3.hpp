@@ -24,11 +24,11 @@ namespace palpate {
                                                                const PlannedModel& model) {
     constexpr double usual_force_limit = 2.0;  // [N]; the service does not state one
     if (model.position_unit != "m" || model.force_unit != "N") {
-        refuse(model.in_units() + "; an Inverse3 moves along a line: it takes models in m and N");
+        refuse(model.units_text() + "; an Inverse3 moves along a line and needs a model in m and N");
     }
     Inverse3Settings settings = inverse3_settings(options.device.substr(std::string("inverse3").size()));
     if (options.wait_s) {
-        settings.answer_within = std::chrono::milliseconds{std::llround(std::ceil(1e3 * *options.wait_s))};
+        settings.answer_timeout = std::chrono::milliseconds{std::llround(std::ceil(1e3 * *options.wait_s))};
     }
     auto live = std::make_unique<LiveDeviceOf<Inverse3Device>>(
         Inverse3Device{std::move(settings)}, [](const Inverse3Device& device) -> DeviceReport {

@@ -52,7 +52,7 @@ namespace detail {
         {{"round trip", percentiles(stream.round_trip)},
          {"delay",
           "p50 " + readable(samples(0.5)) + ", p99 " + readable(samples(0.99)) + ", max " +
-              readable(samples(1.0)) + " samples, from a sample to the force made of it" +
+              readable(samples(1.0)) + " samples, from a sample to its force" +
               (stream.late_commands == 0 ? ""
                                          : "; " + number(stream.late_commands) + " later than certified")},
          {"wire", number(stream.packets) + " packets, " + number(stream.lost) + " lost, " +
@@ -101,12 +101,12 @@ namespace detail {
     const UsbDevice& device = live->device();
     const std::string name = device.name().text();
     if (model.position_unit != "rad" || model.force_unit != "N*m") {
-        refuse(model.in_units() + "; " + name + " turns: it takes models in rad and N*m");
+        refuse(model.units_text() + "; " + name + " rotates and needs a model in rad and N*m");
     }
     if (std::abs(options.loop.rate_hz - device.info().rate_hz) > 0.5) {
         const std::string rate = std::to_string(device.info().rate_hz);
         refuse("rate_hz is " + readable(options.loop.rate_hz) + "; " + name + " sends " + rate +
-               " packets a second and paces the loop: choose " + rate);
+               " packets a second and paces the loop: must be " + rate);
     }
     live->title = name + (options.uncertified ? ", uncertified," : "");
     live->profile = device.profile();
@@ -126,8 +126,9 @@ namespace detail {
     const wire::Info info = listener.info();
     const std::string name = listener.name().text();
     listener.close();
-    detail::require(!options.probe || options.upper,
-                    "a probe on a real device needs upper: how far it may go from the zero of its encoder");
+    detail::require(
+        !options.probe || options.upper,
+        "a probe on a real device needs upper, its largest position from the zero of the encoder");
     options.force_limit =
         options.force_limit.value_or(std::min(ProbeSettings{}.force_limit, profile.force_limit));
     usb.makes_force = options.moves();

@@ -93,7 +93,7 @@ struct PlannedModel {
     /// Returns the model that the plan renders.
     [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }
     /// Returns the name and the units, for a refusal.
-    [[nodiscard]] std::string in_units() const {
+    [[nodiscard]] std::string units_text() const {
         const auto unit = [](const std::string& text) { return text.empty() ? "no unit" : text; };
         return name + " is in " + unit(position_unit) + " and " + unit(force_unit);
     }
@@ -117,19 +117,19 @@ struct RenderJob {
 }
 
 /// Returns true if the options choose a rendering that differs from the plan. No certificate holds in this case.
-[[nodiscard]] inline bool differs_from_plan(const RenderOptions& options) noexcept {
+[[nodiscard]] inline bool changes_plan(const RenderOptions& options) noexcept {
     return options.scheme.any() || options.force_limit || options.slew_s || options.tolerated;
 }
 
 /// Returns the reason why the certificate of a model does not hold for a simulated device; empty if it holds.
-[[nodiscard]] inline std::string void_reason(const RenderOptions& options, const PlannedModel& model) {
+[[nodiscard]] inline std::string uncertified_reason(const RenderOptions& options, const PlannedModel& model) {
     if (!model.certificate) {
         return "the model has no certificate";
     }
     if (options.uncertified) {
         return "uncertified was set";
     }
-    return differs_from_plan(options) ? "the options change the planned rendering" : "";
+    return changes_plan(options) ? "the options change the plan" : "";
 }
 
 namespace detail {
@@ -147,7 +147,7 @@ namespace detail {
     }
     const DeviceProfile& certified = model.certificate->device;
     if (!model.certificate->certified()) {
-        return "is not certified: " + model.certificate->why;
+        return "is not certified: " + model.certificate->reason;
     }
     if (certified.id != device.id) {
         return "is certified for the device " + certified.id + ", not for " + device.id;
@@ -165,8 +165,8 @@ namespace detail {
         return "is certified for " + readable(certified.force_limit) + " N*m, the device makes " +
                readable(device.force_limit) + " N*m";
     }
-    if (differs_from_plan(options)) {
-        return "is certified as it was planned: leave out structure and its numbers, force_limit, slew_s, "
+    if (changes_plan(options)) {
+        return "is certified for its plan only: do not set structure, its numbers, force_limit, slew_s or "
                "tolerated_samples";
     }
     return "";
@@ -196,7 +196,7 @@ inline constexpr double certified_rate_share = 0.99;
 /// Sets guards and loop as certified. Removes the slew limit and ticks without a force, because the proofs do not cover
 /// them. Sets the certified force limit, the longest certified time between two ticks, and the device's damping and
 /// friction for the energy tank.
-inline void keep_certified(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
+inline void apply_certificate(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
     guards.certified = true;
     guards.slew_s = 0.0;
     guards.force_limit = certificate.device.force_limit;
@@ -219,8 +219,8 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     }
     const std::string reason = sinks.file.open(options.record, units, metadata, options.force);
     require(reason.empty(), reason);
-    const std::string& aside = sinks.file.file().set_aside_as();
-    return aside.empty() ? "" : "a recording that was cut off earlier is kept as " + aside;
+    const std::string& interrupted = sinks.file.file().interrupted_name();
+    return interrupted.empty() ? "" : "an interrupted earlier recording is kept as " + interrupted;
 }
 
 /// Finishes the recording and judges the session.
@@ -260,9 +260,9 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
 /// Chooses scheme, guards and rate of a rendering on an open device, then opens the sinks. A real device requires a
 /// certificate that holds for it, unless `uncertified` is set. Throws std::invalid_argument with the reason of a
 /// refusal.
-[[nodiscard]] inline RenderJob settle(const RenderOptions& options, const PlannedModel& model,
-                                      const LiveDevice& device, RecordSinks& sinks) {
-    std::string reason = void_reason(options, model);
+[[nodiscard]] inline RenderJob prepare_rendering(const RenderOptions& options, const PlannedModel& model,
+                                                 const LiveDevice& device, RecordSinks& sinks) {
+    std::string reason = uncertified_reason(options, model);
     if (!device.simulated && !options.uncertified) {
         reason = detail::certificate_mismatch(options, model, device.profile);
         if (!reason.empty()) {
@@ -282,7 +282,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     loop.rate_hz = device.rate_hz;
     loop.tolerated = options.tolerated.value_or(loop.tolerated);
     if (reason.empty()) {
-        detail::keep_certified(*model.certificate, job.guards, loop);
+        detail::apply_certificate(*model.certificate, job.guards, loop);
     } else if (model.certificate && device.simulated) {
         job.notes.push_back("uncertified: " + reason);
     }
@@ -291,8 +291,8 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     validate(job.scheme, job.model, 1.0 / loop.rate_hz);
     if (!model.plan && !options.scheme.any() && has_coupling(job.scheme.structure)) {
         job.notes.emplace_back(
-            "no plan in the model: rendered behind the default coupling, which is felt; 'palpate plan' finds "
-            "the simplest rendering that is not");
+            "the model has no plan: rendered behind the default coupling, which makes it softer; 'palpate "
+            "plan' chooses a structure");
     }
     job.metadata = device.metadata;
     job.metadata.emplace_back("certified", !reason.empty() ? "no: " + reason
@@ -303,7 +303,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
         flight_metadata(options.created_by, job.metadata, model.name, job.scheme, job.guards, loop.rate_hz);
     if (std::error_code ignored;
         !options.record.empty() && std::filesystem::equivalent(options.record, model.name, ignored)) {
-        refuse("record is " + options.record + ", the model; writing there would destroy it");
+        refuse("record is " + options.record + ", the model file: choose another name");
     }
     if (std::string note = detail::open_sinks(options, model.units(), job.metadata, sinks); !note.empty()) {
         job.notes.push_back(std::move(note));

@@ -78,27 +78,27 @@ template <class Control>
     const auto loop_report = std::make_unique<LoopReport>();  // on the heap, because it is large
     LoopProgress progress;
     std::atomic<bool> privileges_known{false};
-    std::atomic<bool> over{false};
+    std::atomic<bool> finished{false};
     LastRecords<TickRecord> last{settings.last_ticks};
     const LockedMemory memory;
-    const WakefulCores cores;
+    const SleepInhibitor inhibitor;
     using Recorder = FlightRecorder<TickRecord, RecordSinks>;
     Recorder recorder{sinks, capacity, settings.hand_over_every};
 
     std::thread loop{[&] {
-        report.refused = become_real_time(settings.real_time, memory, cores);
+        report.refused = become_real_time(settings.real_time, memory, inhibitor);
         privileges_known.store(true, std::memory_order_release);
         detail::LoopSink<Recorder> sink{recorder, last};
         const auto run = [&](auto clock) {
             run_loop(controller, settings.loop, clock, stop_requested, sink, progress, *loop_report);
         };
         controller.paced_by_device() ? run(PacedByDevice{period}) : run(Periodic{period});
-        over.store(true, std::memory_order_release);
+        finished.store(true, std::memory_order_release);
     }};
-    while (!over.load(std::memory_order_acquire)) {
+    while (!finished.load(std::memory_order_acquire)) {
         std::this_thread::sleep_for(std::chrono::milliseconds{20});
-        const bool known = privileges_known.load(std::memory_order_acquire);
-        watch(SessionView{progress, known ? &report.refused : nullptr, sinks.file.error()});
+        const bool are_known = privileges_known.load(std::memory_order_acquire);
+        watch(SessionView{progress, are_known ? &report.refused : nullptr, sinks.file.error()});
     }
     loop.join();
     recorder.stop();

@@ -41,7 +41,7 @@ namespace palpate {
     const StatusText& status = text(report.status);
     switch (report.exit_reason) {
         case ExitReason::TimeUp:
-            return "ran its time";
+            return "the duration ended";
         case ExitReason::StopRequested:
             return "stopped on request";
         case ExitReason::Guard:
@@ -56,7 +56,7 @@ namespace palpate {
         case ExitReason::RateTooLow:
             break;
     }
-    return "stopped because the loop did not hold its rate: less than " +
+    return "stopped because the rate was too low: less than " +
            readable(settings.lowest_rate_share * settings.rate_hz) + " Hz of " + readable(settings.rate_hz) +
            " Hz for half a second";
 }
@@ -65,8 +65,8 @@ namespace palpate {
 /// object once, so its energy is stated separately.
 [[nodiscard]] inline std::string energy_text(const LoopReport& report) {
     const std::string stored = std::isfinite(report.most_stored)
-                                   ? "the object held at most " + readable(report.most_stored) + " J"
-                                   : "no bound is known of what the object held";
+                                   ? "the object stored at most " + readable(report.most_stored) + " J"
+                                   : "no bound of the stored energy is known";
     return "given " + readable(report.given_in_ramp) + " J during the ramp, " + readable(report.given) +
            " J after it; " + stored;
 }
@@ -101,7 +101,7 @@ namespace palpate {
                     {{"model", model},
                      {"structure", describe(scheme)},
                      {"guards", "force limit " + readable(guards.force_limit) +
-                                    (guards.slew_s > 0.0 ? ", slew from nothing to the limit in " +
+                                    (guards.slew_s > 0.0 ? ", slew from zero to the limit in " +
                                                                readable(guards.slew_s) + " s"
                                                          : ", no slew limit") +
                                     ", ramp " + readable(guards.ramp_s) + " s"},
@@ -117,7 +117,7 @@ namespace palpate {
     const int disk = file.error();
     std::string ended = exit_text(report.loop, settings) + "; zero force sent, device closed";
     if (disk != 0) {
-        ended += std::string("; incomplete, the disk took no more: ") + std::generic_category().message(disk);
+        ended += std::string("; incomplete, because of the disk: ") + std::generic_category().message(disk);
         warnings.push_back(name + " is incomplete: " + std::generic_category().message(disk) + "; " +
                            std::to_string(file.refused()) + " rows are missing at its end");
     }

@@ -96,7 +96,7 @@ inline void judge_forces(const LoopReport& loop, const RecordSinks& sinks, const
     };
     changed(count(Status::Limited),
             "clipped the force to its limit: raise the limit, or use a stronger device");
-    changed(count(Status::Drained) + count(Status::Softened),
+    changed(count(Status::EnergyLimited) + count(Status::LimitCycleScaled),
             "reduced the force, because the rendering gave energy: choose its structure with palpate plan");
     changed(count(Status::MaxIterations) + count(Status::NotUnique),
             "did not solve the load line: choose the structure with palpate plan");
@@ -122,8 +122,9 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
     const double domain = expected.domain.upper - expected.domain.lower;
     const std::string range = "the handle covered " + readable(covered) + " " + expected.position_unit;
     if (!(covered > 2.0 * expected.encoder_step)) {
-        findings.push_back({expected.recorded ? "no" : "usable",
-                            range + ", so no force over position is known: move it over the whole object"});
+        findings.push_back(
+            {expected.recorded ? "no" : "usable",
+             range + ", so the force over position is unknown: move it over the whole object"});
     } else if (covered < smallest_domain_share * domain) {
         findings.push_back({"usable", range + ", " + readable(100.0 * covered / domain) +
                                           " % of the model's domain: move it over the whole object"});
@@ -150,7 +151,7 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
     } else if (expected.recorded && usable_rows == 0) {
         findings.push_back({"no", "the recording has no usable row, because none of its " +
                                       std::to_string(sinks.file.written()) +
-                                      " forces is the object's alone: record for a longer time"});
+                                      " forces is that of the object alone: record for a longer time"});
     }
     for (const std::string& warning : expected.warnings) {
         findings.push_back({"usable", warning});

@@ -136,7 +136,7 @@ struct Summary {
     Lines all{
         {"ended", summary.ended()},
         {"rate", readable(loop.timing.rate_hz()) + " Hz of " + readable(summary.loop.rate_hz) + " Hz" +
-                     (slow ? ", lower than asked, " : ", ") + std::to_string(loop.timing.missed) +
+                     (slow ? ", lower than required, " : ", ") + std::to_string(loop.timing.missed) +
                      " deadlines missed"},
         {"period", percentiles(loop.timing.period) + " (the longest gap)"},
         {"late by", percentiles(loop.timing.lateness)},

@@ -39,13 +39,13 @@ std::size_t closed_loop(D& device, S structure, const Guards& guards, std::size_
     Controller controller{device, std::move(structure), guards};
     (void)controller.start();
     SimulatedTick now{0, {}, {}, device.handle(), 0.0, device.applied_force()};
-    for (bool goes_on = true; now.number < ticks && goes_on; ++now.number) {
+    for (bool continues = true; now.number < ticks && continues; ++now.number) {
         now.start = now.end;
         now.force_before = now.force;
         now.tick = controller.tick();
         now.end = device.handle();
         now.force = device.applied_force();
-        goes_on = watch(std::as_const(now));
+        continues = watch(std::as_const(now));
     }
     return now.number;
 }
@@ -61,7 +61,7 @@ struct ClosedLoopSettings {
 /// Result of a closed loop with energy account.
 struct ClosedLoopEnd {
     EnergyAccount energy;
-    Motion met;             ///< the handle when the object's first force acted on it
+    Motion at_first_force;  ///< the handle when the object's first force acted on it
     Motion handle;          ///< the handle at the end
     std::size_t ticks = 0;  ///< number of ticks
 };
@@ -78,7 +78,7 @@ template <Structure S, SimulatedHand H, class Watch>
     end.ticks =
         closed_loop(device, std::move(structure), settings.guards, ticks, [&](const SimulatedTick& now) {
             if (now.number == 0 || now.number == delay) {
-                end.met = now.start;
+                end.at_first_force = now.start;
             }
             return watch(now.tick, now.end, device.plant().account());
         });
@@ -214,7 +214,7 @@ template <class Each>
             } else {
                 throw std::invalid_argument(
                     "structure is " + std::string(name_of(scheme.structure)) +
-                    ", must be implicit or explicit: only an inertia turns force into motion");
+                    ", must be implicit or explicit: others have no mass that a force can move");
             }
         });
 }

@@ -56,15 +56,15 @@ class Faulty {
     Opened open() {
         exchanges_ = 0;
         next_ = 0;
-        gone_ = false;
+        disconnected_ = false;
         return device_.open();
     }
 
     /// Exchanges a command for a reading, with the fault of this exchange.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         const Fault* fault = fault_of(exchanges_++);
-        gone_ = gone_ || (fault != nullptr && fault->kind == FaultKind::Gone);
-        if (gone_) {
+        disconnected_ = disconnected_ || (fault != nullptr && fault->kind == FaultKind::Gone);
+        if (disconnected_) {
             last_ = device_.exchange({});
             last_.status = Status::Fault;
             return last_;
@@ -90,37 +90,37 @@ class Faulty {
     [[nodiscard]] Reading faulty(const Fault& fault, const Command& command) noexcept {
         const bool half = fault.kind == FaultKind::Saturated;
         Reading now = device_.exchange({half ? 0.5 * command.force : command.force});
-        Reading told = now;
+        Reading reported = now;
         switch (fault.kind) {
             case FaultKind::Late:
-                told = now = last_;
-                told.status = Status::Timeout;
+                reported = now = last_;
+                reported.status = Status::Timeout;
                 break;
             case FaultKind::Lost:
-                told = now = device_.exchange(command);
+                reported = now = device_.exchange(command);
                 break;
             case FaultKind::Repeated:
-                told = now = last_;
+                reported = now = last_;
                 break;
             case FaultKind::NotANumber:
-                told.position = std::numeric_limits<double>::quiet_NaN();
+                reported.position = std::numeric_limits<double>::quiet_NaN();
                 break;
             case FaultKind::Frozen:
-                told.position = last_.position;
-                told.velocity = 0.0;
+                reported.position = last_.position;
+                reported.velocity = 0.0;
                 now.position = last_.position;
                 break;
             case FaultKind::Jump:
-                told.position += jump_;
+                reported.position += jump_;
                 break;
             case FaultKind::Saturated:
-                told.status = command.force == 0.0 ? told.status : Status::Limited;
+                reported.status = command.force == 0.0 ? reported.status : Status::Limited;
                 break;
             case FaultKind::Gone:
                 break;
         }
         last_ = now;
-        return told;
+        return reported;
     }
 
     D device_;
@@ -128,7 +128,7 @@ class Faulty {
     double jump_;
     std::uint64_t exchanges_ = 0;
     std::size_t next_ = 0;
-    bool gone_ = false;
+    bool disconnected_ = false;
     Reading last_;
 };
 

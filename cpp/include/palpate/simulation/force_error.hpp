@@ -91,7 +91,7 @@ template <class Law>
     const std::size_t ticks = held.start.size();
     for (const std::span<const double> column : {held.middle, held.end, held.applied, held.mean_applied}) {
         if (column.size() != ticks) {
-            throw std::invalid_argument("force_error needs as many values of each column as of start, " +
+            throw std::invalid_argument("every column of force_error must have as many values as start, " +
                                         std::to_string(ticks) + ", not " + std::to_string(column.size()));
         }
     }

@@ -65,9 +65,9 @@ static_assert(SimulatedHand<Hand>);
 
 template <>
 inline constexpr auto fields_of<Hand> =
-    std::tuple{Field<&Hand::stiffness>{"stiffness", "[N/m or N*m/rad]"},
-               Field<&Hand::damping>{"damping", "[N*s/m or N*m*s/rad]"},
-               Field<&Hand::lower>{"lower", "Least target [m or rad]."},
+    std::tuple{Field<&Hand::stiffness>{"stiffness", "Stiffness of the spring [N/m or N*m/rad]."},
+               Field<&Hand::damping>{"damping", "Damping to ground [N*s/m or N*m*s/rad]."},
+               Field<&Hand::lower>{"lower", "Smallest target [m or rad]."},
                Field<&Hand::upper>{"upper", "Largest target [m or rad]."},
                Field<&Hand::frequency_hz>{"frequency_hz", "Sweeps a second [Hz]."}};
 

@@ -25,11 +25,11 @@ namespace palpate {
 /// scale.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_simulated(const RenderOptions& options,
                                                                 const PlannedModel& model) {
-    const bool certified = void_reason(options, model).empty();
+    const bool certified = uncertified_reason(options, model).empty();
     const double rate_hz = certified ? 1.0 / model.certificate->device.period_s : options.loop.rate_hz;
     if (options.rate_given && std::abs(options.loop.rate_hz - rate_hz) > 1e-6 * rate_hz) {
-        refuse("rate_hz is " + readable(options.loop.rate_hz) + ", and the certificate is for " +
-               readable(rate_hz) + " Hz: plan again for a device of that period, or set uncertified");
+        refuse("rate_hz is " + readable(options.loop.rate_hz) + ", but the certificate is for " +
+               readable(rate_hz) + " Hz: plan for a device with this period, or set uncertified");
     }
     LoopSettings loop = options.loop;
     loop.rate_hz = rate_hz;
@@ -52,7 +52,7 @@ namespace palpate {
     if (const Opened opened = live->open(); !opened) {
         refuse(opened.reason);
     }
-    live->title = rig.device.id + " (simulated: nothing moves)";
+    live->title = rig.device.id + " (simulated: no device moves)";
     live->profile = rig.device;
     live->scale = rig.scale;
     live->rate_hz = rate_hz;
@@ -73,11 +73,10 @@ namespace palpate {
                "', must be simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]");
     }
     if (kind != "simulated" && !options.faults.empty()) {
-        refuse("faults are for the simulated device");
+        refuse("faults is set: must be empty for a real device");
     }
     if (model.force_unit == "A") {
-        refuse(
-            "the model's force is a motor current in A; identify it again with --torque-constant-Nm-per-A");
+        refuse("the model's force is a motor current in A: identify it with --torque-constant-Nm-per-A");
     }
     return kind == "usb"        ? open_usb(options, model)
            : kind == "inverse3" ? open_inverse3(options, model)
@@ -94,7 +93,7 @@ namespace palpate {
     detail::require(options.device == "simulated",
                     "device is '" + options.device + "', must be simulated or usb[:SERIAL]");
     detail::require(object || options.record.empty(),
-                    "nothing is mounted on the simulated device; give it an object, a model file");
+                    "the simulated device has no object: set object to a model file");
     validate(options.loop);
     const double period_s = 1.0 / options.loop.rate_hz;
     TestRig rig;
@@ -119,7 +118,7 @@ namespace palpate {
     live->profile = rig.device;
     live->scale = rig.scale;
     live->rate_hz = options.loop.rate_hz;
-    live->metadata = {{"simulated", "yes: device, hand and object; nothing here was measured"},
+    live->metadata = {{"simulated", "yes: device, hand and object; no value was measured"},
                       {"device", rig.device.id}};
     live->simulated = true;
     live->transducer = transducer;

@@ -68,11 +68,11 @@ struct MountedObject {
 };
 
 /// Energy flows since the device was opened. The port is between hand and handle, so the handle's damping and friction
-/// are inside: hand = motor + loss + increase of the handle's kinetic energy.
+/// are inside: hand = motor + dissipated + increase of the handle's kinetic energy.
 struct EnergyAccount {
     double hand = 0.0;        ///< work on the handle [J]
     double motor = 0.0;       ///< work against the motor [J]
-    double loss = 0.0;        ///< lost by damping and friction [J]
+    double dissipated = 0.0;  ///< by damping and friction [J]
     double throughput = 0.0;  ///< absolute work of hand and motor, the scale of rounding errors [J]
     double least = 0.0;       ///< least of hand + 1e-12 throughput after any substep [J]
 };
@@ -115,7 +115,7 @@ class Midpoint : public PlainPlant {
             motion.position += moved;
             account_.hand += hand * moved;
             account_.motor += applied * moved;
-            account_.loss += handle.damping * mean * moved + handle.friction * std::abs(moved);
+            account_.dissipated += handle.damping * mean * moved + handle.friction * std::abs(moved);
             account_.throughput += (std::abs(hand) + std::abs(applied)) * std::abs(moved);
             if (handle.friction > 0.0 && motion.velocity * before < 0.0) {
                 stop(handle, grip, applied, motion);
@@ -138,7 +138,7 @@ class Midpoint : public PlainPlant {
         const double squared = motion.velocity * motion.velocity;
         motion.velocity = 0.0;
         account_.hand += 0.5 * grip.mass * squared;
-        account_.loss += 0.5 * (handle.inertia + grip.mass) * squared;
+        account_.dissipated += 0.5 * (handle.inertia + grip.mass) * squared;
     }
 
     EnergyAccount account_;

@@ -41,31 +41,31 @@ inline constexpr auto fields_of<TestRig> = std::tuple{
 
 namespace detail {
 
-/// Returns the target at which the handle rests at the end of a slow motion, or before it if the felt force exceeds 80
-/// % of the force limit. The remaining 20 % are for coupling and damping.
-[[nodiscard]] inline double resting_target(const std::vector<Rendered>& felt,
+/// Returns the target at which the handle rests at the end of a slow motion, or before it if the rendered force exceeds
+/// 80 % of the force limit. The remaining 20 % are for coupling and damping.
+[[nodiscard]] inline double resting_target(const std::vector<Rendered>& rendered,
                                            const std::vector<double>& motion, double force_limit,
                                            double hand_stiffness) {
     constexpr double held_share = 0.8;
     std::size_t last = motion.size() - 1;
-    while (last > 0 && std::abs(felt[last].force) > held_share * force_limit) {
+    while (last > 0 && std::abs(rendered[last].force) > held_share * force_limit) {
         --last;
     }
-    return motion[last] + felt[last].force / hand_stiffness;
+    return motion[last] + rendered[last].force / hand_stiffness;
 }
 
 /// Returns a hand that moves the handle through the domain, except 1 % at either end.
 ///
-/// The hand is a spring to a moving target, which leads the handle by the felt force divided by the hand's stiffness. A
-/// coupling reduces the felt force, so the target is computed from the force felt behind the default coupling. Stiffer
+/// The hand is a spring to a moving target, which leads the handle by the rendered force divided by the hand's stiffness. A
+/// coupling reduces this force, so the target is computed for the default coupling. Stiffer
 /// structures are pressed less far, and the handle never leaves the domain.
 [[nodiscard]] inline Hand sweeping_hand(const ForceModel& model, const TestRig& rig) {
     constexpr int steps = 1000;
     const double lower = model.domain().lower[0];
     const double travel = model.domain().upper[0] - lower;
-    const double pressed = std::min(largest_force(model), rig.device.force_limit);
+    const double largest = std::min(largest_force(model), rig.device.force_limit);
     Hand hand;
-    hand.stiffness = std::max(hand.stiffness * rig.scale.stiffness(), 2.0 * pressed / travel);
+    hand.stiffness = std::max(hand.stiffness * rig.scale.stiffness(), 2.0 * largest / travel);
     hand.damping *= rig.scale.stiffness();
 
     SchemeChoices soft;
@@ -77,8 +77,8 @@ namespace detail {
     }
     const std::vector<double> outwards{inwards.rbegin(), inwards.rend()};
     const auto end_of = [&](const std::vector<double>& motion) {
-        const std::vector<Rendered> felt = motion_driven(model, scheme, motion, rig.device.period_s);
-        return resting_target(felt, motion, rig.device.force_limit, hand.stiffness);
+        const std::vector<Rendered> rendered = motion_driven(model, scheme, motion, rig.device.period_s);
+        return resting_target(rendered, motion, rig.device.force_limit, hand.stiffness);
     };
     const double first = end_of(outwards);
     const double last = end_of(inwards);
@@ -115,7 +115,7 @@ namespace detail {
 
 /// Returns the metadata of a flight record on a simulated device.
 [[nodiscard]] inline Metadata simulated_metadata(const TestRig& rig) {
-    return {{"simulated", "yes: device and hand; nothing here was measured"},
+    return {{"simulated", "yes: device and hand; no value was measured"},
             {"device", rig.device.id},
             {"hand", "spring " + readable(rig.hand.stiffness) + ", damper " + readable(rig.hand.damping) +
                          ", to a point between " + readable(rig.hand.lower) + " and " +

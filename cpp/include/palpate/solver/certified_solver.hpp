@@ -62,9 +62,10 @@ class CertifiedSolver {
         explicit Memory(double at) noexcept : position{at} {}
     };
 
-    CertifiedSolver(const PiecewiseForce& force, double p) : CertifiedSolver{force, silent(force), 0.0, p} {}
+    CertifiedSolver(const PiecewiseForce& force, double p)
+        : CertifiedSolver{force, zero_hysteresis(force), 0.0, p} {}
     CertifiedSolver(const HysteresisNetwork& pair, double p)
-        : CertifiedSolver{piecewise(pair, 0.0), piecewise_loss(pair), pair.play_radius(), p} {}
+        : CertifiedSolver{piecewise(pair, 0.0), piecewise_hysteresis(pair), pair.play_radius(), p} {}
 
     [[nodiscard]] static constexpr bool tabulated() noexcept { return false; }
     /// Returns true if every load line of this slope is certified to have one solution.
@@ -85,15 +86,19 @@ class CertifiedSolver {
         const EnvironmentSample sample = environment.at(y, state);
         // Newton's correction by the last compliance and two terms of its geometric series, which avoids a division.
         // The remaining error is the share missing^3 of the correction.
-        const double rough = (sample.force + (line.slope * y - line.intercept)) * memory.compliance;
-        const double missing = (1.0 - memory.compliance * line.slope) - memory.compliance * sample.slope;
-        const double correction = -rough - rough * (missing + missing * missing);
+        const double first_correction =
+            (sample.force + (line.slope * y - line.intercept)) * memory.compliance;
+        const double slope_mismatch =
+            (1.0 - memory.compliance * line.slope) - memory.compliance * sample.slope;
+        const double correction =
+            -first_correction - first_correction * (slope_mismatch + slope_mismatch * slope_mismatch);
         // F' changes by at most a quarter over a cell. The solution is in the cell if the ends are farther away than
         // this.
         const double reach = 3.0 * std::abs(correction);
-        const double left = 2.0 * (std::abs(rough * missing) * (missing * missing) +
-                                   memory.curvature * (correction * correction));
-        if (!(left <= tolerance_ && std::abs(missing) <= 0.25 && y - reach >= memory.low &&
+        const double remaining_error =
+            2.0 * (std::abs(first_correction * slope_mismatch) * (slope_mismatch * slope_mismatch) +
+                   memory.curvature * (correction * correction));
+        if (!(remaining_error <= tolerance_ && std::abs(slope_mismatch) <= 0.25 && y - reach >= memory.low &&
               y + reach <= memory.high)) {
             return from_borders(environment, state, line, memory, y + correction, 1);
         }
@@ -118,8 +123,8 @@ class CertifiedSolver {
     /// A border between cells, with c of the cell above it.
     struct Border {
         double position;
-        double force;  ///< f, or g of a hysteresis
-        double loss;   ///< h
+        double force;       ///< f, or g of a hysteresis
+        double hysteresis;  ///< h
         double curvature;
     };
 
@@ -133,14 +138,14 @@ class CertifiedSolver {
     /// Index of a cell, and the turns of a knob as a distance.
     struct Place {
         std::size_t cell;
-        double turned;
+        double turn_offset;
     };
 
-    /// An interval over which force and loss are networks; a straight line is a network without wavelets.
+    /// An interval over which force and hysteresis are networks; a straight line is a network without wavelets.
     struct Piece {
         Interval positions;
         NetworkParameters force;
-        NetworkParameters loss;
+        NetworkParameters hysteresis;
     };
 
     /// Result of one Newton step.
@@ -152,7 +157,7 @@ class CertifiedSolver {
         EnvironmentSample sample;
     };
 
-    CertifiedSolver(const PiecewiseForce& force, const PiecewiseForce& loss, double radius, double p)
+    CertifiedSolver(const PiecewiseForce& force, const PiecewiseForce& hysteresis, double radius, double p)
         : radius_{radius},
           by_radius_{radius > 0.0 ? 1.0 / radius : 0.0},
           travel_{force.upper - force.lower},
@@ -166,7 +171,7 @@ class CertifiedSolver {
             search_.longest_step = std::min(search_.longest_step, 0.5 * radius);
         }
         if (std::isfinite(p)) {
-            cut(pieces_of(force, loss), p);
+            cut(pieces_of(force, hysteresis), p);
         }
     }
 
@@ -196,17 +201,18 @@ class CertifiedSolver {
         return cell.low >= play + radius_ ? 1.0 : -1.0;
     }
 
-    /// Returns F at a border, sliding or sticking, for a knob after `turned`.
-    [[nodiscard]] double value(const Border& border, double turned, double p, double play) const noexcept {
-        const double y = border.position + turned;
+    /// Returns F at a border, sliding or sticking, for a knob after `turn_offset`.
+    [[nodiscard]] double value(const Border& border, double turn_offset, double p,
+                               double play) const noexcept {
+        const double y = border.position + turn_offset;
         const double s = std::clamp((y - play) * by_radius_, -1.0, 1.0);
-        return border.force + s * border.loss + p * y;
+        return border.force + s * border.hysteresis + p * y;
     }
 
-    /// Returns cell k of a knob after `turned`.
-    [[nodiscard]] Cell cell_at(std::size_t k, double turned) const noexcept {
-        return {k == 0 ? -infinity : borders_[k - 1].position + turned,
-                k == borders_.size() ? infinity : borders_[k].position + turned,
+    /// Returns cell k of a knob after `turn_offset`.
+    [[nodiscard]] Cell cell_at(std::size_t k, double turn_offset) const noexcept {
+        return {k == 0 ? -infinity : borders_[k - 1].position + turn_offset,
+                k == borders_.size() ? infinity : borders_[k].position + turn_offset,
                 k == 0 ? 0.0 : borders_[k - 1].curvature};
     }
 
@@ -221,7 +227,7 @@ class CertifiedSolver {
         const double sum = line.slope * y - line.intercept;
         if constexpr (requires { state.play; }) {
             const auto g = environment.force().at(y);
-            const auto h = environment.loss().at(y);
+            const auto h = environment.hysteresis_force().at(y);
             constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
             Trial trial{0.0, 0.0, 0.0, 0.0, {g.value, unknown, unknown, environment.force().extrapolated(y)}};
             const auto step = [&](double s, double gain) {
@@ -273,14 +279,14 @@ class CertifiedSolver {
     [[nodiscard, gnu::noinline]] Solution from_borders(const E& environment, const typename E::State& state,
                                                        LoadLine line, Memory& memory, double guess,
                                                        int evaluations) const noexcept {
-        constexpr int most = 3;
+        constexpr int most_steps = 3;
         if (!(unique(line.slope) && std::isfinite(line.intercept))) {
             return search(environment, state, line, memory);
         }
         const double play = play_of(state);
-        const auto [k, turned] = locate(line, play);
-        const Cell cell = cell_at(k, turned);
-        double y = interpolated(k, turned, line, play);
+        const auto [k, turn_offset] = locate(line, play);
+        const Cell cell = cell_at(k, turn_offset);
+        double y = interpolated(k, turn_offset, line, play);
         if (32.0 * std::abs(guess - y) <= std::fmin(cell.high - cell.low, travel_)) {
             y = guess;
         }
@@ -289,19 +295,21 @@ class CertifiedSolver {
             if (!std::isfinite(trial.position)) {
                 return {y, trial.sample, trial.position, evaluations + steps, Status::NonFinite};
             }
-            const double left = 64.0 / 49.0 * cell.curvature * (trial.correction * trial.correction);
+            const double remaining_error =
+                64.0 / 49.0 * cell.curvature * (trial.correction * trial.correction);
             y = trial.position;
             const double size =
                 std::abs(trial.sample.force) + std::abs(line.slope * y) + std::abs(line.intercept);
-            if (left <= tolerance_ || left * trial.steepest <= 4.0 * epsilon * size || steps == most) {
-                remember(cell, y, play, memory);
+            if (remaining_error <= tolerance_ || remaining_error * trial.steepest <= 4.0 * epsilon * size ||
+                steps == most_steps) {
+                store_range(cell, y, play, memory);
                 return found(trial.sample, y, trial.compliance, line, evaluations + steps, memory);
             }
         }
     }
 
     /// Stores the range around y in which F is smooth.
-    void remember(const Cell& cell, double y, double play, Memory& memory) const noexcept {
+    void store_range(const Cell& cell, double y, double play, Memory& memory) const noexcept {
         memory.low = cell.low + margin(y);
         memory.high = cell.high - margin(y);
         if (radius_ > 0.0) {
@@ -321,43 +329,43 @@ class CertifiedSolver {
     /// Returns the cell of the solution, from the values at the borders only.
     [[nodiscard]] Place locate(LoadLine line, double play) const noexcept {
         const Border& first = borders_.front();
-        double turned = 0.0;
+        double turn_offset = 0.0;
         const auto lies_below = [&](const Border& border) {
-            return value(border, turned, line.slope, play) <= line.intercept;
+            return value(border, turn_offset, line.slope, play) <= line.intercept;
         };
         if (period_ > 0.0) {
             double turns = std::floor((line.intercept - first.force - line.slope * first.position) /
                                       (line.slope * period_));
-            turned = turns * period_;
-            // Loss or rounding can shift the solution by some turns.
+            turn_offset = turns * period_;
+            // Hysteresis or rounding can shift the solution by some turns.
             constexpr int farthest = 4;
             for (int k = 0; k < farthest && !lies_below(first); ++k) {
-                turned = --turns * period_;
+                turn_offset = --turns * period_;
             }
             for (int k = 0; k < farthest && lies_below(borders_.back()); ++k) {
-                turned = ++turns * period_;
+                turn_offset = ++turns * period_;
             }
         }
         const auto above = std::partition_point(borders_.begin(), borders_.end(), lies_below);
-        return {static_cast<std::size_t>(above - borders_.begin()), turned};
+        return {static_cast<std::size_t>(above - borders_.begin()), turn_offset};
     }
 
     /// Returns the position at which the chords of the sheets over cell k reach q. On a half-line returns its end,
     /// because every sheet is a line there.
-    [[nodiscard]] double interpolated(std::size_t k, double turned, LoadLine line,
+    [[nodiscard]] double interpolated(std::size_t k, double turn_offset, LoadLine line,
                                       double play) const noexcept {
         if (k == 0 || k == borders_.size()) {
-            return borders_[k == 0 ? 0 : k - 1].position + turned;
+            return borders_[k == 0 ? 0 : k - 1].position + turn_offset;
         }
-        const Cell cell = cell_at(k, turned);
+        const Cell cell = cell_at(k, turn_offset);
         const Border& from = borders_[k - 1];
         const Border& to = borders_[k];
         const double width = to.position - from.position;
-        const double missing = line.intercept - (from.force + line.slope * cell.low);
+        const double slope_mismatch = line.intercept - (from.force + line.slope * cell.low);
         const double rise = to.force - from.force + line.slope * width;
         const auto chord = [&](double from_s, double to_s) {
-            const double at_from = from_s * from.loss;
-            return cell.low + width * (missing - at_from) / (rise + to_s * to.loss - at_from);
+            const double at_from = from_s * from.hysteresis;
+            return cell.low + width * (slope_mismatch - at_from) / (rise + to_s * to.hysteresis - at_from);
         };
         double start = 0.0;
         if (may_stick(cell, play)) {
@@ -375,25 +383,25 @@ class CertifiedSolver {
         return {1, {}, {}, {}, {slope}, at_zero};
     }
 
-    /// Returns a loss of zero in the same pieces, for a force without memory.
-    [[nodiscard]] static PiecewiseForce silent(const PiecewiseForce& force) {
-        PiecewiseForce loss = scaled(force, 0.0);
-        loss.network = straight(0.0, 0.0);
-        return loss;
+    /// Returns a hysteresis of zero in the same pieces, for a force without memory.
+    [[nodiscard]] static PiecewiseForce zero_hysteresis(const PiecewiseForce& force) {
+        PiecewiseForce hysteresis = scaled(force, 0.0);
+        hysteresis.network = straight(0.0, 0.0);
+        return hysteresis;
     }
 
     /// Returns the pieces from left to right; on both sides the last line is infinite.
     [[nodiscard]] static std::vector<Piece> pieces_of(const PiecewiseForce& force,
-                                                      const PiecewiseForce& loss) {
+                                                      const PiecewiseForce& hysteresis) {
         std::vector<Piece> pieces;
         const auto add_lines = [&](const std::vector<OuterLine>& of_force,
-                                   const std::vector<OuterLine>& of_loss, double y, double outward) {
+                                   const std::vector<OuterLine>& of_hysteresis, double y, double outward) {
             double g = jet(force.network, y)[0];
-            double h = jet(loss.network, y)[0];
+            double h = jet(hysteresis.network, y)[0];
             for (std::size_t k = 0; k < of_force.size(); ++k) {
                 const double end = y + outward * of_force[k].length;
                 const double g_slope = of_force[k].slope;
-                const double h_slope = of_loss[k].slope;
+                const double h_slope = of_hysteresis[k].slope;
                 pieces.push_back({{std::min(y, end), std::max(y, end)},
                                   straight(g_slope, g - g_slope * y),
                                   straight(h_slope, h - h_slope * y)});
@@ -402,10 +410,10 @@ class CertifiedSolver {
                 y = end;
             }
         };
-        add_lines(force.below, loss.below, force.lower, -1.0);
+        add_lines(force.below, hysteresis.below, force.lower, -1.0);
         std::reverse(pieces.begin(), pieces.end());
-        pieces.push_back({{force.lower, force.upper}, force.network, loss.network});
-        add_lines(force.above, loss.above, force.upper, 1.0);
+        pieces.push_back({{force.lower, force.upper}, force.network, hysteresis.network});
+        add_lines(force.above, hysteresis.above, force.upper, 1.0);
         return pieces;
     }
 
@@ -417,8 +425,9 @@ class CertifiedSolver {
         const double radius = 0.5 * (to - from);
         const Expansion g{derivatives(piece.force, middle), derivatives_rounding(piece.force, reach),
                           derivative_bounds(piece.force, from, to)};
-        const Expansion h{derivatives(piece.loss, middle), derivatives_rounding(piece.loss, reach),
-                          derivative_bounds(piece.loss, from, to)};
+        const Expansion h{derivatives(piece.hysteresis, middle),
+                          derivatives_rounding(piece.hysteresis, reach),
+                          derivative_bounds(piece.hysteresis, from, to)};
         if (!(radius_ > 0.0)) {
             return sheet_curvature(g, h, 0.0, 0.0, radius, p);
         }
@@ -460,10 +469,10 @@ class CertifiedSolver {
         const double least = p + f[1] + lowest - r * r * r * (std::abs(f[4]) / 6.0 + fifth * r / 24.0) -
                              (rounding[1] + 8.0 * epsilon * std::abs(p) +
                               r * (rounding[2] + r * (0.5 * rounding[3] + r * rounding[4] / 6.0)));
-        const double most =
+        const double most_steps =
             std::abs(f[2]) + rounding[2] +
             r * (std::abs(f[3]) + rounding[3] + r * (0.5 * (std::abs(f[4]) + rounding[4]) + r * fifth / 6.0));
-        return least > 0.0 && 8.0 * r * most <= least ? 0.5 * most / least : infinity;
+        return least > 0.0 && 8.0 * r * most_steps <= least ? 0.5 * most_steps / least : infinity;
     }
 
     /// Makes the cells from left to right, each about as wide as can be certified. Makes none if one cannot be
@@ -472,18 +481,18 @@ class CertifiedSolver {
         constexpr std::size_t most_cells = 4096;
         constexpr double narrowest = 1e-12;
         const auto border = [](const Piece& piece, double y, double curvature) {
-            return Border{y, jet(piece.force, y)[0], jet(piece.loss, y)[0], curvature};
+            return Border{y, jet(piece.force, y)[0], jet(piece.hysteresis, y)[0], curvature};
         };
         std::vector<Border> borders;
         double width = 0.125 * travel_;
         for (const Piece& piece : pieces) {
             const auto [lower, upper] = piece.positions;
             if (!std::isfinite(lower) || !std::isfinite(upper)) {
-                // F is a straight line, because the loss is constant there.
+                // F is a straight line, because h is constant there.
                 const double edge = std::isfinite(lower) ? lower : upper;
                 const double slope = piece.force.linear[0];
-                const double gain = by_radius_ * jet(piece.loss, edge)[0];
-                if (!(p + slope + std::min(0.0, gain) > 0.0) || piece.loss.linear[0] != 0.0) {
+                const double gain = by_radius_ * jet(piece.hysteresis, edge)[0];
+                if (!(p + slope + std::min(0.0, gain) > 0.0) || piece.hysteresis.linear[0] != 0.0) {
                     return;
                 }
                 continue;

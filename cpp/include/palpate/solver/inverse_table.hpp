@@ -62,7 +62,8 @@ namespace detail {
 /// the cell.
 class InverseCells {
   public:
-    InverseCells(const RisingForce& force, double asked, double width) : force_{force}, asked_{asked} {
+    InverseCells(const RisingForce& force, double largest_error, double width)
+        : force_{force}, largest_error_{largest_error} {
         const auto jet = [&](double q) {
             borders_.push_back(invert(q));
             return borders_.back().inverse;
@@ -74,13 +75,13 @@ class InverseCells {
         for (std::size_t k = 0; k < table_.size(); ++k) {
             errors_.push_back(cell_error(k, rounding));
             certified_ += certified(k) ? 1 : 0;
-            curable_ += certified(k) || errors_[k] == by_rounding ? 0 : 1;
+            improvable_ += certified(k) || errors_[k] == rounding_limited ? 0 : 1;
         }
     }
 
     /// Return the number of certified cells, and of the others that could be certified if they were narrower.
     [[nodiscard]] std::size_t certified() const noexcept { return certified_; }
-    [[nodiscard]] std::size_t curable() const noexcept { return curable_; }
+    [[nodiscard]] std::size_t improvable() const noexcept { return improvable_; }
     [[nodiscard]] std::size_t size() const noexcept { return table_.size(); }
 
     /// Returns the runs of certified cells from left to right. Runs of fewer than four cells are dropped as too short.
@@ -117,7 +118,7 @@ class InverseCells {
         double residual;  ///< F(y) - q
     };
 
-    [[nodiscard]] bool certified(std::size_t k) const noexcept { return errors_[k] <= asked_; }
+    [[nodiscard]] bool certified(std::size_t k) const noexcept { return errors_[k] <= largest_error_; }
 
     /// Applies Newton's method to the last digit, in a bracket between the ends.
     [[nodiscard]] InverseJet invert(double q) const noexcept {
@@ -125,8 +126,8 @@ class InverseCells {
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
         const bool below = q < force_.values.lower;
         const bool above = q > force_.values.upper;
-        constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
-        InverseJet at{{nowhere, nowhere, nowhere, nowhere}, {}, nowhere};
+        constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+        InverseJet at{{nan, nan, nan, nan}, {}, nan};
         if ((below && force_.folds_below) || (above && force_.folds_above)) {
             return at;
         }
@@ -171,7 +172,7 @@ class InverseCells {
     }
 
     /// Error of a cell that a narrower cell would not reduce.
-    static constexpr double by_rounding = std::numeric_limits<double>::max();
+    static constexpr double rounding_limited = std::numeric_limits<double>::max();
 
     /// Returns a bound of |P - F^-1| on one cell; infinity without a proof.
     [[nodiscard]] double cell_error(std::size_t k, const Jet& of_f) noexcept {
@@ -192,7 +193,7 @@ class InverseCells {
             }
             inner[j] *= 1.0 + 1e-9;
         }
-        const double spread = 0.5 * inner[1] + asked_;
+        const double spread = 0.5 * inner[1] + largest_error_;
         const DerivativeBounds outer = derivative_bounds(force_.network, c[0] - spread, c[0] + spread);
         const double least_slope = force_.p + jet(force_.network, c[0])[1] - of_f[1] - outer[2] * spread;
         if (!(least_slope > 0.0)) {
@@ -217,7 +218,7 @@ class InverseCells {
         const double rounding =
             table_.rounding(k)[0] + std::max(border_rounding(borders_[k], of_f, least_slope),
                                              border_rounding(borders_[k + 1], of_f, least_slope));
-        return rounding < asked_ ? truncation + rounding : by_rounding;
+        return rounding < largest_error_ ? truncation + rounding : rounding_limited;
     }
 
     /// Returns a bound of the change of a cell's polynomial by rounding at a border.
@@ -227,32 +228,33 @@ class InverseCells {
         const auto& [y, s, second, third] = at.forward;
         const double argument =
             4.0 * epsilon * (std::abs(at.forward[0]) + std::abs(force_.p * at.inverse[0]));
-        const double off = (std::abs(at.residual) + of_f[0] + argument) / least_slope;
+        const double offset = (std::abs(at.residual) + of_f[0] + argument) / least_slope;
         // An error in y changes every derivative by the next one; the change by the fourth is below rounding.
         const double f2 = std::abs(second);
         const double f3 = std::abs(third);
-        const double d1 = of_f[1] + f2 * off + 2.0 * epsilon * s;
-        const double d2 = of_f[2] + f3 * off;
+        const double d1 = of_f[1] + f2 * offset + 2.0 * epsilon * s;
+        const double d2 = of_f[2] + f3 * offset;
         const double d3 = 2.0 * of_f[3];
-        const Jet off_by{off, d1 / (s * s), d2 / (s * s * s) + 3.0 * f2 * d1 / (s * s * s * s),
-                         (6.0 * f2 * d2 + s * d3 + f3 * d1) / std::pow(s, 5) +
-                             5.0 * (3.0 * f2 * f2 + s * f3) * d1 / std::pow(s, 6)};
+        const Jet derivative_errors{offset, d1 / (s * s), d2 / (s * s * s) + 3.0 * f2 * d1 / (s * s * s * s),
+                                    (6.0 * f2 * d2 + s * d3 + f3 * d1) / std::pow(s, 5) +
+                                        5.0 * (3.0 * f2 * f2 + s * f3) * d1 / std::pow(s, 6)};
         double sum = 0.0;
         double power = 1.0;
-        for (std::size_t d = 0; d < off_by.size(); ++d) {
-            sum += detail::hermite_value[d] * (off_by[d] + 16.0 * epsilon * std::abs(at.inverse[d])) * power;
+        for (std::size_t d = 0; d < derivative_errors.size(); ++d) {
+            sum += detail::hermite_value[d] *
+                   (derivative_errors[d] + 16.0 * epsilon * std::abs(at.inverse[d])) * power;
             power *= table_.width();
         }
         return sum;
     }
 
     const RisingForce& force_;
-    double asked_;
+    double largest_error_;
     PiecewiseSeptic table_;
     std::vector<InverseJet> borders_;
     std::vector<double> errors_;
     std::size_t certified_ = 0;
-    std::size_t curable_ = 0;
+    std::size_t improvable_ = 0;
 };
 
 }  // namespace detail
@@ -260,7 +262,7 @@ class InverseCells {
 /// Returns tables of the inverse of a rising F, with the widest cells that cover all values or as many as any cells do.
 /// Near a fold the inverse is a square root, which polynomials do not approximate, so a few cells are missing there.
 /// They are also missing if F is so flat that rounding alone exceeds the required error.
-[[nodiscard]] inline std::vector<InverseTable> inverse_tables(const RisingForce& force, double asked,
+[[nodiscard]] inline std::vector<InverseTable> inverse_tables(const RisingForce& force, double largest_error,
                                                               std::size_t largest_table) {
     const double range = force.values.upper - force.values.lower;
     const double size = std::max(std::abs(force.values.lower), std::abs(force.values.upper));
@@ -270,7 +272,7 @@ class InverseCells {
     double width = std::exp2(std::floor(std::log2(range / 128.0)));
     while (range / width + 2.0 <= static_cast<double>(largest_table) && size / width < 0x1p40 &&
            PiecewiseSeptic::is_sound(width)) {
-        const detail::InverseCells cells{force, asked, width};
+        const detail::InverseCells cells{force, largest_error, width};
         const auto share = [&](std::size_t count) {
             return static_cast<double>(count) / static_cast<double>(cells.size());
         };
@@ -278,7 +280,7 @@ class InverseCells {
             covered = share(cells.certified());
             best = cells.runs();
         }
-        if (share(cells.curable()) <= left_out) {
+        if (share(cells.improvable()) <= left_out) {
             break;
         }
         width *= 0.5;

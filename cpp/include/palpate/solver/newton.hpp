@@ -115,9 +115,9 @@ struct LoadLineSolver {
             }
             // This test comes before the bracket can halve the step, and its bound is at least the rounding error of a
             // residual. Otherwise the end of the bracket would cost dozens of bisections.
-            const double close = accepted(at.position);
+            const double tolerated = accepted(at.position);
             const double size = std::abs(line.slope * at.position) + std::abs(line.intercept);
-            if (std::abs(at.residual) <= std::fmax(close * std::abs(slope), rounding * size)) {
+            if (std::abs(at.residual) <= std::fmax(tolerated * std::abs(slope), rounding * size)) {
                 at.status = slope > 0.0 ? Status::Ok : Status::NotUnique;
                 return at;
             }
@@ -127,7 +127,7 @@ struct LoadLineSolver {
                 return at;
             }
             const bool bracketed = std::isfinite(low) && std::isfinite(high);
-            if (bracketed && high - low <= close) {
+            if (bracketed && high - low <= tolerated) {
                 return at;
             }
             // Newton's step is used while it leads uphill and reduces the residual.

@@ -66,7 +66,7 @@ template <class Slope>
 /// Returns a hysteresis pair while it slides: g + s h, s = 1 for press and -1 for release.
 [[nodiscard]] inline PiecewiseForce piecewise(const HysteresisNetwork& pair, double s) {
     const NetworkCurve& g = pair.force();
-    const NetworkCurve& h = pair.loss();
+    const NetworkCurve& h = pair.hysteresis_force();
     PiecewiseForce force{g.parameters(), g.lower(), g.upper(), g.periodic(), {}, {}};
     for (std::size_t i = 0; i < force.network.weight.size(); ++i) {
         force.network.weight[i] += s * h.parameters().weight[i];
@@ -84,19 +84,19 @@ template <class Slope>
     return force;
 }
 
-/// Returns the loss h of a hysteresis pair, in the same pieces.
-[[nodiscard]] inline PiecewiseForce piecewise_loss(const HysteresisNetwork& pair) {
-    PiecewiseForce loss = piecewise(pair, 0.0);
-    loss.network = pair.loss().parameters();
+/// Returns h of a hysteresis pair, in the same pieces.
+[[nodiscard]] inline PiecewiseForce piecewise_hysteresis(const HysteresisNetwork& pair) {
+    PiecewiseForce hysteresis = piecewise(pair, 0.0);
+    hysteresis.network = pair.hysteresis_force().parameters();
     const PiecewiseForce press = piecewise(pair, 1.0);
     const auto subtract = [](std::vector<OuterLine>& slopes, const std::vector<OuterLine>& of_press) {
         for (std::size_t k = 0; k < slopes.size(); ++k) {
             slopes[k].slope = of_press[k].slope - slopes[k].slope;
         }
     };
-    subtract(loss.below, press.below);
-    subtract(loss.above, press.above);
-    return loss;
+    subtract(hysteresis.below, press.below);
+    subtract(hysteresis.above, press.above);
+    return hysteresis;
 }
 
 /// Returns the force multiplied by a factor.

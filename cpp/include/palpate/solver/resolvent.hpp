@@ -27,9 +27,9 @@ struct Branch {
     Interval values{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     Interval positions{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     InverseTable table;
-    double line_slope = 0.0;  ///< p + f' of a straight line; 0: a curve
-    double bend_low = 0.0;    ///< |f''| at an end that is a fold
-    double bend_high = 0.0;
+    double line_slope = 0.0;     ///< p + f' of a straight line; 0: a curve
+    double curvature_low = 0.0;  ///< |f''| at an end that is a fold
+    double curvature_high = 0.0;
 
     /// Returns the position on a straight line, from its finite end.
     [[nodiscard]] double on_line(double q) const noexcept {
@@ -40,10 +40,10 @@ struct Branch {
     /// Returns a start for Newton's method: a parabola near a fold, elsewhere the last position.
     [[nodiscard]] double first_guess(double q, double last) const noexcept {
         const double near = 0.1 * (values.upper - values.lower);
-        if (bend_high > 0.0 && values.upper - q < near) {
-            last = positions.upper - std::sqrt(2.0 * (values.upper - q) / bend_high);
-        } else if (bend_low > 0.0 && q - values.lower < near) {
-            last = positions.lower + std::sqrt(2.0 * (q - values.lower) / bend_low);
+        if (curvature_high > 0.0 && values.upper - q < near) {
+            last = positions.upper - std::sqrt(2.0 * (values.upper - q) / curvature_high);
+        } else if (curvature_low > 0.0 && q - values.lower < near) {
+            last = positions.lower + std::sqrt(2.0 * (q - values.lower) / curvature_low);
         }
         return last > positions.lower && last < positions.upper ? last
                                                                 : 0.5 * (positions.lower + positions.upper);
@@ -76,7 +76,7 @@ class Resolvent {
     Resolvent(const PiecewiseForce& force, double p, const ResolventOptions& options = {})
         : solver_{force, p}, slope_{p}, period_{force.upper - force.lower} {
         if (std::isfinite(p)) {
-            branch_out(force, options);
+            build_branches(force, options);
         }
     }
     Resolvent(const NetworkCurve& curve, double p, const ResolventOptions& options = {})
@@ -117,19 +117,20 @@ class Resolvent {
         const double q = line.intercept;
         if (branch.table.covers(q) && memory.turns == 0.0 && line.slope == slope_) {
             memory.newton.position = branch.table.at(q);
-            return answer(memory.newton.position, q, false);
+            return solution_at(memory.newton.position, q, false);
         }
-        return elsewhere(environment, state, line, memory);
+        return solve_outside_table(environment, state, line, memory);
     }
 
     /// Returns the unique solution if a table or a line gives it without an evaluation; otherwise NaN.
-    [[nodiscard, gnu::always_inline]] inline Solution look_up(LoadLine line, Memory& memory) const noexcept {
+    [[nodiscard, gnu::always_inline]] inline Solution without_evaluation(LoadLine line,
+                                                                         Memory& memory) const noexcept {
         const Branch& branch = branches_[memory.branch];
         const double q = line.intercept;
         if (branch.table.covers(q) && memory.turns == 0.0 && line.slope == slope_) {
-            return answer(branch.table.at(q), q, false);
+            return solution_at(branch.table.at(q), q, false);
         }
-        return look_further(line, memory);
+        return from_any_branch(line, memory);
     }
 
     /// Solves from a start, without memory.
@@ -142,14 +143,15 @@ class Resolvent {
 
   private:
     /// Returns position and force. Slope and energy would double the cost, and no structure uses them.
-    [[nodiscard]] Solution answer(double y, double q, bool extrapolated) const noexcept {
+    [[nodiscard]] Solution solution_at(double y, double q, bool extrapolated) const noexcept {
         constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
         return {y, {q - slope_ * y, unknown, unknown, extrapolated}};
     }
 
     template <Environment E>
-    [[nodiscard, gnu::noinline]] Solution elsewhere(const E& environment, const typename E::State& state,
-                                                    LoadLine line, Memory& memory) const noexcept {
+    [[nodiscard, gnu::noinline]] Solution solve_outside_table(const E& environment,
+                                                              const typename E::State& state, LoadLine line,
+                                                              Memory& memory) const noexcept {
         if (!(branches_.size() > 1 && line.slope == slope_ && std::isfinite(line.intercept) &&
               std::isfinite(memory.newton.position))) {
             const Solution solution = solver_.solve(environment, state, line, memory.newton);
@@ -160,7 +162,7 @@ class Resolvent {
             return solution;
         }
         if (unique(slope_)) {
-            Solution solution = look_further(line, memory);
+            Solution solution = from_any_branch(line, memory);
             if (std::isnan(solution.position)) {
                 return solver_.solve(environment, state, line, memory.newton);
             }
@@ -169,18 +171,19 @@ class Resolvent {
         }
         Memory next = memory;
         if (next.branch == 0) {
-            place(environment, state, line, next);
+            locate_branch(environment, state, line, next);
         }
-        walk(line.intercept, next);
+        find_branch(line.intercept, next);
         Solution solution = on_branch(line.intercept, next);
         if (std::isnan(solution.position)) {
             const Branch& branch = branches_[next.branch];
-            const double turned = period_ * next.turns;
+            const double turn_offset = period_ * next.turns;
             const double q =
-                std::clamp(line.intercept - slope_ * turned, branch.values.lower, branch.values.upper);
+                std::clamp(line.intercept - slope_ * turn_offset, branch.values.lower, branch.values.upper);
             solution = uncertified().solve(
-                environment, state, line, branch.first_guess(q, next.newton.position - turned) + turned,
-                {branch.positions.lower + turned, branch.positions.upper + turned});
+                environment, state, line,
+                branch.first_guess(q, next.newton.position - turn_offset) + turn_offset,
+                {branch.positions.lower + turn_offset, branch.positions.upper + turn_offset});
         }
         if (solution.status != Status::NonFinite) {
             next.newton = CertifiedSolver::Memory{solution.position};
@@ -190,35 +193,36 @@ class Resolvent {
     }
 
     /// Looks up the solution on any branch.
-    [[nodiscard, gnu::noinline]] Solution look_further(LoadLine line, Memory& memory) const noexcept {
+    [[nodiscard, gnu::noinline]] Solution from_any_branch(LoadLine line, Memory& memory) const noexcept {
         if (!(branches_.size() > 1 && line.slope == slope_ && std::isfinite(line.intercept))) {
-            constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
-            return answer(nowhere, nowhere, false);
+            constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+            return solution_at(nan, nan, false);
         }
         memory.branch = std::max(memory.branch, std::size_t{1});
-        walk(line.intercept, memory);
+        find_branch(line.intercept, memory);
         return on_branch(line.intercept, memory);
     }
 
     /// Looks up the solution on the branch in the memory; NaN if it has neither a table nor a line.
     [[nodiscard]] Solution on_branch(double intercept, const Memory& memory) const noexcept {
         const Branch& branch = branches_[memory.branch];
-        const double turned = period_ * memory.turns;
-        const double q = std::clamp(intercept - slope_ * turned, branch.values.lower, branch.values.upper);
+        const double turn_offset = period_ * memory.turns;
+        const double q =
+            std::clamp(intercept - slope_ * turn_offset, branch.values.lower, branch.values.upper);
         if (branch.table.covers(q)) {
-            return answer(branch.table.at(q) + turned, intercept, false);
+            return solution_at(branch.table.at(q) + turn_offset, intercept, false);
         }
         if (branch.line_slope > 0.0) {
-            return answer(branch.on_line(q), q, true);
+            return solution_at(branch.on_line(q), q, true);
         }
-        constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
-        return answer(nowhere, nowhere, false);
+        constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+        return solution_at(nan, nan, false);
     }
 
     /// Sets the branch that holds the last position. Where F falls, sets the branch in the direction of -residual.
     template <Environment E>
-    void place(const E& environment, const typename E::State& state, LoadLine line,
-               Memory& memory) const noexcept {
+    void locate_branch(const E& environment, const typename E::State& state, LoadLine line,
+                       Memory& memory) const noexcept {
         const double y = memory.newton.position;
         memory.turns = repeats_ ? std::floor((y - branches_[1].positions.lower) / period_) : 0.0;
         double along = y - memory.turns * period_;
@@ -233,18 +237,18 @@ class Resolvent {
         }
         if (along < branches_[memory.branch].positions.lower &&
             environment.at(y, state).force + line.slope * y > line.intercept) {
-            retreat(memory);
+            to_previous_branch(memory);
         }
     }
 
-    void advance(Memory& memory) const noexcept {
+    void to_next_branch(Memory& memory) const noexcept {
         if (++memory.branch == branches_.size()) {
             memory.branch = 1;
             memory.turns += 1.0;
         }
     }
 
-    void retreat(Memory& memory) const noexcept {
+    void to_previous_branch(Memory& memory) const noexcept {
         if (--memory.branch == 0) {
             memory.branch = branches_.size() - 1;
             memory.turns -= 1.0;
@@ -252,7 +256,7 @@ class Resolvent {
     }
 
     /// Moves over the branches to the first one that contains q.
-    void walk(double q, Memory& memory) const noexcept {
+    void find_branch(double q, Memory& memory) const noexcept {
         const double turn = slope_ * period_;
         if (repeats_) {
             // Skips whole turns without a root.
@@ -267,26 +271,26 @@ class Resolvent {
         // Two turns are sufficient. The limit ends the loop at positions so large that rounding exceeds a turn.
         std::size_t steps = 2 * branches_.size();
         while (q - memory.turns * turn > branches_[memory.branch].values.upper && steps-- > 0) {
-            advance(memory);
+            to_next_branch(memory);
         }
         while (q - memory.turns * turn < branches_[memory.branch].values.lower && steps-- > 0) {
-            retreat(memory);
+            to_previous_branch(memory);
         }
     }
 
-    void branch_out(const PiecewiseForce& force, const ResolventOptions& options) {
-        const auto stretches = rising_stretches(force.network, slope_, force.lower, force.upper);
+    void build_branches(const PiecewiseForce& force, const ResolventOptions& options) {
+        const auto intervals = rising_intervals(force.network, slope_, force.lower, force.upper);
         const auto rises = [&](const std::vector<OuterLine>& side) {
             return side.empty() || slope_ + side.back().slope > 0.0;
         };
-        if (!stretches || !rises(force.below) || !rises(force.above) ||
-            (force.periodic && (stretches->empty() || !(slope_ > 0.0)))) {
+        if (!intervals || !rises(force.below) || !rises(force.above) ||
+            (force.periodic && (intervals->empty() || !(slope_ > 0.0)))) {
             return;
         }
         add_lines(force.below, force.lower, total(force, force.lower), -1.0);
         std::reverse(branches_.begin() + 1, branches_.end());
-        for (const Interval& positions : *stretches) {
-            add_stretch(force, positions, options);
+        for (const Interval& positions : *intervals) {
+            add_interval(force, positions, options);
         }
         add_lines(force.above, force.upper, total(force, force.upper), 1.0);
         repeats_ = force.periodic;
@@ -297,15 +301,15 @@ class Resolvent {
     }
 
     /// Adds the tables of a rising interval, and branches without a table for the gaps between them.
-    void add_stretch(const PiecewiseForce& force, Interval positions, const ResolventOptions& options) {
+    void add_interval(const PiecewiseForce& force, Interval positions, const ResolventOptions& options) {
         const Interval values{total(force, positions.lower), total(force, positions.upper)};
         const bool folds_below = positions.lower > force.lower;
         const bool folds_above = positions.upper < force.upper;
-        const auto bend = [&](double y) { return std::abs(jet(force.network, y)[2]); };
+        const auto curvature = [&](double y) { return std::abs(jet(force.network, y)[2]); };
         Branch gap;
         gap.values = values;
         gap.positions = positions;
-        gap.bend_low = folds_below ? bend(positions.lower) : 0.0;
+        gap.curvature_low = folds_below ? curvature(positions.lower) : 0.0;
         const auto close_gap = [&](double value, double position) {
             gap.values.upper = value;
             gap.positions.upper = position;
@@ -328,7 +332,7 @@ class Resolvent {
             branch.table = std::move(table);
             branches_.push_back(std::move(branch));
         }
-        gap.bend_high = folds_above ? bend(positions.upper) : 0.0;
+        gap.curvature_high = folds_above ? curvature(positions.upper) : 0.0;
         close_gap(values.upper, positions.upper);
         highest_ = std::max(highest_, values.upper);
         lowest_ = std::min(lowest_, values.lower);

@@ -19,7 +19,7 @@ namespace palpate {
 /// A bisection proves on every cell that p + f' keeps its sign, or that it is monotone and has one zero. The proof uses
 /// its value and slope in the middle of the cell and the bound of |f'''| over the cell. Returns nothing if a fold is
 /// too flat to be distinguished from a curve without a fold.
-[[nodiscard]] inline std::optional<std::vector<Interval>> rising_stretches(const NetworkParameters& network,
+[[nodiscard]] inline std::optional<std::vector<Interval>> rising_intervals(const NetworkParameters& network,
                                                                            double p, double lower,
                                                                            double upper) {
     constexpr int first_cells = 61;
@@ -33,25 +33,25 @@ namespace palpate {
         const auto border = [&](int j) { return lower + (upper - lower) * j / first_cells; };
         cells.push_back({k == 1 ? lower : border(k - 1), k == first_cells ? upper : border(k)});
     }
-    std::vector<Interval> stretches;
+    std::vector<Interval> intervals;
     const double first_slope = slope(lower);
     if (!(std::abs(first_slope) > margin)) {
         return std::nullopt;
     }
     bool rises = first_slope > 0.0;
     double start = lower;  // of the current interval
-    for (int looked_at = 0; !cells.empty(); ++looked_at) {
+    for (int examined = 0; !cells.empty(); ++examined) {
         const Interval cell = cells.back();
         cells.pop_back();
         const double middle = 0.5 * (cell.lower + cell.upper);
         const double radius = 0.5 * (cell.upper - cell.lower);
-        const Jet here = jet(network, middle);
+        const Jet at_middle = jet(network, middle);
         const double jerk = derivative_bounds(network, cell.lower, cell.upper)[3];
-        const double bend = std::abs(here[2]);
-        if (std::abs(p + here[1]) > (bend + rounding[2] + 0.5 * jerk * radius) * radius + margin) {
+        const double curvature = std::abs(at_middle[2]);
+        if (std::abs(p + at_middle[1]) > (curvature + rounding[2] + 0.5 * jerk * radius) * radius + margin) {
             continue;
         }
-        if (bend - rounding[2] > jerk * radius) {
+        if (curvature - rounding[2] > jerk * radius) {
             double left = cell.lower;
             double right = cell.upper;
             const double at_left = slope(left);
@@ -69,21 +69,21 @@ namespace palpate {
                 if (rises) {
                     start = right;
                 } else {
-                    stretches.push_back({start, left});
+                    intervals.push_back({start, left});
                 }
                 continue;
             }
         }
-        if (looked_at >= budget || !(radius > 1e-12 * (upper - lower))) {
+        if (examined >= budget || !(radius > 1e-12 * (upper - lower))) {
             return std::nullopt;
         }
         cells.push_back({middle, cell.upper});
         cells.push_back({cell.lower, middle});
     }
     if (rises) {
-        stretches.push_back({start, upper});
+        intervals.push_back({start, upper});
     }
-    return stretches;
+    return intervals;
 }
 
 }  // namespace palpate

@@ -57,12 +57,12 @@ class SlidingResolvent {
                                                             const typename E::State& state, LoadLine line,
                                                             Memory& memory) const noexcept {
         if (unique(line.slope)) {
-            const Solution press = press_.look_up(line, memory.press);
+            const Solution press = press_.without_evaluation(line, memory.press);
             if (press.position >= state.play + radius_) {
                 memory.newton = CertifiedSolver::Memory{press.position};
                 return press;
             }
-            const Solution release = release_.look_up(line, memory.release);
+            const Solution release = release_.without_evaluation(line, memory.release);
             if (release.position <= state.play - radius_) {
                 memory.newton = CertifiedSolver::Memory{release.position};
                 return release;

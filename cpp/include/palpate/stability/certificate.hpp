@@ -47,7 +47,7 @@ struct Certificate {
     Verdict verdict = Verdict::Refused;
     double longest_period_s = 0.0;
     std::string fingerprint;
-    std::string why;
+    std::string reason;
 
     /// Returns true if the rendering is passive.
     [[nodiscard]] bool certified() const noexcept { return verdict == Verdict::Certified; }
@@ -55,19 +55,19 @@ struct Certificate {
 
 template <>
 inline constexpr auto fields_of<Certificate> = std::tuple{
-    Field<&Certificate::model>{"model", "Fingerprint of the model; empty where only bounds were certified."},
-    Field<&Certificate::scheme>{"scheme", "How the model is rendered."},
-    Field<&Certificate::device>{"device", "The device it holds for."},
-    Field<&Certificate::bounds>{"bounds", "Of the force that is rendered, compensation included."},
-    Field<&Certificate::inequalities>{"inequalities", "Every line with both its sides."},
+    Field<&Certificate::model>{"model", "Fingerprint of the model; empty if only bounds were certified."},
+    Field<&Certificate::scheme>{"scheme", "Structure that renders the model, with its numbers."},
+    Field<&Certificate::device>{"device", "Device for which it holds."},
+    Field<&Certificate::bounds>{"bounds", "Bounds of the rendered force, compensation included."},
+    Field<&Certificate::inequalities>{"inequalities", "All inequalities with both sides."},
     Field<&Certificate::verdict>{"verdict", "certified, stable-locally or refused."},
     Field<&Certificate::longest_period_s>{
         "longest_period_s",
-        "Time between two samples up to which every inequality holds [s]; 0 where one does not.",
+        "Longest time between two samples for which every inequality holds [s]; 0 if one does not hold.",
         Rule::NotNegative},
     Field<&Certificate::fingerprint>{"fingerprint",
-                                     "16 hexadecimal digits over every stored number and name before it."},
-    Field<&Certificate::why>{"why", "One sentence.", Rule::Any, false}};
+                                     "16 hexadecimal digits computed from all other stored fields."},
+    Field<&Certificate::reason>{"reason", "Reason for the verdict, one sentence.", Rule::Any, false}};
 
 namespace detail {
 
@@ -121,7 +121,7 @@ void hash_value(NumberHash& hash, const T& value) {
     std::vector<Inequality> lines = with_kind(
         scheme.structure, [&](auto structure) { return inequalities(structure, bounds, scheme, device); });
     if (bounds.drag > 0.0 && !traits_of(scheme.structure).velocity) {
-        lines.push_back({"velocity-coupling", "force of velocity, not rendered directly", "B_v = 0", 0.0,
+        lines.push_back({"velocity-coupling", "force of velocity without direct rendering", "B_v = 0", 0.0,
                          bounds.drag, Basis::None, "use direct rendering"});
     }
     return lines;
@@ -185,15 +185,14 @@ namespace detail {
 [[nodiscard]] inline std::string reason(const std::vector<Inequality>& lines, Verdict verdict) {
     for (const Inequality& line : lines) {
         if (!line.holds()) {
-            return (line.rests_on == Basis::None ? "no bound is known: " : "") + shortfall(line);
+            return (line.basis == Basis::None ? "no bound is known: " : "") + shortfall(line);
         }
     }
     std::string text = verdict == Verdict::Certified
                            ? "every inequality is proved and holds"
                            : "the linearised system is stable; energy is not accounted for";
     if (const Inequality* least = tightest(lines)) {
-        text +=
-            "; the tightest, " + least->name + ", has " + readable(100.0 * least->reserve()) + " % to spare";
+        text += "; smallest reserve: " + least->name + ", " + readable(100.0 * least->reserve()) + " %";
     }
     return text;
 }
@@ -214,18 +213,17 @@ namespace detail {
     certificate.bounds = bounds;
     std::vector<Inequality> lines = inequalities_of(bounds, scheme, device);
     if (!finite(bounds)) {
-        certificate.why = "a bound of the model is not a finite number";
+        certificate.reason = "a bound of the model is not a finite number";
         certificate.inequalities = std::move(lines);
         return certificate;
     }
     if (all_hold(lines)) {
-        const bool proved = std::all_of(lines.begin(), lines.end(), [](const Inequality& line) {
-            return line.rests_on != Basis::Linear;
-        });
+        const bool proved = std::all_of(lines.begin(), lines.end(),
+                                        [](const Inequality& line) { return line.basis != Basis::Linear; });
         certificate.verdict = proved ? Verdict::Certified : Verdict::StableLocally;
         certificate.longest_period_s = detail::longest_period(lines, bounds, scheme, device);
     }
-    certificate.why = detail::reason(lines, certificate.verdict);
+    certificate.reason = detail::reason(lines, certificate.verdict);
     certificate.inequalities = std::move(lines);
     certificate.fingerprint = fingerprint_of(certificate);
     return certificate;
@@ -245,8 +243,9 @@ namespace detail {
     const double limit =
         has_mass(scheme.structure) ? std::numeric_limits<double>::infinity() : device.force_limit;
     ForceBounds bounds = rendered_bounds(force_bounds(model, scheme.play_radius, limit), scheme);
-    if (traits_of(scheme.structure).keeps_loss && model.hysteresis() != nullptr) {
-        bounds.mean_force = detail::mean_push({model.hysteresis()->force(), nullptr, bounds.sliding}, limit);
+    if (traits_of(scheme.structure).may_reduce_hysteresis && model.hysteresis() != nullptr) {
+        bounds.mean_force =
+            detail::active_mean({model.hysteresis()->force(), nullptr, bounds.sliding}, limit);
     }
     return bounds;
 }

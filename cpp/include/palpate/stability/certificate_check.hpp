@@ -31,24 +31,24 @@ namespace detail {
 [[nodiscard]] inline std::string disagrees(const std::string& path, double stored, double recomputed,
                                            const char* bound = "") {
     return "certificate." + path + " is " + readable(stored) + ": must be " + bound + readable(recomputed) +
-           ", which is what model and device give; plan it again";
+           ", computed from model and device; plan it again";
 }
 
 /// Returns a sentence if a stored bound does not hold for the model. It may be wider than the bound computed today: an
 /// older release used wider bounds, and its proofs remain valid.
-[[nodiscard]] inline std::string tighter_than_true(const ForceBounds& stored, const ForceBounds& now) {
-    std::string wrong;
+[[nodiscard]] inline std::string narrower_bound(const ForceBounds& stored, const ForceBounds& now) {
+    std::string difference;
     for_each_field<ForceBounds>([&](const auto& field) {
         const auto bound = static_cast<double>(field.of(stored));
         const auto true_bound = static_cast<double>(field.of(now));
         const bool lower = std::string_view{field.name}.ends_with("_min");
-        if (wrong.empty() && !(lower ? bound <= true_bound : bound >= true_bound) &&
+        if (difference.empty() && !(lower ? bound <= true_bound : bound >= true_bound) &&
             !agree(bound, true_bound)) {
-            wrong = disagrees(std::string("bounds.") + field.name, bound, true_bound,
-                              lower ? "at most " : "at least ");
+            difference = disagrees(std::string("bounds.") + field.name, bound, true_bound,
+                                   lower ? "at most " : "at least ");
         }
     });
-    return wrong;
+    return difference;
 }
 
 /// Returns a sentence about the first difference between two lines; empty without one.
@@ -72,35 +72,37 @@ namespace detail {
 [[nodiscard]] inline std::string device_difference(const DeviceProfile& certified,
                                                    const DeviceProfile& device) {
     const std::string opening = "the certificate is for the device " + certified.id;
-    std::string wrong;
+    std::string difference;
     for_each_field<DeviceProfile>([&](const auto& field) {
         const auto& before = field.of(certified);
         const auto& now = field.of(device);
-        if (!wrong.empty()) {
+        if (!difference.empty()) {
             return;
         }
         if constexpr (std::is_same_v<decltype(before), const std::string&>) {
             if (&before == &certified.id && before != now) {
-                wrong = opening + ", and this is " + now + "; plan it again for this one";
+                difference = opening + ", not for " + now + "; plan it again for this device";
             } else if (before != now) {
-                wrong = opening + " in " + before + ", and here it moves in " + now;
+                difference = opening + " in " + before + ", not in " + now;
             }
         } else if (!agree(before, now)) {
-            wrong = opening + " with " + field.name + " = " + readable(before) + ", and here it is " +
-                    readable(now) + "; plan it again";
+            difference = opening + " with " + field.name + " = " + readable(before) + ", not " +
+                         readable(now) + "; plan it again";
         }
     });
-    return wrong;
+    return difference;
 }
 
 /// Recomputes a stored certificate and returns the result, with its texts. The stored sides, verdict and period must
 /// follow from the stored bounds. The stored bounds must contain the bounds computed from the model. Throws
 /// std::invalid_argument with the first field that differs, its value and the right one.
 [[nodiscard]] inline Certificate checked(const Certificate& stored, const ForceModel& model) {
-    const auto require = [](const std::string& wrong) { detail::require(wrong.empty(), wrong); };
+    const auto require = [](const std::string& difference) {
+        detail::require(difference.empty(), difference);
+    };
     if (const std::string now = fingerprint(model); stored.model != now) {
         require("certificate.model is \"" + stored.model + "\": must be \"" + now +
-                "\", that of this network; it was changed after it was certified, plan it again");
+                "\", that of this network; the model was changed after it was certified, plan it again");
     }
     ForceBounds bounds;
     try {
@@ -108,13 +110,13 @@ namespace detail {
         validate(stored.scheme, model);
         bounds = rendered_bounds(model, stored.scheme, stored.device);
     } catch (const std::invalid_argument& error) {
-        require(std::string("certificate is of an impossible plan: ") + error.what());
+        require(std::string("the plan of the certificate is invalid: ") + error.what());
     }
-    require(detail::tighter_than_true(stored.bounds, bounds));
+    require(detail::narrower_bound(stored.bounds, bounds));
     Certificate now = certify_rendered(stored.bounds, stored.scheme, stored.device);
     if (stored.verdict != now.verdict || now.verdict == Verdict::Refused) {
         require("certificate.verdict is \"" + std::string(name_of(stored.verdict)) + "\": must be \"" +
-                std::string(name_of(now.verdict)) + "\", " + now.why);
+                std::string(name_of(now.verdict)) + "\", " + now.reason);
     }
     if (stored.inequalities.size() != now.inequalities.size()) {
         require("certificate.inequalities has " + std::to_string(stored.inequalities.size()) +

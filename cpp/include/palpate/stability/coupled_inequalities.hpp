@@ -19,7 +19,7 @@ namespace palpate {
 namespace detail {
 
 /// Returns true if the device has a delay.
-[[nodiscard]] inline bool late(const DeviceProfile& device) noexcept {
+[[nodiscard]] inline bool has_delay(const DeviceProfile& device) noexcept {
     return device.late_samples() > 0;
 }
 
@@ -34,10 +34,10 @@ namespace detail {
 [[nodiscard]] inline Inequality coupling_inequality(VirtualCoupling coupling, double falling,
                                                     const DeviceProfile& device) {
     return {"damping-coupling",
-            late(device) ? "viscous damping against the held, late coupling"
-                         : "viscous damping against the held coupling",
-            late(device) ? "b >= T (s_ / 2 + max |H - s_|^2 / (2 (K_c + 2 B_c / T - s_)))"
-                         : "b >= K_c T / 2 + B_c",
+            has_delay(device) ? "viscous damping against the held and delayed coupling"
+                              : "viscous damping against the held coupling",
+            has_delay(device) ? "b >= T (s_ / 2 + max |H - s_|^2 / (2 (K_c + 2 B_c / T - s_)))"
+                              : "b >= K_c T / 2 + B_c",
             device.viscous_damping,
             device.longest_period_s() * coupling_need(coupling, device.period_s, device.whole_delay_samples(),
                                                       device.delay_fraction(), falling),
@@ -46,9 +46,9 @@ namespace detail {
 }
 
 /// Adds the line h >= 0, if the model has hysteresis.
-inline void add_loss(std::vector<Inequality>& lines, const ForceBounds& bounds) {
+inline void add_hysteresis(std::vector<Inequality>& lines, const ForceBounds& bounds) {
     if (bounds.hysteresis) {
-        lines.push_back(loss_inequality(bounds));
+        lines.push_back(nonnegative_hysteresis(bounds));
     }
 }
 
@@ -70,7 +70,7 @@ inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBound
 inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                           const DeviceProfile& device) {
     add_no_quantisation(lines, bounds, device, "encoder steps and a mass behind a coupling",
-                        "leave the mass out (mass 0, damping 0)");
+                        "leave the mass out (mass 0, object damping 0)");
 }
 
 /// Returns p + min f' > 0: the load line has one solution.
@@ -93,17 +93,18 @@ inline constexpr double usual_coupling_share = 0.95;
 /// Returns the largest coupling stiffness for which `share` of the device's damping is sufficient. The coupling has
 /// damping, and the force of the object falls with a slope of at most `falling`. Returns 0 if no stiffness is
 /// certified.
-[[nodiscard]] inline double stiffest_coupling(double damping, double falling, const DeviceProfile& device,
+[[nodiscard]] inline double stiffest_coupling(double coupling_damping, double falling,
+                                              const DeviceProfile& device,
                                               double share = usual_coupling_share) {
     constexpr double finer = 0.97;
     constexpr double softest = 1e-9;
     constexpr int halvings = 40;
-    DeviceProfile spared = device;
-    spared.viscous_damping *= share;
+    DeviceProfile reduced = device;
+    reduced.viscous_damping *= share;
     const auto fits = [&](double stiffness) {
-        return detail::coupling_inequality({stiffness, damping}, falling, spared).holds();
+        return detail::coupling_inequality({stiffness, coupling_damping}, falling, reduced).holds();
     };
-    const double most = 2.0 * spared.viscous_damping / device.longest_period_s();
+    const double most = 2.0 * reduced.viscous_damping / device.longest_period_s();
     double low = most;
     while (low > softest * most && !fits(low)) {
         low *= finer;
@@ -126,19 +127,20 @@ inline constexpr double usual_coupling_share = 0.95;
     const VirtualCoupling coupling = scheme.coupling;
     const double p = coupling.load_line_slope(device.period_s);
     std::vector<Inequality> lines;
-    detail::add_loss(lines, bounds);
+    detail::add_hysteresis(lines, bounds);
     lines.push_back(
         detail::uniqueness(p, bounds.falling(), coupling.damping == 0.0 ? "K_c > s_" : "K_c + B_c / T > s_"));
     if (!lines.back().holds()) {
         return lines;
     }
     if (coupling.damping == 0.0 && !bounds.hysteresis) {
-        ForceBounds felt = bounds;
-        felt.slope = {felt_slope(bounds.slope.lower, coupling.stiffness),
-                      std::isfinite(bounds.slope.upper) ? felt_slope(bounds.slope.upper, coupling.stiffness)
-                                                        : bounds.slope.upper};
-        felt.steepest = felt.sliding = felt.slope.largest();
-        for (Inequality& line : direct_inequalities(felt, device)) {
+        ForceBounds series = bounds;
+        series.slope = {slope_behind_coupling(bounds.slope.lower, coupling.stiffness),
+                        std::isfinite(bounds.slope.upper)
+                            ? slope_behind_coupling(bounds.slope.upper, coupling.stiffness)
+                            : bounds.slope.upper};
+        series.steepest = series.sliding = series.slope.largest();
+        for (Inequality& line : direct_inequalities(series, device)) {
             line.formula += ", M and L of K_c f' / (K_c + f')";
             lines.push_back(std::move(line));
         }
@@ -166,16 +168,16 @@ inline constexpr double usual_coupling_share = 0.95;
     const VirtualCoupling coupling = scheme.coupling;
     const double T = device.period_s;
     const double damped = 2.0 * scheme.inertia.damping / T;
-    const double alone = scheme.inertia.load_line_slope(T);
+    const double uncoupled = scheme.inertia.load_line_slope(T);
     const double coupled = coupling.load_line_slope(T);
     std::vector<Inequality> lines;
-    detail::add_loss(lines, bounds);
+    detail::add_hysteresis(lines, bounds);
     if (detail::limit_acts(device)) {
         lines.push_back(detail::coupling_inequality(coupling, 0.0, device));
         lines.push_back(detail::unknown(
-            "falling-slope-limit", "falling force of an object with mass, with a force limit",
+            "falling-slope-limit", "falling force of a force-limited object with mass",
             "known for s_ <= 2 B_o / T", damped, bounds.falling(), "use the energy-consistent structure"));
-        lines.push_back(detail::uniqueness(alone, bounds.falling(), "m / T^2 + B_o / T > s_"));
+        lines.push_back(detail::uniqueness(uncoupled, bounds.falling(), "m / T^2 + B_o / T > s_"));
         detail::add_no_quantisation_of_a_mass(lines, bounds, device);
         return lines;
     }
@@ -183,7 +185,7 @@ inline constexpr double usual_coupling_share = 0.95;
                      "K_c + (B_c + 2 B_o) / T >= s_", coupled + damped, bounds.falling(), Basis::Proved,
                      "docs/certificate.md"});
     lines.push_back(detail::coupling_inequality(coupling, std::max(0.0, bounds.falling() - damped), device));
-    lines.push_back(detail::uniqueness(coupled + alone, bounds.falling(), "p > s_"));
+    lines.push_back(detail::uniqueness(coupled + uncoupled, bounds.falling(), "p > s_"));
     if (!bounds.hysteresis && bounds.slope.lower == bounds.slope.upper) {
         lines.push_back(detail::friction_inequality(
             device, implicit_gain(bounds.slope.lower, scheme.inertia, coupling, T), bounds.mean_force,
@@ -202,14 +204,14 @@ inline constexpr double usual_coupling_share = 0.95;
     const VirtualCoupling coupling = scheme.coupling;
     const double T = device.period_s;
     const bool limited = detail::limit_acts(device);
-    const double alone = scheme.inertia.midpoint_slope(T);
+    const double uncoupled = scheme.inertia.midpoint_slope(T);
     const double coupled = coupling.load_line_slope(T);
     std::vector<Inequality> lines;
-    detail::add_loss(lines, bounds);
+    detail::add_hysteresis(lines, bounds);
     lines.push_back(detail::coupling_inequality(coupling, 0.0, device));
     lines.push_back({"solution-exists", "a solution of every step",
                      limited ? "2 m / T^2 + B_o / T > s_ / 2" : "p > s_ / 2",
-                     limited ? alone : alone + coupled, 0.5 * bounds.falling(), Basis::Proved,
+                     limited ? uncoupled : uncoupled + coupled, 0.5 * bounds.falling(), Basis::Proved,
                      "docs/certificate.md", true});
     detail::add_no_quantisation_of_a_mass(lines, bounds, device);
     return lines;

@@ -22,7 +22,7 @@ namespace detail {
 /// inequality it is at most 1 / (1 - (N h)^2 / 8) of the largest value at points h apart. The result is never below the
 /// true maximum, and at most 2e-6 of it above.
 template <class Polynomial>
-[[nodiscard]] double most_over_frequencies(int degree, Polynomial polynomial) noexcept {
+[[nodiscard]] double largest_over_frequencies(int degree, Polynomial polynomial) noexcept {
     const int points = 1024 * degree;
     double largest = 0.0;
     for (int k = 0; k <= points; ++k) {
@@ -44,10 +44,11 @@ template <class Need>
 [[nodiscard]] double need_up_to(int whole, double fraction, Need need) noexcept {
     double largest = 0.0;
     for (int n = 1; n <= whole; ++n) {
-        largest = std::max(largest, most_over_frequencies(n + 1, [&](double phi) { return need(n, phi); }));
+        largest =
+            std::max(largest, largest_over_frequencies(n + 1, [&](double phi) { return need(n, phi); }));
     }
     if (fraction > 0.0) {
-        largest = std::max(largest, most_over_frequencies(whole + 2, [&](double phi) {
+        largest = std::max(largest, largest_over_frequencies(whole + 2, [&](double phi) {
                                return (1.0 - fraction) * need(whole, phi) + fraction * need(whole + 1, phi);
                            }));
     }
@@ -98,10 +99,10 @@ template <class Need>
     }
     const double beta = coupling.damping / period_s;
     const double p = coupling.load_line_slope(period_s);
-    const double carried = std::max(1.0, falling / (coupling.stiffness - falling));
+    const double amplification = std::max(1.0, falling / (coupling.stiffness - falling));
     double gain = 0.0;
     for (const double slope : {-falling, bounds.rising()}) {
-        gain = std::max(gain, std::abs(slope) * (p + beta * carried) / (p + slope));
+        gain = std::max(gain, std::abs(slope) * (p + beta * amplification) / (p + slope));
     }
     return gain;
 }

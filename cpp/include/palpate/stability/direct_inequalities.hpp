@@ -31,9 +31,14 @@ namespace detail {
 }
 
 /// Returns the line h >= 0 for hysteresis.
-[[nodiscard]] inline Inequality loss_inequality(const ForceBounds& bounds) {
-    return {"loss-nonnegative", "loss that never generates", "min h >= 0", bounds.loss.lower, 0.0,
-            Basis::Proved,      "docs/certificate.md"};
+[[nodiscard]] inline Inequality nonnegative_hysteresis(const ForceBounds& bounds) {
+    return {"loss-nonnegative",
+            "hysteresis that never generates energy",
+            "min h >= 0",
+            bounds.hysteresis_force.lower,
+            0.0,
+            Basis::Proved,
+            "docs/certificate.md"};
 }
 
 /// Returns the line for damping, which must exceed the effects of hold and delay on a force with these slopes, and B_v
@@ -85,31 +90,32 @@ namespace detail {
 [[nodiscard]] inline std::vector<Inequality> hysteresis_inequalities(const ForceBounds& bounds,
                                                                      const DeviceProfile& device,
                                                                      int predict = 0) {
-    const Inequality loss = detail::loss_inequality(bounds);
+    const Inequality nonnegative = detail::nonnegative_hysteresis(bounds);
     const bool late = device.late_samples() > 0;
     if (predict > 0) {
         const double gain = predicted_encoder_gain(predict);
-        return {loss,
-                detail::prediction_inequality(
-                    device, predicted_path_need(device, {bounds.rising(), bounds.falling()}),
-                    late ? "b >= T (B(M_h, s_h, t_d) + L_h / 2)" : "b >= T (M_h + L_h) / 2"),
-                detail::friction_inequality(
-                    device, gain * bounds.sliding + (gain + 1.0) * bounds.loss_per_play, bounds.mean_force,
-                    "((m + 3) max(|g'| + |h'|) + (2 m + 4) max h / r) / (m + 1) Delta / 2")};
+        return {
+            nonnegative,
+            detail::prediction_inequality(
+                device, predicted_path_need(device, {bounds.rising(), bounds.falling()}),
+                late ? "b >= T (B(M_h, s_h, t_d) + L_h / 2)" : "b >= T (M_h + L_h) / 2"),
+            detail::friction_inequality(
+                device, gain * bounds.sliding + (gain + 1.0) * bounds.hysteresis_per_play, bounds.mean_force,
+                "((m + 3) max(|g'| + |h'|) + (2 m + 4) max h / r) / (m + 1) Delta / 2")};
     }
     const auto hold = [&](double more, const std::string& added) {
         return detail::hold_inequality(device, {bounds.rising() + more, bounds.falling() + more}, 0.0,
                                        late ? "b >= T B(M_h, s_h, t_d)" : "b >= T (M_h" + added + ") / 2");
     };
     const Inequality both =
-        detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.loss_per_play, bounds.mean_force,
-                                    "(max(|g'| + |h'|) + 2 max h / r) Delta / 2");
+        detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.hysteresis_per_play,
+                                    bounds.mean_force, "(max(|g'| + |h'|) + 2 max h / r) Delta / 2");
     if (both.holds() || late || !(2.0 * bounds.play_radius() >= device.encoder_step)) {
-        return {loss, hold(0.0, ""), both};
+        return {nonnegative, hold(0.0, ""), both};
     }
     const double more = 0.5 * bounds.sliding * device.encoder_step / bounds.play_radius();
-    return {loss, hold(more, " + e"),
-            detail::friction_inequality(device, bounds.sliding + more + bounds.loss_per_play,
+    return {nonnegative, hold(more, " + e"),
+            detail::friction_inequality(device, bounds.sliding + more + bounds.hysteresis_per_play,
                                         bounds.mean_force, "(max(|g'| + |h'|) + e + max h / r) Delta / 2")};
 }
 

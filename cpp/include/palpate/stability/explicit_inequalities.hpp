@@ -32,10 +32,10 @@ namespace palpate {
     const std::complex<double> environment =
         inertia.mass / (period_s * period_s) * (z - (2.0 - drag) + (1.0 - drag) * back) + slope;
     const std::complex<double> spring = coupling.stiffness + coupling.damping / period_s * (1.0 - back);
-    const std::complex<double> felt = spring * environment / (spring + environment);
+    const std::complex<double> series = spring * environment / (spring + environment);
     const double sine = std::sin(0.5 * theta);
     return period_s / (4.0 * sine * sine) *
-           ((1.0 - back) * std::polar(1.0, -delay_samples * theta) * felt).real();
+           ((1.0 - back) * std::polar(1.0, -delay_samples * theta) * series).real();
 }
 
 /// Returns the largest need over all frequencies and all slopes of an interval, by sampling and refinement of the best
@@ -54,11 +54,11 @@ namespace palpate {
     double best = -std::numeric_limits<double>::infinity();
     double best_along = 0.0;
     double best_slope = slopes.lower;
-    const auto look = [&](double along, double slope) noexcept {
+    const auto try_sample = [&](double along, double slope) noexcept {
         along = std::clamp(along, 0.0, 1.0);
         slope = std::clamp(slope, slopes.lower, slopes.upper);
-        if (const double here = need(along, slope); here > best) {
-            best = here;
+        if (const double value = need(along, slope); value > best) {
+            best = value;
             best_along = along;
             best_slope = slope;
         }
@@ -66,7 +66,7 @@ namespace palpate {
     const double across = slopes.upper - slopes.lower;
     for (int i = 0; i <= slope_steps; ++i) {
         for (int k = 0; k <= frequencies; ++k) {
-            look(static_cast<double>(k) / frequencies, slopes.lower + across * i / slope_steps);
+            try_sample(static_cast<double>(k) / frequencies, slopes.lower + across * i / slope_steps);
         }
     }
     for (int halving = 0; halving < halvings; ++halving) {
@@ -75,7 +75,7 @@ namespace palpate {
         const double slope = best_slope;
         for (const double i : {-1.0, 0.0, 1.0}) {
             for (const double k : {-1.0, 0.0, 1.0}) {
-                look(along + k * share / frequencies, slope + i * share * across / slope_steps);
+                try_sample(along + k * share / frequencies, slope + i * share * across / slope_steps);
             }
         }
     }
@@ -97,7 +97,7 @@ namespace palpate {
         {"explicit-slope", "slope below the step's limit", "(4 m - 2 (B_o + B_c) T) / T^2 > K + K_c",
          explicit_slope_limit(inertia, {0.0, coupling.damping}, T), slopes.upper + coupling.stiffness,
          Basis::Linear, poles, true},
-        {"explicit-damping", "damping that the step can follow", "2 m > (B_o + B_c) T", 2.0 * inertia.mass,
+        {"explicit-damping", "damping below the step's limit", "2 m > (B_o + B_c) T", 2.0 * inertia.mass,
          damping * T, Basis::Linear, poles, true},
         {"explicit-damping-positive", "damping inside the unit circle", "B_o + B_c > 0", damping, 0.0,
          Basis::Linear, poles, true},

@@ -22,8 +22,8 @@ struct ForceBounds {
     Interval slope;
     double steepest = 0.0;
     double sliding = 0.0;
-    Interval loss;
-    double loss_per_play = 0.0;
+    Interval hysteresis_force;
+    double hysteresis_per_play = 0.0;
     double mean_force = 0.0;
     double drag = 0.0;
     bool hysteresis = false;
@@ -33,25 +33,27 @@ struct ForceBounds {
     /// Returns s_ = max(0, -min f'); NaN stays NaN.
     [[nodiscard]] double falling() const noexcept { return slope.lower >= 0.0 ? 0.0 : -slope.lower; }
 
-    /// Returns r, computed from loss and loss_per_play; infinity without hysteresis.
+    /// Returns r, computed from the largest h and h/r; infinity without hysteresis.
     [[nodiscard]] double play_radius() const noexcept {
-        return loss_per_play > 0.0 ? loss.upper / loss_per_play : std::numeric_limits<double>::infinity();
+        return hysteresis_per_play > 0.0 ? hysteresis_force.upper / hysteresis_per_play
+                                         : std::numeric_limits<double>::infinity();
     }
 };
 
 template <>
 inline constexpr auto fields_of<ForceBounds> = std::tuple{
-    Field<&ForceBounds::slope, &Interval::lower>{"slope_min", "Of every path: min f', or min(g' - |h'|)."},
-    Field<&ForceBounds::slope, &Interval::upper>{"slope_max",
-                                                 "Of every path: max f', or max(g' + |h'| + h/r)."},
+    Field<&ForceBounds::slope, &Interval::lower>{"slope_min",
+                                                 "Smallest slope of any path: min f', or min(g' - |h'|)."},
+    Field<&ForceBounds::slope, &Interval::upper>{
+        "slope_max", "Largest slope of any path: max f', or max(g' + |h'| + h/r)."},
     Field<&ForceBounds::steepest>{"steepest", "L = max |f'|, or max(|g'| + |h'| + h/r)."},
-    Field<&ForceBounds::sliding>{"sliding", "max |f'|, or max(|g'| + |h'|); of all velocities."},
-    Field<&ForceBounds::loss, &Interval::lower>{"loss_min", "Smallest h; 0 without hysteresis."},
-    Field<&ForceBounds::loss, &Interval::upper>{"loss_max", "Largest h; 0 without hysteresis."},
-    Field<&ForceBounds::loss_per_play>{"loss_per_play", "max h/r"},
+    Field<&ForceBounds::sliding>{"sliding", "max |f'|, or max(|g'| + |h'|), over all velocities."},
+    Field<&ForceBounds::hysteresis_force, &Interval::lower>{"loss_min", "Smallest h; 0 without hysteresis."},
+    Field<&ForceBounds::hysteresis_force, &Interval::upper>{"loss_max", "Largest h; 0 without hysteresis."},
+    Field<&ForceBounds::hysteresis_per_play>{"loss_per_play", "max h/r"},
     Field<&ForceBounds::mean_force>{"mean_force",
-                                    "Mean of a limited force that repeats over its period, beyond its loss."},
-    Field<&ForceBounds::drag>{"drag", "B_v = max |f(x, v) - f(x, 0)| / |v|; 0 of a force of position alone.",
+                                    "Mean of a limited periodic force in excess of its hysteresis."},
+    Field<&ForceBounds::drag>{"drag", "B_v = max |f(x, v) - f(x, 0)| / |v|; 0 for a force of position alone.",
                               Rule::NotNegative},
     Field<&ForceBounds::hysteresis>{"hysteresis", "True if the model has hysteresis.", Rule::Any, false}};
 
@@ -63,15 +65,15 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
     return all;
 }
 
-/// Returns the slope K_c k / (K_c + k) that is felt through a coupling to an object of slope k > -K_c.
-[[nodiscard]] inline double felt_slope(double slope, double coupling_stiffness) noexcept {
+/// Returns K_c k / (K_c + k), the slope of an object of slope k > -K_c behind a coupling.
+[[nodiscard]] inline double slope_behind_coupling(double slope, double coupling_stiffness) noexcept {
     return coupling_stiffness * slope / (coupling_stiffness + slope);
 }
 
 /// Returns the bounds of a compensated static force, with slopes K_c f' / (K_c - f').
 [[nodiscard]] inline ForceBounds compensated(const ForceBounds& bounds, double coupling_stiffness) noexcept {
     const auto hardened = [&](double slope) {
-        return slope < coupling_stiffness ? -felt_slope(-slope, coupling_stiffness)
+        return slope < coupling_stiffness ? -slope_behind_coupling(-slope, coupling_stiffness)
                                           : std::numeric_limits<double>::infinity();
     };
     ForceBounds result = bounds;
@@ -90,25 +92,26 @@ inline constexpr double velocity_slack = 1e-3;
 
 /// Coefficients of a g' + b h' + c h, where h uses the wavelets of g.
 struct SlopeReading {
-    double of_force_slope = 1.0;  ///< a
-    double of_loss_slope = 0.0;   ///< b
-    double of_loss = 0.0;         ///< c
+    double of_force_slope = 1.0;       ///< a
+    double of_hysteresis_slope = 0.0;  ///< b
+    double of_hysteresis = 0.0;        ///< c
 };
 
 /// Returns proved bounds of this sum over [from, to].
-[[nodiscard]] inline Interval reading_bounds(const NetworkParameters& force, const NetworkParameters& loss,
-                                             const SlopeReading& reading, double from, double to,
-                                             double relative = slope_slack) {
+[[nodiscard]] inline Interval reading_bounds(const NetworkParameters& force,
+                                             const NetworkParameters& hysteresis, const SlopeReading& reading,
+                                             double from, double to, double relative = slope_slack) {
     NetworkParameters slope_of = force;
-    NetworkParameters value_of = loss;
+    NetworkParameters value_of = hysteresis;
     for (std::size_t i = 0; i < force.weight.size(); ++i) {
         slope_of.weight[i] =
-            reading.of_force_slope * force.weight[i] + reading.of_loss_slope * loss.weight[i];
-        value_of.weight[i] = reading.of_loss * loss.weight[i];
+            reading.of_force_slope * force.weight[i] + reading.of_hysteresis_slope * hysteresis.weight[i];
+        value_of.weight[i] = reading.of_hysteresis * hysteresis.weight[i];
     }
-    slope_of.linear[0] = reading.of_force_slope * force.linear[0] + reading.of_loss_slope * loss.linear[0];
-    value_of.linear[0] = reading.of_loss * loss.linear[0];
-    value_of.bias = reading.of_loss * loss.bias;
+    slope_of.linear[0] =
+        reading.of_force_slope * force.linear[0] + reading.of_hysteresis_slope * hysteresis.linear[0];
+    value_of.linear[0] = reading.of_hysteresis * hysteresis.linear[0];
+    value_of.bias = reading.of_hysteresis * hysteresis.bias;
     return enclose(std::array{Term{slope_of, 1}, Term{value_of, 0}}, from, to, relative);
 }
 
@@ -121,10 +124,11 @@ struct SlopeReading {
 
 /// Returns bounds of h, sharpened until its sign is certain or irrelevant. h >= 0 is enforced with a margin that is
 /// small compared with its largest value.
-[[nodiscard]] inline Interval loss_bounds(const NetworkParameters& loss, double from, double to) {
+[[nodiscard]] inline Interval hysteresis_force_bounds(const NetworkParameters& hysteresis, double from,
+                                                      double to) {
     Interval bounds;
     for (const double relative : {1e-4, 1e-6}) {
-        bounds = value_bounds(loss, from, to, relative);
+        bounds = value_bounds(hysteresis, from, to, relative);
         if (bounds.lower >= 0.0) {
             break;
         }
@@ -144,7 +148,7 @@ struct SlopeReading {
         }
     }
     bounds.steepest = bounds.sliding = bounds.slope.largest();
-    bounds.mean_force = mean_push(PeriodicStrokes{curve, nullptr, bounds.sliding}, force_limit);
+    bounds.mean_force = active_mean(PeriodicStrokes{curve, nullptr, bounds.sliding}, force_limit);
     return bounds;
 }
 
@@ -152,7 +156,7 @@ struct SlopeReading {
 [[nodiscard]] inline ForceBounds hysteresis_bounds(const HysteresisNetwork& pair, double radius,
                                                    double force_limit) {
     const NetworkCurve& g = pair.force();
-    const NetworkCurve& h = pair.loss();
+    const NetworkCurve& h = pair.hysteresis_force();
     const auto over_domain = [&](double a, double b, double c) {
         return reading_bounds(g.parameters(), h.parameters(), {a, b, c}, g.lower(), g.upper());
     };
@@ -169,25 +173,26 @@ struct SlopeReading {
         bounds.sliding = std::max(bounds.sliding, slide.largest());
         bounds.steepest = std::max({bounds.steepest, slide.largest(), rising_stick, falling_stick});
     }
-    bounds.loss = loss_bounds(h.parameters(), g.lower(), g.upper());
+    bounds.hysteresis_force = hysteresis_force_bounds(h.parameters(), g.lower(), g.upper());
     if (!g.periodic()) {
-        for (const auto& [line, loss] : {std::pair{g.below(), h.below()}, std::pair{g.above(), h.above()}}) {
+        for (const auto& [line, hysteresis] :
+             {std::pair{g.below(), h.below()}, std::pair{g.above(), h.above()}}) {
             const Interval slopes = line_slopes(line);
-            const double loss_slope = std::abs(loss.at_edge.slope);
-            if (std::isfinite(loss.reach)) {  // it decreases to zero
-                bounds.loss.lower = std::min(bounds.loss.lower, 0.0);
+            const double hysteresis_slope = std::abs(hysteresis.at_edge.slope);
+            if (std::isfinite(hysteresis.reach)) {  // it decreases to zero
+                bounds.hysteresis_force.lower = std::min(bounds.hysteresis_force.lower, 0.0);
             }
-            const double stick = std::max(0.0, loss.at_edge.value) / radius;
-            const double rounding = 1e-12 * (slopes.largest() + loss_slope + stick);
-            const double slide = slopes.largest() + loss_slope + rounding;
-            bounds.slope = {std::min(bounds.slope.lower, slopes.lower - loss_slope - rounding),
-                            std::max(bounds.slope.upper, slopes.upper + loss_slope + stick + rounding)};
+            const double stick = std::max(0.0, hysteresis.at_edge.value) / radius;
+            const double rounding = 1e-12 * (slopes.largest() + hysteresis_slope + stick);
+            const double slide = slopes.largest() + hysteresis_slope + rounding;
+            bounds.slope = {std::min(bounds.slope.lower, slopes.lower - hysteresis_slope - rounding),
+                            std::max(bounds.slope.upper, slopes.upper + hysteresis_slope + stick + rounding)};
             bounds.sliding = std::max(bounds.sliding, slide);
             bounds.steepest = std::max(bounds.steepest, slide + stick);
         }
     }
-    bounds.loss_per_play = std::max(0.0, bounds.loss.upper) / radius;
-    bounds.mean_force = mean_push(PeriodicStrokes{g, &h, bounds.sliding}, force_limit);
+    bounds.hysteresis_per_play = std::max(0.0, bounds.hysteresis_force.upper) / radius;
+    bounds.mean_force = active_mean(PeriodicStrokes{g, &h, bounds.sliding}, force_limit);
     return bounds;
 }
 
@@ -226,16 +231,16 @@ struct SlopeReading {
 
 /// Returns the shift of a periodic force for which its limited mean is not active; 0 for other models. Add it to the
 /// bias of the network.
-[[nodiscard]] inline double balancing_shift(const ForceModel& model, double force_limit) {
+[[nodiscard]] inline double passive_shift(const ForceModel& model, double force_limit) {
     if (const WaveletNetwork* network = model.network()) {
         const NetworkCurve& f = network->curve();
         const Interval slope = slope_bounds(f.parameters(), f.lower(), f.upper(), detail::slope_slack);
-        return detail::balancing_shift({f, nullptr, slope.largest()}, force_limit);
+        return detail::passive_shift({f, nullptr, slope.largest()}, force_limit);
     }
     if (const HysteresisNetwork* pair = model.hysteresis()) {
         const double wide = pair->force().upper() - pair->force().lower();
         const double sliding = detail::hysteresis_bounds(*pair, wide, force_limit).sliding;
-        return detail::balancing_shift({pair->force(), &pair->loss(), sliding}, force_limit);
+        return detail::passive_shift({pair->force(), &pair->hysteresis_force(), sliding}, force_limit);
     }
     return 0.0;
 }

@@ -94,8 +94,8 @@ template <class Value>
     std::size_t at = 0;
     double largest = value(0);
     for (std::size_t k = 1; k <= last; ++k) {
-        if (const double here = value(k); here > largest) {
-            largest = here;
+        if (const double sample = value(k); sample > largest) {
+            largest = sample;
             at = k;
         }
     }
@@ -144,13 +144,13 @@ class FilterGain {
 };
 
 /// Position and value of the minimum of a convex function.
-struct Least {
+struct Minimum {
     double at = 0.0;
     double value = 0.0;
 };
 /// Finds the minimum of a convex function between two ends by golden sections.
 template <class Function>
-[[nodiscard]] Least least_between(double low, double high, Function function) {
+[[nodiscard]] Minimum minimum_between(double low, double high, Function function) {
     constexpr int steps = 40;  // to 4e-9 of the interval
     constexpr double golden = 0.6180339887498949;
     double left = high - golden * (high - low);
@@ -172,7 +172,7 @@ template <class Function>
             at_right = function(right);
         }
     }
-    return at_left <= at_right ? Least{left, at_left} : Least{right, at_right};
+    return at_left <= at_right ? Minimum{left, at_left} : Minimum{right, at_right};
 }
 
 /// Returns min over l and gamma of cost(gain, l, gamma), convex in both. Every l and gamma is a proof, so the search
@@ -185,12 +185,12 @@ template <class Gain = FilterGain, class Cost>
     const double slope = slopes.rising + slopes.falling;
     const double highest = 8.0 * slope / rough.size();
     const auto least_over_gamma = [&](double l) {
-        return least_between(0.0, highest, [&](double gamma) {
+        return minimum_between(0.0, highest, [&](double gamma) {
             return cost(rough, l, gamma) +
                    weight * (l * l / slope + slope * (gamma / highest) * (gamma / highest));
         });
     };
-    const double l = least_between(-slope, slope, [&](double at) { return least_over_gamma(at).value; }).at;
+    const double l = minimum_between(-slope, slope, [&](double at) { return least_over_gamma(at).value; }).at;
     return cost(Gain{taps, Maximum::Proved, 2048}, l, least_over_gamma(l).at) * (1.0 + 1e-13);
 }
 

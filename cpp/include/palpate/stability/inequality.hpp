@@ -31,7 +31,7 @@ struct Inequality {
     std::string formula;
     double left = 0.0;
     double right = 0.0;
-    Basis rests_on = Basis::Proved;
+    Basis basis = Basis::Proved;
     std::string source;
     bool strict = false;
 
@@ -50,14 +50,15 @@ struct Inequality {
 template <>
 inline constexpr auto fields_of<Inequality> = std::tuple{
     Field<&Inequality::id>{"id", "Stable name, compared when a certificate is checked; texts are not."},
-    Field<&Inequality::left>{"left", "What there is."},
-    Field<&Inequality::right>{"right", "What is needed."},
+    Field<&Inequality::left>{"left", "Left side: the available value."},
+    Field<&Inequality::right>{"right", "Right side: the required value."},
     Field<&Inequality::name>{"name", "Subject in words.", Rule::Any, false},
-    Field<&Inequality::formula>{"formula", "In the symbols of docs/certificate.md.", Rule::Any, false},
-    Field<&Inequality::rests_on>{
-        "rests_on", "proved, linear (the linearised system only) or none (no bound is known beyond).",
-        Rule::Any, false},
-    Field<&Inequality::source>{"source", "Where the proof stands.", Rule::Any, false},
+    Field<&Inequality::formula>{"formula", "Formula in the symbols of docs/certificate.md.", Rule::Any,
+                                false},
+    Field<&Inequality::basis>{"basis",
+                              "proved, linear (the linearised system only) or none (no bound is known).",
+                              Rule::Any, false},
+    Field<&Inequality::source>{"source", "Source of the proof.", Rule::Any, false},
     Field<&Inequality::strict>{"strict", "True if both sides must differ.", Rule::Any, false}};
 
 /// Returns true if all lines hold.
@@ -68,7 +69,7 @@ inline constexpr auto fields_of<Inequality> = std::tuple{
 /// Returns a text such as "viscous damping: b >= T M / 2 needs 0.075, there is 0.06, short by 0.015". A line without a
 /// known bound has its cure as source.
 [[nodiscard]] inline std::string shortfall(const Inequality& line) {
-    if (line.rests_on == Basis::None) {
+    if (line.basis == Basis::None) {
         return line.name + ": " + line.formula + (line.left != 0.0 ? " = " + readable(line.left) : "") +
                ", and it is " + readable(line.right) + "; " + line.source;
     }

@@ -26,8 +26,9 @@ struct PeriodicStrokes {
     /// Returns value and antiderivative of g + side h + shift.
     [[nodiscard]] std::pair<double, double> at(double x, double side, double shift) const noexcept {
         const Curve force = g.inside(x);
-        const Curve loss = h != nullptr ? h->inside(x) : Curve{};
-        return {force.value + side * loss.value + shift, force.integral + side * loss.integral + shift * x};
+        const Curve hysteresis = h != nullptr ? h->inside(x) : Curve{};
+        return {force.value + side * hysteresis.value + shift,
+                force.integral + side * hysteresis.integral + shift * x};
     }
 
     /// Returns the largest rounding error of a mean.
@@ -58,7 +59,7 @@ struct PeriodicStrokes {
     const auto at = [&](double x) { return strokes.at(x, side, shift); };
     const double whole = at(strokes.g.upper()).second - at(lower).second;
     double beyond = 0.0;  // integral of f - c(f)
-    double hidden = 0.0;
+    double uncertain = 0.0;
     if (std::isfinite(limit)) {
         std::vector<std::uint64_t> open(first_cells);
         for (std::size_t k = 0; k < first_cells; ++k) {
@@ -81,8 +82,8 @@ struct PeriodicStrokes {
                     next.push_back(2 * cell + 1);
                 }
             }
-            hidden = 0.125 * strokes.steepest * width * width * static_cast<double>(next.size());
-            if (hidden <= 1e-15 * limit * period || next.size() > most_cells || halving == most_halvings) {
+            uncertain = 0.125 * strokes.steepest * width * width * static_cast<double>(next.size());
+            if (uncertain <= 1e-15 * limit * period || next.size() > most_cells || halving == most_halvings) {
                 beyond += guess;
                 break;
             }
@@ -90,38 +91,38 @@ struct PeriodicStrokes {
         }
     }
     const double mean = (whole - beyond) / period;
-    return {mean - hidden / period, mean + hidden / period};
+    return {mean - uncertain / period, mean + uncertain / period};
 }
 
-/// Returns the mean force of a limited periodic model in excess of its loss: max(0, mean c(g - h), -mean c(g + h)).
+/// Returns the mean force of a limited periodic model in excess of its hysteresis: max(0, mean c(g - h), -mean c(g + h)).
 /// Above 0 the model is active. Values below rounding count as 0.
-[[nodiscard]] inline double mean_push(const PeriodicStrokes& strokes, double limit, double shift = 0.0) {
+[[nodiscard]] inline double active_mean(const PeriodicStrokes& strokes, double limit, double shift = 0.0) {
     if (!strokes.g.periodic()) {
         return 0.0;
     }
     if (!std::isfinite(strokes.steepest)) {
         return std::numeric_limits<double>::quiet_NaN();
     }
-    const double push = std::max(limited_mean(strokes, -1.0, shift, limit).upper,
-                                 -limited_mean(strokes, 1.0, shift, limit).lower);
-    return push <= strokes.rounding() ? 0.0 : push;
+    const double excess = std::max(limited_mean(strokes, -1.0, shift, limit).upper,
+                                   -limited_mean(strokes, 1.0, shift, limit).lower);
+    return excess <= strokes.rounding() ? 0.0 : excess;
 }
 
 /// Returns the smallest shift of the force for which the model is not active. The mean of a limited force never
 /// decreases with the shift, and has one zero.
-[[nodiscard]] inline double balancing_shift(const PeriodicStrokes& strokes, double limit) {
-    if (mean_push(strokes, limit) == 0.0) {
+[[nodiscard]] inline double passive_shift(const PeriodicStrokes& strokes, double limit) {
+    if (active_mean(strokes, limit) == 0.0) {
         return 0.0;
     }
     // The active side: the mean of g - h is above 0, or that of g + h is below 0.
     const double side = limited_mean(strokes, -1.0, 0.0, limit).upper > 0.0 ? -1.0 : 1.0;
-    const auto pushes = [&](double shift) {
+    const auto is_active = [&](double shift) {
         const Interval mean = limited_mean(strokes, side, side * shift, limit);
         return side * (mean.lower + mean.upper) < 0.0;
     };
     double low = 0.0;
-    double high = mean_push(strokes, limit);
-    while (pushes(high)) {
+    double high = active_mean(strokes, limit);
+    while (is_active(high)) {
         low = high;
         high *= 2.0;
     }
@@ -131,7 +132,7 @@ struct PeriodicStrokes {
         if (!(middle > low && middle < high)) {
             break;
         }
-        (pushes(middle) ? low : high) = middle;
+        (is_active(middle) ? low : high) = middle;
     }
     return side * high;
 }

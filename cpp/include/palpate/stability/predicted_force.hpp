@@ -49,23 +49,23 @@ namespace palpate {
     const double P = device.period_s;
     const double T = device.longest_period_s();
     const double fraction = device.delay_fraction();
-    const double moves = device.late_samples() > 0 ? device.jitter_s : 0.0;
+    const double jitter = device.late_samples() > 0 ? device.jitter_s : 0.0;
     const int whole = device.whole_delay_samples();
-    if (fraction == 0.0 && moves == 0.0) {
+    if (fraction == 0.0 && jitter == 0.0) {
         return std::min(simple, filtered_need(prediction_taps(whole, predict), slopes));
     }
-    if (whole == 0 ? device.delay_s <= P - moves : moves <= std::min(fraction, 1.0 - fraction) * P) {
-        const double uncertain = whole == 0 ? 0.0 : moves;
+    if (whole == 0 ? device.delay_s <= P - jitter : jitter <= std::min(fraction, 1.0 - fraction) * P) {
+        const double uncertain_s = whole == 0 ? 0.0 : jitter;
         const std::vector<double> taps = prediction_taps(whole, predict);
-        const double split =
-            filtered_need(taps, (fraction * P + uncertain) / T, slopes, ((1.0 - fraction) * P + moves) / T);
+        const double split = filtered_need(taps, (fraction * P + uncertain_s) / T, slopes,
+                                           ((1.0 - fraction) * P + jitter) / T);
         return std::min(simple, std::max(filtered_need(taps, slopes), split));  // a delay may be shorter
     }
-    if (moves >= P) {
+    if (jitter >= P) {
         return simple;
     }
     const int nearest = static_cast<int>(std::lround(device.delay_s / P));
-    const double nu = detail::uncertain_time(device.delay_s, P, moves, nearest);
+    const double nu = detail::uncertain_time(device.delay_s, P, jitter, nearest);
     return std::min(simple, detail::roughly_filtered_need(prediction_taps(nearest, predict),
                                                           predicted_encoder_gain(predict), nu, slopes));
 }

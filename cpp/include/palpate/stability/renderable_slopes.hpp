@@ -51,13 +51,13 @@ template <class Holds>
     bounds.slope = {-sliding.falling, sliding.rising + stick};
     bounds.sliding = sliding.steepest();
     bounds.steepest = bounds.sliding + stick;
-    bounds.loss_per_play = stick;
+    bounds.hysteresis_per_play = stick;
     return all_hold(stick > 0.0 ? hysteresis_inequalities(bounds, device)
                                 : direct_inequalities(bounds, device));
 }
 
 /// Returns a slope that is larger than any realistic one and far below the largest number.
-[[nodiscard]] inline double beyond_every_slope(const DeviceProfile& device) noexcept {
+[[nodiscard]] inline double slope_search_limit(const DeviceProfile& device) noexcept {
     return 1e9 * (1.0 + device.viscous_damping / device.period_s);
 }
 
@@ -73,7 +73,7 @@ template <class Holds>
                                                     std::numeric_limits<double>::infinity(),
                                                     std::numeric_limits<double>::infinity()}) {
     constexpr double inside = 1.0 - 1e-5;
-    const double most = detail::beyond_every_slope(device);
+    const double most = detail::slope_search_limit(device);
     const auto holds = [&](double rising, double falling) {
         return detail::holds_directly(device, {rising, falling}, stick);
     };
@@ -95,7 +95,7 @@ template <class Holds>
 
 /// Returns the slope h / r that leaves half of the device's largest slope for sliding.
 [[nodiscard]] inline double steepest_stick(const DeviceProfile& device) {
-    return detail::largest_that_holds(detail::beyond_every_slope(device), [&](double stick) {
+    return detail::largest_that_holds(detail::slope_search_limit(device), [&](double stick) {
         return detail::holds_directly(device, {stick, stick}, stick);
     });
 }
@@ -106,9 +106,9 @@ template <class Holds>
                                            double least, double most) {
     const auto holds = [&](double radius) {
         ForceBounds bounds = sliding;
-        bounds.loss_per_play = std::max(0.0, sliding.loss.upper) / radius;
-        bounds.slope.upper += bounds.loss_per_play;
-        bounds.steepest = sliding.sliding + bounds.loss_per_play;
+        bounds.hysteresis_per_play = std::max(0.0, sliding.hysteresis_force.upper) / radius;
+        bounds.slope.upper += bounds.hysteresis_per_play;
+        bounds.steepest = sliding.sliding + bounds.hysteresis_per_play;
         const std::vector<Inequality> lines = hysteresis_inequalities(bounds, device);
         return all_hold(lines);
     };
@@ -150,7 +150,7 @@ template <class Holds>
                 const double limit = reserve * (std::max(0.0, bounds.slope.upper) + stiffness) - stiffness;
                 const Inertia object = explicit_object(limit, scheme.coupling, ratio, T);
                 const double mass = chosen.mass.value_or(0.0) > 0.0 ? *chosen.mass : object.mass;
-                objects.emplace(chosen.damping.value_or(ratio * mass / T), mass);
+                objects.emplace(chosen.object_damping.value_or(ratio * mass / T), mass);
             }
         }
         for (const auto& [damping, mass] : objects) {

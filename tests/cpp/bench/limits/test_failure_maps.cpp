@@ -36,17 +36,17 @@ void expect_between(const Interval& found, double least, double most) {
 }
 
 // spec section 5: "f = Kx without coupling is stable iff 0 < K < (4m - 2 B_o T)/T^2 and B_o T < 2m"
-TEST(FailureMaps, TheExplicitBoundIsMetOverTwoDecadesOfMassAndDamping) {
+TEST(FailureMaps, ExplicitBoundIsExactOverTwoDecadesOfMassAndDamping) {
     expect_between(ratios(explicit_map(test::cases(5)), 0, 2), 0.99, 1.01);
 }
 
 // spec section 7: b >= T M / 2 + t_d L is needed and not merely enough
-TEST(FailureMaps, ASpringJustPastItsBoundSwingsUpWithAHeavyHand) {
+TEST(FailureMaps, SpringJustAboveItsBoundOscillatesWithAHeavyHand) {
     expect_between(ratios(damping_map(3), 0, 2), 1.0, 1.02);
 }
 
 // A spring against a bound for every force with slopes from 0 to its stiffness: within 4 %.
-TEST(FailureMaps, PredictionFailsJustPastItsBoundForEveryNumberOfSamplesAndDelay) {
+TEST(FailureMaps, PredictionFailsJustAboveItsBoundForEveryNumberOfSamplesAndDelay) {
     const FailureMap map = prediction_map(test::cases(5));
     expect_between(ratios(map, 0, 2), 1.0, 1.04);
     EXPECT_LE(ratios(map, 0, 0).lower, 1.001);
@@ -56,28 +56,28 @@ TEST(FailureMaps, PredictionFailsJustPastItsBoundForEveryNumberOfSamplesAndDelay
     }
 }
 
-TEST(FailureMaps, TheEncoderBoundOfAbbottAndOkamuraIsMet) {
+TEST(FailureMaps, EncoderBoundOfAbbottAndOkamuraIsExact) {
     expect_between(ratios(encoder_map(test::cases(7)), 0, 1), 1.0, 1.01);
 }
 
-TEST(FailureMaps, TheStickOfAHysteresisCountsAsItsSlope) {
+TEST(FailureMaps, SlopeOfAHysteresisIncludesSticking) {
     expect_between(ratios(play_map(test::cases(4)), 0, 2), 1.0, 1.01);
 }
 
 // spec section 7, behind a coupling: "exact over all passive environments"
-TEST(FailureMaps, TheCouplingBoundsAreMetWithAndWithoutDelay) {
+TEST(FailureMaps, CouplingBoundsAreExactWithAndWithoutDelay) {
     const FailureMap map = coupling_map(1);
     expect_between(ratios(map, 0, 0), 1.0, 1.002);
     expect_between(ratios(map, 1, 1), 1.0, 1.01);
     expect_between(ratios(map, 2, 2), 1.0, 1.06);
 }
 
-TEST(FailureMaps, NothingFailsBeforeItsBoundWhereTheForceFalls) {
+TEST(FailureMaps, FallingForcesDoNotFailBelowTheirBound) {
     EXPECT_GE(ratios(falling_map(test::cases(3)), 0, 1, 10.0).lower, 1.0);
 }
 
 // spec of the certificate: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
-TEST(FailureMaps, AForceLimitOutsideTheStepMakesAMotorOfAMassAndInsideItDoesNot) {
+TEST(FailureMaps, ForceLimitOutsideTheStepMakesAMassActiveAndInsideItDoesNot) {
     const FailureMap map = limit_map(6);
     EXPECT_LT(map.lines[0].measured.back(), -1.9);
     for (std::size_t k = 0; k < map.lines[0].at.size(); ++k) {
@@ -87,16 +87,16 @@ TEST(FailureMaps, AForceLimitOutsideTheStepMakesAMotorOfAMassAndInsideItDoesNot)
 }
 
 // spec section 5: "uniqueness: p + min f' > 0; fixed-point iteration converges if L < p"
-TEST(FailureMaps, SolversFailWhereTheoryPutsIt) {
+TEST(FailureMaps, SolversFailAtTheTheoreticalBound) {
     expect_between(ratios(solver_map(3), 0, 2), 0.999, 1.001);
 }
 
-TEST(FailureMaps, TheSampleTimeMovesEveryBound) {
+TEST(FailureMaps, BoundsAreExactForEverySampleTime) {
     expect_between(ratios(period_map(3), 0, 4), 0.999, 1.02);
 }
 
 // spec section 5: "pole (B_c/T - K/2)/(K_c + B_c/T + K/2) -> -1"
-TEST(FailureMaps, TheEnergyConsistentStepRingsAndItsSwitchDoesNot) {
+TEST(FailureMaps, EnergyConsistentStepOscillatesAndTheSwitchedOneDoesNot) {
     const FailureMap map = pole_map(7);
     for (std::size_t k = 0; k < map.lines[0].at.size(); ++k) {
         EXPECT_NEAR(map.lines[0].measured[k], map.lines[0].theory[k], 1e-6);
@@ -106,7 +106,7 @@ TEST(FailureMaps, TheEnergyConsistentStepRingsAndItsSwitchDoesNot) {
     EXPECT_LT(map.lines[0].measured.back(), -0.99);
 }
 
-TEST(FailureMaps, GuardsTakeTheBuzzOutOfAWallThatIsTooStiff) {
+TEST(FailureMaps, GuardsStopTheLimitCycleOfATooStiffWall) {
     const FailureMap map = guard_map(8);
     for (std::size_t k = 0; k < map.lines[0].at.size(); ++k) {
         const double without = map.lines[0].measured[k];
@@ -123,7 +123,7 @@ TEST(FailureMaps, GuardsTakeTheBuzzOutOfAWallThatIsTooStiff) {
 }
 
 // The bound is for every passive hand: a heavy hand needs all of it, a light one almost all.
-TEST(FailureMaps, ALightHandLeavesLittleOfTheBoundUnusedAndAHandThatDampsLeavesMuch) {
+TEST(FailureMaps, BoundSlackIsSmallForALightHandAndLargeForADampingHand) {
     const FailureMap map = hand_map(3);
     for (std::size_t delay = 0; delay <= 2; ++delay) {
         const FailureLine& line = map.lines[delay];
@@ -135,7 +135,7 @@ TEST(FailureMaps, ALightHandLeavesLittleOfTheBoundUnusedAndAHandThatDampsLeavesM
 }
 
 // A heavy hand swings slowly and does not feel a lag, so its need is far below the bound.
-TEST(FailureMaps, AHeavyHandCarriesUpTo18TimesTheStiffnessWithAPrediction) {
+TEST(FailureMaps, HeavyHandAllows18TimesTheStiffnessWithAPrediction) {
     const FailureMap map = hand_map(3);
     const FailureLine& plain = map.lines[0];
     const FailureLine& predicted = map.lines[4];
@@ -145,13 +145,13 @@ TEST(FailureMaps, AHeavyHandCarriesUpTo18TimesTheStiffnessWithAPrediction) {
 }
 
 // spec section 7, quantised: "massless f_c >= gamma Delta/2; B_c = 0: L' Delta/2"
-TEST(FailureMaps, TheEncoderBoundOfACouplingIsMetWithoutItsDamperAndIsEnoughWithIt) {
+TEST(FailureMaps, EncoderBoundOfACouplingIsExactWithoutADamperAndSufficientWithOne) {
     const FailureMap map = coupled_encoder_map(test::cases(3));
     expect_between(ratios(map, 0, 0, 10.0), 1.0, 1.01);
     EXPECT_GE(ratios(map, 1, 2, 10.0).lower, 1.0);
 }
 
-TEST(FailureMaps, PrintNullForWhatTheoryDoesNotGive) {
+TEST(FailureMaps, PrintNullForABoundWithoutTheory) {
     const nlohmann::ordered_json printed = nlohmann::ordered_json::parse(as_json(pole_map(2)).dump());
     EXPECT_EQ(printed["name"], "pole");
     EXPECT_EQ(printed["lines"][0]["at"], (nlohmann::ordered_json{1.0, 1e5}));
@@ -168,7 +168,7 @@ TEST(FailureMaps, ArePublishedInTheirOrder) {
     }
 }
 
-TEST(Guards, CostNextToNothingAndDoWhatTheyAreThereFor) {
+TEST(Guards, ChangeForcesByAtMostTwoPercentAndHalveFaults) {
     for (const GuardEffect& effect : guard_effects()) {
         EXPECT_LE(effect.cost, 0.02) << effect.guard;
         EXPECT_LE(effect.with, 0.5 * effect.without) << effect.guard << ": " << effect.wrong;
@@ -182,10 +182,12 @@ bool generates(const ForceModel& model, const DeviceProfile& device) {
     scheme.structure = StructureKind::Direct;
     const HysteresisNetwork& both = *model.hysteresis();
     const double radius = both.play_radius();
-    const auto stuck = [&](double x) { return both.force().at(x).slope + both.loss().at(x).value / radius; };
+    const auto sticking_slope = [&](double x) {
+        return both.force().at(x).slope + both.hysteresis_force().at(x).value / radius;
+    };
     double start = 0.0;
     for (double x = 0.0; x <= 1.0; x += 0.01) {
-        start = stuck(x) > stuck(start) ? x : start;
+        start = sticking_slope(x) > sticking_slope(start) ? x : start;
     }
     const double held = test::energy_at(model, scheme, start) - energy_range(model).least;
     for (const double share : {0.1, 0.5, 1.0, 3.0, 10.0}) {
@@ -196,7 +198,7 @@ bool generates(const ForceModel& model, const DeviceProfile& device) {
                     return closed_loop(std::move(structure), device, hand, ticks, {2, start, 0.0, unguarded},
                                        [](const Tick&, const Motion&, const EnergyAccount&) { return true; });
                 });
-            if (end.energy.motor + end.energy.loss < -held - 1e-9 * end.energy.throughput) {
+            if (end.energy.motor + end.energy.dissipated < -held - 1e-9 * end.energy.throughput) {
                 return true;
             }
         }
@@ -205,7 +207,7 @@ bool generates(const ForceModel& model, const DeviceProfile& device) {
 }
 
 // spec section 7: "hysteresis, direct: M_h = max(0, max(g' + |h'| + h/r)); without the h/r term it fails"
-TEST(Hysteresis, GeneratesInInnerAndOuterLoopsOnlyWhereItsStickIsLeftOut) {
+TEST(Hysteresis, GeneratesEnergyOnlyIfStickingIsIgnored) {
     test::Random random{5};
     int without = 0;
     const int tried = test::cases(12);
@@ -216,7 +218,7 @@ TEST(Hysteresis, GeneratesInInnerAndOuterLoopsOnlyWhereItsStickIsLeftOut) {
         DeviceProfile device = smooth_knob();
         device.delay_s = (k % 3) * device.period_s;
         device.force_limit = 1e9;
-        const auto enough = test::just_enough(model, scheme, device, 1.0 + 1e-9);
+        const auto enough = test::device_at_its_bound(model, scheme, device, 1.0 + 1e-9);
         ASSERT_TRUE(enough);
         EXPECT_FALSE(generates(model, *enough)) << "model " << k;
         const ForceBounds bounds = force_bounds(model);

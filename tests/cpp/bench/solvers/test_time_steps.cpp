@@ -50,7 +50,7 @@ TEST(TimeSteps, OneNewtonStepIsExactForALine) {
     }
 }
 
-TEST(TimeSteps, SubstepsSeeTheDeviceMoveEvenly) {
+TEST(TimeSteps, SubstepsInterpolateTheDeviceMotion) {
     Substepped together{Hardening{}, inertia, coupling, 1e-3, 4};
     Explicit apart{Hardening{}, inertia, coupling, 0.25e-3};
     for (int k = 1; k <= 500; ++k) {
@@ -65,14 +65,14 @@ TEST(TimeSteps, SubstepsSeeTheDeviceMoveEvenly) {
     }
 }
 
-TEST(TimeSteps, SettleOnTheSameForceBehindTheCoupling) {
+TEST(TimeSteps, ReachTheSameForceBehindTheCoupling) {
     test::expect_the_force_of_the_coupling_at_rest(
         Implicit{Hardening{}, inertia, coupling, 1e-3, OneNewtonStep{}});
     test::expect_the_force_of_the_coupling_at_rest(Trapezoidal{Hardening{}, inertia, coupling, 1e-3});
     test::expect_the_force_of_the_coupling_at_rest(Substepped{Hardening{}, inertia, coupling, 1e-3, 4});
 }
 
-TEST(TimeSteps, RefuseNanAndGoOn) {
+TEST(TimeSteps, NanGivesZeroForceAndTheNextStepContinues) {
     test::expect_nan_is_refused(Implicit{Hardening{}, inertia, coupling, 1e-3, OneNewtonStep{}});
     test::expect_nan_is_refused(Trapezoidal{Hardening{}, inertia, coupling, 1e-3});
     test::expect_nan_is_refused(Substepped{Hardening{}, inertia, coupling, 1e-3, 4});

@@ -63,7 +63,7 @@ class UsbConnection {
     [[nodiscard]] Opened open(const std::string& serial) {
         libusb_context* context = nullptr;
         if (const int code = libusb_init(&context); code != 0) {
-            return {"libusb does not start: " + usb_reason(code)};
+            return {"libusb cannot start: " + usb_reason(code)};
         }
         context_.reset(context);
         Opened opened = choose(serial);
@@ -81,10 +81,10 @@ class UsbConnection {
 
     /// Sends a request without data. Returns 0 or an error of libusb.
     [[nodiscard]] int request(wire::Request request, std::uint16_t value) const noexcept {
-        const int moved = libusb_control_transfer(handle_.get(), wire::request_to_device,
-                                                  static_cast<std::uint8_t>(request), value,
-                                                  wire::interface_number, nullptr, 0, request_timeout_ms);
-        return moved < 0 ? moved : 0;
+        const int transferred = libusb_control_transfer(
+            handle_.get(), wire::request_to_device, static_cast<std::uint8_t>(request), value,
+            wire::interface_number, nullptr, 0, request_timeout_ms);
+        return transferred < 0 ? transferred : 0;
     }
 
     [[nodiscard]] libusb_context* context() const noexcept { return context_.get(); }
@@ -110,25 +110,26 @@ class UsbConnection {
             return {"the USB devices cannot be listed: " + usb_reason(static_cast<int>(count))};
         }
         const std::unique_ptr<libusb_device*, FreeList> list{found};
-        std::vector<Candidate> fitting;
+        std::vector<Candidate> suitable;
         std::vector<std::string> others;   // serial numbers
         std::vector<std::string> reasons;  // why a device is not suitable
         for (libusb_device* device : std::span{found, static_cast<std::size_t>(count)}) {
             if (is_ours(device)) {
-                examine(device, serial, fitting, others, reasons);
+                examine(device, serial, suitable, others, reasons);
             }
         }
-        if (fitting.size() == 1) {
-            handle_ = std::move(fitting.front().handle);
-            name_ = fitting.front().name;
-            info_ = fitting.front().info;
+        if (suitable.size() == 1) {
+            handle_ = std::move(suitable.front().handle);
+            name_ = suitable.front().name;
+            info_ = suitable.front().info;
             return {};
         }
-        return {refusal(serial, fitting, others, reasons)};
+        return {refusal(serial, suitable, others, reasons)};
     }
 
     /// Returns the sentence about none or several suitable devices.
-    [[nodiscard]] static std::string refusal(const std::string& serial, const std::vector<Candidate>& fitting,
+    [[nodiscard]] static std::string refusal(const std::string& serial,
+                                             const std::vector<Candidate>& suitable,
                                              const std::vector<std::string>& others,
                                              const std::vector<std::string>& reasons) {
         const auto listed = [](std::vector<std::string> words) {
@@ -139,24 +140,23 @@ class UsbConnection {
             }
             return text;
         };
-        if (!fitting.empty()) {
+        if (!suitable.empty()) {
             std::vector<std::string> serials;
-            serials.reserve(fitting.size());
-            for (const Candidate& candidate : fitting) {
+            serials.reserve(suitable.size());
+            for (const Candidate& candidate : suitable) {
                 serials.push_back(candidate.name.serial);
             }
-            return std::to_string(fitting.size()) + " USB devices could be meant (" + listed(serials) +
-                   "): choose with usb:SERIAL";
+            return std::to_string(suitable.size()) + " suitable USB devices are connected (" +
+                   listed(serials) + "): choose one with usb:SERIAL";
         }
         if (!reasons.empty()) {
             return reasons.front();
         }
         if (!others.empty()) {
-            return "no USB device has the serial number " + serial + "; there is " + listed(others);
+            return "no USB device has the serial number " + serial + "; connected: " + listed(others);
         }
-        return "no USB device 1209:0001 of this protocol is plugged in; 'lsusb -d 1209:0001' shows whether "
-               "the "
-               "system sees one";
+        return "no USB device 1209:0001 with this protocol is connected; 'lsusb -d 1209:0001' lists those "
+               "that the system detects";
     }
 
     /// Returns true if the descriptors, which the system knows without opening the device, are those of the protocol.
@@ -190,13 +190,13 @@ class UsbConnection {
     }
 
     /// Opens a device, reads its name and checks its properties.
-    static void examine(libusb_device* device, const std::string& serial, std::vector<Candidate>& fitting,
+    static void examine(libusb_device* device, const std::string& serial, std::vector<Candidate>& suitable,
                         std::vector<std::string>& others, std::vector<std::string>& reasons) {
         UsbName name;
         name.bus = libusb_get_bus_number(device);
         name.address = libusb_get_device_address(device);
-        const auto refuse = [&](const std::string& what, int code) {
-            reasons.push_back(name.text() + " " + what + ": " + usb_reason(code));
+        const auto refuse = [&](const std::string& failure, int code) {
+            reasons.push_back(name.text() + " " + failure + ": " + usb_reason(code));
         };
         libusb_device_handle* opened = nullptr;
         if (const int code = libusb_open(device, &opened); code != 0) {
@@ -216,19 +216,20 @@ class UsbConnection {
             return refuse("cannot be used", code);
         }
         std::array<std::uint8_t, wire::largest_packet> bytes{};
-        const int moved = libusb_control_transfer(
+        const int transferred = libusb_control_transfer(
             opened, wire::request_to_host, static_cast<std::uint8_t>(wire::Request::GetInfo), 0,
             wire::interface_number, bytes.data(), bytes.size(), request_timeout_ms);
-        if (moved < 0) {
-            return refuse("does not say what it is (GET_INFO)", moved);
+        if (transferred < 0) {
+            return refuse("does not report its properties (GET_INFO)", transferred);
         }
         wire::Info info;
-        const std::string fault = wire::decode(std::span{bytes}.first(static_cast<std::size_t>(moved)), info);
+        const std::string fault =
+            wire::decode(std::span{bytes}.first(static_cast<std::size_t>(transferred)), info);
         if (!fault.empty()) {
-            reasons.push_back(name.text() + " is 1209:0001 but not of this protocol: " + fault);
+            reasons.push_back(name.text() + " is 1209:0001 with another protocol: " + fault);
             return;
         }
-        fitting.push_back({std::move(handle), name, info});
+        suitable.push_back({std::move(handle), name, info});
     }
 
     std::unique_ptr<libusb_context, CloseContext> context_;

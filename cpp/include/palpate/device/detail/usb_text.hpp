@@ -79,12 +79,12 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
 /// Returns a string of the device, in its first language; empty without one.
 [[nodiscard]] inline std::string string_of(libusb_device_handle* handle, std::uint8_t index) {
     std::array<std::uint8_t, 255> bytes{};
-    const auto read = [&](std::uint8_t which, std::uint16_t language) {
-        const int length = libusb_get_string_descriptor(handle, which, language, bytes.data(),
+    const auto read = [&](std::uint8_t string_index, std::uint16_t language) {
+        const int length = libusb_get_string_descriptor(handle, string_index, language, bytes.data(),
                                                         static_cast<int>(bytes.size()));
-        const bool is_one = length >= 2 && bytes[0] >= 2 && bytes[1] == LIBUSB_DT_STRING;
-        return std::span<const std::uint8_t>{bytes}.first(is_one ? std::min<std::size_t>(bytes[0], length)
-                                                                 : 0);
+        const bool is_string = length >= 2 && bytes[0] >= 2 && bytes[1] == LIBUSB_DT_STRING;
+        return std::span<const std::uint8_t>{bytes}.first(is_string ? std::min<std::size_t>(bytes[0], length)
+                                                                    : 0);
     };
     if (index == 0) {
         return "";

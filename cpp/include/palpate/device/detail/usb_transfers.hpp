@@ -40,7 +40,7 @@ struct UsbArrival {
 class UsbTransfers {
   public:
     UsbTransfers(libusb_context* context, libusb_device_handle* handle)
-        : context_{context}, handle_{handle}, arrivals_{most_waiting} {
+        : context_{context}, handle_{handle}, arrivals_{most_waiting_packets} {
         for (Read& read : reads_) {
             read.owner = this;
             read.transfer.reset(libusb_alloc_transfer(0));
@@ -76,9 +76,9 @@ class UsbTransfers {
         cancel_all();
         const Nanoseconds last = monotonic_now() + longest_stop;
         while (in_flight() > 0 && monotonic_now() < last) {
-            const std::uint32_t seen = changes_.events();
+            const std::uint32_t known_events = changes_.events();
             if (in_flight() > 0) {
-                (void)changes_.wait(seen, std::min(last, monotonic_now() + cancel_again));
+                (void)changes_.wait(known_events, std::min(last, monotonic_now() + cancel_interval));
                 cancel_all();
             }
         }
@@ -90,7 +90,7 @@ class UsbTransfers {
     /// Sends a command, unless the last one is still in flight. Returns 0, LIBUSB_ERROR_BUSY or another error of
     /// libusb.
     [[nodiscard]] int write(const wire::OutPacket& command) noexcept {
-        if (is_gone()) {
+        if (has_failed()) {
             return LIBUSB_ERROR_NO_DEVICE;
         }
         if (writes()) {
@@ -99,13 +99,13 @@ class UsbTransfers {
         out_bytes_ = wire::encode(command);
         constexpr unsigned no_timeout = 0;  // the device's watchdog ends a command instead
         libusb_fill_interrupt_transfer(write_.get(), handle_, wire::out_endpoint, out_bytes_.data(),
-                                       static_cast<int>(out_bytes_.size()), &UsbTransfers::written, this,
-                                       no_timeout);
+                                       static_cast<int>(out_bytes_.size()), &UsbTransfers::write_callback,
+                                       this, no_timeout);
         writes_in_flight_.store(1, std::memory_order_relaxed);
         const int code = libusb_submit_transfer(write_.get());
         if (code != 0) {
             writes_in_flight_.store(0, std::memory_order_relaxed);
-            note(code);
+            store_error(code);
         }
         return code;
     }
@@ -118,8 +118,8 @@ class UsbTransfers {
         }
         libusb_fill_control_setup(setup_.data(), wire::request_to_device, static_cast<std::uint8_t>(request),
                                   value, wire::interface_number, 0);
-        libusb_fill_control_transfer(request_.get(), handle_, setup_.data(), &UsbTransfers::requested, this,
-                                     request_timeout_ms);
+        libusb_fill_control_transfer(request_.get(), handle_, setup_.data(), &UsbTransfers::request_callback,
+                                     this, request_timeout_ms);
         requests_in_flight_.store(1, std::memory_order_relaxed);
         if (const int code = libusb_submit_transfer(request_.get()); code != 0) {
             requests_in_flight_.store(0, std::memory_order_relaxed);
@@ -133,7 +133,7 @@ class UsbTransfers {
 
     /// Waits for packets. Returns false if none came before the deadline, or none can come.
     [[nodiscard]] bool wait_for_arrival(Nanoseconds deadline) noexcept {
-        (void)wait_until([&] { return arrived() > 0 || is_gone(); }, deadline);
+        (void)wait_until([&] { return arrived() > 0 || has_failed(); }, deadline);
         return arrived() > 0;
     }
     /// Returns true if a write is in flight.
@@ -146,7 +146,7 @@ class UsbTransfers {
     }
     /// Waits until the write has ended or a packet has arrived. Returns false if neither happened.
     [[nodiscard]] bool wait_for_write_or_arrival(Nanoseconds deadline) noexcept {
-        return wait_until([&] { return !writes() || arrived() > 0 || is_gone(); }, deadline);
+        return wait_until([&] { return !writes() || arrived() > 0 || has_failed(); }, deadline);
     }
 
     /// Returns the number of packets that wait.
@@ -155,7 +155,7 @@ class UsbTransfers {
     [[nodiscard]] bool take(UsbArrival& arrival) noexcept { return arrivals_.pop({&arrival, 1}) == 1; }
 
     /// Returns true after an error that cannot be recovered: unplugged, or a repeated error.
-    [[nodiscard]] bool is_gone() const noexcept { return error_.load(std::memory_order_acquire) != 0; }
+    [[nodiscard]] bool has_failed() const noexcept { return error_.load(std::memory_order_acquire) != 0; }
     /// Returns the first error that cannot be recovered; 0 without one.
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_acquire); }
     [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_.load(std::memory_order_relaxed); }
@@ -174,11 +174,11 @@ class UsbTransfers {
     }
 
   private:
-    static constexpr std::size_t most_waiting = 64;
+    static constexpr std::size_t most_waiting_packets = 64;
     static constexpr Nanoseconds longest_stop = 5 * nanoseconds_a_second;
-    static constexpr Nanoseconds cancel_again = nanoseconds_a_second / 10;
+    static constexpr Nanoseconds cancel_interval = nanoseconds_a_second / 10;
     static constexpr unsigned request_timeout_ms = 500;
-    static constexpr int errors_to_give_up = 100;  ///< consecutive errors
+    static constexpr int most_errors_in_a_row = 100;  ///< consecutive errors
 
     struct FreeTransfer {
         void operator()(libusb_transfer* transfer) const noexcept { libusb_free_transfer(transfer); }
@@ -203,7 +203,7 @@ class UsbTransfers {
             timeval wait{0, 100'000};
             const int code = libusb_handle_events_timeout_completed(context_, &wait, nullptr);
             if (code != 0 && code != LIBUSB_ERROR_INTERRUPTED && code != LIBUSB_ERROR_TIMEOUT) {
-                note(code);
+                store_error(code);
                 std::this_thread::yield();
             }
             recover();
@@ -212,7 +212,7 @@ class UsbTransfers {
 
     /// Clears a halted endpoint: cancels its other transfers, clears it and continues.
     void recover() noexcept {
-        if (stopping_.load(std::memory_order_acquire) || is_gone()) {
+        if (stopping_.load(std::memory_order_acquire) || has_failed()) {
             return;
         }
         if (reads_halted_) {
@@ -222,17 +222,17 @@ class UsbTransfers {
                 }
                 return;
             }
-            note(libusb_clear_halt(handle_, wire::in_endpoint));
+            store_error(libusb_clear_halt(handle_, wire::in_endpoint));
             reads_halted_ = false;
             for (Read& read : reads_) {
                 submit(read);
             }
         }
         if (writes_halted_) {
-            note(libusb_clear_halt(handle_, wire::out_endpoint));
+            store_error(libusb_clear_halt(handle_, wire::out_endpoint));
             writes_halted_ = false;
             writes_in_flight_.store(0, std::memory_order_release);
-            changes_.happened();
+            changes_.notify();
         }
     }
 
@@ -240,16 +240,16 @@ class UsbTransfers {
     void submit(Read& read) noexcept {
         constexpr unsigned no_timeout = 0;
         libusb_fill_interrupt_transfer(read.transfer.get(), handle_, wire::in_endpoint, read.bytes.data(),
-                                       static_cast<int>(read.bytes.size()), &UsbTransfers::arrived_here,
+                                       static_cast<int>(read.bytes.size()), &UsbTransfers::read_callback,
                                        &read, no_timeout);
         reads_in_flight_.fetch_add(1, std::memory_order_acq_rel);
         if (const int code = libusb_submit_transfer(read.transfer.get()); code != 0) {
-            note(code);
-            ended_one_read();
+            store_error(code);
+            end_read();
         }
     }
 
-    static void LIBUSB_CALL arrived_here(libusb_transfer* transfer) {
+    static void LIBUSB_CALL read_callback(libusb_transfer* transfer) {
         auto& read = *static_cast<Read*>(transfer->user_data);
         read.owner->read_ended(read);
     }
@@ -270,17 +270,17 @@ class UsbTransfers {
             case LIBUSB_TRANSFER_CANCELLED:
                 break;
             case LIBUSB_TRANSFER_NO_DEVICE:
-                note(LIBUSB_ERROR_NO_DEVICE);
+                store_error(LIBUSB_ERROR_NO_DEVICE);
                 break;
             default:
-                failed();
+                count_bus_error();
         }
-        const bool again = !is_gone() && !stopping_.load(std::memory_order_acquire) && !reads_halted_;
+        const bool again = !has_failed() && !stopping_.load(std::memory_order_acquire) && !reads_halted_;
         if (!again) {
-            ended_one_read();
+            end_read();
         } else if (const int code = libusb_submit_transfer(read.transfer.get()); code != 0) {
-            note(code);
-            ended_one_read();
+            store_error(code);
+            end_read();
         }
     }
 
@@ -291,15 +291,15 @@ class UsbTransfers {
         arrival.size = static_cast<std::uint32_t>(read.transfer->actual_length);
         std::copy_n(read.bytes.begin(), arrival.size, arrival.bytes.begin());
         (void)arrivals_.push(arrival);  // full: the loop has not read for long and will restart
-        changes_.happened();
+        changes_.notify();
     }
 
-    void ended_one_read() noexcept {
+    void end_read() noexcept {
         reads_in_flight_.fetch_sub(1, std::memory_order_acq_rel);
-        changes_.happened();
+        changes_.notify();
     }
 
-    static void LIBUSB_CALL written(libusb_transfer* transfer) {
+    static void LIBUSB_CALL write_callback(libusb_transfer* transfer) {
         static_cast<UsbTransfers*>(transfer->user_data)->write_ended(*transfer);
     }
 
@@ -317,24 +317,24 @@ class UsbTransfers {
                 }
                 break;
             case LIBUSB_TRANSFER_NO_DEVICE:
-                note(LIBUSB_ERROR_NO_DEVICE);
+                store_error(LIBUSB_ERROR_NO_DEVICE);
                 break;
             case LIBUSB_TRANSFER_ERROR:
             case LIBUSB_TRANSFER_OVERFLOW:
-                failed();
+                count_bus_error();
                 break;
             default:
                 break;
         }
         writes_in_flight_.store(0, std::memory_order_release);
-        changes_.happened();
+        changes_.notify();
     }
 
-    static void LIBUSB_CALL requested(libusb_transfer* transfer) {
+    static void LIBUSB_CALL request_callback(libusb_transfer* transfer) {
         auto& self = *static_cast<UsbTransfers*>(transfer->user_data);
         self.answer_.store(error_of(transfer->status), std::memory_order_relaxed);
         self.requests_in_flight_.store(0, std::memory_order_release);
-        self.changes_.happened();
+        self.changes_.notify();
     }
 
     /// Returns the error of libusb for the status of a transfer.
@@ -357,33 +357,33 @@ class UsbTransfers {
     // ------------------------------------------------------------------------------------------- both threads
 
     /// Waits until a condition that transfers change is true. Returns false after the deadline.
-    template <class IsSo>
-    [[nodiscard]] bool wait_until(IsSo is_so, Nanoseconds deadline) noexcept {
-        while (!is_so()) {
-            const std::uint32_t seen = changes_.events();
-            if (!is_so() && !changes_.wait(seen, deadline)) {
-                return is_so();
+    template <class Condition>
+    [[nodiscard]] bool wait_until(Condition condition, Nanoseconds deadline) noexcept {
+        while (!condition()) {
+            const std::uint32_t known_events = changes_.events();
+            if (!condition() && !changes_.wait(known_events, deadline)) {
+                return condition();
             }
         }
         return true;
     }
 
     /// Counts an error of the bus. Many consecutive errors are final.
-    void failed() noexcept {
+    void count_bus_error() noexcept {
         bus_errors_.fetch_add(1, std::memory_order_relaxed);
-        if (++errors_in_a_row_ >= errors_to_give_up) {
-            note(LIBUSB_ERROR_IO);
+        if (++errors_in_a_row_ >= most_errors_in_a_row) {
+            store_error(LIBUSB_ERROR_IO);
         }
     }
 
     /// Stores the first error that cannot be recovered.
-    void note(int code) noexcept {
+    void store_error(int code) noexcept {
         if (code == 0) {
             return;
         }
         int none = 0;
         (void)error_.compare_exchange_strong(none, code, std::memory_order_acq_rel);
-        changes_.happened();
+        changes_.notify();
     }
 
     void cancel_all() noexcept {

@@ -56,14 +56,18 @@ inline constexpr double fourth_derivative_decay = 0.22;
 /// dilation times the radius, B bounds |D^4 psi| at the wavelet's least distance, and w are the uncancelled weights.
 struct RadialExpansion {
     RadialExpansion(std::size_t d, std::size_t size)
-        : gradient(d), bend(d * d), twist(d * d * d), rest(d), room((2 * d + 4) * size + d * d) {}
+        : gradient(d),
+          second_derivative(d * d),
+          third_derivative(d * d * d),
+          rest(d),
+          workspace((2 * d + 4) * size + d * d) {}
 
     double value = 0.0;
-    std::vector<double> gradient;  ///< d
-    std::vector<double> bend;      ///< d x d second derivatives
-    std::vector<double> twist;     ///< d x d x d third derivatives
-    std::vector<double> rest;      ///< d
-    std::vector<double> room;      ///< working memory of the kernel
+    std::vector<double> gradient;           ///< d
+    std::vector<double> second_derivative;  ///< d x d second derivatives
+    std::vector<double> third_derivative;   ///< d x d x d third derivatives
+    std::vector<double> rest;               ///< d
+    std::vector<double> workspace;          ///< working memory of the kernel
 };
 
 /// Functions that one instruction set implements.

@@ -71,20 +71,20 @@ PALPATE_TARGET inline void at(const HatColumns& of, double x, Curve& sum) noexce
     Lanes integral{};
     Lanes double_integral{};
     for (std::size_t i = 0; i < of.size; i += PALPATE_LANES) {
-        Lanes alpha, beta, weight, steep, flat, flatter, square, e;
+        Lanes alpha, beta, weight, weight_by_width, weight_width, weight_width_squared, square, e;
         load(alpha, of.alpha + i);
         load(beta, of.beta + i);
         load(weight, of.weight + i);
-        load(steep, of.weight_by_width + i);
-        load(flat, of.weight_width + i);
-        load(flatter, of.weight_width_squared + i);
+        load(weight_by_width, of.weight_by_width + i);
+        load(weight_width, of.weight_width + i);
+        load(weight_width_squared, of.weight_width_squared + i);
         Lanes u = alpha * (x - beta);
         gaussian(u, square, e);
         const Lanes ue = u * e;
         value += weight * ((square - 1.0) * e);
-        slope += steep * ((3.0 - square) * ue);
-        integral -= flat * ue;
-        double_integral += flatter * e;
+        slope += weight_by_width * ((3.0 - square) * ue);
+        integral -= weight_width * ue;
+        double_integral += weight_width_squared * e;
     }
     sum.value += total(value);
     sum.slope += total(slope);
@@ -209,15 +209,15 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
     const std::size_t n = of.size;
     const std::size_t d = of.dimension;
     const auto inputs = static_cast<double>(d);
-    double* const first = sums.room.data();  // A_2, A_4, A_6
+    double* const first = sums.workspace.data();  // A_2, A_4, A_6
     double* const second = first + n;
     double* const third = second + n;
     double* const rest = third + n;
     double* const offset = rest + n;        // input by input: u_j s_j, s = alpha times the radius
     double* const spread = offset + d * n;  // s_j^2
     double* const mixed = spread + d * n;   // d x d: sums of A_4 s_j^2 u_l s_l
-    const Lanes nothing{};
-    const Lanes reach = nothing + hat_reach;
+    const Lanes zero{};
+    const Lanes reach = zero + hat_reach;
     Lanes values{};
     for (std::size_t i = 0; i < n; i += PALPATE_LANES) {
         Lanes square{};
@@ -231,8 +231,8 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
             Lanes u = alpha * (middle[j] - beta);
             u = u > reach ? reach : u;
             u = u < -reach ? -reach : u;
-            Lanes near = (u < nothing ? -u : u) - scale;
-            near = near > nothing ? near : nothing;
+            Lanes near = (u < zero ? -u : u) - scale;
+            near = near > zero ? near : zero;
             square += u * u;
             least += near * near;
             const Lanes along = scale * scale;
@@ -267,17 +267,18 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
     }
     for (std::size_t j = 0; j < d; ++j) {
         for (std::size_t k = 0; k <= j; ++k) {
-            const double bend = (j == k ? sum_of(n, first, spread + j * n) : 0.0) -
-                                sum_of(n, second, offset + j * n, offset + k * n);
-            sums.bend[j * d + k] = bend;
-            sums.bend[k * d + j] = bend;
+            const double second_sum = (j == k ? sum_of(n, first, spread + j * n) : 0.0) -
+                                      sum_of(n, second, offset + j * n, offset + k * n);
+            sums.second_derivative[j * d + k] = second_sum;
+            sums.second_derivative[k * d + j] = second_sum;
             for (std::size_t l = 0; l <= k; ++l) {
-                const double twist = sum_of(n, third, offset + j * n, offset + k * n, offset + l * n) -
-                                     (j == k ? mixed[j * d + l] : 0.0) - (j == l ? mixed[j * d + k] : 0.0) -
-                                     (k == l ? mixed[k * d + j] : 0.0);
+                const double third_sum = sum_of(n, third, offset + j * n, offset + k * n, offset + l * n) -
+                                         (j == k ? mixed[j * d + l] : 0.0) -
+                                         (j == l ? mixed[j * d + k] : 0.0) -
+                                         (k == l ? mixed[k * d + j] : 0.0);
                 for (const std::size_t at : {(j * d + k) * d + l, (j * d + l) * d + k, (k * d + j) * d + l,
                                              (k * d + l) * d + j, (l * d + j) * d + k, (l * d + k) * d + j}) {
-                    sums.twist[at] = twist;
+                    sums.third_derivative[at] = third_sum;
                 }
             }
         }

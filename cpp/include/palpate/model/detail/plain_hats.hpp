@@ -24,9 +24,9 @@ inline void at(const HatColumns& of, double x, Curve& sum) noexcept {
 template <double Curve::* member>
 void batch(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept {
     for (std::size_t k = 0; k < n; ++k) {
-        Curve here;
-        at(of, x[k], here);
-        sum[k] += here.*member;
+        Curve curve;
+        at(of, x[k], curve);
+        sum[k] += curve.*member;
     }
 }
 
@@ -53,10 +53,10 @@ inline void expansion(const RadialColumns& of, const double* middle, const doubl
                       RadialExpansion& sums) noexcept {
     const std::size_t d = of.dimension;
     const auto inputs = static_cast<double>(d);
-    double* const u = sums.room.data();
+    double* const u = sums.workspace.data();
     double* const scale = u + d;
     sums.value = 0.0;
-    for (auto* all : {&sums.gradient, &sums.bend, &sums.twist, &sums.rest}) {
+    for (auto* all : {&sums.gradient, &sums.second_derivative, &sums.third_derivative, &sums.rest}) {
         std::fill(all->begin(), all->end(), 0.0);
     }
     for (std::size_t i = 0; i < of.size; ++i) {
@@ -86,11 +86,11 @@ inline void expansion(const RadialColumns& of, const double* middle, const doubl
             sums.rest[j] += of.uncancelled[i] * beyond * spread * scale[j] * scale[j];
             for (std::size_t k = 0; k < d; ++k) {
                 const double by_two = scale[j] * scale[k];
-                sums.bend[j * d + k] += by_two * ((j == k ? first : 0.0) - second * u[j] * u[k]);
+                sums.second_derivative[j * d + k] += by_two * ((j == k ? first : 0.0) - second * u[j] * u[k]);
                 for (std::size_t l = 0; l < d; ++l) {
                     const double mixed =
                         (j == k ? u[l] : 0.0) + (j == l ? u[k] : 0.0) + (k == l ? u[j] : 0.0);
-                    sums.twist[(j * d + k) * d + l] +=
+                    sums.third_derivative[(j * d + k) * d + l] +=
                         by_two * scale[l] * (third * u[j] * u[k] * u[l] - second * mixed);
                 }
             }

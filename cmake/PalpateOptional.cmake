@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Third-party headers of the leaves (Debian: nlohmann-json3-dev, libcli11-dev).
+# Third-party libraries of the optional headers and of palpate-control (Debian: nlohmann-json3-dev, libcli11-dev).
 
 palpate_find_or_fetch(
   nlohmann_json https://github.com/nlohmann/json/releases/download/v3.11.2/json.tar.xz
