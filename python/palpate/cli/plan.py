@@ -189,7 +189,7 @@ _LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", 
 
 def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
     error = plan.force_error
-    felt, steepest = plan.felt_slopes
+    felt, steepest = plan.slopes_behind_coupling
     return {
         "structure": plan.structure,
         "verdict": str(plan.verdict),

@@ -19,7 +19,7 @@ from ..recording import Source
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
-from .classes.climb import VELOCITY_INPUTS
+from .classes.class_selection import VELOCITY_INPUTS
 from .classes.findings import identified, verdict_of
 from .classes.model_selection import select
 from .data.limits import ForceScale

@@ -46,16 +46,16 @@ from .identify import fit_environment, model_of
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from
 
-LEAST_KNOWN = 0.5
+LEAST_KNOWN_SHARE = 0.5
 """Share of the rows whose direction must be known to test hysteresis [-]."""
 
 MOST_CELLS = 8192
-"""Cells of position that are kept apart: as fine as identification needs."""
+"""Largest number of position cells that are kept apart: as fine as identification needs."""
 
 UNKNOWN_STROKES = "no column states the direction, and the order of rows does not show it"
 """Reason for which hysteresis is not tested."""
 
-SCATTER_ROWS = 16
+SCATTER_CELLS = 16
 """Neighbouring cells in which the force of single rows is compared with one line."""
 
 Progress = Callable[[int, int], None]
@@ -280,7 +280,7 @@ def _identified(
 def _known_strokes(summary: Summary) -> bool:
     """Both directions occur, and most rows have one."""
     press, release = (float(summary.count[summary.side == side].sum()) for side in (1, -1))
-    return min(press, release) > 0.0 and press + release >= LEAST_KNOWN * summary.rows
+    return min(press, release) > 0.0 and press + release >= LEAST_KNOWN_SHARE * summary.rows
 
 
 def _untested(summary: Summary, force_unit: Unit) -> Finding:
@@ -362,8 +362,8 @@ class Summary:
 
     @property
     def scatter(self) -> float:
-        """Standard deviation of the force about one line in each interval of SCATTER_ROWS cells [force]."""
-        group = np.argsort(np.argsort(self.position, kind="stable")) // SCATTER_ROWS
+        """Standard deviation of the force about one line in each interval of SCATTER_CELLS cells [force]."""
+        group = np.argsort(np.argsort(self.position, kind="stable")) // SCATTER_CELLS
         total = np.bincount(group, self.count)
         dx, dy = (
             values - (np.bincount(group, self.count * values) / total)[group]

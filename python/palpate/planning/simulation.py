@@ -33,16 +33,17 @@ MEAN_APPLIED = "mean_applied"
 
 _GRID = 1001
 """Number of positions at which the force range is computed [-]"""
-_TOLERATED_ERROR = 0.02
+_TOLERATED_ERROR_SHARE = 0.02
 """Largest force error without a finding [share of the force range]"""
 
-_COMPENSATED_DAMPING = 0.25
+_COMPENSATED_DAMPING_RATIO = 0.25
 """Coupling damping of the compensated structure over that of the others; (f'/K_c)^2 of it is felt."""
 
-_PREDICT = 4
+_COMPARED_PREDICTION = 4
 """Samples of the prediction in a comparison [-]"""
 
 _NAMES = {int(value): name for name, value in Status.__members__.items()}
+"""Status value to its name."""
 
 
 def rig_for(model: Model) -> TestRig:
@@ -221,12 +222,13 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
         )
     span = force_range(plan)
     share = error.end / span if span > 0 else 0.0
-    if share > _TOLERATED_ERROR:
+    if share > _TOLERATED_ERROR_SHARE:
         level = no if share > plan.accept_force_error else usable
         findings.append(
             level(
                 f"the force error is {100 * share:.3g} % of the object's force range, above "
-                f"{100 * _TOLERATED_ERROR:.3g} %: choose a structure with palpate plan, or a stiffer coupling"
+                f"{100 * _TOLERATED_ERROR_SHARE:.3g} %: choose a structure with palpate plan, or a stiffer "
+                "coupling"
             )
         )
     outside = int(rendered.columns["extrapolated"].sum())
@@ -299,9 +301,9 @@ def compare_structures(model: Model, rig: TestRig, duration: float) -> tuple[Com
     duration : float
         Simulated time of each rendering [s].
     """
-    quarter = _COMPENSATED_DAMPING * rig.scheme(model).coupling_damping
+    quarter = _COMPENSATED_DAMPING_RATIO * rig.scheme(model).coupling_damping
     schemes = (
-        rig.scheme(model, structure="direct", predict=_PREDICT),
+        rig.scheme(model, structure="direct", predict=_COMPARED_PREDICTION),
         rig.scheme(model, structure="direct"),
         rig.scheme(model, structure="massless", compensated=True, coupling_damping=quarter),
         rig.scheme(model, structure="massless"),

@@ -15,19 +15,19 @@ from ..recording.units import UNITS, Unit
 from .metrics import normalised, root_mean_square
 from .prediction import Prediction
 
-WORTH_TELLING = 0.5
+REPORTED_NRMSE_RATIO = 0.5
 """Largest NRMSE under an explanation that is reported, as a share of the NRMSE without it [-]."""
 
-AS_GOOD = 1.2
+EQUIVALENT_NRMSE_RATIO = 1.2
 """Largest ratio to the least NRMSE at which a simpler explanation is preferred [-]."""
 
-SAME_FACTOR = 0.02
+FACTOR_TOLERANCE = 0.02
 """Largest relative difference of a factor from the factor of a unit [-]."""
 
-SHIFTS = 41
+OFFSETS_PER_GRID = 41
 """Number of position offsets on a grid."""
 
-GRIDS = 3
+OFFSET_GRIDS = 3
 """Number of grids of position offsets, each finer than the previous one."""
 
 MOST_ROWS = 2000
@@ -61,10 +61,12 @@ def explanation(model: Model, recording: Recording, prediction: Prediction) -> E
     if model.dimension == 1 and model.mass is None and model.damping is None:
         side = None if prediction.side is None else prediction.side[few]
         tried += _of_position(model, prediction.position[few], side, force, recording)
-    found = [each for each in tried if each.nrmse < WORTH_TELLING * nrmse]
+    found = [each for each in tried if each.nrmse < REPORTED_NRMSE_RATIO * nrmse]
     least = min((each.nrmse for each in found), default=0.0)
     return min(
-        (each for each in found if each.nrmse <= AS_GOOD * least), key=lambda each: each.order, default=None
+        (each for each in found if each.nrmse <= EQUIVALENT_NRMSE_RATIO * least),
+        key=lambda each: each.order,
+        default=None,
     )
 
 
@@ -133,11 +135,11 @@ def _of_position(
                     order=4,
                 )
     # Search the offset on a grid over the travel, then on finer grids around the best one.
-    best, step = 0.0, 2.0 * float(model.upper[0] - model.lower[0]) / (SHIFTS - 1)
-    for _ in range(GRIDS):
-        grid = best + step * (np.arange(SHIFTS) - SHIFTS // 2)
+    best, step = 0.0, 2.0 * float(model.upper[0] - model.lower[0]) / (OFFSETS_PER_GRID - 1)
+    for _ in range(OFFSET_GRIDS):
+        grid = best + step * (np.arange(OFFSETS_PER_GRID) - OFFSETS_PER_GRID // 2)
         best = float(min(grid, key=lambda shift: left(position + shift, side)))
-        step *= 4.0 / (SHIFTS - 1)
+        step *= 4.0 / (OFFSETS_PER_GRID - 1)
     yield Explanation(
         left(position + best, side),
         f"the model fits if {recording.file_unit('position').text(abs(best))} is "
@@ -150,8 +152,8 @@ def _unit_of(factor: float, unit: str) -> str | None:
     """Returns the mistaken unit that a factor corrects, in words, or None."""
     for symbol, other in UNITS.items():
         if other.si == unit and other.factor != 1.0:
-            if abs(factor / other.factor - 1.0) < SAME_FACTOR:
+            if abs(factor / other.factor - 1.0) < FACTOR_TOLERANCE:
                 return f"it may be in {symbol}"
-            if abs(factor * other.factor - 1.0) < SAME_FACTOR:
+            if abs(factor * other.factor - 1.0) < FACTOR_TOLERANCE:
                 return f"it may be in {unit}, not in {symbol}"
     return None

@@ -19,7 +19,7 @@ from ..decision import latest
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, RowError
-from .climb import Climb
+from .class_selection import ClassSelection
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: a tenth of the force's spread [-]."""
@@ -27,16 +27,17 @@ USABLE_NRMSE = 0.1
 UNFIT_NRMSE = 0.5
 """NRMSE above which a model is unfit: it leaves a quarter of the force's variance unexplained [-]."""
 
-ROWS_A_PARAMETER = 7
+ROWS_PER_PARAMETER = 7
 """Rows for each parameter below which the error between the rows may exceed that of the fit by a fifth."""
 
-ROWS_A_PARAMETER_OF_FEW = 10
-"""The same among fewer than FEW_ROWS rows, which may miss a bend of the force."""
+ROWS_PER_PARAMETER_IF_FEW = 10
+"""The same with fewer than FEW_ROWS rows, which may miss a bend of the force."""
 
 FEW_ROWS = 500
+"""Number of rows below which ROWS_PER_PARAMETER_IF_FEW applies."""
 
-CERTAINLY_ENOUGH = 1000
-"""Rows for each parameter from which repetitions are not counted."""
+AMPLE_ROWS_PER_PARAMETER = 1000
+"""Rows for each parameter from which repeated rows are not counted."""
 
 
 def error_findings(nrmse: float, rows: str) -> list[Finding]:
@@ -59,11 +60,11 @@ def size_findings(network: FittedNetwork, recordings: Sequence[Recording]) -> li
     Rows that repeat another one do not count, and correlated noise makes each row count for less.
     """
     rows = sum(map(len, recordings))
-    if not recordings or rows >= CERTAINLY_ENOUGH * network.n_parameters:
+    if not recordings or rows >= AMPLE_ROWS_PER_PARAMETER * network.n_parameters:
         return []
     pairs = np.concatenate([part.position + 1j * part.force for part in recordings])
     distinct = len(np.unique(pairs))
-    each = ROWS_A_PARAMETER_OF_FEW if distinct < FEW_ROWS else ROWS_A_PARAMETER
+    each = ROWS_PER_PARAMETER_IF_FEW if distinct < FEW_ROWS else ROWS_PER_PARAMETER
     needed = each * network.n_parameters
     if min(distinct, network.independent_rows) >= needed:
         return []
@@ -90,23 +91,23 @@ def verdict_of(
     return Verdict(tuple(dict.fromkeys(findings)))
 
 
-MOST_OF_THE_ERROR = 0.5
-"""Part of a model's mean square error that position cannot explain, from which wavelets stay wide [-]"""
+LARGE_UNEXPLAINED_SHARE = 0.5
+"""Share of the mean square error that position cannot explain, from which wavelets stay wide [-]."""
 
-REPORTED_SHARE = 0.25
-"""The same part, from which a finding says so [-]"""
+REPORTED_UNEXPLAINED_SHARE = 0.25
+"""The same share from which a finding reports it [-]."""
 
-CAUSE = 0.4
-"""Part of the residual's variance that a cause must explain to be named [-]"""
+LEAST_CAUSE_SHARE = 0.4
+"""Least share of the variance of the residual that a named cause explains [-]."""
 
-BLOCKS = 40
-"""Stretches of the recording whose mean residuals show a dependence on time."""
+TIME_BLOCKS = 40
+"""Number of stretches of the recording whose mean residuals show a dependence on time."""
 
-PARTS = 8
-"""Parts of the travel, in each of which the residual may depend differently on the direction of motion."""
+TRAVEL_PARTS = 8
+"""Number of parts of the travel, in each of which the residual may depend differently on the direction."""
 
 MOST_ROWS = 50_000
-"""Rows, evenly spread, that are enough to estimate a share."""
+"""Largest number of rows, evenly spread, for the estimate of a share."""
 
 
 def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None = None) -> float:
@@ -142,9 +143,9 @@ def unexplained_share(position: Float1D, force: Float1D, side: Float1D | None) -
     return unexplained_variance(position[rows], force[rows], side) / spread if spread > 0.0 else 0.0
 
 
-def most_of_error(nrmse: float) -> float:
+def large_unexplained_share(nrmse: float) -> float:
     """Share that cannot be explained from which it is most of a model's error."""
-    return MOST_OF_THE_ERROR * nrmse**2
+    return LARGE_UNEXPLAINED_SHARE * nrmse**2
 
 
 def _thinned(values: Float1D) -> slice:
@@ -154,11 +155,11 @@ def _thinned(values: Float1D) -> slice:
 
 def likely_cause(position: Float1D, residual: Float1D) -> tuple[str, str]:
     """Likely cause of a residual (n,) at positions (n,) in recorded order, and the cure."""
-    part = np.argsort(np.argsort(position, kind="stable"), kind="stable") * PARTS // len(position)
+    part = np.argsort(np.argsort(position, kind="stable"), kind="stable") * TRAVEL_PARTS // len(position)
     ahead = np.sign(np.gradient(position))
     by_direction = _explained(residual, 3 * part + ahead.astype(np.intp) + 1) - _explained(residual, part)
-    in_time = _explained(residual, np.arange(len(residual)) * BLOCKS // len(residual))
-    if max(by_direction, in_time) < CAUSE:
+    in_time = _explained(residual, np.arange(len(residual)) * TIME_BLOCKS // len(residual))
+    if max(by_direction, in_time) < LEAST_CAUSE_SHARE:
         return (
             "another input (a second position, the place on the object, velocity), or noise of the force",
             "record the other inputs as columns and name them with --inputs, or identify each place "
@@ -212,7 +213,7 @@ def explained_findings(
     if nrmse <= USABLE_NRMSE or spread == 0.0:
         return []
     least = unexplained_share(position, force, side)
-    if least < REPORTED_SHARE * nrmse**2:
+    if least < REPORTED_UNEXPLAINED_SHARE * nrmse**2:
         return []
     judge = no if nrmse > UNFIT_NRMSE else usable
     share = max(0.0, 1.0 - least)
@@ -228,36 +229,36 @@ def explained_findings(
     ]
 
 
-DISAGREEMENT = 1.5
-"""Ratio of the error on rows to the error on cells above which the cells were too wide [-]"""
+CELL_ERROR_RATIO = 1.5
+"""Ratio of the error on rows to the error on cells above which the cells were too wide [-]."""
 
 REPORTED_NRMSE = 0.02
-"""NRMSE on rows below which that ratio is not reported [-]"""
+"""NRMSE on rows below which that ratio is not reported [-]."""
 
-SAMPLED = 10_000
-"""Rows, evenly spread, that show the spread of the force."""
+MOST_SAMPLED_ROWS = 10_000
+"""Largest number of rows, evenly spread, for the spread of the force."""
 
 EXTREME_SHARE = 0.01
-"""Share of the rows, those with the most extreme forces, that must not decide the NRMSE alone [-]"""
+"""Share of the rows, those with the most extreme forces, that must not decide the NRMSE alone [-]."""
 
 LEAST_ROWS = 100
-"""Rows below which one percent of them is less than one row."""
+"""Least number of rows of which one percent is a row."""
 
-HIDDEN = 1.2
-"""Ratio of the NRMSE without these rows to the reported NRMSE above which a finding says so [-]"""
+HIDDEN_ERROR_RATIO = 1.2
+"""Ratio of the NRMSE without these rows to the reported NRMSE above which a finding reports it [-]."""
 
-BETWEEN_ROWS = 4001
-"""Positions over the domain, with the extrema of each wavelet, where the force between rows is computed."""
+POSITIONS_BETWEEN_ROWS = 4001
+"""Number of positions over the domain, besides the extrema of each wavelet, where the force is computed."""
 
-USABLE_BEYOND = 0.25
+USABLE_EXCESS = 0.25
 """Share of the range of the recorded forces by which the model may exceed them without a finding [-].
 Models of measured switches, domes and springs exceed it by less than 0.1."""
 
-UNFIT_BEYOND = 1.0
+UNFIT_EXCESS = 1.0
 """The same, from which the model is unfit [-]."""
 
 
-def extreme_forces(error: RowError, force_unit: Unit = UNSTATED_UNIT) -> list[Finding]:
+def extreme_force_findings(error: RowError, force_unit: Unit = UNSTATED_UNIT) -> list[Finding]:
     """A finding if few rows of extreme force hide a large error of all others."""
     rows = np.flatnonzero(error.weight > 0.0)
     if len(rows) < LEAST_ROWS or error.spread == 0.0 or _plainly_small(error, rows):
@@ -266,7 +267,7 @@ def extreme_forces(error: RowError, force_unit: Unit = UNSTATED_UNIT) -> list[Fi
     count = len(rows) - int(EXTREME_SHARE * len(rows))
     kept = rows[np.sort(np.argpartition(far, count - 1)[:count])]
     inner = RowError(error.residual[kept], error.force[kept], error.weight[kept])
-    if inner.nrmse <= max(USABLE_NRMSE, HIDDEN * error.nrmse):
+    if inner.nrmse <= max(USABLE_NRMSE, HIDDEN_ERROR_RATIO * error.nrmse):
         return []
     judge = no if inner.nrmse > UNFIT_NRMSE else usable
     return [
@@ -282,13 +283,13 @@ def extreme_forces(error: RowError, force_unit: Unit = UNSTATED_UNIT) -> list[Fi
 
 def _plainly_small(error: RowError, rows: NDArray[np.intp]) -> bool:
     """True if the error is small for the spread of all but the most extreme forces, of some rows (k,)."""
-    some = error.force[rows[:: max(1, len(rows) // SAMPLED)]]
+    some = error.force[rows[:: max(1, len(rows) // MOST_SAMPLED_ROWS)]]
     low, high = np.quantile(some, (EXTREME_SHARE, 1.0 - EXTREME_SHARE))
     inner = some[(some >= low) & (some <= high)]
     return bool(error.rmse < 0.5 * USABLE_NRMSE * float(np.std(inner)))
 
 
-def beyond_rows(
+def excess_findings(
     network: FittedNetwork,
     force: Float1D,
     *,
@@ -306,7 +307,7 @@ def beyond_rows(
     lower, upper = float(network.lower[0]), float(network.upper[0])
     sides = np.array([0.0, -1.0, 1.0, -np.sqrt(3.0), np.sqrt(3.0)])
     extrema = (network.beta[:, :1] + sides / network.alpha[:, :1]).ravel()
-    at = np.concatenate([np.linspace(lower, upper, BETWEEN_ROWS), np.clip(extrema, lower, upper)])
+    at = np.concatenate([np.linspace(lower, upper, POSITIONS_BETWEEN_ROWS), np.clip(extrema, lower, upper)])
     directions = ("", "") if network.weight_hysteresis is None else (" while pressing", " while releasing")
     found = []
     play = 0.0 if repeats else min(2.0 * (network.play_radius or 0.0), upper - lower)
@@ -319,9 +320,9 @@ def beyond_rows(
         worst = int(np.argmax(excess))
         found.append((float(excess[worst]), float(x[worst]), float(values[worst]), stroke))
     share, place, value, stroke = max(found)
-    if share <= USABLE_BEYOND:
+    if share <= USABLE_EXCESS:
         return []
-    judge = no if share > UNFIT_BEYOND else usable
+    judge = no if share > UNFIT_EXCESS else usable
     return [
         judge(
             f"between the rows the force of the model is {force_unit.text(value)} at position "
@@ -332,7 +333,7 @@ def beyond_rows(
     ]
 
 
-def disagreement(
+def cell_findings(
     on_rows: RowError,
     on_cells: float,
     travel: float,
@@ -342,7 +343,7 @@ def disagreement(
     force_unit: Unit = UNSTATED_UNIT,
 ) -> list[Finding]:
     """A finding if the error on rows is far above the error on the cells that were fitted."""
-    if on_rows.nrmse <= REPORTED_NRMSE or on_rows.rmse <= DISAGREEMENT * on_cells:
+    if on_rows.nrmse <= REPORTED_NRMSE or on_rows.rmse <= CELL_ERROR_RATIO * on_cells:
         return []
     return [
         no(
@@ -369,9 +370,9 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     ]
 
 
-def identified(climb: Climb) -> FittedNetwork:
+def identified(selection: ClassSelection) -> FittedNetwork:
     """The accepted model in the units of the data, with its error on the rows, all notes and all findings."""
-    best, report, options = climb.best, climb.report, climb.options
+    best, report, options = selection.best, selection.report, selection.options
     data, error, network = best.data, best.error, best.network
     single, counted = len(data.names) == 1, error.weight
     notes, findings = list(data.notes), list(data.findings)
@@ -384,10 +385,10 @@ def identified(climb: Climb) -> FittedNetwork:
     if data.robust is not None:
         findings += data.robust.findings(best.residual, data.force_unit)
     units = {"position_unit": data.position_unit, "force_unit": data.force_unit}
-    findings += extreme_forces(error, data.force_unit)
+    findings += extreme_force_findings(error, data.force_unit)
     on_rows, travel = best.error_on(data.weight), float(data.reach[0])
-    findings += disagreement(on_rows, best.rmse, travel, best.rows.cells, **units)
-    findings += beyond_rows(network, data.force[counted > 0.0], repeats=data.period is not None, **units)
+    findings += cell_findings(on_rows, best.rmse, travel, best.rows.cells, **units)
+    findings += excess_findings(network, data.force[counted > 0.0], repeats=data.period is not None, **units)
     if data.counted is None and single:
         rows = np.flatnonzero(counted)
         side, position = None if best.side is None else best.side[rows], data.domain[rows, 0]

@@ -20,13 +20,14 @@ from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
 from ..decision import Decision
 from ..options import IdentifyOptions
-from .compression import EVERY, held_out_rows
+from .compression import HELD_OUT_EVERY, held_out_rows
 from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, position_noise, repeated
 from .outliers import Robust
 from .strokes import strokes_of
 
-LARGEST = 1e100
-"""Largest absolute value, and the inverse of the smallest travel and force, that is identified."""
+LARGEST_MAGNITUDE = 1e100
+"""Largest absolute value, and inverse of the smallest travel and force, that is identified: its square does
+not overflow."""
 
 
 def require_in_range(name: str, values: Float1D) -> None:
@@ -37,8 +38,10 @@ def require_in_range(name: str, values: Float1D) -> None:
     InputError
         Names the largest value and the limit.
     """
-    if (largest := float(np.abs(values).max())) > LARGEST:
-        raise InputError(f"{name} reaches {largest:.3g}: must be at most {LARGEST:g}. Use another unit")
+    if (largest := float(np.abs(values).max())) > LARGEST_MAGNITUDE:
+        raise InputError(
+            f"{name} reaches {largest:.3g}: must be at most {LARGEST_MAGNITUDE:g}. Use another unit"
+        )
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,7 @@ class Rows:
         if self.weight is not None:
             counted = np.flatnonzero(self.weight > 0.0)
             held_out &= self.weight > 0.0
-            if 2 * EVERY * np.count_nonzero(held_out) < len(counted):
+            if 2 * HELD_OUT_EVERY * np.count_nonzero(held_out) < len(counted):
                 # rows that repeat others can fill every place that is held out
                 held_out[:] = False
                 held_out[counted] = held_out_rows(len(counted), self.starts)
@@ -184,15 +187,16 @@ def require_usable(rows: Rows, options: IdentifyOptions) -> None:
             )
     for name, column in zip((*names, "force"), (*positions.T, force), strict=True):
         require_in_range(name, column)
-    if 0.0 < (largest := float(np.abs(force).max())) < 1.0 / LARGEST:
+    if 0.0 < (largest := float(np.abs(force).max())) < 1.0 / LARGEST_MAGNITUDE:
         raise InputError(
-            f"the largest |force| is {largest:.3g}: must be at least {1.0 / LARGEST:g}, or 0. Use another "
-            "unit"
+            f"the largest |force| is {largest:.3g}: must be at least {1.0 / LARGEST_MAGNITUDE:g}, or 0. Use "
+            "another unit"
         )
     for name, column in zip(names, positions.T, strict=True):
-        if 0.0 < (travel := float(np.ptp(column))) < 1.0 / LARGEST:
+        if 0.0 < (travel := float(np.ptp(column))) < 1.0 / LARGEST_MAGNITUDE:
             raise InputError(
-                f"{name} has a range of {travel:.3g}: must be at least {1.0 / LARGEST:g}. Use another unit"
+                f"{name} has a range of {travel:.3g}: must be at least {1.0 / LARGEST_MAGNITUDE:g}. Use "
+                "another unit"
             )
         if column.min() == column.max():
             raise InputError(f"every {name} is {column[0]:g}: must vary")
