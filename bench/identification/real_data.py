@@ -26,7 +26,7 @@ from bench.identification.figures import WORST_SPLINE_RATIO
 from bench.studies import SCALE, count, measured_data, write_results
 
 import palpate
-from palpate.baselines import PASSIVE, Compared, comparable, compare
+from palpate.baselines import PASSIVE_SPLINE, Compared, comparable, compare
 from palpate.recording.motion import velocity
 from palpate.verification.metrics import normalised, root_mean_square
 
@@ -184,7 +184,7 @@ def row_of(path: Path, recording_set: Set) -> dict[str, Any]:
         "file": path.stem,
         **numbers,
         "splines": _numbers(splines),
-        "passive_splines": _numbers(baselines[PASSIVE]) if PASSIVE in baselines else None,
+        "passive_splines": _numbers(baselines[PASSIVE_SPLINE]) if PASSIVE_SPLINE in baselines else None,
         "baselines": {name: _numbers(each) for name, each in baselines.items()}
         if recording_set.with_baselines
         else {},
