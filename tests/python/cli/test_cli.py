@@ -14,7 +14,7 @@ import click
 import pytest
 
 from palpate import InputError
-from palpate.cli.exit_status import WorkError, ending_of, finishing
+from palpate.cli.exit_status import WorkError, exit_status_of, finishing
 from palpate.cli.main import main, palpate
 from palpate.cli.printing import print_json
 from palpate.cli.verb import require_writable
@@ -91,7 +91,7 @@ def test_program_help_imports_no_large_library() -> None:
 def test_every_failure_has_one_sentence_and_an_exit_code(
     error: BaseException, code: int, sentence: str
 ) -> None:
-    status = ending_of(error)
+    status = exit_status_of(error)
     assert (status.code, status.sentence) == (code, sentence)
 
 
@@ -99,7 +99,7 @@ def test_a_defect_is_reported_with_file_and_line_and_without_traceback() -> None
     try:
         raise RuntimeError("two\nlines")
     except RuntimeError as error:
-        status = ending_of(error)
+        status = exit_status_of(error)
     assert status.code == 1
     assert "RuntimeError: two lines (test_cli.py, line" in status.sentence
 
@@ -162,7 +162,7 @@ def test_an_input_is_never_overwritten(tmp_path: Path) -> None:
     symbolic_link = tmp_path / "link.csv"
     symbolic_link.symlink_to(recording)
     for target in (recording, symbolic_link):
-        with pytest.raises(InputError, match="is an input as well"):
+        with pytest.raises(InputError, match="is also an input"):
             require_writable(target, inputs=[recording])
 
 

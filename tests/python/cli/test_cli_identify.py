@@ -197,7 +197,7 @@ def test_settings_reach_the_identification(folder: Path, capsys: pytest.CaptureF
         (["--units", "position_rad=parsec"], "parsec"),
         (["--rows", "10"], "must be START:STOP"),
         (["--position", "depth"], "no column 'depth'"),
-        (["--search", "play_radius=wide"], "play_radius is 'wide'; it must be numbers joined by commas"),
+        (["--search", "play_radius=wide"], "play_radius is 'wide': must be numbers joined by commas"),
         (["--search", "unknown=1"], "search has no setting 'unknown'"),
         (["--search", "patience"], "must be NAME=VALUE"),
         (["--plot", "m.doc"], "is not a figure file"),

@@ -96,7 +96,7 @@ def test_predict_alone_renders_directly_with_less_force_error(
         (["--structure", "direct", "--compensated"], "compensated is set for the direct structure"),
         (["--compensated", "--coupling-stiffness", "5"], "coupling_stiffness is 5"),
         (["-o", "nowhere/r.csv"], "there is no folder nowhere"),
-        (["-o", "m.json"], "is an input as well"),
+        (["-o", "m.json"], "is also an input"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
@@ -131,7 +131,7 @@ def test_a_diverged_rendering_exits_with_code_1(
     assert main(["simulate", "m.json", "-o", "r.csv"]) == 1
     verdict, reason, *_ = capsys.readouterr().out.splitlines()
     assert verdict == "verdict: no"
-    assert "ran away: 7 of 4000 ticks" in reason
+    assert "diverged: 7 of 4000 ticks" in reason
     assert not Path("r.csv").exists()
 
 
@@ -285,7 +285,7 @@ def test_the_demo_names_every_file_it_writes(demo_run: tuple[Path, str, str]) ->
 
 def test_the_demo_labels_all_its_data_as_simulated(demo_run: tuple[Path, str, str]) -> None:
     folder, _, messages = demo_run
-    assert messages.splitlines()[0].startswith("everything in this demo is simulated")
+    assert messages.splitlines()[0].startswith("all data of this demo is simulated")
     for name in ("sample-1.csv", "sample-2.csv"):
         assert any(
             "simulated" in f"{key} {value}" for key, value in read_recording(folder / name).metadata.items()
