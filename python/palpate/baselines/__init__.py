@@ -5,11 +5,11 @@ All have the same interface: ``fit(X, y)`` returns the estimator, ``predict(X)``
 counts every fitted real number. X (n, 1 to 3) holds position and, if known, velocity and acceleration.
 """
 
-from .comparison import PASSIVE, Compared, baselines, comparable, compare
+from .comparison import PASSIVE_SPLINE, Compared, baselines, comparable, compare
 from .methods import HuntCrossley, LinearZones, LookupTable, PerStroke, SmoothingSpline, TissueParameters
 
 __all__ = [
-    "PASSIVE",
+    "PASSIVE_SPLINE",
     "Compared",
     "HuntCrossley",
     "LinearZones",

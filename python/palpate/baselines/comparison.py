@@ -40,10 +40,10 @@ class Compared:
     """Reason why it could not be fitted"""
 
 
-PASSIVE = "smoothing spline, two strokes, h >= 0"
+PASSIVE_SPLINE = "smoothing spline, two strokes, h >= 0"
 """The same two splines, but press is never below release: a fair comparison for a passive model."""
 
-LEAST_STROKE = 0.1
+LEAST_STROKE_SHARE = 0.1
 """Least share of the travel of a stroke."""
 
 
@@ -59,7 +59,7 @@ def baselines(strokes: bool) -> dict[str, Estimator]:
     if not strokes:
         return single
     pairs: dict[str, Estimator] = {f"{name}, two strokes": PerStroke(each) for name, each in single.items()}
-    return {**pairs, PASSIVE: PerStroke(SmoothingSpline(), passive=True)}
+    return {**pairs, PASSIVE_SPLINE: PerStroke(SmoothingSpline(), passive=True)}
 
 
 def comparable(recording: Recording) -> NDArray[np.bool_]:
@@ -107,7 +107,7 @@ def _has_strokes(recording: Recording) -> bool:
     if recording.direction is None:
         return False
     strokes = [recording.position[recording.direction == side] for side in (1, -1)]
-    least = LEAST_STROKE * float(np.ptp(recording.position))
+    least = LEAST_STROKE_SHARE * float(np.ptp(recording.position))
     return all(len(stroke) > 0 and float(np.ptp(stroke)) >= least for stroke in strokes)
 
 

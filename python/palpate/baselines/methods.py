@@ -16,30 +16,35 @@ from scipy.optimize import least_squares
 
 from .._typing import Float1D, Float2D
 
-HELD_OUT = 5
+HELD_OUT_EVERY = 5
 """Every fifth of the fitted rows is used to choose missing settings."""
 
 SIZES = (2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
+"""Numbers of table entries that are tried."""
 
 SMOOTHINGS = (30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.0, 0.9, 0.8)
+"""Residuals of a smoothing spline that are tried [multiples of the noise]."""
 
 MOST_FITTED_ROWS = 20_000
 """Largest number of fitted rows; longer data is thinned evenly."""
 
 EXPONENTS = (0.5, 6.0)
-"""Range of the exponent."""
+"""Range of the exponent of the tissue law [-]."""
 
 THRESHOLDS = (0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001)
+"""Largest residuals of linear zones that are tried [share of the range of the force]."""
 
-PLACES = 256
+MOST_ZONE_BOUNDARIES = 256
 """Number of places at which a zone may be divided: quantiles of its positions."""
 
 LEAST_ZONE_ROWS = 8
 """Least number of rows in a zone for each of its parameters."""
 
 RIDGE = 1e-10
+"""Ridge of the least squares [-]: keeps equal columns solvable, far below any noise."""
 
 C = TypeVar("C")
+"""Setting of a method."""
 
 
 class Estimator(Protocol):
@@ -63,7 +68,7 @@ def best_of(
     Every fifth row is held out. Candidates are sorted, the simplest first; one that cannot be fitted is
     skipped. So no method is compared with an unsuitable setting.
     """
-    kept = np.arange(len(y)) % HELD_OUT != HELD_OUT - 1
+    kept = np.arange(len(y)) % HELD_OUT_EVERY != HELD_OUT_EVERY - 1
     if kept.all():
         return next(iter(candidates))
     tried: list[tuple[float, float, C]] = []
@@ -354,7 +359,7 @@ def _best_cut(x: Float1D, design: Float2D, y: Float1D, allowed: float) -> int | 
     rest = y - design @ _solved(design, y)
     if len(y) < 2 * least or float(np.sqrt(np.mean(rest**2))) <= allowed:
         return None
-    cuts = np.unique(np.linspace(least, len(y) - least, PLACES).astype(np.int64))
+    cuts = np.unique(np.linspace(least, len(y) - least, MOST_ZONE_BOUNDARIES).astype(np.int64))
     # rows of one position stay together
     cuts = np.unique(np.searchsorted(x, x[cuts], side="left"))
     cuts = cuts[(cuts >= least) & (cuts <= len(y) - least)]

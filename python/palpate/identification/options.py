@@ -138,8 +138,8 @@ class IdentifyOptions:
             object.__setattr__(self, "inputs", tuple(name.strip() for name in names))
             if "position" not in self.inputs or "" in self.inputs or len(set(self.inputs)) < len(self.inputs):
                 raise InputError(
-                    f'inputs is {",".join(self.inputs)!r}; use "auto", or position and what else the force '
-                    "depends on: hysteresis, velocity, columns"
+                    f'inputs is {",".join(self.inputs)!r}; use "auto", or position and the further inputs '
+                    "of the force: hysteresis, velocity, columns"
                 )
         _require(self)
         given: object = self.search
@@ -174,7 +174,7 @@ class IdentifyOptions:
             raise InputError(f"fixed_force is {shown(self.fixed_force)}: must be (position, force)")
 
 
-_LEAST = {
+_LEAST_WHOLE = {
     "max_wavelets": 0,
     "patience": 1,
     "refine_steps": 1,
@@ -183,9 +183,9 @@ _LEAST = {
     "resolved_by": 3,
     "max_positions": 16,
 }
-"""Whole-number settings and the least that makes sense."""
+"""Settings that are whole numbers and their least value."""
 
-_ABOVE = {
+_LOWER_BOUND = {
     "evidence": -math.inf,
     "frame_scale": 1.0,
     "frame_step": 0.0,
@@ -195,7 +195,7 @@ _ABOVE = {
     "coupling_stiffness": 0.0,
     "period": 0.0,
 }
-"""Real settings and the number that they must exceed."""
+"""Settings that are real numbers and their exclusive lower bound."""
 
 
 def _require(options: IdentifyOptions | SearchOptions) -> None:
@@ -214,11 +214,11 @@ def _require(options: IdentifyOptions | SearchOptions) -> None:
         elif isinstance(each.default, bool):
             if not isinstance(value, (bool, np.bool_)):
                 raise InputError(f"{name} is {shown(value)}: must be True or False")
-        elif name in _LEAST:
-            if not isinstance(value, int) or isinstance(value, bool) or value < _LEAST[name]:
-                raise InputError(f"{name} is {shown(value)}: must be a whole number >= {_LEAST[name]}")
-        elif name in _ABOVE:
-            _require_number(name, value, _ABOVE[name])
+        elif name in _LEAST_WHOLE:
+            if not isinstance(value, int) or isinstance(value, bool) or value < _LEAST_WHOLE[name]:
+                raise InputError(f"{name} is {shown(value)}: must be a whole number >= {_LEAST_WHOLE[name]}")
+        elif name in _LOWER_BOUND:
+            _require_number(name, value, _LOWER_BOUND[name])
 
 
 def _parsed(name: str, text: str) -> Any:

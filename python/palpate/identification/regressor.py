@@ -21,7 +21,7 @@ from ..recording import Source
 from .classes.model_selection import select
 from .data.compression import held_out_rows
 from .data.limits import ForceScale, distinct_rows
-from .data.rows import LARGEST, Rows
+from .data.rows import LARGEST_MAGNITUDE, Rows
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions
 from .search.evidence import ON_HELD_OUT_ROWS, RowError
@@ -42,11 +42,11 @@ SETTINGS = {
 }
 """Those of :class:`IdentifyOptions` that need no recording, with defaults; search None: its own."""
 
-NARROWEST = 1e-12
-"""A column whose range is below this share of its largest value is constant except for rounding."""
+LEAST_RELATIVE_RANGE = 1e-12
+"""Least range of a column over its largest absolute value [-]. Below it the column is constant."""
 
-MOST_ROWS = 200_000
-"""Rows, evenly spread, that the error is computed on: more change its third digit at most."""
+MOST_ERROR_ROWS = 200_000
+"""Largest number of rows, evenly spread, for the reported error. More change at most its third digit."""
 
 
 class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
@@ -201,17 +201,18 @@ def fit_regression(
         weight = np.ones(len(y))
     counted = weight > 0.0
     if not counted.any():
-        raise InputError("sample_weight is 0 in every row: at least one must be > 0")
+        raise InputError("sample_weight is zero in every row: at least one must be > 0")
     X, y, weight = X[counted], y[counted], weight[counted]
     largest = max(float(np.abs(X).max()), float(np.abs(y).max()))
-    if largest > LARGEST:
+    if largest > LARGEST_MAGNITUDE:
         raise InputError(
-            f"the largest absolute value is {largest:.3g}: must be at most {LARGEST:g}. Use other units"
+            f"the largest absolute value is {largest:.3g}: must be at most {LARGEST_MAGNITUDE:g}. Use other "
+            "units"
         )
     if scale := ForceScale.of(y, options):
         columns, scaled = fit_regression(X, scale.scaled(y), weight, scale.scaled_options(options))
         return columns, scaled.unscaled(scale)
-    varies = np.ptp(X, axis=0) > NARROWEST * np.abs(X).max(axis=0)
+    varies = np.ptp(X, axis=0) > LEAST_RELATIVE_RANGE * np.abs(X).max(axis=0)
     # a network needs an input: where none varies, the first one gets a box as wide as its value
     columns = np.flatnonzero(varies) if varies.any() else np.zeros(1, dtype=np.int64)
     lower, upper = X[:, columns].min(axis=0), X[:, columns].max(axis=0)
@@ -224,12 +225,12 @@ def fit_regression(
     names = tuple(f"x{column}" for column in columns)
     rows = Rows(names, X[:, columns], y, weight=weight, corners=(lower, upper))
     with threadpool_limits(limits=1, user_api="blas"):
-        climb = select(rows, options, on_held_out=False)
-        best = climb.best
-        some = slice(None, None, max(1, -(-len(y) // MOST_ROWS)))
+        selection = select(rows, options, on_held_out=False)
+        best = selection.best
+        some = slice(None, None, max(1, -(-len(y) // MOST_ERROR_ROWS)))
         error = RowError(y[some] - best.force_at(some), y[some], weight[some])
     margin = _margin(rows.box) * (upper - lower)
-    path = tuple(climb.report.path)
+    path = tuple(selection.report.path)
     network = replace(best.network, rmse=error.rmse, path=path, lower=lower - margin, upper=upper + margin)
     return columns, network
 

@@ -30,16 +30,16 @@ from .limited_network import (
 )
 from .plan import static_force_error, with_network
 
-_COUPLING_DAMPING = 0.2
+_COUPLING_DAMPING_SHARE = 0.2
 """Default coupling damping of a structure with mass [share of the device's damping]"""
 
-_WIDER_PLAY = 1.02
+_PLAY_ENLARGEMENT = 1.02
 """Play radius that is tried if the computed one is just refused [share of the computed one]"""
 
-_PREDICTIONS = (1, 2, 4, 8, 16)
+_PREDICTION_SAMPLES = (1, 2, 4, 8, 16)
 """Samples tried for a prediction. Few give less delay and force error; many need less damping [-]"""
 
-_LATE_TICK = 1.25
+_LATE_TICK_PERIODS = 1.25
 """Time between two samples for which a chosen prediction must be certified, unless none is
 [longest time between samples of the device]
 """
@@ -144,6 +144,7 @@ class Task:
 
 
 _NOT_LIMITED = Refusal("the identified model must be rendered without changes")
+"""Refusal of a structure that would change the model."""
 
 
 def _direct(task: Task) -> Candidate | Refusal:
@@ -153,7 +154,7 @@ def _direct(task: Task) -> Candidate | Refusal:
     found = task.certified(task.direct_scheme(task.model))
     if found.certificate.refused and task.chooses_play:
         # Bounds of the sum g' + h / r can be wider than the sum of the bounds, which gave r.
-        wider = min(_WIDER_PLAY * found.scheme.play_radius, task.longest_play)
+        wider = min(_PLAY_ENLARGEMENT * found.scheme.play_radius, task.longest_play)
         again = task.certified(_direct_with(wider, found.scheme.predict))
         found = found if again.certificate.refused else again
     return _predicted(found, task)
@@ -187,13 +188,13 @@ def _massless(task: Task) -> Candidate | Refusal:
     if not task.coupling:
         return Refusal("no coupling is required, and a coupling does not allow steeper slopes")
     model, device = task.model, task.device
-    damping = task.coupling_damping or 0.0
+    coupling_damping = task.coupling_damping or 0.0
     stiffness = task.coupling_stiffness
     low, high = (-math.inf, math.inf) if model.hysteretic else renderable_slopes(device)
     if stiffness is None:
-        static = damping == 0.0 and not model.hysteretic
+        static = coupling_damping == 0.0 and not model.hysteretic
         falling = 0.0 if static else max(0.0, -force_bounds(model, task.usual_play).slope_min)
-        stiffness = stiffest_coupling(coupling_damping=damping, falling=falling, device=device)
+        stiffness = stiffest_coupling(coupling_damping=coupling_damping, falling=falling, device=device)
         if static:
             stiffness = min(stiffness, usual_coupling_share * high)
     if stiffness <= 0.0:
@@ -201,7 +202,7 @@ def _massless(task: Task) -> Candidate | Refusal:
     scheme = Scheme(
         structure="massless",
         coupling_stiffness=stiffness,
-        coupling_damping=damping,
+        coupling_damping=coupling_damping,
         compensated=not model.hysteretic,
         play_radius=task.usual_play,
     )
@@ -209,7 +210,7 @@ def _massless(task: Task) -> Candidate | Refusal:
         return task.certified(scheme)
     highest = compensated_share * stiffness
     balanced = _balanced(model, device)
-    low, high = low if damping == 0.0 else -math.inf, min(highest, high)
+    low, high = low if coupling_damping == 0.0 else -math.inf, min(highest, high)
     if not task.may_limit and not (balanced is model and _fits(model, low, high)):
         return _NOT_LIMITED
     limited = _within(balanced, low, high, device)
@@ -224,19 +225,19 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
         return Refusal("the object has no mass and no damping")
     if not task.mass:
         return Refusal("the object has damping but no mass: give mass")
-    damping = task.coupling_damping
-    if damping is None:
-        damping = _COUPLING_DAMPING * task.device.viscous_damping
+    coupling_damping = task.coupling_damping
+    if coupling_damping is None:
+        coupling_damping = _COUPLING_DAMPING_SHARE * task.device.viscous_damping
     stiffness = task.coupling_stiffness
     if stiffness is None:
-        stiffness = stiffest_coupling(coupling_damping=damping, falling=0.0, device=task.device)
+        stiffness = stiffest_coupling(coupling_damping=coupling_damping, falling=0.0, device=task.device)
     if stiffness <= 0.0:
         return Refusal(f"device damping is {task.device.viscous_damping:.4g}: too small for any coupling")
     return task.certified(
         Scheme(
             structure=structure,
             coupling_stiffness=stiffness,
-            coupling_damping=damping,
+            coupling_damping=coupling_damping,
             mass=task.mass,
             object_damping=task.object_damping or 0.0,
             play_radius=task.usual_play,
@@ -261,6 +262,7 @@ def _explicit(task: Task) -> Candidate | Refusal:
 
 
 Propose = Callable[[Task], Candidate | Refusal]
+"""Returns the candidate of a structure, or its refusal."""
 
 
 def _of_position(propose: Propose) -> Propose:
@@ -313,12 +315,12 @@ def _predicted(found: Candidate, task: Task) -> Candidate:
     """Adds a prediction with the fewest certified samples; returns `found` if none is certified.
 
     A prediction needs damping, which shortens the allowed delay of a tick. That time must remain
-    `_LATE_TICK`, or the time without prediction. If only predictions are certified, any is allowed.
+    `_LATE_TICK_PERIODS`, or the time without prediction. If only predictions are certified, any is allowed.
     """
     if task.predict is not None or task.model.of_velocity:
         return found
-    enough = min(_LATE_TICK * task.device.longest_period_s, found.certificate.longest_period_s)
-    for samples in _PREDICTIONS:
+    enough = min(_LATE_TICK_PERIODS * task.device.longest_period_s, found.certificate.longest_period_s)
+    for samples in _PREDICTION_SAMPLES:
         ahead = task.certified(_direct_with(found.scheme.play_radius, samples), found.rendered)
         if ahead.certificate.certified and ahead.certificate.longest_period_s >= enough:
             return ahead

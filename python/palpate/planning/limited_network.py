@@ -32,7 +32,7 @@ from .plan import SAMPLES, strokes, with_network
 LONGEST_PLAY = 0.1
 """Largest play radius [share of the travel]; a wider one feels like play, not like hysteresis."""
 
-_WANTED = 1.02
+_USED_SLOPE = 1.02
 """Slope for which a device is used [share of that of the model]; a network is fitted just below its limits"""
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
@@ -40,29 +40,30 @@ _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
 <= 0 at the lower and >= 0 at the upper one: otherwise it begins, or continues, too steeply.
 """
 
-_RESERVE = 0.985
+_PROJECTED_SHARE = 0.985
 """Share of a limit for the nearest force; the rest is for the error of the network [-]"""
 
-_CERTIFIED = 0.997
+_IMPOSED_SHARE = 0.997
 """Share of a limit that is imposed; the rest is for bounds wider than the true range [-]"""
 
-_CLOSE = 2e-5
+_SUFFICIENT_ERROR = 2e-5
 """RMS error at which no further wavelets are added [share of the force's range]"""
 
-_CLOSE_SLOPE = 0.01
+_SUFFICIENT_SLOPE_ERROR = 0.01
 """Error of the slope at which no further wavelets are added [share of the smaller limit]"""
 
-_MOST = 64
+_MOST_WAVELETS = 64
 """Largest number of further wavelets [-]"""
 
-_NEW = 1e-5
+_LEAST_NEW_SHARE = 1e-5
 """Least share of a candidate's squared norm outside the chosen ones [-]"""
 
 _SCALE_RATIO = 1.6
+"""Ratio of adjacent dilations in the frame of the candidates [-]."""
 _SCALE_STEP = 0.75
-"""Frame of the candidates: ratio of adjacent dilations, translation step over width [-]"""
+"""Translation step over width in that frame [-]."""
 
-_WIDE = 1e9
+_STICKLESS_PLAY = 1e9
 """Play radius that adds no slope in the stick phase [travels]"""
 
 
@@ -70,7 +71,7 @@ _WIDE = 1e9
 def sliding_bounds(model: ForceModel, force_limit: float = math.inf) -> ForceBounds:
     """Returns proved bounds while sliding, continuations included: those of a play that adds no slope."""
     travel = float(model.upper[0] - model.lower[0])
-    return force_bounds(model, _WIDE * travel if model.hysteretic else 0.0, force_limit)
+    return force_bounds(model, _STICKLESS_PLAY * travel if model.hysteretic else 0.0, force_limit)
 
 
 def sliding_slopes(model: ForceModel) -> tuple[float, float]:
@@ -88,7 +89,7 @@ def renderable_slopes(
     """
     low, high = (-math.inf, math.inf) if model is None else sliding_slopes(model)
     return stability.renderable_slopes(
-        device, stick, rising=max(0.0, _WANTED * high), falling=max(0.0, -_WANTED * low)
+        device, stick, rising=max(0.0, _USED_SLOPE * high), falling=max(0.0, -_USED_SLOPE * low)
     )
 
 
@@ -137,7 +138,9 @@ def _limited_once(
     """Returns the model with the fitted change, or None if its continuations are steeper than the limit."""
     x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
     forces = strokes(model, x)
-    changes = _changes_needed(x, forces, _RESERVE * low, _RESERVE * high, sigma, model, restoring)
+    changes = _changes_needed(
+        x, forces, _PROJECTED_SHARE * low, _PROJECTED_SHARE * high, sigma, model, restoring
+    )
     wanted = forces + changes
     middle, travel = wanted.mean(axis=0), x[-1] - x[0]
     pushed_out = model.period is None and (middle[0] > 0.0 or middle[-1] < 0.0)
@@ -146,10 +149,12 @@ def _limited_once(
     if len(changes) == 2:  # of g and h
         changes = np.array([0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])])
     alpha, beta = _candidates(x, np.any(changes != 0.0, axis=0), sigma)
-    close = min(_CLOSE * float(np.ptp(forces)), _CLOSE_SLOPE * sigma * min(abs(low), abs(high)))
+    close = min(
+        _SUFFICIENT_ERROR * float(np.ptp(forces)), _SUFFICIENT_SLOPE_ERROR * sigma * min(abs(low), abs(high))
+    )
     before = model.alpha[:, 0], model.beta[:, 0]
     chosen = _chosen(x, changes, before, (alpha, beta), sigma, close)
-    return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _CERTIFIED * low, _CERTIFIED * high)
+    return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _IMPOSED_SHARE * low, _IMPOSED_SHARE * high)
 
 
 def _changes_needed(
@@ -296,10 +301,10 @@ def _chosen(
     gram, products = left.T @ left, left.T @ residual
     size = np.diag(gram).copy()
     rest = float(np.square(residual).sum())
-    factor = np.empty((_MOST, len(size)))
+    factor = np.empty((_MOST_WAVELETS, len(size)))
     chosen: list[int] = []
-    while len(chosen) < _MOST and rest > residual.size * close**2:
-        new = size > _NEW * norms
+    while len(chosen) < _MOST_WAVELETS and rest > residual.size * close**2:
+        new = size > _LEAST_NEW_SHARE * norms
         gains = np.where(new, np.square(products).sum(axis=1) / np.where(new, size, 1.0), 0.0)
         best = int(np.argmax(gains))
         if gains[best] <= 0.0:

@@ -28,6 +28,7 @@ _CERTIFICATE = {
     "stable-locally": "stable (local), passivity not certified",
     "refused": "refused",
 }
+"""Verdict of a certificate to its text."""
 
 ACCEPTED_FORCE_ERROR = 0.1
 """Default limit of the force error [share of the range of the identified force]"""
@@ -177,7 +178,7 @@ class Plan:
         )
 
     @property
-    def felt_slopes(self) -> tuple[float, float]:
+    def slopes_behind_coupling(self) -> tuple[float, float]:
         """Steepest felt slope and that of the model; a coupling makes it softer [force/position].
 
         If the coupling was subtracted from the model, the bounds of the certificate are for the remainder.
@@ -186,8 +187,8 @@ class Plan:
         steepest = max(0.0, self.certificate.bounds.slope_max)
         if not self.scheme.has_coupling:
             return steepest, steepest
-        felt = slope_behind_coupling(steepest, self.scheme.coupling_stiffness)
-        return felt, felt if self.scheme.compensated else steepest
+        slope = slope_behind_coupling(steepest, self.scheme.coupling_stiffness)
+        return slope, slope if self.scheme.compensated else steepest
 
     def summary(self) -> dict[str, str]:
         """Returns the main properties of a certified plan for display, by name."""
@@ -195,9 +196,9 @@ class Plan:
         error, certificate = self.force_error, self.certificate
         rows = {"structure": self.description}
         unit = self.model.units["force"] or "in the model's unit"
-        felt, steepest = self.felt_slopes
-        if felt < steepest:
-            rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {felt:.4g}"
+        slope, steepest = self.slopes_behind_coupling
+        if slope < steepest:
+            rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {slope:.4g}"
         rows["force error"] = (
             f"up to {error.largest:.4g} {unit}, "
             f"{100.0 * error.share:.3g} % of the range; RMS {100.0 * error.rms_share:.3g} % of the spread"
@@ -342,8 +343,8 @@ def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Sch
         return StaticForceError(0.0, 0.0, 0.0, 0.0)
     x = np.linspace(identified.lower[0], identified.upper[0], SAMPLES)
     wanted = strokes(identified, x)
-    felt = strokes(rendered, x) if exact else _behind_coupling(rendered, scheme, x)
-    error = felt - wanted
+    rendered_force = strokes(rendered, x) if exact else _behind_coupling(rendered, scheme, x)
+    error = rendered_force - wanted
     largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))
     return StaticForceError(
         largest, rms, _share(largest, float(np.ptp(wanted)), wanted), _share(rms, float(wanted.std()), wanted)

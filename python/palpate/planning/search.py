@@ -21,6 +21,7 @@ from .limited_network import sliding_bounds
 from .plan import ACCEPTED_FORCE_ERROR, Plan, network_of, require_force, static_force_error, with_network
 
 _FORCE_UNIT = {"rad": "N*m", "m": "N"}
+"""Position unit of a device to its force unit."""
 
 
 def plan(
@@ -166,13 +167,14 @@ def _require_number(name: str, value: object) -> None:
         raise InputError(f"{name} is {float(value):g}: must be a finite number >= 0")
 
 
-_AMPLE = (40.0, 14.0, 8.0)
+_AMPLE_DOUBLINGS = (40.0, 14.0, 8.0)
 """Doublings after which a property is ample; too many can make an explicit structure diverge [-]"""
 
 _BISECTIONS = 15
 """Bisections of the doublings, for the least sufficient value within 0.1 % [-]"""
 
 Fits = Callable[[DeviceProfile], bool]
+"""Returns True if a device suffices."""
 
 
 @dataclass(frozen=True)
@@ -218,11 +220,11 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
         found = _improved(device, properties, fits)
         return "" if found is None else " and ".join(each.text(found) for each in properties)
 
-    damping, friction, rate, encoder = _properties(task.model, device)
+    device_damping, friction, rate, encoder = _properties(task.model, device)
     for short, otherwise in (
-        ((damping,), (rate,)),
+        ((device_damping,), (rate,)),
         ((friction,), (encoder,)),
-        ((damping, friction), (rate, encoder)),
+        ((device_damping, friction), (rate, encoder)),
     ):
         if need := least(*short):
             other = least(*otherwise)
@@ -288,7 +290,12 @@ def _improved(device: DeviceProfile, properties: Sequence[_Property], fits: Fits
         return changed
 
     found = next(
-        (ample for ample in ([number] * len(properties) for number in _AMPLE) if fits(after(ample))), None
+        (
+            ample
+            for ample in ([number] * len(properties) for number in _AMPLE_DOUBLINGS)
+            if fits(after(ample))
+        ),
+        None,
     )
     if found is None:
         return None

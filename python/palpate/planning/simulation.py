@@ -20,8 +20,7 @@ from ..arguments import instance_of, real_of
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording
-from ..recording.comparison import amount
-from ..recording.units import COLUMN_SUFFIX
+from ..recording.units import COLUMN_SUFFIX, Unit
 from ..verdict import Finding, Verdict, no, usable
 from .plan import Plan, describe
 
@@ -34,16 +33,17 @@ MEAN_APPLIED = "mean_applied"
 
 _GRID = 1001
 """Number of positions at which the force range is computed [-]"""
-_TOLERATED_ERROR = 0.02
+_TOLERATED_ERROR_SHARE = 0.02
 """Largest force error without a finding [share of the force range]"""
 
-_COMPENSATED_DAMPING = 0.25
+_COMPENSATED_DAMPING_RATIO = 0.25
 """Coupling damping of the compensated structure over that of the others; (f'/K_c)^2 of it is felt."""
 
-_PREDICT = 4
+_COMPARED_PREDICTION = 4
 """Samples of the prediction in a comparison [-]"""
 
 _NAMES = {int(value): name for name, value in Status.__members__.items()}
+"""Status value to its name."""
 
 
 def rig_for(model: Model) -> TestRig:
@@ -204,11 +204,9 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
     if failed := status["NonFinite"]:
         return Verdict((no(f"the rendering diverged: {failed} of {ticks} ticks had no finite force"),))
     lower, upper = float(rendered.position.min()), float(rendered.position.max())
-    position_unit = plan.model.units["position"]
+    position_unit = Unit.of_si(plan.model.units["position"])
     if not rendered.force.any():
-        still = no(
-            f"every force was zero: the handle stayed between {lower:.4g} and {amount(upper, position_unit)}"
-        )
+        still = no(f"every force was zero: the handle stayed at {position_unit.interval(lower, upper)}")
         return Verdict((still,))
     domain = float(plan.model.upper[0]) - float(plan.model.lower[0])
     covered = (upper - lower) / domain
@@ -224,12 +222,13 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
         )
     span = force_range(plan)
     share = error.end / span if span > 0 else 0.0
-    if share > _TOLERATED_ERROR:
+    if share > _TOLERATED_ERROR_SHARE:
         level = no if share > plan.accept_force_error else usable
         findings.append(
             level(
                 f"the force error is {100 * share:.3g} % of the object's force range, above "
-                f"{100 * _TOLERATED_ERROR:.3g} %: choose a structure with palpate plan, or a stiffer coupling"
+                f"{100 * _TOLERATED_ERROR_SHARE:.3g} %: choose a structure with palpate plan, or a stiffer "
+                "coupling"
             )
         )
     outside = int(rendered.columns["extrapolated"].sum())
@@ -302,9 +301,9 @@ def compare_structures(model: Model, rig: TestRig, duration: float) -> tuple[Com
     duration : float
         Simulated time of each rendering [s].
     """
-    quarter = _COMPENSATED_DAMPING * rig.scheme(model).coupling_damping
+    quarter = _COMPENSATED_DAMPING_RATIO * rig.scheme(model).coupling_damping
     schemes = (
-        rig.scheme(model, structure="direct", predict=_PREDICT),
+        rig.scheme(model, structure="direct", predict=_COMPARED_PREDICTION),
         rig.scheme(model, structure="direct"),
         rig.scheme(model, structure="massless", compensated=True, coupling_damping=quarter),
         rig.scheme(model, structure="massless"),

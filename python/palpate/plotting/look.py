@@ -19,6 +19,7 @@ MOST_POINTS = 6000
 """Largest number of drawn points; more are indistinguishable at the width of a column."""
 
 _UNIT_TEXT = {"count": "counts"}
+"""Units whose name in a figure differs from their symbol."""
 
 
 def label(name: str, unit: str) -> str:

@@ -16,6 +16,7 @@ from ..verification import Stroke
 from .look import grid, legend_above, plain_decades, scale_for, strokes, thinned
 
 _LINES = {"press": "solid", "release": (0, (4, 2)), "": "solid"}
+"""Line style of each stroke."""
 
 
 def draw_measured_and_modelled(
@@ -48,11 +49,11 @@ def draw_measured_and_modelled(
         the dots.
     """
     residual = recording.force - modelled
-    told_apart = strokes(recording.direction, len(recording))
+    by_stroke = strokes(recording.direction, len(recording))
     x = scale_for(recording.units["position"], recording.position)
     y = scale_for(recording.units["force"], recording.force, modelled)
     z = scale_for(recording.units["force"], residual)
-    for name, rows in told_apart:
+    for name, rows in by_stroke:
         suffix = f", {name}" if name else ""
         position, force, rest = thinned(recording.position[rows], recording.force[rows], residual[rows])
         dots: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0}
@@ -68,7 +69,7 @@ def draw_measured_and_modelled(
         )
         shade = "0.45" if name != "release" else "0.7"
         residual_axes.plot(position * x.factor, rest * z.factor, **dots, color=shade, markersize=2.0)
-    for name, rows in told_apart:
+    for name, rows in by_stroke:
         suffix = f", {name}" if name else ""
         position, curve = recording.position[rows], modelled[rows]
         if one_curve:
@@ -163,6 +164,7 @@ def draw_two_models(
 
 
 _MARKERS = "os^Dv<>p"
+"""Markers of the model classes, in order."""
 
 
 def draw_path(

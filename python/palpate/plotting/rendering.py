@@ -18,8 +18,9 @@ from ..planning import Plan
 from .look import grid, plain_decades, scale_for, thinned
 
 _LINES = ("-", "--", ":", "-.")
+"""Line styles of the slopes, in order."""
 
-_SAMPLES = 801
+_LOCUS_DAMPINGS = 801
 """Number of dampings of a locus [-]"""
 
 
@@ -148,7 +149,9 @@ def root_locus(scheme: Scheme, slopes: Float1D, period_s: float) -> RootLocus:
     # A sample where two poles meet, T B/m = 2 sqrt(c) - c with c = T^2 K/m: their path has a corner there.
     c = np.maximum(period_s**2 * (slopes + scheme.coupling_stiffness) / scheme.mass, 0.0)
     meeting = scheme.mass / period_s * (2.0 * np.sqrt(c) - c) - scheme.coupling_damping
-    dampings = np.union1d(np.linspace(0.0, largest, _SAMPLES), meeting[(meeting > 0.0) & (meeting < largest)])
+    dampings = np.union1d(
+        np.linspace(0.0, largest, _LOCUS_DAMPINGS), meeting[(meeting > 0.0) & (meeting < largest)]
+    )
     return RootLocus(
         slopes=slopes,
         dampings=dampings,

@@ -11,24 +11,23 @@ import numpy as np
 from .._typing import Float1D
 from ..model import Model
 from ..recording import Recording
-from ..recording.comparison import amount
-from ..recording.units import UNITS
+from ..recording.units import UNITS, Unit
 from .metrics import normalised, root_mean_square
 from .prediction import Prediction
 
-WORTH_TELLING = 0.5
+REPORTED_NRMSE_RATIO = 0.5
 """Largest NRMSE under an explanation that is reported, as a share of the NRMSE without it [-]."""
 
-AS_GOOD = 1.2
+EQUIVALENT_NRMSE_RATIO = 1.2
 """Largest ratio to the least NRMSE at which a simpler explanation is preferred [-]."""
 
-SAME_FACTOR = 0.02
+FACTOR_TOLERANCE = 0.02
 """Largest relative difference of a factor from the factor of a unit [-]."""
 
-SHIFTS = 41
+OFFSETS_PER_GRID = 41
 """Number of position offsets on a grid."""
 
-GRIDS = 3
+OFFSET_GRIDS = 3
 """Number of grids of position offsets, each finer than the previous one."""
 
 MOST_ROWS = 2000
@@ -57,15 +56,17 @@ def explanation(model: Model, recording: Recording, prediction: Prediction) -> E
     if float(np.std(force)) == 0.0:
         return None
     nrmse = _share(modelled - force, force)
-    unit = recording.units["force"] or model.units["force"]
+    unit = recording.file_unit("force") if recording.units["force"] else Unit.of_si(model.units["force"])
     tried = [*_of_force(force, modelled, unit)]
     if model.dimension == 1 and model.mass is None and model.damping is None:
         side = None if prediction.side is None else prediction.side[few]
         tried += _of_position(model, prediction.position[few], side, force, recording)
-    found = [each for each in tried if each.nrmse < WORTH_TELLING * nrmse]
+    found = [each for each in tried if each.nrmse < REPORTED_NRMSE_RATIO * nrmse]
     least = min((each.nrmse for each in found), default=0.0)
     return min(
-        (each for each in found if each.nrmse <= AS_GOOD * least), key=lambda each: each.order, default=None
+        (each for each in found if each.nrmse <= EQUIVALENT_NRMSE_RATIO * least),
+        key=lambda each: each.order,
+        default=None,
     )
 
 
@@ -73,7 +74,7 @@ def _share(error: Float1D, force: Float1D) -> float:
     return normalised(root_mean_square(error), force)
 
 
-def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanation]:
+def _of_force(force: Float1D, modelled: Float1D, unit: Unit) -> Iterator[Explanation]:
     """Yields the sign, an offset and a factor of the force."""
     yield Explanation(
         _share(modelled + force, force),
@@ -83,14 +84,14 @@ def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanat
     offset = float(np.mean(force - modelled))
     yield Explanation(
         _share(modelled - (force - offset), force),
-        f"the model fits if {amount(offset, unit)} is subtracted from the recorded force: the sensor may "
+        f"the model fits if {unit.text(offset)} is subtracted from the recorded force: the sensor may "
         "have an offset. Give --zero START:STOP, the rows without contact",
         order=2,
     )
     factor = float(modelled @ force) / float(force @ force)
     if factor == 0.0 or float(np.std(modelled)) == 0.0:
         return
-    known = _unit_of(factor, unit)
+    known = _unit_of(factor, unit.si)
     cause = f"{known}. Give its unit with --units" if known else "the gain may differ"
     yield Explanation(
         _share(modelled - factor * force, modelled),
@@ -134,15 +135,16 @@ def _of_position(
                     order=4,
                 )
     # Search the offset on a grid over the travel, then on finer grids around the best one.
-    best, step = 0.0, 2.0 * float(model.upper[0] - model.lower[0]) / (SHIFTS - 1)
-    for _ in range(GRIDS):
-        grid = best + step * (np.arange(SHIFTS) - SHIFTS // 2)
+    best, step = 0.0, 2.0 * float(model.upper[0] - model.lower[0]) / (OFFSETS_PER_GRID - 1)
+    for _ in range(OFFSET_GRIDS):
+        grid = best + step * (np.arange(OFFSETS_PER_GRID) - OFFSETS_PER_GRID // 2)
         best = float(min(grid, key=lambda shift: left(position + shift, side)))
-        step *= 4.0 / (SHIFTS - 1)
+        step *= 4.0 / (OFFSETS_PER_GRID - 1)
     yield Explanation(
         left(position + best, side),
-        f"the model fits if {amount(abs(best), unit)} is {'added to' if best > 0.0 else 'subtracted from'} "
-        "the recorded position: its zero may have moved. Correct it in the file",
+        f"the model fits if {recording.file_unit('position').text(abs(best))} is "
+        f"{'added to' if best > 0.0 else 'subtracted from'} the recorded position: its zero may have "
+        "moved. Correct it in the file",
         order=5,
     )
 
@@ -151,8 +153,8 @@ def _unit_of(factor: float, unit: str) -> str | None:
     """Returns the mistaken unit that a factor corrects, in words, or None."""
     for symbol, other in UNITS.items():
         if other.si == unit and other.factor != 1.0:
-            if abs(factor / other.factor - 1.0) < SAME_FACTOR:
+            if abs(factor / other.factor - 1.0) < FACTOR_TOLERANCE:
                 return f"it may be in {symbol}"
-            if abs(factor * other.factor - 1.0) < SAME_FACTOR:
+            if abs(factor * other.factor - 1.0) < FACTOR_TOLERANCE:
                 return f"it may be in {unit}, not in {symbol}"
     return None

@@ -18,7 +18,7 @@ STIFFNESS_JND = 0.23
 STIFFNESS_CELLS = 20
 """Number of equal cells over the range of positions in which a local stiffness is computed."""
 
-_CELL_ROWS = 5
+_LEAST_CELL_ROWS = 5
 """Least number of rows of a cell for its stiffness."""
 
 
@@ -91,7 +91,7 @@ def share_within_stiffness_jnd(position: Float1D, reference: Float1D, error: Flo
     centre = cell_sums(position) / np.maximum(rows, 1)
     offset = position - centre[cell]
     spread = cell_sums(offset**2)
-    usable = (rows >= _CELL_ROWS) & (spread > 0)
+    usable = (rows >= _LEAST_CELL_ROWS) & (spread > 0)
     if not usable.any():
         return None
     stiffness = cell_sums(offset * reference)[usable] / spread[usable]
@@ -99,7 +99,7 @@ def share_within_stiffness_jnd(position: Float1D, reference: Float1D, error: Flo
     return float(np.mean(np.abs(difference) <= np.maximum(STIFFNESS_JND * np.abs(stiffness), floor)))
 
 
-_POSITIONS = 2001
+_COMPARED_POSITIONS = 2001
 """Number of positions at which two models are compared."""
 
 
@@ -159,7 +159,7 @@ def compare(first: Model, second: Model) -> tuple[Stroke, ...]:
             f"the domains of the models have no common position: one ends at {upper:.6g}, the other begins "
             f"at {lower:.6g}"
         )
-    position = np.linspace(lower, upper, _POSITIONS)
+    position = np.linspace(lower, upper, _COMPARED_POSITIONS)
     directions = {"press": 1, "release": -1} if first.hysteretic or second.hysteretic else {"": 1}
     strokes = []
     for name, direction in directions.items():

@@ -22,8 +22,10 @@ from ..recording.conversion import Motion
 from ..recording.motion import GAP_RATIO, acceleration, ordered_strokes, turns_of, velocity
 
 NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are not compared."
+"""Note on rows without velocity, with their number."""
 
 _UNSTATED = ""
+"""Unit that is not stated."""
 
 _STRUCTURE = "structure"
 """Metadata key of the rendered structure."""
@@ -116,12 +118,10 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
     position: Float1D = recording.position
     if flight.object_position is not None:
         position = flight.object_position
-        notes = (
-            "The force is compared at the predicted position, half a sample ahead of the handle."
-            if flight.predicted
-            else "The force is compared at the position of the virtual object. A virtual coupling joins it to the "
-            "handle.",
-        )
+        where = "of the virtual object, behind the virtual coupling"
+        if flight.predicted:
+            where = "predicted half a sample ahead of the handle"
+        notes = (f"The force is compared at the position {where}.",)
     side = None
     if not model.hysteretic:
         force = model.force(position)

@@ -31,7 +31,7 @@ BLOCK_ROWS = 50_000
 SLOPE_STEP = 1e-5
 """Half the distance of the two Jacobians whose difference gives that of the slope [domain]."""
 
-SMALLEST = 1e-12
+LEAST_EIGENVALUE_SHARE = 1e-12
 """Eigenvalues of J'J on unit columns below this share of the largest are rounding errors."""
 
 LARGEST_RHO = 0.999
@@ -126,6 +126,6 @@ def _inverse(gram: Float2D) -> Float2D:
     """Returns the pseudo-inverse of J'J, on columns of unit norm."""
     norm = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     value, vector = np.linalg.eigh(gram / np.outer(norm, norm))
-    kept = value > SMALLEST * value.max()
+    kept = value > LEAST_EIGENVALUE_SHARE * value.max()
     scaled = vector[:, kept] / norm[:, None]
     return np.asarray((scaled / value[kept]) @ scaled.T)

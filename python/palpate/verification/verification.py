@@ -17,7 +17,6 @@ from ..identification.classes.findings import USABLE_NRMSE, error_findings
 from ..identification.data.rows import require_in_range
 from ..model import Model
 from ..recording import Recording, Source
-from ..recording.comparison import amount
 from ..recording.reading import RecordingLike, recording_from
 from ..verdict import FORCE_JND, GOOD, Finding, Verdict, no, usable
 from .explanation import explanation
@@ -38,13 +37,13 @@ FEW_OUTSIDE = 0.01
 MOST_OUTSIDE = 0.5
 """Share of rows outside the model's domain above which the model is unfit for the recording [-]."""
 
-FEW_COMPARED = 0.5
+LEAST_COMPARED_SHARE = 0.5
 """Share of compared rows below which a comparison does not represent the recording [-]."""
 
-FELT = 0.5
+LEAST_SHARE_WITHIN_JND = 0.5
 """Share of rows within the just noticeable difference below which a hand feels the error [-]."""
 
-STRUCTURED = 0.5
+STRUCTURED_CORRELATION = 0.5
 """Lag-1 autocorrelation above which the error is structured [-]."""
 
 
@@ -221,26 +220,27 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
         findings.append(
             judge(
                 f"{found.extrapolated} of {found.n} rows ({outside:.0%}) lie outside the model's domain"
-                f"{_domain(model)}, where the force is extrapolated: identify on a recording of this range"
+                f"{_domain(model, recording)}, where the force is extrapolated: identify on a recording of "
+                "this range"
             )
         )
     if flight_of(recording).object_position is not None:
         handle = predict(model, replace(recording, columns={}))
         reference = recording.force[handle.rows]
-        felt = normalised(root_mean_square(handle.force - reference), reference)
-        if felt > USABLE_NRMSE:
+        handle_nrmse = normalised(root_mean_square(handle.force - reference), reference)
+        if handle_nrmse > USABLE_NRMSE:
             findings.append(
                 usable(
-                    f"at the position of the handle the NRMSE is {felt:.3g}, above {USABLE_NRMSE:g}: the "
-                    "virtual coupling is softer than the object. Plan the model with palpate plan, or "
+                    f"at the position of the handle the NRMSE is {handle_nrmse:.3g}, above {USABLE_NRMSE:g}: "
+                    "the virtual coupling is softer than the object. Plan the model with palpate plan, or "
                     "render with --structure direct"
                 )
             )
-    if found.n < FEW_COMPARED * len(recording):
+    if found.n < LEAST_COMPARED_SHARE * len(recording):
         findings.append(
             usable(
-                f"only {found.n} of {len(recording)} rows were compared, fewer than {FEW_COMPARED:.0%}: "
-                f"{' '.join(found.notes)}"
+                f"only {found.n} of {len(recording)} rows were compared, fewer than "
+                f"{LEAST_COMPARED_SHARE:.0%}: {' '.join(found.notes)}"
             )
         )
     return findings
@@ -253,15 +253,15 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
         cause = explanation(model, recording, found.prediction)
         if cause is not None:
             findings.append(usable(f"{cause.sentence} (NRMSE {cause.nrmse:.3g})"))
-        elif found.whiteness > STRUCTURED:
+        elif found.whiteness > STRUCTURED_CORRELATION:
             findings.append(
                 usable(
                     f"the errors of neighbouring rows are correlated ({found.whiteness:.2g}, above "
-                    f"{STRUCTURED:g}): the force depends on an input that the model does not have, such as "
-                    "velocity, hysteresis or another column"
+                    f"{STRUCTURED_CORRELATION:g}): the force depends on an input that the model does not "
+                    "have, such as velocity, hysteresis or another column"
                 )
             )
-    if found.within_jnd < FELT:
+    if found.within_jnd < LEAST_SHARE_WITHIN_JND:
         findings.append(
             usable(
                 f"a hand feels the error in {1.0 - found.within_jnd:.0%} of the rows: it is larger than the "
@@ -271,7 +271,7 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
     return findings
 
 
-def _domain(model: Model) -> str:
+def _domain(model: Model, recording: Recording) -> str:
     if model.dimension > 1:
         return ""
-    return f" from {float(model.lower[0]):.4g} to {amount(float(model.upper[0]), model.units['position'])}"
+    return f" from {recording.file_unit('position').interval(float(model.lower[0]), float(model.upper[0]))}"

@@ -44,7 +44,7 @@ def press_and_release(seed: int = 0, n: int = 600) -> Recording:
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=named)
-def test_every_baseline_has_the_face_of_an_estimator(estimator: object) -> None:
+def test_every_baseline_has_the_estimator_interface(estimator: object) -> None:
     X = moving()
     y = 100.0 * X[:, 0]
     fitted = estimator.fit(X, y)  # type: ignore[attr-defined]
@@ -122,7 +122,7 @@ def test_passive_strokes_meet_in_their_mean_where_they_would_cross() -> None:
     assert passive.predict(X) == pytest.approx(x + side * np.maximum(0.5 - x, 0.0))
 
 
-def test_rows_that_hardly_move_are_no_stroke() -> None:
+def test_rows_with_little_motion_are_not_a_stroke() -> None:
     x = np.concatenate([np.linspace(0.0, 0.01, 20), np.linspace(1.0, 0.0, 3000)])
     direction = np.repeat([1, -1], [20, 3000]).astype(np.int8)
     recording = Recording.from_arrays(x, 2.0 * x, direction=direction)
@@ -159,7 +159,7 @@ def test_time_gives_velocity_and_acceleration() -> None:
     assert table["lookup table"].nrmse > 0.05
 
 
-def test_the_command_prints_them_beside_the_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_prints_baselines_with_the_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = press_and_release().write(tmp_path / "press.csv")
     model = tmp_path / "press.json"
     command = ["identify", str(file), "-o", str(model), "--hold-out-every", "5", "--baselines"]
@@ -168,11 +168,11 @@ def test_the_command_prints_them_beside_the_model(tmp_path: Path, capsys: pytest
     assert any(line.startswith("wavelet network") for line in lines)
     assert any(line.startswith("smoothing spline, two strokes") for line in lines)
     assert main([*command, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert {"name", "nrmse", "n_parameters", "seconds", "refused"} == set(told["baselines"][0])
+    printed = json.loads(capsys.readouterr().out)
+    assert {"name", "nrmse", "n_parameters", "seconds", "refused"} == set(printed["baselines"][0])
 
 
-def test_the_command_asks_for_held_out_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_requires_held_out_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = press_and_release().write(tmp_path / "press.csv")
     assert main(["identify", str(file), "-o", str(tmp_path / "press.json"), "--baselines"]) == 2
     assert "--hold-out-every" in capsys.readouterr().err

@@ -40,7 +40,7 @@ def test_the_model_is_the_network_that_was_identified(sample_model: Model) -> No
     assert fit.nrmse == pytest.approx(np.sqrt(np.mean(error**2)) / np.std(recording.force), rel=5e-3)
     assert sample_model.domain[0][0] == recording.position.min()
     assert sample_model.domain[1][0] == recording.position.max()
-    assert any("hysteresis refused" in note for note in sample_model.notes["identification"])
+    assert any("hysteresis: not accepted" in line for line in sample_model.notes["model_selection"])
 
 
 def test_several_recordings_of_one_environment_are_identified_together() -> None:
@@ -74,7 +74,7 @@ def test_play_starts_at_rest_in_every_recording() -> None:
     assert model.fit.nrmse * spread < 0.015
 
 
-def test_a_model_with_hysteresis_asks_for_the_direction_it_needs() -> None:
+def test_force_of_hysteresis_model_without_direction_is_refused() -> None:
     x = np.concatenate([np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)])
     direction = np.repeat([1, -1], 200)
     model = identify(Recording.from_arrays(x, x + 0.1 * direction, direction=direction))
@@ -95,7 +95,7 @@ def test_recordings_in_different_units_are_refused() -> None:
 def test_no_recording_and_unknown_options_are_refused() -> None:
     with pytest.raises(InputError, match="recording is an empty list"):
         identify([])
-    with pytest.raises(InputError, match="no option 'wavelets'; it has inputs, max_wavelets"):
+    with pytest.raises(InputError, match="no option 'wavelets'; its options are inputs, max_wavelets"):
         identify(sample_recording(1, duration_s=1.0), wavelets=3)
 
 
@@ -106,7 +106,7 @@ def test_a_period_that_is_given_is_kept() -> None:
     assert model.force(0.7 + 2.0 * np.pi) == pytest.approx(model.force(0.7))
 
 
-def test_control_c_leaves_identify_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_control_c_interrupts_identify_immediately(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
@@ -130,7 +130,7 @@ def held_out_nrmse(path: Path, **options: object) -> tuple[float, Model]:
     ("folder", "every", "median"),
     [("keyswitches", 4, 0.024), ("rubber_domes", 4, 0.0125), ("switch_springs", 4, 0.024)],
 )
-def test_measured_strokes_are_held_to_their_error(
+def test_error_of_measured_strokes_does_not_grow(
     data: Path, folder: str, every: int, median: float, bounded: bool
 ) -> None:
     """Some files of each set, more in long runs; a benchmark covers the whole table."""

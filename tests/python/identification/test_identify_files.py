@@ -75,7 +75,7 @@ def test_no_digits_are_lost_to_a_large_offset() -> None:
     assert far.yy.sum() == pytest.approx(near.yy.sum(), rel=1e-6)
 
 
-def test_the_number_of_cells_is_bounded_whatever_comes() -> None:
+def test_number_of_cells_is_bounded_for_any_rows() -> None:
     random = np.random.default_rng(0)
     summary = None
     for scale in (1e-6, 1.0, 1e3, 1e-3, 1e5):
@@ -158,7 +158,9 @@ def test_text_in_a_number_column_is_named_with_its_line(tmp_path: Path) -> None:
     ("options", "sentence"),
     [({"inputs": "position,velocity"}, "inputs names velocity"), ({"loss": "huber"}, "loss is 'huber'")],
 )
-def test_what_needs_all_rows_is_refused(tmp_path: Path, options: dict[str, str], sentence: str) -> None:
+def test_options_that_need_all_rows_are_refused(
+    tmp_path: Path, options: dict[str, str], sentence: str
+) -> None:
     rows(100).to_csv(tmp_path / "press.csv", index=False)
     with pytest.raises(InputError, match=sentence):
         palpate.identify_files(tmp_path / "press.csv", **options)
@@ -230,7 +232,9 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_to_the_last_bit(tmp_path: 
     assert same(one, lost_one)
 
 
-def test_no_scheduler_is_told_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_scheduler_is_reported_in_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     rows(1_000).to_csv(tmp_path / "press.csv", index=False)
     command = ["identify", str(tmp_path / "press.csv"), "-o", str(tmp_path / "m.json")]
     assert main([*command, "--scheduler", "nonsense://127.0.0.1:1"]) == 2
@@ -238,16 +242,16 @@ def test_no_scheduler_is_told_in_one_sentence(tmp_path: Path, capsys: pytest.Cap
     assert not (tmp_path / "m.json").exists()
 
 
-def test_the_command_shows_how_far_it_is(
+def test_command_shows_its_progress(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("palpate.cli.printing._EVERY_S", 0.0)
     rows(5_000).to_csv(tmp_path / "press.csv", index=False)
     command = ["identify", str(tmp_path / "press.csv"), "-o", str(tmp_path / "m.json"), "--out-of-core"]
     assert main(command) == 0
-    told = capsys.readouterr()
-    assert "read 1 of 1 parts (100 %)" in told.err
-    assert "read 5000 rows; position is position_rad" in told.err
+    printed = capsys.readouterr()
+    assert "read 1 of 1 parts (100 %)" in printed.err
+    assert "read 5000 rows; position is position_rad" in printed.err
     assert main([*command, "--hold-out-every", "5"]) == 2
     assert "--hold-out-every needs all rows at once" in capsys.readouterr().err
 
@@ -365,10 +369,10 @@ def test_dropped_rows_are_reported_by_the_command(tmp_path: Path, capsys: pytest
     file = written(frame, tmp_path / "press.csv")
     command = ["identify", str(file), "-o", str(tmp_path / "m.json"), "--out-of-core", "--invalid", "drop"]
     assert main(command) == 0
-    told = capsys.readouterr().err
-    assert "read 997 rows;" in told
-    assert "dropped 2 rows without a finite number in torque_Nm (first: line 12)" in told
-    assert "dropped 1 row without a direction in direction (first: line 502)" in told
+    printed = capsys.readouterr().err
+    assert "read 997 rows;" in printed
+    assert "dropped 2 rows without a finite number in torque_Nm (first: line 12)" in printed
+    assert "dropped 1 row without a direction in direction (first: line 502)" in printed
 
 
 @pytest.mark.parametrize("part_rows", [20, 90, 333, 1_000_000])
@@ -420,11 +424,11 @@ def test_a_file_that_loses_a_row_while_it_is_read_is_refused(tmp_path: Path) -> 
             kept, _, last = text.rpartition("\n")
             file.write_text(f"{kept}\n{' ' * len(last)}\n", encoding="utf-8")
 
-    with pytest.raises(InputError, match=r"has 1000 rows, but 999 were used and 0 left out"):
+    with pytest.raises(InputError, match=r"has 1000 rows, but 999 were used and 0 were not"):
         palpate.identify_files(file, part_rows=300, progress=blank_the_last_row)
 
 
-def test_rows_whose_force_was_not_the_models_are_left_out_and_counted(tmp_path: Path) -> None:
+def test_rows_with_a_force_not_from_the_model_are_dropped_and_counted(tmp_path: Path) -> None:
     frame = stroke_rows(1000)
     frame["status"] = "Ok"
     frame.loc[:20, "status"] = "Starting"
@@ -442,7 +446,7 @@ def test_rows_whose_force_was_not_the_models_are_left_out_and_counted(tmp_path: 
     )
 
 
-def test_numbered_segments_are_no_direction(tmp_path: Path) -> None:
+def test_segment_numbers_are_not_taken_as_direction(tmp_path: Path) -> None:
     frame = stroke_rows(1000).drop(columns="direction")
     frame["segment"] = np.arange(1000) // 500
     for suffix in ("csv", "parquet"):
@@ -451,13 +455,13 @@ def test_numbered_segments_are_no_direction(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
-def test_hysteresis_is_tried_without_a_direction(tmp_path: Path, suffix: str) -> None:
+def test_hysteresis_is_tested_without_a_direction_column(tmp_path: Path, suffix: str) -> None:
     stated = written(stroke_rows(4000), tmp_path / f"stated.{suffix}")
     silent = written(stroke_rows(4000).drop(columns="direction"), tmp_path / f"silent.{suffix}")
     expected, model = palpate.identify_files(stated), palpate.identify_files(silent)
     assert model.fit.model_class == expected.fit.model_class == "hysteresis"
     assert model.fit.nrmse < 0.02
-    assert "direction is taken from the order of rows, block by block" in model.notes["identification"]
+    assert "The direction is taken from the order of rows, block by block." in model.notes["identification"]
     x = np.linspace(0.05, 0.55, 100)
     for side in (1.0, -1.0):
         sides = np.full(100, side)
@@ -485,7 +489,7 @@ def test_a_force_that_falls_with_position_is_reported_part_by_part(tmp_path: Pat
     assert falling[0][:60] == at_once[:60]
 
 
-def test_utf_16_is_refused_part_by_part_and_the_command_cures_it(tmp_path: Path) -> None:
+def test_utf_16_is_refused_part_by_part_and_the_suggested_command_converts_it(tmp_path: Path) -> None:
     file = tmp_path / "press.csv"
     file.write_text(stroke_rows(1000).to_csv(index=False), encoding="utf-16")
     with pytest.raises(InputError, match="cannot be read part by part; convert it: iconv") as refused:

@@ -24,7 +24,7 @@ from palpate import IdentifyOptions, SearchOptions, WaveletNetworkRegressor
 
 @parametrize_with_checks([WaveletNetworkRegressor()])
 @pytest.mark.filterwarnings("ignore")
-def test_scikit_learn_finds_nothing_to_object_to(estimator: Any, check: Any) -> None:
+def test_scikit_learn_estimator_checks_pass(estimator: Any, check: Any) -> None:
     check(estimator)
 
 
@@ -47,13 +47,13 @@ def test_settings_and_defaults_are_those_of_identification() -> None:
     assert set(inspect.signature(WaveletNetworkRegressor).parameters) == set(taken)
 
 
-def test_an_unknown_setting_is_told() -> None:
+def test_unknown_setting_is_refused_by_name() -> None:
     with pytest.raises(TypeError, match="flavour"):
         WaveletNetworkRegressor(flavour="sweet")
 
 
-def test_a_wrong_setting_is_told_when_fitting() -> None:
-    with pytest.raises(ValueError, match=r"max_wavelets is -1; it must be a whole number of 0 or more"):
+def test_wrong_setting_is_refused_by_fit() -> None:
+    with pytest.raises(ValueError, match=r"max_wavelets is -1: must be a whole number >= 0"):
         WaveletNetworkRegressor(max_wavelets=-1).fit(*bump())
 
 
@@ -81,7 +81,7 @@ def test_a_weight_counts_as_that_many_rows(seed: int) -> None:
     assert weighted.n_parameters_ == repeated.n_parameters_
 
 
-def test_nothing_is_learned_from_a_row_of_no_weight() -> None:
+def test_row_with_zero_weight_does_not_change_the_fit() -> None:
     X, y = bump()
     far = np.vstack([X, [[50.0]]])
     weight = np.append(np.ones(len(y)), 0.0)
@@ -91,7 +91,7 @@ def test_nothing_is_learned_from_a_row_of_no_weight() -> None:
     assert np.array_equal(network.predict(X), without.predict(X))
 
 
-def test_the_domain_reaches_beyond_rows_drawn_from_a_range_as_far_as_they_fall_short_of_it() -> None:
+def test_domain_extends_beyond_rows_by_the_margin_of_a_sample() -> None:
     """The least of m values from 0 to 1 is 1/(m + 1) on average, and the edge of the domain is 0."""
     random = np.random.default_rng(0)
     edges = []
@@ -104,7 +104,7 @@ def test_the_domain_reaches_beyond_rows_drawn_from_a_range_as_far_as_they_fall_s
     assert abs(np.mean(edges)) < 0.2 / 31.0
 
 
-def test_repeated_rows_say_no_more_about_the_domain() -> None:
+def test_repeated_rows_do_not_change_the_domain() -> None:
     X, y = bump(40)
     once, often = (
         WaveletNetworkRegressor(max_wavelets=0).fit(np.repeat(X, k, axis=0), np.repeat(y, k)) for k in (1, 5)
@@ -113,12 +113,12 @@ def test_repeated_rows_say_no_more_about_the_domain() -> None:
 
 
 @pytest.mark.parametrize("weight", [[1.0] * 299, [-1.0] + [1.0] * 299, [np.nan] + [1.0] * 299, [0.0] * 300])
-def test_weights_that_cannot_be_are_refused(weight: list[float]) -> None:
+def test_invalid_weights_are_refused(weight: list[float]) -> None:
     with pytest.raises(ValueError, match=r"sample.weight"):
         WaveletNetworkRegressor().fit(*bump(), sample_weight=weight)
 
 
-def test_constant_columns_take_no_part() -> None:
+def test_constant_columns_are_not_used() -> None:
     X, y = bump()
     padded = np.column_stack([np.full(len(y), 1e8), X, np.zeros(len(y))])
     network = WaveletNetworkRegressor().fit(padded, y)
@@ -129,7 +129,7 @@ def test_constant_columns_take_no_part() -> None:
     assert np.array_equal(network.predict(moved), network.predict(padded))
 
 
-def test_where_nothing_varies_the_mean_is_left() -> None:
+def test_constant_columns_alone_give_the_mean() -> None:
     network = WaveletNetworkRegressor().fit(np.full((20, 3), 2.0), np.arange(20.0))
     assert network.predict(np.full((2, 3), 2.0)) == pytest.approx([9.5, 9.5])
     assert (network.n_wavelets_, network.n_parameters_) == (0, 1)
@@ -165,14 +165,14 @@ def test_a_clone_and_a_pickle_are_the_same_estimator() -> None:
     assert "max_wavelets=4" in repr(network)
 
 
-def test_the_network_is_a_model_that_can_be_kept(tmp_path: Path) -> None:
+def test_network_is_a_model_that_can_be_saved(tmp_path: Path) -> None:
     X, y = saddle(150)
     network = WaveletNetworkRegressor().fit(X, y)
     network.network_.save(tmp_path / "saddle.json")
     assert np.array_equal(palpate.load_model(tmp_path / "saddle.json").predict(X), network.predict(X))
 
 
-def test_without_scikit_learn_one_sentence_says_what_to_install() -> None:
+def test_missing_scikit_learn_is_reported_with_the_install_command() -> None:
     code = (
         "import sys; sys.modules['sklearn'] = None\n"
         "import palpate\n"

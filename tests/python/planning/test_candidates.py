@@ -38,7 +38,7 @@ def given_in_a_turn(model: Model, force_limit: float) -> float:
     return float(abs(np.clip(model.force(x), -force_limit, force_limit).mean()) * TURN)
 
 
-def test_a_wheel_with_a_peak_above_the_force_limit_is_no_longer_certified_as_it_is() -> None:
+def test_periodic_model_above_the_force_limit_is_not_certified_unchanged() -> None:
     model = wheel()
     strong = DeviceProfile(id="strong", viscous_damping=10.0, coulomb_friction=0.02, force_limit=100.0)
     assert certify(model, Scheme(structure="direct"), strong).certified

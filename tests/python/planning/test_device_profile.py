@@ -44,7 +44,7 @@ MODEL = ROOT / "tests" / "models" / "good" / "position.json"
     ],
     ids=lambda value: value[:24],
 )
-def test_a_value_of_a_profile_that_does_not_fit_is_one_sentence(
+def test_invalid_profile_value_is_reported_in_one_sentence(
     tmp_path: Path, field: str, value: str, sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = DeviceProfile(id="knob").save(tmp_path / "p.toml")
@@ -54,7 +54,7 @@ def test_a_value_of_a_profile_that_does_not_fit_is_one_sentence(
         DeviceProfile.load(path)
     assert str(refused.value).startswith(f"{path}: ")
     assert main(["plan", str(MODEL), "--device", str(path)]) == 2
-    told = capsys.readouterr().err.splitlines()[-1]
-    assert told.startswith(f"error: {path}: ")
-    assert "defect" not in told
-    assert "sys." not in told
+    printed = capsys.readouterr().err.splitlines()[-1]
+    assert printed.startswith(f"error: {path}: ")
+    assert "defect" not in printed
+    assert "sys." not in printed

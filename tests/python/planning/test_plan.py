@@ -44,12 +44,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("name", example_profiles())
-def test_every_example_loads_under_its_name_and_says_where_its_numbers_are_from(name: str) -> None:
+def test_every_example_loads_by_name_and_states_its_sources(name: str) -> None:
     file, sources = example_profiles()[name]
     assert DeviceProfile.load(file).id == name
     assert profile_file(name) == file
-    told = " ".join(sources)
-    assert "data sheet" in told or "EVERY NUMBER IS AN ASSUMPTION" in told
+    text = " ".join(sources)
+    assert "data sheet" in text or "EVERY NUMBER IS AN ASSUMPTION" in text
 
 
 def test_a_profile_is_read_as_it_was_written(tmp_path: Path) -> None:
@@ -76,7 +76,7 @@ def test_a_profile_is_read_as_it_was_written(tmp_path: Path) -> None:
         ("id", None, "id is missing"),
     ],
 )
-def test_what_no_device_can_have_is_refused_with_file_and_field(
+def test_impossible_device_value_is_refused_with_file_and_field(
     tmp_path: Path, field: str, value: str | None, sentence: str
 ) -> None:
     path = KNOB.save(tmp_path / "knob.toml")
@@ -88,7 +88,7 @@ def test_what_no_device_can_have_is_refused_with_file_and_field(
     assert sentence in str(refused.value)
 
 
-def test_the_simplest_structure_that_holds_is_taken() -> None:
+def test_plan_takes_the_simplest_certified_structure() -> None:
     chosen = plan(model_by_hand(), KNOB)
     assert (chosen.structure, chosen.refused, chosen.limited) == ("direct", (), None)
     assert (chosen.force_error.largest, str(chosen.verdict)) == (0.0, "good")
@@ -99,9 +99,7 @@ def test_the_simplest_structure_that_holds_is_taken() -> None:
 @pytest.mark.parametrize(
     ("damping", "samples"), [(1.0, 1), (0.049, 2), (0.036, 4), (0.030, 8), (0.0278, 16), (0.027, 0)]
 )
-def test_the_prediction_takes_the_fewest_samples_that_leave_a_tick_time_to_be_late(
-    damping: float, samples: int
-) -> None:
+def test_prediction_takes_fewest_samples_certified_for_a_late_tick(damping: float, samples: int) -> None:
     """A slope of 40 needs 0.0400, 0.0303, 0.0255, 0.0231, 0.0218 for 1 to 16 samples; 1.25 times as much."""
     device = DeviceProfile(viscous_damping=damping, coulomb_friction=0.02)
     model = model_by_hand(weight=[0.0], linear=[40.0])
@@ -113,7 +111,7 @@ def test_the_prediction_takes_the_fewest_samples_that_leave_a_tick_time_to_be_la
     assert plan(model, device, predict="off").scheme.predict == 0
 
 
-def test_a_prediction_never_costs_the_network_or_the_certificate() -> None:
+def test_prediction_changes_neither_network_nor_certificate() -> None:
     model = model_by_hand(weight=[0.0], linear=[40.0])
     for damping in (0.0201, 0.021, 0.023):
         chosen = plan(model, DeviceProfile(viscous_damping=damping, coulomb_friction=0.02))
@@ -122,7 +120,7 @@ def test_a_prediction_never_costs_the_network_or_the_certificate() -> None:
         assert chosen.certificate.certified
 
 
-def test_a_late_device_that_holds_a_model_only_with_a_prediction_gets_one() -> None:
+def test_late_device_gets_a_prediction_if_only_that_is_certified() -> None:
     """A sample of delay: slopes up to 40 need 0.060 without prediction, 0.052 with that of one sample."""
     model = model_by_hand(weight=[0.0], linear=[40.0])
     device = DeviceProfile(viscous_damping=0.055, coulomb_friction=0.02, delay_s=1e-3)
@@ -132,7 +130,7 @@ def test_a_late_device_that_holds_a_model_only_with_a_prediction_gets_one() -> N
     assert without.limited is not None
 
 
-def test_a_prediction_that_was_asked_for_is_taken_or_refused_but_not_dropped() -> None:
+def test_requested_prediction_is_used_or_refused() -> None:
     model = model_by_hand(weight=[0.0], linear=[40.0])
     assert plan(model, DeviceProfile(coulomb_friction=0.02), predict=16).scheme.predict == 16
     weak = plan(model, DeviceProfile(viscous_damping=0.03, coulomb_friction=0.02), predict=1)
@@ -157,12 +155,12 @@ def test_a_prediction_of_a_model_with_hysteresis_keeps_its_play_radius() -> None
     assert plan(model, firm, predict=0).certificate != chosen.certificate
 
 
-def test_the_verb_takes_stores_and_names_the_samples_of_a_prediction(
+def test_verb_takes_stores_and_prints_prediction_samples(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model_by_hand(weight=[0.0], linear=[20.0]).save("soft.json")
-    for asked, samples in (("auto", 1), ("off", 0), ("4", 4)):
-        assert main(["plan", "soft.json", "--device", "knob.toml", "--predict", asked, "-o", "p.json"]) == 0
+    for predict, samples in (("auto", 1), ("off", 0), ("4", 4)):
+        assert main(["plan", "soft.json", "--device", "knob.toml", "--predict", predict, "-o", "p.json"]) == 0
         shown = capsys.readouterr().out
         assert (f"direct, predict {samples}" in shown) == (samples > 0)
         assert Plan.of(load_model("p.json")).scheme.predict == samples
@@ -170,7 +168,7 @@ def test_the_verb_takes_stores_and_names_the_samples_of_a_prediction(
     assert "give 0 to 16, auto or off" in capsys.readouterr().err
 
 
-def test_a_weak_device_gets_a_force_whose_slope_it_holds_and_is_told_the_loss() -> None:
+def test_weak_device_gets_a_limited_slope_and_the_force_error_is_reported() -> None:
     model = model_by_hand()
     chosen = plan(model, WEAK)
     assert chosen.structure == "direct"
@@ -187,7 +185,7 @@ def test_a_weak_device_gets_a_force_whose_slope_it_holds_and_is_told_the_loss() 
     assert np.abs(rendered - model.force(x)).max() <= chosen.force_error.largest * 1.001
 
 
-def test_the_loss_is_none_where_the_slope_stays_within_the_limit() -> None:
+def test_force_error_is_zero_if_slopes_are_within_the_limit() -> None:
     model = model_by_hand()
     rendered = plan(model, WEAK).rendered
     x = np.linspace(0.0, 0.5, 2001)
@@ -197,7 +195,7 @@ def test_the_loss_is_none_where_the_slope_stays_within_the_limit() -> None:
     assert np.abs(rendered.force(x) - model.force(x))[away].max() < 2e-4 * np.ptp(model.force(x))
 
 
-def test_a_switch_that_is_too_steep_where_contact_begins_is_left_alone_behind_it() -> None:
+def test_steep_contact_of_a_switch_is_limited_only_at_the_contact() -> None:
     """Both strokes begin there with one force: the decrease of h beyond the edge would be too steep."""
     model = keyswitch_by_hand(beta=[[0.0]], weight=[0.3], bias=0.33, bias_hysteresis=0.02)
     weak = slide(viscous_damping=0.35)
@@ -218,7 +216,7 @@ def test_a_switch_that_is_too_steep_where_contact_begins_is_left_alone_behind_it
     assert departure[alone].max() < 1e-3 * np.ptp(model.force(x, direction=1.0))
 
 
-def test_press_and_release_are_rendered_with_a_play_that_is_proved() -> None:
+def test_hysteresis_is_rendered_with_a_certified_play_radius() -> None:
     chosen = plan(keyswitch_by_hand(), slide(viscous_damping=6.0))
     assert chosen.structure == "direct"
     assert chosen.certificate is not None
@@ -227,13 +225,13 @@ def test_press_and_release_are_rendered_with_a_play_that_is_proved() -> None:
     assert chosen.certificate.inequalities[0].id == "loss-nonnegative"
 
 
-def test_a_coupling_is_taken_only_when_asked_for_and_its_spring_is_taken_out() -> None:
+def test_coupling_is_used_only_if_required_and_its_spring_is_subtracted() -> None:
     chosen = plan(model_by_hand(), SMOOTH, coupling_stiffness=100.0)
     assert (chosen.structure, chosen.scheme.compensated) == ("massless", True)
-    assert chosen.refused[0] == "direct: a coupling was asked for"
+    assert chosen.refused[0] == "direct: a coupling is required, and this structure has none"
 
 
-def test_an_object_with_mass_is_implicit_where_the_encoder_has_no_steps_and_else_stable_only() -> None:
+def test_object_with_mass_is_implicit_without_encoder_steps_and_else_stable_only() -> None:
     assert plan(model_by_hand(), SMOOTH, mass=1e-3).structure == "implicit"
     chosen = plan(model_by_hand(), KNOB, mass=1e-3)
     assert chosen.structure == "explicit"
@@ -284,7 +282,7 @@ def test_an_edited_model_is_refused_when_it_is_read(tmp_path: Path) -> None:
     assert load_model(path, with_plan=False).plan is None
 
 
-def test_what_is_planned_survives_hands_on_the_device_it_was_planned_for() -> None:
+def test_planned_rendering_is_stable_with_hands_on_its_device() -> None:
     """The plan for a weak device keeps its error in the simulation, the model alone oscillates."""
     from palpate import Hand, simulate
     from palpate.planning import force_error
@@ -304,15 +302,17 @@ def test_what_is_planned_survives_hands_on_the_device_it_was_planned_for() -> No
 
 def test_the_verb_writes_the_plan_into_the_model(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "m.json", "--device", "knob.toml", "-o", "m.json", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    printed = json.loads(capsys.readouterr().out)
     stored = json.loads((here / "m.json").read_text(encoding="utf-8"))
-    assert told["structure"] == "direct"
-    assert told["verdict"] == "good"
-    assert told["force_error_share"] == 0.0
-    assert told["written"] == "m.json"
-    assert (told["plan"], told["certificate"]) == (stored["plan"], stored["certificate"])
-    assert told["felt_slope"] == told["steepest_slope"]
-    for stored_line, line in zip(told["certificate"]["inequalities"], told["inequalities"], strict=True):
+    assert printed["structure"] == "direct"
+    assert printed["verdict"] == "good"
+    assert printed["force_error_share"] == 0.0
+    assert printed["written"] == "m.json"
+    assert (printed["plan"], printed["certificate"]) == (stored["plan"], stored["certificate"])
+    assert printed["slope_behind_coupling"] == printed["steepest_slope"]
+    for stored_line, line in zip(
+        printed["certificate"]["inequalities"], printed["inequalities"], strict=True
+    ):
         assert stored_line == {name: line[name] for name in ("id", "left", "right")}
         assert line["margin"] == line["left"] - line["right"]
         assert line["holds"] == (line["left"] >= line["right"])
@@ -326,18 +326,20 @@ def test_a_model_with_a_plan_is_simulated_as_planned_on_its_device(
     for words, structure in (([], "direct"), (["--structure", "implicit"], "implicit")):
         capsys.readouterr()
         assert main(["simulate", "planned.json", "--duration-s", "0.2", "--json", *words]) == 0
-        told = capsys.readouterr()
-        assert json.loads(told.out)["structure"] == structure
-        assert ("weak knob" in told.err) == (structure == "direct")
+        printed = capsys.readouterr()
+        assert json.loads(printed.out)["structure"] == structure
+        assert ("weak knob" in printed.err) == (structure == "direct")
 
 
-def test_what_a_soft_coupling_loses_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_force_error_of_a_soft_coupling_is_reported(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    stiffness = told["plan"]["coupling"]["stiffness"]
-    assert 1.0 / told["felt_slope"] == pytest.approx(1.0 / told["steepest_slope"] + 1.0 / stiffness)
+    printed = json.loads(capsys.readouterr().out)
+    stiffness = printed["plan"]["coupling"]["stiffness"]
+    assert 1.0 / printed["slope_behind_coupling"] == pytest.approx(
+        1.0 / printed["steepest_slope"] + 1.0 / stiffness
+    )
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3"]) == 0
-    assert f"slopes up to {told['steepest_slope']:.4g} are felt as up to " in capsys.readouterr().out
+    assert f"slopes up to {printed['steepest_slope']:.4g} are felt as up to " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -350,7 +352,7 @@ def test_what_a_soft_coupling_loses_is_told(here: Path, capsys: pytest.CaptureFi
         (keyswitch_by_hand(), ["--device", "touch"]),
     ],
 )
-def test_the_plan_can_be_read_on_80_columns(
+def test_plan_output_fits_80_columns(
     here: Path, capsys: pytest.CaptureFixture[str], model: Model, arguments: list[str]
 ) -> None:
     model.save("m.json")
@@ -361,13 +363,15 @@ def test_the_plan_can_be_read_on_80_columns(
         assert word in text
 
 
-def test_a_device_that_holds_nothing_is_refused_and_nothing_is_written(
+def test_unsuitable_device_is_refused_and_no_file_is_written(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     DeviceProfile(id="ice", viscous_damping=0.0).save("ice.toml")
     assert main(["plan", "m.json", "--device", "ice.toml", "-o", "planned.json"]) == 1
     refusal = " ".join(capsys.readouterr().out.split())
-    assert refusal.startswith("verdict: no no structure holds on this device: the object needs b >= ")
+    assert refusal.startswith(
+        "verdict: no no structure can render the model on this device: the object needs "
+    )
     assert "short by" in refusal
     assert not Path("planned.json").exists()
 
@@ -376,21 +380,21 @@ def test_a_device_that_holds_nothing_is_refused_and_nothing_is_written(
     ("arguments", "sentence"),
     [
         (["--device", "nothing.toml"], "there is no file nothing.toml"),
-        (["--device", "touch"], "moves in m, the model in rad"),
+        (["--device", "touch"], "position_unit of the device touch is m: must be rad"),
         (["--device", "m.json"], "m.json is not TOML"),
         ([], "Missing option '--device'"),
         (["--device", "knob.toml", "-o", "knob.toml"], "is an input as well"),
-        (["--device", "knob.toml", "--plot", "locus.txt"], "is no figure file"),
+        (["--device", "knob.toml", "--plot", "locus.txt"], "locus.txt is not a figure file"),
         (["--device", "knob.toml", "--coupling-stiffness", "-1"], "coupling_stiffness is -1"),
     ],
 )
-def test_what_is_wrong_is_refused_in_one_sentence(
+def test_wrong_usage_is_refused_in_one_sentence(
     here: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], sentence: str
 ) -> None:
     assert main(["plan", "m.json", *arguments]) == 2
-    told = capsys.readouterr().err
-    assert sentence in told
-    assert len([line for line in told.splitlines() if line.startswith("error: ")]) == 1
+    printed = capsys.readouterr().err
+    assert sentence in printed
+    assert len([line for line in printed.splitlines() if line.startswith("error: ")]) == 1
 
 
 def test_the_examples_are_listed_with_their_sources(capsys: pytest.CaptureFixture[str]) -> None:

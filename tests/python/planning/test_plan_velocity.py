@@ -39,7 +39,7 @@ def fluid_by_hand(**changes: Any) -> Model:
     )
 
 
-def test_it_is_rendered_directly_and_certified_with_the_bounds_of_both_slopes() -> None:
+def test_force_of_velocity_is_certified_directly_with_bounds_of_both_slopes() -> None:
     model = fluid_by_hand()
     chosen = plan(model, KNOB)
     certificate = chosen.certificate
@@ -56,7 +56,7 @@ def test_it_is_rendered_directly_and_certified_with_the_bounds_of_both_slopes() 
     assert damping.right == pytest.approx(5e-4 * certificate.bounds.slope_max + certificate.bounds.drag)
 
 
-def test_a_device_that_the_velocity_is_too_much_for_is_refused_with_what_is_missing() -> None:
+def test_device_too_weak_for_the_velocity_slope_is_refused_with_its_need() -> None:
     weak = DeviceProfile(id="weak knob", viscous_damping=0.02, coulomb_friction=0.02)
     chosen = plan(fluid_by_hand(), weak)
     assert chosen.certificate is not None
@@ -65,29 +65,31 @@ def test_a_device_that_the_velocity_is_too_much_for_is_refused_with_what_is_miss
     assert "b >= T M / 2 + B_v T / period needs" in reasons["direct"]
     assert "short by" in reasons["direct"]
     for name in ("direct, slope limited", "massless", "implicit", "energy-consistent", "explicit"):
-        assert "of a force of position and velocity no bound is known" in reasons[name]
+        assert "only direct rendering of the identified model has known bounds" in reasons[name]
 
 
 @pytest.mark.parametrize(
-    "wish", [{"coupling": True}, {"coupling_stiffness": 50.0}, {"mass": 1e-3}, {"object_damping": 0.1}]
+    "requirement", [{"coupling": True}, {"coupling_stiffness": 50.0}, {"mass": 1e-3}, {"object_damping": 0.1}]
 )
-def test_behind_a_coupling_or_with_a_mass_it_is_refused_in_one_sentence(wish: dict[str, Any]) -> None:
-    with pytest.raises(InputError, match="no bound is known"):
-        plan(fluid_by_hand(), KNOB, **wish)
+def test_force_of_velocity_with_coupling_or_mass_is_refused_in_one_sentence(
+    requirement: dict[str, Any],
+) -> None:
+    with pytest.raises(InputError, match="it can only be rendered directly"):
+        plan(fluid_by_hand(), KNOB, **requirement)
 
 
 @pytest.mark.parametrize("structure", sorted(set(structure_names) - {"direct"}))
-def test_no_other_structure_takes_it(structure: str) -> None:
+def test_force_of_velocity_is_refused_by_other_structures(structure: str) -> None:
     with pytest.raises(InputError, match=f"structure is {structure}, must be direct"):
         Plan(fluid_by_hand(), Scheme(structure=structure))
 
 
-def test_other_second_inputs_are_no_velocity() -> None:
+def test_other_second_inputs_are_not_taken_as_velocity() -> None:
     with pytest.raises(InputError, match="the network has 2 inputs, must have 1"):
         plan(fluid_by_hand(kind="general", inputs=("position", "load_N")), KNOB)
 
 
-def test_the_plan_comes_back_from_its_file_and_an_edited_bound_does_not(tmp_path: Path) -> None:
+def test_plan_is_read_from_its_file_and_an_edited_bound_is_refused(tmp_path: Path) -> None:
     path = plan(fluid_by_hand(), KNOB).stored().save(tmp_path / "planned.json")
     again = Plan.of(load_model(path))
     again.check_for(KNOB)
@@ -104,7 +106,7 @@ def test_the_plan_comes_back_from_its_file_and_an_edited_bound_does_not(tmp_path
         load_model(path)
 
 
-def test_what_is_rendered_is_the_model_at_the_last_difference_of_positions() -> None:
+def test_rendered_force_uses_the_last_difference_of_positions() -> None:
     model = fluid_by_hand()
     rig = rig_for(model)
     chosen = plan(model, KNOB)
@@ -120,12 +122,12 @@ def test_what_is_rendered_is_the_model_at_the_last_difference_of_positions() -> 
     assert force_error(chosen, rendered).instant < 6.0 * step + 0.06 * step / KNOB.period_s
 
 
-def test_its_force_along_a_motion_needs_the_period() -> None:
-    with pytest.raises(InputError, match="period_s must be given"):
+def test_force_of_velocity_along_a_motion_needs_the_period() -> None:
+    with pytest.raises(InputError, match="period_s is None: must be given"):
         force_at(Plan(fluid_by_hand(), Scheme(structure="direct")), np.linspace(0.0, 0.1, 5))
 
 
-def test_simulate_renders_it_without_a_plan(
+def test_simulate_renders_a_force_of_velocity_without_a_plan(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -137,12 +139,12 @@ def test_simulate_renders_it_without_a_plan(
 
 
 @needs_program
-def test_the_control_program_renders_it_certified_and_uncertified(tmp_path: Path) -> None:
+def test_control_program_renders_a_force_of_velocity_certified_and_uncertified(tmp_path: Path) -> None:
     path = plan(fluid_by_hand(), PATIENT_KNOB).stored().save(tmp_path / "planned.json")
-    for words, said in (([], "certified: certified"), (["--uncertified"], "certified: no")):
+    for words, expected in (([], "certified: certified"), (["--uncertified"], "certified: no")):
         record = tmp_path / f"felt{len(words)}.csv"
         answer = control(
             path, "--duration-s", 0.3, "--record", record, "--lowest-rate-share", 0, *words, "--json"
         )
         assert answer.returncode == 0, answer.stderr
-        assert said in record.read_text(encoding="utf-8")
+        assert expected in record.read_text(encoding="utf-8")

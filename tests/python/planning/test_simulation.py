@@ -55,7 +55,7 @@ def test_a_plan_does_not_claim_a_table_that_cannot_be_certified() -> None:
     assert Plan(far, Scheme(structure="massless")).solver == "newton"
 
 
-def test_a_needle_costs_the_table_no_more_than_its_own_width() -> None:
+def test_narrow_wavelet_increases_the_table_by_its_width_only() -> None:
     needle = model_by_hand(alpha=[[1e9]])
     assert Plan(needle, Scheme(structure="massless")).solver == "table"
 
@@ -101,14 +101,14 @@ def test_a_hand_leads_the_handle_through_the_domain_and_not_beyond(model: Model,
 
 
 @pytest.mark.parametrize("structure", _core.rendering.structure_names)
-def test_a_sweep_asks_for_no_force_that_the_device_cannot_hold(structure: str) -> None:
+def test_sweep_requires_no_force_above_the_device_limit(structure: str) -> None:
     stiff = model_by_hand(linear=[40.0])
     _, recording = rendered(stiff, structure=structure)
     assert set(recording.columns["status"]) == {"Ok"}
     assert 0.5 * DeviceProfile().force_limit < np.abs(recording.force).max() < DeviceProfile().force_limit
 
 
-def test_the_rig_of_another_unit_is_the_knob_as_a_scale_model() -> None:
+def test_rig_for_another_unit_is_the_scaled_knob() -> None:
     """The same object in metres and newtons, or in radians and newton metres, has the same relative error."""
     scale_length, scale_force = 0.008, 0.2
     rotary = model_by_hand(below="free")
@@ -131,7 +131,7 @@ def test_the_rig_of_another_unit_is_the_knob_as_a_scale_model() -> None:
     assert rig_for(linear).device.encoder_step == pytest.approx(DeviceProfile().encoder_step * scale_length)
 
 
-def test_what_was_rendered_is_a_recording_that_says_it_is_simulated(tmp_path: Any) -> None:
+def test_rendering_is_a_recording_marked_as_simulated(tmp_path: Any) -> None:
     _, recording = rendered(model_by_hand(), 0.5)
     assert "simulated" in recording.metadata
     again = read_recording(recording.write(tmp_path / "rendered.csv"))
@@ -143,7 +143,7 @@ def test_what_was_rendered_is_a_recording_that_says_it_is_simulated(tmp_path: An
     assert set(again.columns["status"]) == {"Ok"}
 
 
-def test_the_recorded_force_is_what_the_device_made_of_the_command() -> None:
+def test_recorded_force_is_that_of_the_device() -> None:
     model = model_by_hand()
     plan = Plan(model, Scheme(structure="direct"))
     coarse = DeviceProfile(force_step=0.5)
@@ -177,7 +177,7 @@ def test_force_along_a_motion_follows_the_play_of_a_hysteresis_model() -> None:
     np.testing.assert_allclose(force[750], model.force(motion[750], direction=-1.0), rtol=1e-12)
 
 
-def test_the_play_radius_is_chosen_only_where_the_model_leaves_it_open() -> None:
+def test_play_radius_is_chosen_only_if_the_model_has_none() -> None:
     for model, radius in (
         (model_by_hand(), 0.0),
         (keyswitch_by_hand(play_radius=1e-4), 0.0),
@@ -187,7 +187,7 @@ def test_the_play_radius_is_chosen_only_where_the_model_leaves_it_open() -> None
     assert rig_for(model).scheme(model, play_radius=1e-3).play_radius == 1e-3
 
 
-def test_the_structures_stand_in_the_order_of_what_they_lose() -> None:
+def test_structures_are_ordered_by_force_error() -> None:
     """Compensated equals direct; softness of the coupling comes next; added damping has the largest error."""
     model = model_by_hand(linear=[8.0])
     rows = compare_structures(model, rig_for(model), 4.0)
@@ -214,7 +214,7 @@ def test_compensation_of_a_slope_beyond_the_coupling_is_refused_with_its_reason(
     assert row.name == "massless, compensated"
 
 
-def test_a_duration_that_is_none_is_an_input_error() -> None:
+def test_invalid_duration_raises_input_error() -> None:
     plan = Plan(model_by_hand(), Scheme())
     with pytest.raises(InputError, match="duration"):
         simulate(plan, DeviceProfile(), Hand(), -1.0)

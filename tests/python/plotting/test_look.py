@@ -8,7 +8,7 @@ from palpate.plotting.look import MOST_POINTS, label, scale_for, strokes, thinne
 
 
 @pytest.mark.parametrize("n", [1, 10, MOST_POINTS, MOST_POINTS + 1, 10 * MOST_POINTS + 7])
-def test_no_more_is_drawn_than_a_column_can_show(n: int) -> None:
+def test_number_of_drawn_points_is_limited(n: int) -> None:
     x, y = thinned(np.arange(n, dtype=float), np.arange(n, dtype=float))
     assert min(n, MOST_POINTS // 2) <= len(x) <= MOST_POINTS
     np.testing.assert_array_equal(x, y)
@@ -16,13 +16,13 @@ def test_no_more_is_drawn_than_a_column_can_show(n: int) -> None:
 
 def test_pauses_belong_to_no_stroke() -> None:
     direction = np.array([1, 0, -1, 0], dtype=np.int8)
-    told_apart = dict(strokes(direction, 4))
-    np.testing.assert_array_equal(told_apart["press"], [True, False, False, False])
-    np.testing.assert_array_equal(told_apart["release"], [False, False, True, False])
+    by_name = dict(strokes(direction, 4))
+    np.testing.assert_array_equal(by_name["press"], [True, False, False, False])
+    np.testing.assert_array_equal(by_name["release"], [False, False, True, False])
     assert [name for name, _ in strokes(np.array([1, 0], dtype=np.int8), 2)] == [""]
 
 
-def test_a_unit_that_is_not_known_is_not_invented() -> None:
+def test_unknown_unit_is_not_drawn() -> None:
     assert label("force", "") == "force"
 
 

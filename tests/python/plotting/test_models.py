@@ -82,7 +82,7 @@ def test_an_object_of_millimetres_is_drawn_in_millimetres() -> None:
     np.testing.assert_allclose(residual.lines[0].get_ydata(), 1e3 * x)
 
 
-def test_a_legend_hides_nothing_that_is_drawn() -> None:
+def test_legend_does_not_cover_curves() -> None:
     recording = press_and_release()
     force, residual = axes(2)
     draw_measured_and_modelled(force, residual, recording, recording.force)

@@ -23,7 +23,7 @@ def test_recorded_is_dotted_and_rendered_is_solid() -> None:
     assert one.get_title() == "driven by the motion"
 
 
-def test_structures_stand_from_top_to_bottom_with_both_errors() -> None:
+def test_structures_are_drawn_from_top_to_bottom_with_both_errors() -> None:
     one = Figure().subplots()
     draw_structures(one, ["direct", "implicit, m = 0.001, B_o = 0"], [0.1, 0.2], [0.01, 0.15], "N")
     mean, end = one.lines
@@ -31,11 +31,11 @@ def test_structures_stand_from_top_to_bottom_with_both_errors() -> None:
     np.testing.assert_array_equal(end.get_xdata(), [0.01, 0.15])
     assert mean.get_markerfacecolor() != end.get_markerfacecolor()
     low, high = one.get_ylim()
-    assert low > high, "the first structure stands at the top"
+    assert low > high, "the first structure must be at the top"
     assert one.get_xlabel() == "force error, RMS [N]"
 
 
-def test_the_poles_are_those_of_the_step_and_leave_the_circle_where_the_certificate_says() -> None:
+def test_poles_are_those_of_the_step_and_leave_the_circle_at_the_certificate_limit() -> None:
     T = 1e-3
     scheme = Scheme(
         structure="explicit", coupling_stiffness=60.0, coupling_damping=0.01, mass=1e-3, object_damping=0.5

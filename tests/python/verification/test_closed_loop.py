@@ -77,19 +77,19 @@ def test_the_error_of_a_force_driven_loop_is_that_of_the_position() -> None:
 
 
 @pytest.mark.parametrize(("stiffness", "structure"), [(2990.0, "explicit"), (3010.0, "implicit")])
-def test_an_unstable_explicit_environment_is_replaced_and_said(stiffness: float, structure: str) -> None:
+def test_unstable_explicit_environment_is_replaced_and_reported(stiffness: float, structure: str) -> None:
     # (4 m - 2 B_o T) / T^2 = 3000 at m = 0.001, B_o = 0.5, T = 1 ms.
     loop = force_driven(spring(stiffness), sweep(stiffness))
     assert loop.scheme.structure == structure
     assert loop.rmse < 0.01
     if structure == "implicit":
-        assert "the implicit environment is used" in loop.notes[0]
-        assert "stable below a slope of 3000, and the model reaches 3010" in loop.notes[0]
+        assert "The implicit environment is used" in loop.notes[0]
+        assert "stable below a slope of 3000, and the steepest slope of the model is 3010" in loop.notes[0]
     else:
         assert loop.notes == ()
 
 
-def test_the_implicit_environment_is_kept_where_it_is_asked_for() -> None:
+def test_requested_implicit_environment_is_kept() -> None:
     loop = force_driven(spring(), sweep(), Scheme(structure="implicit"))
     assert loop.scheme.structure == "implicit"
     assert loop.notes == ()
@@ -135,7 +135,7 @@ def test_a_recording_without_time_is_followed_at_an_assumed_speed() -> None:
     speed = np.abs(np.diff(loop.recorded_position)) / 1e-3
     assert np.median(speed) == pytest.approx(0.5, rel=1e-6)
     assert loop.rmse < 1e-12
-    assert loop.notes == ("the recording has no time: a stroke speed of 0.5 rad/s is assumed",)
+    assert loop.notes == ("The recording has no time. A stroke speed of 0.5 rad/s is assumed.",)
     faster = motion_driven(spring(), sweep(timed=False), stroke_speed=1.0)
     assert faster.time[-1] == pytest.approx(2.0, abs=2e-3)
 
@@ -174,30 +174,36 @@ def test_below_its_wall_the_sample_is_a_spring_to_within_its_noise() -> None:
 @pytest.mark.parametrize(
     ("recording", "options", "sentence"),
     [
-        (sweep(), {"stroke_speed": 0.1}, "the recording has a time of its own"),
-        (sweep(timed=False), {"stroke_speed": -1.0}, "stroke_speed is -1.0; it must be > 0"),
-        (sweep(), {"period_s": 0.0}, "period_s is 0.0; it must be > 0"),
-        (sweep(), {"period_s": 9.0}, "less than two samples of 9 s"),
-        (sweep(), {"period_s": np.inf}, "period_s is inf; it must be > 0 and finite"),
+        (sweep(), {"stroke_speed": 0.1}, "stroke_speed is given, but the recording has time"),
+        (sweep(timed=False), {"stroke_speed": -1.0}, "stroke_speed is -1.0: must be > 0"),
+        (sweep(), {"period_s": 0.0}, "period_s is 0.0: must be > 0"),
+        (sweep(), {"period_s": 9.0}, "must be at least one sample of 9 s"),
+        (sweep(), {"period_s": np.inf}, "period_s is inf: must be > 0 and finite"),
         (sweep(), {"period_s": 1e-12}, "samples of 1e-12 s: choose a larger period"),
-        (sweep(timed=False), {"stroke_speed": np.inf}, "stroke_speed is inf; it must be > 0 and finite"),
+        (sweep(timed=False), {"stroke_speed": np.inf}, "stroke_speed is inf: must be > 0 and finite"),
         (sweep(timed=False), {"stroke_speed": 1e-9}, "samples of 0.001 s: choose a higher stroke speed"),
         (sweep(timed=False), {"stroke_speed": 5e-324}, "more than 20000000 samples"),
-        (Recording.from_arrays(np.ones(20), np.ones(20), units=RAD), {}, "the recording does not move"),
+        (
+            Recording.from_arrays(np.ones(20), np.ones(20), units=RAD),
+            {},
+            "position of the recording is constant",
+        ),
         (
             Recording.from_arrays([0.0, 1.0], [0.0, 1.0], units={"position": "m", "force": "N"}),
             {},
-            "the model's position is in rad, the recording's in m",
+            "the position of the model is in rad, that of the recording in m",
         ),
     ],
 )
-def test_what_cannot_be_driven_is_told(recording: Recording, options: dict[str, Any], sentence: str) -> None:
+def test_invalid_motion_is_refused_with_its_value(
+    recording: Recording, options: dict[str, Any], sentence: str
+) -> None:
     for drive in (motion_driven, force_driven):
         with pytest.raises(InputError, match=re.escape(sentence)):
             drive(spring(), recording, **options)
 
 
-def test_a_scheme_that_does_not_fit_is_named() -> None:
+def test_unsuitable_scheme_is_refused_by_name() -> None:
     with pytest.raises(InputError, match="coupling_stiffness"):
         motion_driven(spring(), sweep(), Scheme(structure="massless", coupling_stiffness=0.0))
     with pytest.raises(InputError, match="mass"):

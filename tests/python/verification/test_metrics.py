@@ -84,7 +84,7 @@ def test_the_stiffness_band_is_23_per_cent(factor: float, share: float) -> None:
     assert share_within_stiffness_jnd(x, 3 * x, factor * 3 * x) == share
 
 
-def test_an_offset_is_no_stiffness() -> None:
+def test_offset_does_not_change_stiffness() -> None:
     x = np.linspace(0.0, 1.0, 1000)
     assert share_within_stiffness_jnd(x, 3 * x, np.full_like(x, 5.0)) == 1.0
 
@@ -108,7 +108,7 @@ def spring(stiffness: float, reach: float = 1.0, loss: float = 0.0) -> Model:
     return identify(Recording.from_arrays(x, force, direction=direction if loss else None))
 
 
-def test_a_difference_counts_in_just_noticeable_ones() -> None:
+def test_difference_is_measured_in_just_noticeable_differences() -> None:
     (stroke,) = compare(spring(10.0), spring(10.35))
     assert stroke.name == ""
     # 3.5 % of the force, with a just noticeable difference of 7 %; near zero force it is 1 % of the largest.
@@ -118,18 +118,18 @@ def test_a_difference_counts_in_just_noticeable_ones() -> None:
     assert same.worst == pytest.approx(0.0, abs=1e-9)
 
 
-def test_strokes_are_told_apart_where_one_of_the_models_does() -> None:
+def test_strokes_are_compared_separately_if_one_model_has_hysteresis() -> None:
     press, release = compare(spring(10.0), spring(10.0, loss=0.2))
     assert (press.name, release.name) == ("press", "release")
     assert np.max(press.second - press.first) == pytest.approx(0.2, rel=1e-6)
     assert np.max(release.second - release.first) == pytest.approx(-0.2, rel=1e-6)
 
 
-def test_models_are_compared_where_both_know_something() -> None:
+def test_models_are_compared_on_their_common_domain() -> None:
     (stroke,) = compare(spring(10.0, reach=0.5), spring(10.0))
     assert (stroke.position[0], stroke.position[-1]) == (0.0, 0.5)
     x = np.linspace(2.0, 3.0, 100)
-    with pytest.raises(InputError, match="share no position"):
+    with pytest.raises(InputError, match="have no common position"):
         compare(spring(10.0), identify(Recording.from_arrays(x, 10.0 * x)))
 
 

@@ -46,7 +46,7 @@ def test_a_flight_record_of_a_model_with_hysteresis_is_verified(
     assert wrong.nrmse > 0.01
 
 
-def test_a_recording_that_is_no_flight_record_states_nothing() -> None:
+def test_other_recordings_have_no_flight_record_statements() -> None:
     recording = Recording.from_arrays(np.arange(20.0), np.arange(20.0), metadata={"hand": "r = 3"})
     assert flight_of(recording).play_radius is None
     assert flight_of(recording).object_position is None

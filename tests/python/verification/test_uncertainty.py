@@ -33,7 +33,7 @@ def strokes(seed: int, loss: float = 0.3) -> Recording:
     return Recording.from_arrays(x, truth(x) + side * loss + random.normal(0.0, 0.02, len(x)), direction=side)
 
 
-def test_errors_are_as_large_as_standard_errors_say() -> None:
+def test_errors_agree_with_their_standard_errors() -> None:
     """Over 15 draws the error over its standard error has the spread of a standard normal."""
     ratios, slopes = [], []
     for seed in range(15):
@@ -49,7 +49,7 @@ def test_errors_are_as_large_as_standard_errors_say() -> None:
         assert np.mean(np.abs(found) < 2.0) > 0.9
 
 
-def test_the_noise_is_found_and_four_times_the_rows_halve_the_error() -> None:
+def test_noise_is_estimated_and_four_times_the_rows_halve_the_error() -> None:
     few, many = noisy(1, 1000), noisy(1, 4000)
     errors = []
     for recording in (few, many):
@@ -59,7 +59,7 @@ def test_the_noise_is_found_and_four_times_the_rows_halve_the_error() -> None:
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.25)
 
 
-def test_strokes_of_a_hysteresis_model_have_errors_of_their_own() -> None:
+def test_strokes_of_a_hysteresis_model_have_separate_errors() -> None:
     recording = strokes(0)
     model = palpate.identify(recording)
     assert model.hysteretic
@@ -70,7 +70,7 @@ def test_strokes_of_a_hysteresis_model_have_errors_of_their_own() -> None:
         assert np.mean(np.abs(error) < 2.5 * known.force(GRID, stroke)) > 0.8
 
 
-def test_residuals_that_resemble_their_neighbours_widen_the_band() -> None:
+def test_correlated_residuals_widen_the_band() -> None:
     random = np.random.default_rng(0)
     x = np.linspace(0.0, 1.0, 2000)
     white = random.normal(0.0, 0.02, len(x))
@@ -103,12 +103,12 @@ def test_outside_the_domain_the_error_is_that_at_its_edge() -> None:
     assert np.array_equal(known.force(far), known.force(edge))
 
 
-def test_what_is_not_known_is_said() -> None:
+def test_unknown_standard_errors_are_refused() -> None:
     recording = strokes(0)
     undirected = Recording.from_arrays(recording.position, recording.force)
-    with pytest.raises(InputError, match="need recordings with directions"):
+    with pytest.raises(InputError, match="a recording has no direction"):
         uncertainty(palpate.identify(recording), undirected)
     X = np.random.default_rng(0).uniform(size=(200, 2))
     surface = palpate.WaveletNetworkRegressor().fit(X, X[:, 0] * X[:, 1]).network_
-    with pytest.raises(InputError, match="more inputs"):
+    with pytest.raises(InputError, match="need position as the only input"):
         uncertainty(surface, recording)

@@ -52,7 +52,7 @@ def curve(seed: int = 1, n: int = 1000) -> Recording:
     return Recording.from_arrays(x, 2 * x + 1 + np.random.default_rng(seed).normal(0, NOISE, n), units=RAD)
 
 
-def test_every_figure_follows_its_definition() -> None:
+def test_every_error_follows_its_definition() -> None:
     recording = curve()
     result = verify(model_of(stroke().source), recording)
     residual = 2 * recording.position + 1 - recording.force
@@ -79,7 +79,7 @@ def test_rows_outside_the_domain_are_counted() -> None:
     assert verify(model, curve()).extrapolated == 500
 
 
-def test_press_and_release_are_told_apart_by_the_direction() -> None:
+def test_direction_selects_press_or_release_force() -> None:
     result = verify(model_of(curve().source, hysteresis=True), stroke())
     assert result.rmse == pytest.approx(NOISE, rel=0.1)
     assert result.stiffness_within_jnd == 1.0
@@ -98,7 +98,7 @@ def test_the_stiffness_is_that_of_each_stroke() -> None:
     assert verify(model_of(curve().source), wrong).stiffness_within_jnd == 0.0
 
 
-def test_rows_without_a_direction_are_left_out_and_counted() -> None:
+def test_rows_without_direction_are_dropped_and_counted() -> None:
     recording = stroke()
     assert recording.direction is not None
     words = recording.direction.copy()
@@ -110,7 +110,7 @@ def test_rows_without_a_direction_are_left_out_and_counted() -> None:
     assert result.n == 750
     assert np.count_nonzero(~result.rows) == 50
     assert result.rmse == pytest.approx(NOISE, rel=0.1)
-    assert "50 rows without a direction (pause, hold) are left out" in result.notes
+    assert "50 rows without a direction (pause, hold) are not compared." in result.notes
 
 
 def test_a_single_valued_model_keeps_rows_without_a_direction() -> None:
@@ -135,19 +135,19 @@ def test_a_motion_without_direction_and_play_radius_takes_one_percent_of_the_tra
     motion = Recording.from_arrays(table.position, table.force, time, units=RAD)
     result = verify(model_of(curve().source, hysteresis=True), motion)
     assert np.mean(np.abs(result.residual) < 4 * NOISE) > 0.98
-    assert "radius of 0.01 rad, 1 % of the travel" in result.notes[0]
+    assert "radius is 0.01 rad, 1 % of the travel" in result.notes[0]
 
 
 def test_a_table_without_direction_and_time_takes_its_strokes_from_the_order_of_rows() -> None:
     result = verify(model_of(curve().source, hysteresis=True), stroke(direction=False))
     assert np.mean(np.abs(result.residual) < 4 * NOISE) > 0.99
-    assert result.notes[0] == "direction is taken from the order of rows: 1 turn"
+    assert result.notes[0] == "The direction is taken from the order of rows: 1 turn."
 
 
 def test_a_play_radius_that_is_given_is_used_even_with_a_direction() -> None:
     model = model_of(curve().source, hysteresis=True, play_radius=0.005)
     result = verify(model, stroke(), play_radius=0.02)
-    assert "radius of 0.02 rad, as given" in result.notes[0]
+    assert "radius is 0.02 rad, as given" in result.notes[0]
     assert result.rmse != verify(model, stroke()).rmse
     with pytest.raises(InputError, match="play_radius is -1"):
         verify(model, stroke(), play_radius=-1)
@@ -166,20 +166,26 @@ def test_the_play_of_held_out_rows_follows_the_rows_between_them() -> None:
 @pytest.mark.parametrize(
     ("changed", "sentence"),
     [
-        ({"force": lambda x, f: f * 1e3}, r"its force x (0.001|0.000999\d?), as if it were in mNm"),
-        ({"force": lambda x, f: f / 7.0}, r"its force x (7|6.99\d?|7.00\d), as if the gain were another"),
-        ({"force": lambda x, f: -f}, "with the sign of its force turned; give --negate force"),
+        ({"force": lambda x, f: f * 1e3}, r"force is multiplied by (0.001|0.000999\d?): it may be in mNm"),
+        ({"force": lambda x, f: f / 7.0}, r"force is multiplied by (7|6.99\d?|7.00\d): the gain may differ"),
+        ({"force": lambda x, f: -f}, "with the opposite sign of the recorded force: give --negate force"),
         (
             {"force": lambda x, f: f + 5.0},
-            r"its force less (5|4.999|5.001) N\*m, as if the sensor had an offset",
+            r"if (5|4.999|5.001) N\*m is subtracted from the recorded force: the sensor may have an offset",
         ),
-        ({"position": lambda x, f: 180 / np.pi * x}, "its position x 0.01745, as if it were in deg"),
-        ({"position": lambda x, f: x - 0.4}, r"its position plus (0.4|0.3999|0.4001)\d? rad"),
-        ({"position": lambda x, f: -x}, "with the sign of its position turned; give --negate position"),
+        ({"position": lambda x, f: 180 / np.pi * x}, "position is multiplied by 0.01745: it may be in deg"),
+        (
+            {"position": lambda x, f: x - 0.4},
+            r"if (0.4|0.3999|0.4001)\d? rad is added to the recorded position",
+        ),
+        (
+            {"position": lambda x, f: -x},
+            "with the opposite sign of the recorded position: give --negate position",
+        ),
     ],
     ids=["unit", "gain", "force-sign", "offset", "degrees", "zero", "position-sign"],
 )
-def test_a_large_error_names_the_change_under_which_the_recording_fits(
+def test_large_error_reports_the_change_that_makes_the_model_fit(
     changed: dict[str, Any], sentence: str
 ) -> None:
     """The force is curved, so an offset of the position differs from one of the force."""
@@ -198,12 +204,12 @@ def test_a_large_error_names_the_change_under_which_the_recording_fits(
     given[role] = changed[role](x, force)
     verdict = verify(model, Recording.from_arrays(**given, units=RAD)).verdict
     assert verdict.level == "no"
-    causes = [reason for reason in verdict.reasons if reason.startswith("the recording fits with")]
+    causes = [reason for reason in verdict.reasons if reason.startswith("the model fits ")]
     assert len(causes) == 1
     assert re.search(sentence, causes[0])
 
 
-def test_press_and_release_exchanged_are_named() -> None:
+def test_exchanged_press_and_release_are_reported() -> None:
     recording = stroke()
     assert recording.direction is not None
     turned = replace(recording, direction=-recording.direction)
@@ -215,7 +221,7 @@ def test_a_good_fresh_recording_has_a_good_verdict() -> None:
     assert str(verify(model_of(stroke().source), curve()).verdict) == "good"
 
 
-def test_seen_rows_and_rows_outside_the_domain_are_reservations() -> None:
+def test_rows_of_the_identification_and_outside_the_domain_give_findings() -> None:
     recording = curve()
     seen = verify(model_of(recording.source), recording).verdict
     assert seen.level == "usable"
@@ -225,15 +231,18 @@ def test_seen_rows_and_rows_outside_the_domain_are_reservations() -> None:
     assert "100 of 1000 rows (10%) lie outside the model's domain from 0 to 0.9" in str(outside)
 
 
-def test_an_error_that_neighbouring_rows_share_is_structured() -> None:
+def test_correlated_error_is_reported_as_structured() -> None:
     x = np.linspace(0.0, 1.0, 1000)
     force = 2 * x + 1 + 0.4 * np.sin(20 * x)
     verdict = verify(model_of(stroke().source), Recording.from_arrays(x, force, units=RAD)).verdict
     assert verdict.level == "usable"
-    assert any("neighbouring rows err alike (correlation 1)" in reason for reason in verdict.reasons)
+    assert any(
+        "the errors of neighbouring rows are correlated (1, above 0.5)" in reason
+        for reason in verdict.reasons
+    )
 
 
-def test_noise_alone_is_not_called_structured() -> None:
+def test_noise_is_not_reported_as_structured() -> None:
     x = np.linspace(0.0, 1.0, 1000)
     force = 2 * x + 1 + np.random.default_rng(0).normal(0.0, 0.3, 1000)
     verdict = verify(model_of(stroke().source), Recording.from_arrays(x, force, units=RAD)).verdict
@@ -241,7 +250,7 @@ def test_noise_alone_is_not_called_structured() -> None:
     assert not any("neighbouring" in reason or "fits with" in reason for reason in verdict.reasons)
 
 
-def test_a_recording_of_rests_only_is_refused() -> None:
+def test_recording_with_pauses_only_is_refused() -> None:
     recording = stroke()
     rest = Recording.from_arrays(
         recording.position, recording.force, direction=np.zeros(len(recording)), units=RAD
@@ -252,7 +261,7 @@ def test_a_recording_of_rests_only_is_refused() -> None:
 
 def test_other_units_are_refused() -> None:
     metres = Recording.from_arrays([0.0, 1.0], [0.0, 1.0], units={"position": "m", "force": "N*m"})
-    with pytest.raises(InputError, match="the model's position is in rad, the recording's in m"):
+    with pytest.raises(InputError, match="the position of the model is in rad, that of the recording in m"):
         verify(model_of(curve().source), metres)
     current = Recording.from_arrays([0.0, 1.0], [0.0, 1.0], units={"position": "rad", "force": "A"})
     with pytest.raises(InputError, match="give --torque-constant-Nm-per-A"):
@@ -296,11 +305,11 @@ def test_further_inputs_are_taken_by_name() -> None:
 
 
 def test_a_model_with_mass_is_not_compared_row_by_row() -> None:
-    with pytest.raises(InputError, match="the model has a mass or a damping"):
+    with pytest.raises(InputError, match="the mass or damping of the model needs"):
         verify(model_of(stroke().source, mass=0.1), curve())
 
 
-def test_data_is_fresh_unless_the_model_has_seen_it(tmp_path: Path) -> None:
+def test_data_is_fresh_unless_used_for_identification(tmp_path: Path) -> None:
     whole = read_recording(curve().write(tmp_path / "a.csv"))
     other = read_recording(curve(seed=2).write(tmp_path / "b.csv"))
     train, test = whole.split(5)

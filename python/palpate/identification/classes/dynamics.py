@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
-from ...recording.comparison import amount
 from ...recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
-from ..data.limits import RESOLVED
+from ..data.limits import FORCE_RESOLUTION
 from ..data.rows import Rows, modulo
 from ..decision import Decision, decided, signed, squared_error_change
 from ..network.basis import Basis
@@ -26,10 +25,10 @@ from ..options import IdentifyOptions
 from ..search.evidence import CRITERIA, CRITERION_NAMES, ON_HELD_OUT_ROWS, Moving
 
 FOLDS = 10
-"""Stretches of the recording that are held out one after the other."""
+"""Number of stretches of the recording that are held out one after the other."""
 
-NAMES = ("damping", "mass")
-"""Factors of the columns v and a."""
+TERMS = ("damping", "mass")
+"""Coefficients of the columns v and a."""
 
 
 class FoldedRegression:
@@ -83,7 +82,7 @@ class FoldedRegression:
     def _columns(self, two_sided: bool, names: Sequence[str]) -> list[int]:
         """Columns of the table: target, v, a, then those of f (and of s)."""
         static = self._n_static if two_sided else self._single
-        return [1 + NAMES.index(name) for name in names] + list(range(3, 3 + static))
+        return [1 + TERMS.index(name) for name in names] + list(range(3, 3 + static))
 
     @staticmethod
     def _solution(gram: Float2D, columns: list[int]) -> Float1D:
@@ -96,24 +95,24 @@ def _rss(gram: Float2D, columns: list[int], solution: Float1D) -> float:
     return max(float(gram[0, 0] - 2.0 * solution @ gram[columns, 0] + quadratic), 0.0)
 
 
-PER_TIME_CONSTANT = 2.0
-"""Samples kept of a filtered column in each time constant of L."""
+SAMPLES_PER_TIME_CONSTANT = 2.0
+"""Samples of a filtered column that are kept for each time constant of L [-]: more are nearly equal."""
 
-LEAST_SAMPLES = 40.0
-"""Independent samples below which nothing is said about velocity or mass."""
+LEAST_INDEPENDENT_SAMPLES = 40.0
+"""Least number of independent samples for a decision on damping and mass."""
 
-LEAST_SPREAD = 0.19
-"""Standard deviation over mean of the speed along the way, as a band of speeds from 1 to 2 has it. Below it
-v is close to its sign, and damping cannot be distinguished from friction."""
+LEAST_SPEED_SPREAD = 0.19
+"""Least standard deviation of the speed along the motion over its mean [-]: that of speeds from 1 to 2. Below
+it v is close to its sign, and damping cannot be distinguished from friction."""
 
-TOO_SHORT = "the motion between gaps of time is too short or too noisy"
+SHORT_MOTION = "the motion between gaps of time is too short or too noisy"
 """Reason for which damping and mass are not tested."""
 
-SLOW = 0.1
-"""Speed at which the smoothed sign of the velocity is tanh(1), as a share of the RMS speed."""
+SMOOTHING_SPEED_SHARE = 0.1
+"""Speed at which the smoothed sign of the velocity is tanh(1) [share of the RMS speed]."""
 
 MOST_ROWS = 20_000
-"""Rows, evenly spread, that are enough to find the inputs of a residual."""
+"""Largest number of rows, evenly spread, for the share of a residual that velocity explains."""
 
 
 class Dynamics:
@@ -133,7 +132,7 @@ class Dynamics:
         self._parts = [] if low_pass is None else long_enough(parts, low_pass)
         self._data, self._evidence = data, options.search.evidence
         self._criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
-        self._step = max(1, int(1.0 / (PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
+        self._step = max(1, int(1.0 / (SAMPLES_PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
         self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
 
     def accepted(self, basis: Basis, side: Float1D | None) -> tuple[dict[str, float], list[Decision]]:
@@ -148,13 +147,13 @@ class Dynamics:
         """
         regression = self._regression(basis, side)
         if regression is None:
-            return {}, [Decision(name, "not tested", TOO_SHORT) for name in NAMES]
+            return {}, [Decision(name, "not tested", SHORT_MOTION) for name in TERMS]
         decisions: list[Decision] = []
-        allowed: tuple[str, ...] = NAMES
-        if (spread := self._spread_of_speeds()) < LEAST_SPREAD:
+        allowed: tuple[str, ...] = TERMS
+        if (spread := self._spread_of_speeds()) < LEAST_SPEED_SPREAD:
             reason = (
                 f"the speed was nearly constant: it varies by {100 * spread:.2g} %, at least "
-                f"{100 * LEAST_SPREAD:.2g} % is needed; record slow and fast strokes"
+                f"{100 * LEAST_SPEED_SPREAD:.2g} % is needed; record slow and fast strokes"
             )
             decisions.append(Decision("damping", "not tested", reason))
             allowed = ("mass",)
@@ -184,15 +183,13 @@ class Dynamics:
             names = tuple(other for other in names if other != name)
             reason = f"{measured}, must fall by more than {100 * error:.2g} %"
             if not found > 0.0:
-                reason = (
-                    f"its value is {amount(found, self._unit_of(name))}, a passive object needs more than 0"
-                )
+                reason = f"its value is {found:.4g} {self._unit_of(name)}, a passive object needs more than 0"
             decisions.append(decided(name, False, f"{reason}; {change}"))
         return regression.solved(use, names), decisions
 
     def _unit_of(self, name: str) -> str:
         """Unit of damping or mass; empty if the units of force and position are not known."""
-        force, position = self._data.force_unit, self._data.position_unit
+        force, position = self._data.force_unit.si, self._data.position_unit.si
         if not (force and position):
             return ""
         return f"{force}*s/{position}" if name == "damping" else f"{force}*s^2/{position}"
@@ -221,7 +218,7 @@ class Dynamics:
     def _at_rows(self, derive: Callable[[Piece], Float1D]) -> tuple[Float1D, NDArray[np.bool_]]:
         return at_rows(self._parts, self._low_pass, derive, len(self._data.force))
 
-    def left_to_velocity(self, residual: Float1D, basis: Basis, *, friction: bool) -> float:
+    def share_of_velocity(self, residual: Float1D, basis: Basis, *, friction: bool) -> float:
         """Share of a residual (n,) that functions of velocity and position explain.
 
         These are v|v|, and v times 1, x and psi_i(x), with the wavelets of the force over position. With
@@ -236,7 +233,7 @@ class Dynamics:
         over_x = np.concatenate([np.ones_like(x), x, wavelet_columns(x, basis.alpha, basis.beta)], 1)
         columns = [v * np.abs(v), v * over_x]
         if friction:
-            slow = SLOW * float(np.sqrt(np.mean(v * v)))
+            slow = SMOOTHING_SPEED_SHARE * float(np.sqrt(np.mean(v * v)))
             columns.append(np.tanh(v / slow) * over_x)
         table = np.concatenate(columns, 1)
         product = table.T @ r
@@ -275,10 +272,10 @@ class Dynamics:
         if not tables:
             return None
         independent = rows * self._step / self._correlation_time()
-        if independent < LEAST_SAMPLES + 2 * len(basis):
+        if independent < LEAST_INDEPENDENT_SAMPLES + 2 * len(basis):
             return None
         forces = np.concatenate([part.force for part in self._parts])
-        least = (RESOLVED * float(np.ptp(forces))) ** 2
+        least = (FORCE_RESOLUTION * float(np.ptp(forces))) ** 2
         return FoldedRegression(
             np.concatenate(tables), np.concatenate(folds), independent, side is not None, least
         )

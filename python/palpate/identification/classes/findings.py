@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...recording import Recording
-from ...recording.comparison import amount
 from ...recording.quality import findings_of
+from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, Verdict, no, usable
 from ..data.rows import period_notes
 from ..decision import latest
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, RowError
-from .climb import Climb
+from .class_selection import ClassSelection
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: a tenth of the force's spread [-]."""
@@ -27,16 +27,17 @@ USABLE_NRMSE = 0.1
 UNFIT_NRMSE = 0.5
 """NRMSE above which a model is unfit: it leaves a quarter of the force's variance unexplained [-]."""
 
-ROWS_A_PARAMETER = 7
+ROWS_PER_PARAMETER = 7
 """Rows for each parameter below which the error between the rows may exceed that of the fit by a fifth."""
 
-ROWS_A_PARAMETER_OF_FEW = 10
-"""The same among fewer than FEW_ROWS rows, which may miss a bend of the force."""
+ROWS_PER_PARAMETER_IF_FEW = 10
+"""The same with fewer than FEW_ROWS rows, which may miss a bend of the force."""
 
 FEW_ROWS = 500
+"""Number of rows below which ROWS_PER_PARAMETER_IF_FEW applies."""
 
-CERTAINLY_ENOUGH = 1000
-"""Rows for each parameter from which repetitions are not counted."""
+AMPLE_ROWS_PER_PARAMETER = 1000
+"""Rows for each parameter from which repeated rows are not counted."""
 
 
 def error_findings(nrmse: float, rows: str) -> list[Finding]:
@@ -59,11 +60,11 @@ def size_findings(network: FittedNetwork, recordings: Sequence[Recording]) -> li
     Rows that repeat another one do not count, and correlated noise makes each row count for less.
     """
     rows = sum(map(len, recordings))
-    if not recordings or rows >= CERTAINLY_ENOUGH * network.n_parameters:
+    if not recordings or rows >= AMPLE_ROWS_PER_PARAMETER * network.n_parameters:
         return []
     pairs = np.concatenate([part.position + 1j * part.force for part in recordings])
     distinct = len(np.unique(pairs))
-    each = ROWS_A_PARAMETER_OF_FEW if distinct < FEW_ROWS else ROWS_A_PARAMETER
+    each = ROWS_PER_PARAMETER_IF_FEW if distinct < FEW_ROWS else ROWS_PER_PARAMETER
     needed = each * network.n_parameters
     if min(distinct, network.independent_rows) >= needed:
         return []
@@ -90,23 +91,23 @@ def verdict_of(
     return Verdict(tuple(dict.fromkeys(findings)))
 
 
-MOST_OF_THE_ERROR = 0.5
-"""Part of a model's mean square error that position cannot explain, from which wavelets stay wide [-]"""
+LARGE_UNEXPLAINED_SHARE = 0.5
+"""Share of the mean square error that position cannot explain, from which wavelets stay wide [-]."""
 
-REPORTED_SHARE = 0.25
-"""The same part, from which a finding says so [-]"""
+REPORTED_UNEXPLAINED_SHARE = 0.25
+"""The same share from which a finding reports it [-]."""
 
-CAUSE = 0.4
-"""Part of the residual's variance that a cause must explain to be named [-]"""
+LEAST_CAUSE_SHARE = 0.4
+"""Least share of the variance of the residual that a named cause explains [-]."""
 
-BLOCKS = 40
-"""Stretches of the recording whose mean residuals show a dependence on time."""
+TIME_BLOCKS = 40
+"""Number of stretches of the recording whose mean residuals show a dependence on time."""
 
-PARTS = 8
-"""Parts of the travel, in each of which the residual may depend differently on the direction of motion."""
+TRAVEL_PARTS = 8
+"""Number of parts of the travel, in each of which the residual may depend differently on the direction."""
 
 MOST_ROWS = 50_000
-"""Rows, evenly spread, that are enough to estimate a share."""
+"""Largest number of rows, evenly spread, for the estimate of a share."""
 
 
 def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None = None) -> float:
@@ -142,9 +143,9 @@ def unexplained_share(position: Float1D, force: Float1D, side: Float1D | None) -
     return unexplained_variance(position[rows], force[rows], side) / spread if spread > 0.0 else 0.0
 
 
-def most_of_error(nrmse: float) -> float:
+def large_unexplained_share(nrmse: float) -> float:
     """Share that cannot be explained from which it is most of a model's error."""
-    return MOST_OF_THE_ERROR * nrmse**2
+    return LARGE_UNEXPLAINED_SHARE * nrmse**2
 
 
 def _thinned(values: Float1D) -> slice:
@@ -154,11 +155,11 @@ def _thinned(values: Float1D) -> slice:
 
 def likely_cause(position: Float1D, residual: Float1D) -> tuple[str, str]:
     """Likely cause of a residual (n,) at positions (n,) in recorded order, and the cure."""
-    part = np.argsort(np.argsort(position, kind="stable"), kind="stable") * PARTS // len(position)
+    part = np.argsort(np.argsort(position, kind="stable"), kind="stable") * TRAVEL_PARTS // len(position)
     ahead = np.sign(np.gradient(position))
     by_direction = _explained(residual, 3 * part + ahead.astype(np.intp) + 1) - _explained(residual, part)
-    in_time = _explained(residual, np.arange(len(residual)) * BLOCKS // len(residual))
-    if max(by_direction, in_time) < CAUSE:
+    in_time = _explained(residual, np.arange(len(residual)) * TIME_BLOCKS // len(residual))
+    if max(by_direction, in_time) < LEAST_CAUSE_SHARE:
         return (
             "another input (a second position, the place on the object, velocity), or noise of the force",
             "record the other inputs as columns and name them with --inputs, or identify each place "
@@ -192,7 +193,7 @@ def explained_findings(
     residual: Float1D,
     side: Float1D | None,
     nrmse: float,
-    force_unit: str = "",
+    force_unit: Unit = UNSTATED_UNIT,
 ) -> list[Finding]:
     """A finding if most of a model's error is force that position cannot explain.
 
@@ -204,7 +205,7 @@ def explained_findings(
         Direction, where the model has hysteresis.
     nrmse : float
         Of the model.
-    force_unit : str
+    force_unit : Unit
         For the message.
     """
     rows = _thinned(force)
@@ -212,7 +213,7 @@ def explained_findings(
     if nrmse <= USABLE_NRMSE or spread == 0.0:
         return []
     least = unexplained_share(position, force, side)
-    if least < REPORTED_SHARE * nrmse**2:
+    if least < REPORTED_UNEXPLAINED_SHARE * nrmse**2:
         return []
     judge = no if nrmse > UNFIT_NRMSE else usable
     share = max(0.0, 1.0 - least)
@@ -222,42 +223,42 @@ def explained_findings(
     return [
         judge(
             f"{inputs} at most {share:.0%} of the variance of the force: rows at neighbouring positions "
-            f"differ by {amount(apart, force_unit)} RMS. No model of these inputs has an NRMSE below "
+            f"differ by {force_unit.text(apart)} RMS. No model of these inputs has an NRMSE below "
             f"{np.sqrt(least):.2g}. Likely cause: {cause}. Cure: {cure}"
         )
     ]
 
 
-DISAGREEMENT = 1.5
-"""Ratio of the error on rows to the error on cells above which the cells were too wide [-]"""
+CELL_ERROR_RATIO = 1.5
+"""Ratio of the error on rows to the error on cells above which the cells were too wide [-]."""
 
 REPORTED_NRMSE = 0.02
-"""NRMSE on rows below which that ratio is not reported [-]"""
+"""NRMSE on rows below which that ratio is not reported [-]."""
 
-SAMPLED = 10_000
-"""Rows, evenly spread, that show the spread of the force."""
+MOST_SAMPLED_ROWS = 10_000
+"""Largest number of rows, evenly spread, for the spread of the force."""
 
 EXTREME_SHARE = 0.01
-"""Share of the rows, those with the most extreme forces, that must not decide the NRMSE alone [-]"""
+"""Share of the rows, those with the most extreme forces, that must not decide the NRMSE alone [-]."""
 
 LEAST_ROWS = 100
-"""Rows below which one percent of them is less than one row."""
+"""Least number of rows of which one percent is a row."""
 
-HIDDEN = 1.2
-"""Ratio of the NRMSE without these rows to the reported NRMSE above which a finding says so [-]"""
+HIDDEN_ERROR_RATIO = 1.2
+"""Ratio of the NRMSE without these rows to the reported NRMSE above which a finding reports it [-]."""
 
-BETWEEN_ROWS = 4001
-"""Positions over the domain, with the extrema of each wavelet, where the force between rows is computed."""
+POSITIONS_BETWEEN_ROWS = 4001
+"""Number of positions over the domain, besides the extrema of each wavelet, where the force is computed."""
 
-USABLE_BEYOND = 0.25
+USABLE_EXCESS = 0.25
 """Share of the range of the recorded forces by which the model may exceed them without a finding [-].
 Models of measured switches, domes and springs exceed it by less than 0.1."""
 
-UNFIT_BEYOND = 1.0
+UNFIT_EXCESS = 1.0
 """The same, from which the model is unfit [-]."""
 
 
-def extreme_forces(error: RowError, force_unit: str = "") -> list[Finding]:
+def extreme_force_findings(error: RowError, force_unit: Unit = UNSTATED_UNIT) -> list[Finding]:
     """A finding if few rows of extreme force hide a large error of all others."""
     rows = np.flatnonzero(error.weight > 0.0)
     if len(rows) < LEAST_ROWS or error.spread == 0.0 or _plainly_small(error, rows):
@@ -266,15 +267,15 @@ def extreme_forces(error: RowError, force_unit: str = "") -> list[Finding]:
     count = len(rows) - int(EXTREME_SHARE * len(rows))
     kept = rows[np.sort(np.argpartition(far, count - 1)[:count])]
     inner = RowError(error.residual[kept], error.force[kept], error.weight[kept])
-    if inner.nrmse <= max(USABLE_NRMSE, HIDDEN * error.nrmse):
+    if inner.nrmse <= max(USABLE_NRMSE, HIDDEN_ERROR_RATIO * error.nrmse):
         return []
     judge = no if inner.nrmse > UNFIT_NRMSE else usable
     return [
         judge(
             f"the NRMSE is {error.nrmse:.3g} over all rows, but {inner.nrmse:.3g} without the "
             f"{EXTREME_SHARE:.0%} with the most extreme forces. These reach "
-            f"{amount(float(np.abs(error.force).max()), force_unit)}, the others have a range of "
-            f"{amount(float(np.ptp(error.force[kept])), force_unit)}, so that few rows hide the error of the "
+            f"{force_unit.text(float(np.abs(error.force).max()))}, the others have a range of "
+            f"{force_unit.text(float(np.ptp(error.force[kept])))}, so that few rows hide the error of the "
             "others. If they are wrong readings, remove these rows or give --loss huber"
         )
     ]
@@ -282,14 +283,19 @@ def extreme_forces(error: RowError, force_unit: str = "") -> list[Finding]:
 
 def _plainly_small(error: RowError, rows: NDArray[np.intp]) -> bool:
     """True if the error is small for the spread of all but the most extreme forces, of some rows (k,)."""
-    some = error.force[rows[:: max(1, len(rows) // SAMPLED)]]
+    some = error.force[rows[:: max(1, len(rows) // MOST_SAMPLED_ROWS)]]
     low, high = np.quantile(some, (EXTREME_SHARE, 1.0 - EXTREME_SHARE))
     inner = some[(some >= low) & (some <= high)]
     return bool(error.rmse < 0.5 * USABLE_NRMSE * float(np.std(inner)))
 
 
-def beyond_rows(
-    network: FittedNetwork, force: Float1D, *, repeats: bool, position_unit: str = "", force_unit: str = ""
+def excess_findings(
+    network: FittedNetwork,
+    force: Float1D,
+    *,
+    repeats: bool,
+    position_unit: Unit = UNSTATED_UNIT,
+    force_unit: Unit = UNSTATED_UNIT,
 ) -> list[Finding]:
     """A finding if a model of one input leaves the range of the recorded forces between the rows.
 
@@ -301,7 +307,7 @@ def beyond_rows(
     lower, upper = float(network.lower[0]), float(network.upper[0])
     sides = np.array([0.0, -1.0, 1.0, -np.sqrt(3.0), np.sqrt(3.0)])
     extrema = (network.beta[:, :1] + sides / network.alpha[:, :1]).ravel()
-    at = np.concatenate([np.linspace(lower, upper, BETWEEN_ROWS), np.clip(extrema, lower, upper)])
+    at = np.concatenate([np.linspace(lower, upper, POSITIONS_BETWEEN_ROWS), np.clip(extrema, lower, upper)])
     directions = ("", "") if network.weight_hysteresis is None else (" while pressing", " while releasing")
     found = []
     play = 0.0 if repeats else min(2.0 * (network.play_radius or 0.0), upper - lower)
@@ -314,36 +320,36 @@ def beyond_rows(
         worst = int(np.argmax(excess))
         found.append((float(excess[worst]), float(x[worst]), float(values[worst]), stroke))
     share, place, value, stroke = max(found)
-    if share <= USABLE_BEYOND:
+    if share <= USABLE_EXCESS:
         return []
-    judge = no if share > UNFIT_BEYOND else usable
+    judge = no if share > UNFIT_EXCESS else usable
     return [
         judge(
-            f"between the rows the force of the model is {amount(value, force_unit)} at position "
-            f"{amount(place, position_unit)}{stroke}, but the recorded forces lie between {force.min():.4g} "
-            f"and {amount(float(force.max()), force_unit)}. Likely cause: few rows of that stroke near this "
-            "position. Cure: record more strokes there, or give a smaller --max-wavelets"
+            f"between the rows the force of the model is {force_unit.text(value)} at position "
+            f"{position_unit.text(place)}{stroke}, but the recorded forces are "
+            f"{force_unit.interval(force.min(), force.max())}. Likely cause: few rows of that stroke near "
+            "this position. Cure: record more strokes there, or give a smaller --max-wavelets"
         )
     ]
 
 
-def disagreement(
+def cell_findings(
     on_rows: RowError,
     on_cells: float,
     travel: float,
     cells: int,
     *,
-    position_unit: str = "",
-    force_unit: str = "",
+    position_unit: Unit = UNSTATED_UNIT,
+    force_unit: Unit = UNSTATED_UNIT,
 ) -> list[Finding]:
     """A finding if the error on rows is far above the error on the cells that were fitted."""
-    if on_rows.nrmse <= REPORTED_NRMSE or on_rows.rmse <= DISAGREEMENT * on_cells:
+    if on_rows.nrmse <= REPORTED_NRMSE or on_rows.rmse <= CELL_ERROR_RATIO * on_cells:
         return []
     return [
         no(
-            f"the RMS error is {amount(on_rows.rmse, force_unit)} on the rows, but "
-            f"{amount(on_cells, force_unit)} on the fitted cells. The cells are too wide for this force: "
-            f"1/{cells} of the travel of {amount(travel, position_unit)}. Remove rows with wrong positions, "
+            f"the RMS error is {force_unit.text(on_rows.rmse)} on the rows, but "
+            f"{force_unit.text(on_cells)} on the fitted cells. The cells are too wide for this force: "
+            f"1/{cells} of the travel of {position_unit.text(travel)}. Remove rows with wrong positions, "
             "or increase max_positions"
         )
     ]
@@ -364,25 +370,25 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     ]
 
 
-def identified(climb: Climb) -> FittedNetwork:
+def identified(selection: ClassSelection) -> FittedNetwork:
     """The accepted model in the units of the data, with its error on the rows, all notes and all findings."""
-    best, report, options = climb.best, climb.report, climb.options
+    best, report, options = selection.best, selection.report, selection.options
     data, error, network = best.data, best.error, best.network
     single, counted = len(data.names) == 1, error.weight
     notes, findings = list(data.notes), list(data.findings)
     decisions, replaced = latest([*report.decisions, *data.decisions])
     if data.period is not None:
         positions = data.lower[0] + data.reach[0] * data.path[:, 0]
-        note, of_period = period_notes(positions, data.period, data.position_unit)
+        note, of_period = period_notes(positions, data.period, data.position_unit.si)
         notes, findings = [*notes, note], findings + of_period
     findings += report.findings + limit_findings(best, options)
     if data.robust is not None:
         findings += data.robust.findings(best.residual, data.force_unit)
     units = {"position_unit": data.position_unit, "force_unit": data.force_unit}
-    findings += extreme_forces(error, data.force_unit)
+    findings += extreme_force_findings(error, data.force_unit)
     on_rows, travel = best.error_on(data.weight), float(data.reach[0])
-    findings += disagreement(on_rows, best.rmse, travel, best.rows.cells, **units)
-    findings += beyond_rows(network, data.force[counted > 0.0], repeats=data.period is not None, **units)
+    findings += cell_findings(on_rows, best.rmse, travel, best.rows.cells, **units)
+    findings += excess_findings(network, data.force[counted > 0.0], repeats=data.period is not None, **units)
     if data.counted is None and single:
         rows = np.flatnonzero(counted)
         side, position = None if best.side is None else best.side[rows], data.domain[rows, 0]

@@ -20,29 +20,29 @@ from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, Samples
-from .climb import Climb, ModelClass, straight_line
+from .class_selection import ClassSelection, ModelClass, straight_line
 from .findings import USABLE_NRMSE
 
-GAINS_ENERGY = 2.0
-"""Ratio of the RMS errors with and without h >= 0 above which a cure is named."""
+REPORTED_ERROR_RATIO = 2.0
+"""Ratio of the RMS errors with and without h >= 0 above which a cure is reported [-]."""
 
-FIRST_SIZE = 4
-"""Wavelets with hysteresis until the play radius is sought again."""
+FIRST_MAX_WAVELETS = 4
+"""Largest number of wavelets with hysteresis until the next search of the play radius."""
 
-RADIUS_ROUNDS = 6
-"""Times that it is sought at most."""
+MOST_RADIUS_SEARCHES = 6
+"""Largest number of searches of the play radius."""
 
-LEAST_KNOWN = 0.5
-"""Share of the rows whose hysteresis input must be known, for a play radius to be considered."""
+LEAST_KNOWN_SHARE = 0.5
+"""Least share of the rows with a known hysteresis input for a play radius [-]."""
 
-NEAR = 1e-3
-"""Share of itself to which a play radius is found."""
+RADIUS_TOLERANCE = 1e-3
+"""Relative tolerance of the play radius [-]."""
 
-WITHIN = 2.0
-"""Ratio to the radius that helped most so far within which a better one is sought."""
+RADIUS_SEARCH_RATIO = 2.0
+"""Largest ratio of a searched play radius to the best one so far, or its inverse [-]."""
 
 MOST_ROWS = 100_000
-"""Rows that are enough to distinguish two radii; more are thinned out evenly."""
+"""Largest number of rows for the comparison of two radii. More are thinned evenly."""
 
 
 class Hysteresis(ModelClass):
@@ -50,16 +50,16 @@ class Hysteresis(ModelClass):
 
     name = "hysteresis"
 
-    def __init__(self, climb: Climb) -> None:
-        super().__init__(climb)
-        data, options = climb.data, climb.options
+    def __init__(self, selection: ClassSelection) -> None:
+        super().__init__(selection)
+        data, options = selection.data, selection.options
         self._named = options.inputs != "auto"
         self._play: PlaySearch | None = None
         if data.side is None and data.starts is not None and len(data.names) == 1:
-            self._play = PlaySearch(climb.samples, options)
+            self._play = PlaySearch(selection.samples, options)
 
     @classmethod
-    def possible(cls, climb: Climb) -> bool:
+    def possible(cls, selection: ClassSelection) -> bool:
         """True if the options allow hysteresis and the rows show directions.
 
         Raises
@@ -67,26 +67,26 @@ class Hysteresis(ModelClass):
         InputError
             The inputs name hysteresis, and the rows show no directions.
         """
-        inputs, data = climb.options.inputs, climb.data
-        told = data.side is not None or (data.starts is not None and len(data.names) == 1)
-        if not told and "hysteresis" in inputs:
+        inputs, data = selection.options.inputs, selection.data
+        has_direction = data.side is not None or (data.starts is not None and len(data.names) == 1)
+        if not has_direction and "hysteresis" in inputs:
             raise InputError(
                 "inputs names hysteresis: the recording needs time, or both directions in a direction "
                 "column; name that column, or remove hysteresis from inputs"
             )
-        return told and (inputs == "auto" or "hysteresis" in inputs)
+        return has_direction and (inputs == "auto" or "hysteresis" in inputs)
 
     def better(self, below: Candidate) -> Candidate:
         if self._play is None:
-            assert self._climb.data.side is not None
-            return self._of(below, HysteresisInput.of_strokes(self._climb.data.side))
-        strokes = self._play.best_tried(below.solution.basis)
+            assert self._selection.data.side is not None
+            return self._of(below, HysteresisInput.of_strokes(self._selection.data.side))
+        strokes = self._play.best_of_options(below.solution.basis)
         if strokes is not None:
             return self._play.with_first_states(self._of(below, strokes))
         untested = "the motions between gaps of time are too short, or never turn back"
         if self._named:
             raise InputError(f"inputs names hysteresis: {untested}")
-        self._climb.report.decisions.append(Decision("hysteresis", "not tested", untested))
+        self._selection.report.decisions.append(Decision("hysteresis", "not tested", untested))
         return below
 
     def _of(self, below: Candidate, strokes: HysteresisInput) -> Candidate:
@@ -95,23 +95,28 @@ class Hysteresis(ModelClass):
         h >= 0 has a mean, which the wavelets of g, the slope and the bias show at once: if the criterion does
         not fall at all with these, growing a network would be in vain.
         """
-        climb, judge, named, samples = self._climb, self._climb.judge, self._named, self._climb.samples
+        selection, judge, named, samples = (
+            self._selection,
+            self._selection.judge,
+            self._named,
+            self._selection.samples,
+        )
         rows = samples.rows(strokes)
         problem = samples.problem(rows, strokes)
         first = problem.solve(below.solution.basis)
-        free = climb.candidate(self.name, problem, first, judge.criterion, rows=rows, strokes=strokes)
+        free = selection.candidate(self.name, problem, first, judge.criterion, rows=rows, strokes=strokes)
         if named or judge.fall(below, free) > 0.0:
             free = self._grown(below, free)
-        if not named and not judge.earned(below, free):
+        if not named and not judge.accepts(below, free):
             return judge.better(below, free)
-        kept = self._climb.constrained(free)
+        kept = self._selection.constrained(free)
         if named:
             self._report_sign(kept, kept, free)
             return kept
         single = self._single_valued(kept) if kept is not free and below.n_wavelets else below
         best = judge.better(single, kept)
         if best is single and best.n_wavelets < below.n_wavelets:
-            self._climb.report.notes.append(
+            self._selection.report.notes.append(
                 f"{best.n_wavelets} of {below.n_wavelets} wavelets over position are kept. The removed ones "
                 "modelled the difference between press and release."
             )
@@ -126,23 +131,23 @@ class Hysteresis(ModelClass):
         radius is sought again whenever the network may be twice as large.
         """
         assert found.strokes is not None
-        climb, play, most = self._climb, self._play, self._climb.options.max_wavelets
+        selection, play, most = self._selection, self._play, self._selection.options.max_wavelets
         strokes = found.strokes
-        basis = climb.begun.get(self.name, found.solution.basis)
-        begun, complete = self.name in climb.begun, False
-        for _ in range(RADIUS_ROUNDS):
+        basis = selection.start_basis.get(self.name, found.solution.basis)
+        has_start, complete = self.name in selection.start_basis, False
+        for _ in range(MOST_RADIUS_SEARCHES):
             before = strokes
-            if play and (self._named or climb.judge.earned(below, found)):
-                strokes = play.nearer(strokes, basis)
-                basis, begun = (basis if begun else Basis.empty(1)), True
+            if play and (self._named or selection.judge.accepts(below, found)):
+                strokes = play.with_best_radius(strokes, basis)
+                basis, has_start = (basis if has_start else Basis.empty(1)), True
             if complete and strokes is before:
                 break
-            rows = climb.samples.rows(strokes)
-            limit = min(most, max(FIRST_SIZE, 2 * len(basis))) if play else most
-            grown = climb.grown(climb.samples.problem(rows, strokes), basis, self.name, limit)
-            basis = climb.begun[self.name] = grown.solution.basis
+            rows = selection.samples.rows(strokes)
+            limit = min(most, max(FIRST_MAX_WAVELETS, 2 * len(basis))) if play else most
+            grown = selection.grown(selection.samples.problem(rows, strokes), basis, self.name, limit)
+            basis = selection.start_basis[self.name] = grown.solution.basis
             reason = grown.stop_reason
-            found = climb.candidate(
+            found = selection.candidate(
                 self.name, grown.problem, grown.solution, reason, rows=rows, strokes=strokes
             )
             complete = limit == most or max(point.n_wavelets for point in grown.path) < limit
@@ -155,23 +160,23 @@ class Hysteresis(ModelClass):
         alone will not do: strokes that a periodic motion samples at different places look like one rapidly
         changing force.
         """
-        climb = self._climb
-        problem = climb.samples.problem(climb.rows)
+        selection = self._selection
+        problem = selection.samples.problem(selection.rows)
         start = problem.solve(hysteresis.solution.basis)
         problem = problem.with_prior(start.rss)
-        problem, solution = climb.growth.prune(problem, problem.solve(start.basis))
-        line = climb.recorded(climb.constrained(straight_line(climb)))
+        problem, solution = selection.growth.prune(problem, problem.solve(start.basis))
+        line = selection.recorded(selection.constrained(straight_line(selection)))
         if len(solution.basis) == 0:
             return line
-        found = climb.candidate("position", problem, solution, hysteresis.stop_reason)
-        found = climb.recorded(climb.constrained(found))
-        return found if climb.judge.earned(line, found) else line
+        found = selection.candidate("position", problem, solution, hysteresis.stop_reason)
+        found = selection.recorded(selection.constrained(found))
+        return found if selection.judge.accepts(line, found) else line
 
     def _report_sign(self, best: Candidate, kept: Candidate, free: Candidate) -> None:
         """Names the cure if h >= 0 costs much: the other sign, or h of either sign."""
-        if kept.rmse <= GAINS_ENERGY * free.rmse:
+        if kept.rmse <= REPORTED_ERROR_RATIO * free.rmse:
             return
-        spread, report = self._climb.spread, self._climb.report
+        spread, report = self._selection.spread, self._selection.report
         cost = f"NRMSE {kept.rmse / spread:.3g} with press >= release, {free.rmse / spread:.3g} without"
         turned = self._turned_rmse(free)
         if turned < math.sqrt(kept.rmse * free.rmse):
@@ -201,7 +206,7 @@ class Hysteresis(ModelClass):
         if free.problem.dimension > 1:
             return math.inf
         turned = replace(free.problem, readout=free.problem.readout * np.array([[1.0], [-1.0]]))
-        return turned.rmse(impose(turned, free.solution, self._climb.bounds(turned)))
+        return turned.rmse(impose(turned, free.solution, self._selection.bounds(turned)))
 
 
 class PlaySearch:
@@ -219,40 +224,40 @@ class PlaySearch:
         self._samples, self._path, self._starts = samples, data.path[:, 0], list(data.starts or ())
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
-    def best_tried(self, basis: Basis) -> HysteresisInput | None:
+    def best_of_options(self, basis: Basis) -> HysteresisInput | None:
         """The hysteresis input of that radius of the options which helps most on given wavelets.
 
         None where the motions between gaps of time are too short for any of them, or never turn back: g + h
         alone is one force of position, and h could be anything.
         """
-        if not self._judged:
+        if not self._usable:
             return None
-        known = _thinned(self._judged[-1].known)
-        return min(self._judged, key=lambda strokes: self._left_by(strokes, basis, known))
+        known = _thinned(self._usable[-1].known)
+        return min(self._usable, key=lambda strokes: self._residual_squares(strokes, basis, known))
 
-    def nearer(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
+    def with_best_radius(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
         """The hysteresis input of the radius around the one tried that helps most on given wavelets.
 
         The same one, if no other is better by as much as a model class has to be. Hysteresis must be certain:
         a radius that may be anything also fits other differences between press and release, such as damping.
         """
         radius = strokes.play_radius or 0.0
-        least, most = (each.play_radius or 0.0 for each in (self._judged[0], self._judged[-1]))
-        lower, upper = max(radius / WITHIN, least), min(radius * WITHIN, most)
+        least, most = (each.play_radius or 0.0 for each in (self._usable[0], self._usable[-1]))
+        lower, upper = max(radius / RADIUS_SEARCH_RATIO, least), min(radius * RADIUS_SEARCH_RATIO, most)
         if lower >= upper:
             return strokes
         known = _thinned(self._of(upper).known)
         found = minimize_scalar(
-            lambda log_radius: self._left_by(self._of(math.exp(log_radius)), basis, known),
+            lambda log_radius: self._residual_squares(self._of(math.exp(log_radius)), basis, known),
             bounds=(math.log(lower), math.log(upper)),
             method="bounded",
-            options={"xatol": NEAR},
+            options={"xatol": RADIUS_TOLERANCE},
         )
-        falls = math.log(self._left_by(strokes, basis, known) / found.fun) * np.count_nonzero(known)
+        falls = math.log(self._residual_squares(strokes, basis, known) / found.fun) * np.count_nonzero(known)
         return self._of(math.exp(found.x)) if falls > self._evidence else strokes
 
     def with_first_states(self, found: Candidate) -> Candidate:
-        """The candidate with each motion's play begun where its first force says."""
+        """The candidate with each motion's play has_start where its first force says."""
         if found.play_radius is None:
             return found
         g, h = found.parts_at(self._samples.data.box[self._starts])
@@ -265,12 +270,12 @@ class PlaySearch:
         return HysteresisInput.of_play(motions, radius, first)
 
     @cached_property
-    def _judged(self) -> list[HysteresisInput]:
+    def _usable(self) -> list[HysteresisInput]:
         """The plays of the radii tried for which enough rows are known, both ways, the smallest first."""
         tried = [self._of(radius) for radius in self._radii]
-        return [one for one in tried if one.known.mean() >= LEAST_KNOWN and one.both_ways]
+        return [one for one in tried if one.known.mean() >= LEAST_KNOWN_SHARE and one.both_ways]
 
-    def _left_by(self, strokes: HysteresisInput, basis: Basis, known: NDArray[np.bool_]) -> float:
+    def _residual_squares(self, strokes: HysteresisInput, basis: Basis, known: NDArray[np.bool_]) -> float:
         """Sum of squares that the best weights on given wavelets leave in these rows, for all radii the same.
 
         The random error of rows that only one radius knows must not decide between radii.

@@ -8,51 +8,58 @@ from dataclasses import replace
 import numpy as np
 
 from ..._typing import Float1D
-from ..data.limits import MOST_ORDERED, RESOLVED, correlation, independent_share, innovation_deviance
+from ..data.limits import (
+    FORCE_RESOLUTION,
+    MOST_ORDERED_ROWS,
+    correlation,
+    independent_share,
+    innovation_deviance,
+)
 from ..data.outliers import robust_weights, suspects
 from ..data.rows import Rows
 from ..decision import decided, in_words, signed
-from ..network.separable import NOISE_WIDTHS
+from ..network.separable import HALF_CORE_NOISE_RATIO
 from ..options import IdentifyOptions
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
-from .climb import VELOCITY_INPUTS, Climb, Linear, ModelClass, Network
-from .findings import USABLE_NRMSE, most_of_error, unexplained_share
+from .class_selection import VELOCITY_INPUTS, ClassSelection, Linear, ModelClass, Network
+from .findings import USABLE_NRMSE, large_unexplained_share, unexplained_share
 from .hysteresis import Hysteresis
 
 MOST_HALVINGS = 3
-"""Times that cells are halved at most."""
+"""Largest number of times that the cells are halved."""
 
-DYNAMIC_ROUNDS = 2
-"""Times that the model is selected again, with better values of damping and mass each time."""
+MOST_DYNAMIC_SELECTIONS = 2
+"""Times that the model is selected again, each time with better values of damping and mass."""
 
-WORTH_A_VELOCITY = 0.05
-"""Share of the squared error that velocity as an input must remove in addition to a constant damping: a force
-of two inputs is harder to render."""
+LEAST_GAIN_OVER_DAMPING = 0.05
+"""Least fall of the squared error, as a share, for velocity as an input in addition to constant damping [-].
+A force of two inputs is harder to render."""
 
-WORTH_FRICTION = 0.25
-"""The same where no constant damping was found, such as for Coulomb friction: its sign changes with that of
-the velocity."""
+LEAST_GAIN_WITHOUT_DAMPING = 0.25
+"""The same without constant damping, such as for Coulomb friction [-]: its sign changes with that of the
+velocity."""
 
-WORTH_MORE_THAN_HYSTERESIS = 0.75
-"""The same where hysteresis was accepted, which is easier to render and certify."""
+LEAST_GAIN_OVER_HYSTERESIS = 0.75
+"""The same if hysteresis was accepted [-]: it is easier to render and certify."""
 
-CORRELATION_ROUNDS = 5
-"""Times that the correlation of noise is estimated at most."""
+MOST_CORRELATION_ESTIMATES = 5
+"""Largest number of estimates of the correlation of noise."""
 
-LEAST_INDEPENDENT = 0.02
-"""Independent samples per sample below which a residual is memory or drift rather than noise [-]"""
+LEAST_INDEPENDENT_SHARE = 0.02
+"""Least share of independent samples of noise [-]. Below it a residual is memory or drift."""
 
-WORTH_CLIMBING = 0.8
-"""Ratio of the independent samples to those before from which the model is not selected again [-]"""
+SETTLED_INDEPENDENT_RATIO = 0.8
+"""Ratio of the new to the previous share of independent samples above which the selection is not repeated
+[-]."""
 
-LARGE_ERROR = 0.2
-"""NRMSE above which wavelets stay wide if position cannot explain most of it [-]"""
+LARGE_NRMSE = 0.2
+"""NRMSE above which wavelets stay wide if position cannot explain most of it [-]."""
 
-LEAST_CORE = 1.0 / 64.0
-"""Half of the core of these wavelets, as a share of the travel [-]"""
+LEAST_HALF_CORE = 1.0 / 64.0
+"""Half of the core of these wavelets [share of the travel]."""
 
 
-def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) -> Climb:
+def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) -> ClassSelection:
     """Selects a model: the classes at rest, revised where the rows require it, then those in motion.
 
     Cells are halved until they are fine enough. Outliers are weighed down if the loss is Huber's.
@@ -63,27 +70,27 @@ def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) ->
         suspect = suspects(rows.box, rows.force, rows.side, given)
         rows = replace(rows, weight=np.where(suspect, 0.0, 1.0 if given is None else given))
     cells = options.search.max_positions * 2 ** (rows.box.shape[1] - 1)
-    found = Climb(rows, options, AT_REST, cells, on_held_out=on_held_out)
+    found = ClassSelection(rows, options, STATIC_CLASSES, cells, on_held_out=on_held_out)
     for _ in range(MOST_HALVINGS):
         if not found.best.cells_too_wide():
             break
-        found = found.again(rows, cells=2 * found.cells, keep=True)
+        found = found.repeated(rows, cells=2 * found.cells, keep=True)
     if robust:
         halved = found
 
         def fit(weight: Float1D) -> Float1D:
-            return halved.again(replace(rows, weight=weight), keep=True).best.force_at()
+            return halved.repeated(replace(rows, weight=weight), keep=True).best.force_at()
 
         weights = robust_weights(fit, found.best.force_at(), rows.force, given, suspect)
-        found = found.again(replace(rows, weight=weights.weight, robust=weights), keep=True)
+        found = found.repeated(replace(rows, weight=weights.weight, robust=weights), keep=True)
         found.report.notes.append(weights.note)
     for revised in REVISIONS:
         found = revised(found)
-    found.take(IN_MOTION)
+    found.try_classes(DYNAMIC_CLASSES)
     return found
 
 
-def correlated_noise(first: Climb) -> Climb:
+def correlated_noise(first: ClassSelection) -> ClassSelection:
     """The model selected again on fewer independent samples, if the noise is correlated in recorded order.
 
     Wavelets that follow the noise hide part of its correlation, so that it is estimated again after each
@@ -95,23 +102,23 @@ def correlated_noise(first: Climb) -> Climb:
     if data.counted is not None or first.options.criterion in ON_HELD_OUT_ROWS:
         return first
     count = len(data.force)
-    first_row = max(0, (count - MOST_ORDERED) // 2)
-    rows = slice(first_row, first_row + MOST_ORDERED)
+    first_row = max(0, (count - MOST_ORDERED_ROWS) // 2)
+    rows = slice(first_row, first_row + MOST_ORDERED_ROWS)
     used = np.ones(count, dtype=bool) if data.weight is None else data.weight > 0.0
-    least = (RESOLVED * float(np.ptp(data.force))) ** 2 + np.finfo(float).tiny
+    least = (FORCE_RESOLUTION * float(np.ptp(data.force))) ** 2 + np.finfo(float).tiny
     found = []
     current = first
-    for _ in range(CORRELATION_ROUNDS):
+    for _ in range(MOST_CORRELATION_ESTIMATES):
         best, limits = current.best, current.data.limits
         residual = (data.force[rows] - best.force_at(rows))[used[rows]]
         found.append((innovation_deviance(residual, best.n_parameters, least), current))
         share = independent_share(correlation(residual))
-        if share > WORTH_CLIMBING * limits.independent or share < LEAST_INDEPENDENT:
+        if share > SETTLED_INDEPENDENT_RATIO * limits.independent or share < LEAST_INDEPENDENT_SHARE:
             break
-        again = current.again(replace(current.data, limits=replace(limits, independent=share)))
+        repeated = current.repeated(replace(current.data, limits=replace(limits, independent=share)))
         note = f"The noise is correlated: {count} rows count as {share * count:.4g} independent rows."
-        again.report.replaces(current.report, note)
-        current = again
+        repeated.report.replaces(current.report, note)
+        current = repeated
     chosen = min(found, key=lambda each: each[0])[1]
     full = first.best.stop_reason == "max_wavelets"
     if full and 2 * chosen.best.n_wavelets > first.best.n_wavelets:
@@ -119,7 +126,7 @@ def correlated_noise(first: Climb) -> Climb:
     return chosen
 
 
-def no_finer_than_explained(first: Climb) -> Climb:
+def no_finer_than_explained(first: ClassSelection) -> ClassSelection:
     """The model selected again with wide wavelets, if position cannot explain most of a large error.
 
     Rows that differ for another reason, such as time during a pause, differ by as much between neighbouring
@@ -131,17 +138,17 @@ def no_finer_than_explained(first: Climb) -> Climb:
     rows = data.reported
     force, side = data.force[rows], None if best.side is None else best.side[rows]
     spread = float(np.std(force))
-    if best.rmse <= LARGE_ERROR * spread or best.n_wavelets == 0:
+    if best.rmse <= LARGE_NRMSE * spread or best.n_wavelets == 0:
         return first
     error = float(np.std(force - best.force_at()[rows])) / spread
-    if unexplained_share(data.box[rows, 0], force, side) < most_of_error(error):
+    if unexplained_share(data.box[rows, 0], force, side) < large_unexplained_share(error):
         return first
-    noise = max(LEAST_CORE / NOISE_WIDTHS, data.limits.position_noise)
-    wide = first.again(replace(data, limits=replace(data.limits, position_noise=noise)))
+    noise = max(LEAST_HALF_CORE / HALF_CORE_NOISE_RATIO, data.limits.position_noise)
+    wide = first.repeated(replace(data, limits=replace(data.limits, position_noise=noise)))
     wide.report.replaces(
         first.report,
-        f"Wavelets narrower than {200 * LEAST_CORE:.3g} % of the travel were not tried: position does not "
-        "explain most of the error.",
+        f"Wavelets narrower than {200 * LEAST_HALF_CORE:.3g} % of the travel were not tried: position does "
+        "not explain most of the error.",
     )
     return wide
 
@@ -150,23 +157,23 @@ class MassAndDamping(ModelClass):
     """Mass and damping, added to a model at rest that is selected again without their force."""
 
     @classmethod
-    def possible(cls, climb: Climb) -> bool:
+    def possible(cls, selection: ClassSelection) -> bool:
         """True if the motion may decide."""
-        return climb.motion is not None
+        return selection.motion is not None
 
     def better(self, below: Candidate) -> Candidate:
-        climb, motion, data = self._climb, self._climb.motion, self._climb.data
+        selection, motion, data = self._selection, self._selection.motion, self._selection.data
         assert motion is not None
         values, decisions = motion.accepted(below.solution.basis, below.side)
-        climb.report.decisions.extend(decisions)
-        best, current, names = below, climb, tuple(values)
-        for _ in range(DYNAMIC_ROUNDS):
+        selection.report.decisions.extend(decisions)
+        best, current, names = below, selection, tuple(values)
+        for _ in range(MOST_DYNAMIC_SELECTIONS):
             if not values or min(values.values()) <= 0.0:
                 break  # a passive object has none below zero: the values of the round before stay
             moving = motion.moving(values)
             weight = moving.known if data.weight is None else moving.known * data.weight
             still = replace(data, force=data.force - moving.force, weight=weight)
-            current = current.again(still, keep=current is not climb)
+            current = current.repeated(still, keep=current is not selection)
             best = replace(
                 current.best,
                 model_class="velocity" if moving.mass is None else "mass and damping",
@@ -178,30 +185,35 @@ class MassAndDamping(ModelClass):
         if best is below:
             return below
         note = f"The model was selected again after the force of {' and '.join(names)} was subtracted."
-        climb.report.add(current.report, note)
-        return climb.recorded(best)
+        selection.report.add(current.report, note)
+        return selection.recorded(best)
 
 
 class Velocity(ModelClass):
     """A network over position and velocity, where damping or friction depends on both."""
 
     @classmethod
-    def possible(cls, climb: Climb) -> bool:
+    def possible(cls, selection: ClassSelection) -> bool:
         """True if the motion may decide; a force that repeats has one input."""
-        return climb.motion is not None and climb.data.period is None
+        return selection.motion is not None and selection.data.period is None
 
     def better(self, below: Candidate) -> Candidate:
-        """The network if it lowers the squared error by the share that it is worth, else the one below."""
-        data, report, motion, moving = self._climb.data, self._climb.report, self._climb.motion, below.moving
+        """The network if it lowers the squared error by the least share or more, else the one below."""
+        data, report, motion, moving = (
+            self._selection.data,
+            self._selection.report,
+            self._selection.motion,
+            below.moving,
+        )
         assert motion is not None
         damped = moving is not None and moving.mass is None
         if not (damped or below.error.nrmse > USABLE_NRMSE):
             return below
         residual = (data.force if moving is None else data.force - moving.force) - below.force_at()
-        worth = WORTH_A_VELOCITY if damped else WORTH_FRICTION
+        least_share = LEAST_GAIN_OVER_DAMPING if damped else LEAST_GAIN_WITHOUT_DAMPING
         if below.strokes is not None and not damped:
-            worth = WORTH_MORE_THAN_HYSTERESIS
-        if motion.left_to_velocity(residual, below.solution.basis, friction=not damped) < worth:
+            least_share = LEAST_GAIN_OVER_HYSTERESIS
+        if motion.share_of_velocity(residual, below.solution.basis, friction=not damped) < least_share:
             return below
         velocity, known = motion.velocity()
         rows = known if data.weight is None else known & (data.weight > 0.0)
@@ -217,16 +229,16 @@ class Velocity(ModelClass):
             position_unit=data.position_unit,
             force_unit=data.force_unit,
         )
-        both = select(over_both, self._climb.options)
+        both = select(over_both, self._selection.options)
         before = float(np.mean(residual[rows] ** 2))
         share = 1.0 - both.best.error.rmse**2 / before if before > 0.0 else 0.0
         constant = moving is not None and moving.damping is not None
         compared = "constant damping" if constant else in_words(below.model_class)
         change = f"squared error {signed(-100 * share)} % compared with {compared}"
-        bound = f"must fall by at least {100 * worth:g} %"
+        bound = f"must fall by at least {100 * least_share:g} %"
         report.path += both.report.path
-        report.decisions.append(decided("velocity", share >= worth, f"{change}, {bound}"))
-        if share < worth:
+        report.decisions.append(decided("velocity", share >= least_share, f"{change}, {bound}"))
+        if share < least_share:
             return below
         over_both_inputs = [f"Over position and velocity: {decision}." for decision in both.report.decisions]
         report.notes += [*over_both_inputs, *both.report.notes]
@@ -235,11 +247,11 @@ class Velocity(ModelClass):
         return both.best
 
 
-AT_REST = (Linear, Network, Hysteresis)
+STATIC_CLASSES = (Linear, Network, Hysteresis)
 """Model classes above the constant force, the simplest first, that do not depend on the motion."""
 
 REVISIONS = (correlated_noise, no_finer_than_explained)
 """Steps that select a model at rest again where its residual requires it."""
 
-IN_MOTION = (MassAndDamping, Velocity)
+DYNAMIC_CLASSES = (MassAndDamping, Velocity)
 """Model classes above them that need the motion."""

@@ -25,16 +25,18 @@ from ...verdict import FORCE_FLOOR, FORCE_JND
 from .limits import NO_LIMITS, RowLimits, distinct_rows
 
 SIDE_LEVELS = 16
-"""Cells of the hysteresis input over [-1, 1]; +-1, where a sliding contact stays, are centres of two."""
+"""Number of cells of the hysteresis input over [-1, 1]. +-1, where a sliding contact stays, are centres of
+two."""
 
 POOLED_CELLS = 4
-"""Neighbouring cells that share one slope (2 per input where there are several)."""
+"""Neighbouring cells with a common slope (2 per input if there are several)."""
 
 SIDE_PARTS = 8
-"""Parts of the travel in each of which the force's slope over the hysteresis input is taken to be one."""
+"""Number of parts of the travel, in each of which the slope of the force over the hysteresis input is
+constant."""
 
-LEAST_PER_AXIS = 8
-"""Cells along each input below which gathering says too little of a force; rows are left out instead."""
+LEAST_CELLS_PER_AXIS = 8
+"""Least number of cells along each input. With fewer, rows are dropped instead of gathered."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class Compressed:
     cells: int = 0
     """Cells that positions are gathered in, where there are more of them"""
 
-    def standing_for(self, samples: float) -> Compressed:
+    def reweighted_to(self, samples: float) -> Compressed:
         """The same rows, representing that many samples."""
         more = samples / self.samples
         return replace(self, weight=more * self.weight, within=more * self.within, samples=samples)
@@ -97,7 +99,7 @@ class Compressor:
         self.kept = np.arange(len(force)) if weight is None else np.flatnonzero(weight > 0.0)
         """The rows that represent all."""
         self._key, self._per_axis = _position_key(positions[self.kept], max_positions)
-        if 0 < self._per_axis < LEAST_PER_AXIS:
+        if 0 < self._per_axis < LEAST_CELLS_PER_AXIS:
             self.kept = self.kept[np.linspace(0, len(self.kept) - 1, max_positions).round().astype(np.int64)]
             self._key, self._per_axis = np.arange(max_positions), 0
         self._positions = positions[self.kept]
@@ -217,7 +219,7 @@ def _mean(group: NDArray[np.int64], count: Float1D, weighted: Float1D) -> Float1
     return np.asarray(np.bincount(group, weighted) / count)
 
 
-SEAM = 0.02
+SEAM_SHARE = 0.02
 """Share of the period at each end whose rows are repeated beyond the other end for the fit [-]."""
 
 
@@ -227,7 +229,7 @@ def around_seam(rows: Compressed) -> Compressed:
     A row and its copy share the weight. Wavelets near one end are then fitted to the rows of both ends.
     """
     x = rows.positions[:, 0]
-    first, last = np.flatnonzero(x < SEAM), np.flatnonzero(x >= 1.0 - SEAM)
+    first, last = np.flatnonzero(x < SEAM_SHARE), np.flatnonzero(x >= 1.0 - SEAM_SHARE)
     index = np.concatenate([last, np.arange(len(x)), first])
     shift = np.repeat([-1.0, 0.0, 1.0], [len(last), len(x), len(first)])
     shared = np.zeros(len(x), dtype=np.bool_)
@@ -242,17 +244,17 @@ def around_seam(rows: Compressed) -> Compressed:
     )
 
 
-EVERY = 5
-"""One row of so many is held out."""
+HELD_OUT_EVERY = 5
+"""One row of this number of rows, or one stretch of stretches, is held out."""
 
-BLOCKS = 50
-"""Stretches of a motion, a part of which is held out: adjacent samples are correlated."""
+HELD_OUT_BLOCKS = 50
+"""Number of stretches of a motion, some of which are held out: adjacent samples are correlated."""
 
-TRIM = 0.1
-"""Share of the groups at each end that a robust gain leaves out."""
+TRIMMED_SHARE = 0.1
+"""Share of the groups at each end that a trimmed gain drops [-]."""
 
-MOST_ROWS = 20_000
-"""Held-out rows at most; more are thinned out evenly."""
+MOST_HELD_OUT_ROWS = 20_000
+"""Largest number of held-out rows; more are thinned evenly."""
 
 
 @dataclass(frozen=True)
@@ -267,7 +269,7 @@ class HeldOutRows:
     @staticmethod
     def of(positions: Float2D, force: Float1D, side: Float1D | None, rows: NDArray[np.bool_]) -> HeldOutRows:
         index = np.flatnonzero(rows)
-        index = index[:: max(1, -(-len(index) // MOST_ROWS))]
+        index = index[:: max(1, -(-len(index) // MOST_HELD_OUT_ROWS))]
         return HeldOutRows(
             np.ascontiguousarray(positions[index]), force[index], None if side is None else side[index]
         )
@@ -286,7 +288,7 @@ class HeldOutRows:
         modelled = channels[:, 0] if self.side is None else channels[:, 0] + self.side * channels[:, -1]
         return np.asarray(self.force - modelled)
 
-    def felt(self, errors: Float1D) -> Float1D:
+    def in_jnd(self, errors: Float1D) -> Float1D:
         """Errors (k,) in just noticeable differences: 7 % of the local force, or the floor."""
         return np.asarray(errors / np.maximum(FORCE_JND * np.abs(self.force), self._floor))
 
@@ -298,9 +300,9 @@ class HeldOutRows:
 def held_out_rows(n: int, starts: Sequence[int] | None) -> NDArray[np.bool_]:
     """Rows (n,) that are held out: stretches of a motion where its starts are given, else single rows."""
     index = np.arange(n)
-    if starts is None or n < EVERY * BLOCKS:
-        return np.asarray(index % EVERY == EVERY // 2)
-    return np.asarray(index * BLOCKS // n % EVERY == EVERY // 2)
+    if starts is None or n < HELD_OUT_EVERY * HELD_OUT_BLOCKS:
+        return np.asarray(index % HELD_OUT_EVERY == HELD_OUT_EVERY // 2)
+    return np.asarray(index * HELD_OUT_BLOCKS // n % HELD_OUT_EVERY == HELD_OUT_EVERY // 2)
 
 
 def inside(rows: Float2D, others: Float2D) -> NDArray[np.bool_]:
@@ -314,11 +316,13 @@ def inside(rows: Float2D, others: Float2D) -> NDArray[np.bool_]:
 def gain(below: Float1D, above: Float1D, *, trim: float = 0.0) -> tuple[float, float]:
     """Fall of the mean squared error from errors below (k,) to above (k,) as a share, and its standard error.
 
-    The rows are taken in BLOCKS groups, so that errors that belong together count once. With trim, this share
-    of the groups is left out at both ends: where the error grows most and where it falls most.
+    The rows are taken in HELD_OUT_BLOCKS groups, so that correlated errors count once. With trim, this share
+    of the groups is dropped at both ends: where the error grows most and where it falls most.
     """
     square = np.array([below * below, above * above])
-    groups = np.array([part.mean(axis=1) for part in np.array_split(square, min(BLOCKS, len(below)), axis=1)])
+    groups = np.array(
+        [part.mean(axis=1) for part in np.array_split(square, min(HELD_OUT_BLOCKS, len(below)), axis=1)]
+    )
     if trim:
         cut = int(np.ceil(trim * len(groups)))
         order = np.argsort(groups[:, 1] - groups[:, 0], kind="stable")

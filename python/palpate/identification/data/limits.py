@@ -16,49 +16,50 @@ from numpy.typing import NDArray
 from ..._typing import Float1D, Float2D
 from ..options import IdentifyOptions
 
-RESOLVED = 2.0**-16
-"""Share of the force's range below which errors do not count: one step of a 16-bit converter. A rendered
-force is recorded without noise, and a criterion would add wavelets down to its last digit."""
+FORCE_RESOLUTION = 2.0**-16
+"""Error below which errors do not count [share of the range of the force]: one step of a 16-bit converter. A
+rendered force is recorded without noise, and a criterion would add wavelets down to its last digit."""
 
-REPEATED = 1.0 / 3.0
-"""Share of rows equal to the row before from which repeats count once [-]"""
+REPEATED_ROWS_SHARE = 1.0 / 3.0
+"""Share of rows equal to the previous row above which repeated rows count once [-]."""
 
-PROBED = 7
-"""Rows whose number of occurrences is counted first, to see if a table may hold all rows several times."""
+PROBED_ROWS = 7
+"""Number of rows whose occurrences are counted first. They show if a table may contain all rows several
+times."""
 
 LEAST_LEVELS = 3
-"""Distinct forces from which a step is sought."""
+"""Least number of distinct forces for a force step."""
 
 ROWS_PER_LEVEL = 2.0
-"""Rows for each distinct force from which equal steps between forces are those of a converter [-]"""
+"""Least number of rows for each distinct force of a converter [-]: equal steps are then no coincidence."""
 
-SAMPLED = 8192
-"""Rows that show if a force takes few distinct values."""
+MOST_SAMPLED_ROWS = 8192
+"""Largest number of rows that show if a force has few distinct values."""
 
-ON_GRID = 0.02
-"""Part of a step by which a multiple of it may be missed [-]"""
+GRID_TOLERANCE = 0.02
+"""Largest deviation from a multiple of the force step [steps]."""
 
 STEP_ERROR = 1.0 / 3.0
 """RMS error, in steps, below which a force in steps resolves nothing: uniform errors have 1/sqrt(12) [-]"""
 
 LEAST_CORRELATION = 0.15
-"""Correlation of neighbouring residuals below which they are taken as independent [-]"""
+"""Correlation of neighbouring residuals below which they count as independent [-]."""
 
-SIGNIFICANT = 5.0
-"""Standard errors by which a correlation must differ from 0."""
+SIGNIFICANT_STANDARD_ERRORS = 5.0
+"""Least correlation that is not chance [standard errors]."""
 
-EVEN_RESIDUAL = 0.8
-"""Evenness of residuals (1 for normal noise) from which a correlation is that of noise: an unfitted structure
-is large in a few places and small in others [-]"""
+LEAST_NOISE_EVENNESS = 0.8
+"""Least evenness of correlated residuals that are noise [-]: 1 for normal noise. An unfitted structure is
+large in a few places and small in others."""
 
-MOST_ORDERED = 50_000
-"""Rows in recorded order that are enough to see noise."""
+MOST_ORDERED_ROWS = 50_000
+"""Largest number of rows in recorded order for the estimate of noise."""
 
 LEAST_REVERSALS = 0.1
-"""Share of the steps of position that reverse the step before, from which they show noise [-]"""
+"""Least share of position steps that reverse the previous one, for position noise [-]."""
 
-ORDERED = 0.02
-"""Reversed steps above this share of the travel belong to a shuffled table, not to noise [-]"""
+LARGEST_NOISE_STEP = 0.02
+"""Largest step of position noise [share of the travel]. Larger reversed steps belong to a shuffled table."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,9 @@ class RowLimits:
 NO_LIMITS = RowLimits()
 """Independent, exact rows."""
 
-ALL_BUT_TURNS = 0.99
-"""Share of the rows of a file joined to itself that occur equally often: a join can change a stroke [-]"""
+LEAST_EQUAL_REPEATS = 0.99
+"""Least share of the rows with the same number of occurrences, in a file that contains itself several times
+[-]. At a joint the stroke of a row can change."""
 
 
 def distinct_rows(table: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
@@ -114,13 +116,13 @@ def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[
     columns = [*positions.T, force] if side is None else [*positions.T, force, side]
     again = np.zeros(len(force), dtype=bool)
     again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
-    if again.mean() > REPEATED:
+    if again.mean() > REPEATED_ROWS_SHARE:
         return again, f"{np.count_nonzero(again)} rows repeat the previous row and are not counted."
-    probes = np.linspace(0, len(force) - 1, PROBED).astype(np.intp)
+    probes = np.linspace(0, len(force) - 1, PROBED_ROWS).astype(np.intp)
     if all(np.count_nonzero(force == force[row]) > 1 for row in probes):
         chosen, _, count = distinct_rows(np.column_stack(columns))
         usual = int(np.median(count))
-        if usual > 1 and np.mean(count == usual) > ALL_BUT_TURNS:
+        if usual > 1 and np.mean(count == usual) > LEAST_EQUAL_REPEATS:
             again[:] = True
             again[chosen] = False
             return again, f"Each row occurs {usual} times in the data and is counted once."
@@ -129,7 +131,7 @@ def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[
 
 def force_step(force: Float1D) -> float:
     """Step of a force that only takes multiples of one; 0 where it does not, or takes a value in few rows."""
-    sample = force[:: max(1, len(force) // SAMPLED)]
+    sample = force[:: max(1, len(force) // MOST_SAMPLED_ROWS)]
     if len(np.unique(sample)) * ROWS_PER_LEVEL > len(sample):
         return 0.0
     levels = np.unique(force)
@@ -141,7 +143,7 @@ def force_step(force: Float1D) -> float:
     least = float(steps.min())
     step = reach / max(round(reach / least), 1)
     away = np.abs(steps / step - np.rint(steps / step))
-    return step if float(away.max()) <= ON_GRID else 0.0
+    return step if float(away.max()) <= GRID_TOLERANCE else 0.0
 
 
 def correlation(residual: Float1D) -> float:
@@ -151,8 +153,8 @@ def correlation(residual: Float1D) -> float:
         return 0.0
     even = 1.4826 * float(np.median(np.abs(residual))) / float(np.sqrt(power / len(residual)))
     found = float(residual[1:] @ residual[:-1]) / power
-    limit = max(LEAST_CORRELATION, SIGNIFICANT / float(np.sqrt(len(residual))))
-    return found if even >= EVEN_RESIDUAL and found > limit else 0.0
+    limit = max(LEAST_CORRELATION, SIGNIFICANT_STANDARD_ERRORS / float(np.sqrt(len(residual))))
+    return found if even >= LEAST_NOISE_EVENNESS and found > limit else 0.0
 
 
 def independent_share(rho: float) -> float:
@@ -174,8 +176,8 @@ def position_noise(position: Float1D) -> float:
     During a pause the position only moves by its noise, and a force that changes meanwhile does not depend on
     it.
     """
-    first = max(0, (len(position) - MOST_ORDERED) // 2)
-    steps = np.diff(position[first : first + MOST_ORDERED])
+    first = max(0, (len(position) - MOST_ORDERED_ROWS) // 2)
+    steps = np.diff(position[first : first + MOST_ORDERED_ROWS])
     steps = steps[steps != 0.0]
     if len(steps) < 2:
         return 0.0
@@ -183,14 +185,14 @@ def position_noise(position: Float1D) -> float:
     if turned.mean() < LEAST_REVERSALS:
         return 0.0
     size = float(np.median(np.minimum(np.abs(steps[1:]), np.abs(steps[:-1]))[turned]))
-    return size if size < ORDERED else 0.0
+    return size if size < LARGEST_NOISE_STEP else 0.0
 
 
-FAR = 1e3
-"""Ratio of the mean force to the force's range above which the mean is subtracted before fitting [-]"""
+LARGE_OFFSET_RATIO = 1e3
+"""Ratio of the mean force to the range of the force above which the mean is subtracted before the fit [-]."""
 
-ORDINARY_EXPONENT = 50
-"""A force range from 2^-50 to 2^50 is not scaled [-]"""
+UNSCALED_EXPONENT = 50
+"""A force range from 2^-50 to 2^50 is not scaled [-]."""
 
 
 @dataclass(frozen=True)
@@ -208,12 +210,12 @@ class ForceScale:
         """
         reach = float(np.ptp(force))
         mean = float(np.mean(force)) if reach > 0.0 and options.criterion != "perceptual" else 0.0
-        offset = mean if abs(mean) > FAR * reach else 0.0
+        offset = mean if abs(mean) > LARGE_OFFSET_RATIO * reach else 0.0
         size = reach if offset else float(np.abs(force).max())
         if size == 0.0:
             return cls()
         exponent = math.frexp(size)[1]
-        return cls(offset, 1.0 if abs(exponent) <= ORDINARY_EXPONENT else 2.0**-exponent)
+        return cls(offset, 1.0 if abs(exponent) <= UNSCALED_EXPONENT else 2.0**-exponent)
 
     def __bool__(self) -> bool:
         return self.offset != 0.0 or self.factor != 1.0

@@ -25,36 +25,37 @@ from scipy.spatial import cKDTree
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...recording import Recording
-from ...recording.comparison import amount
+from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
-from .limits import RESOLVED
+from .limits import FORCE_RESOLUTION
 
-FEW = 0.01
-"""Largest share of the rows that may be isolated [-]"""
+MOST_ISOLATED_SHARE = 0.01
+"""Largest share of the rows that may be isolated [-]."""
 
 LEAST_ROWS = 100
-"""Rows below which only one row may be isolated, by a larger gap: sparse tables may be spaced by factors."""
+"""Number of rows below which only one row may be isolated, by a larger gap: the steps of sparse tables may
+grow by factors."""
 
-GAP = 10.0
-"""Ratio of the gap to the range of the other rows above which rows are dropped [-]"""
+ISOLATED_GAP_RATIO = 10.0
+"""Ratio of the gap to the range of the other rows above which rows are dropped [-]."""
 
-SPARSE_GAP = 1000.0
-"""The same for a recording of few rows [-]"""
+SPARSE_GAP_RATIO = 1000.0
+"""The same for a recording of few rows [-]."""
 
-STRETCHED = 0.2
-"""Ratio of a gap that is reported, to one at which rows are dropped [-]"""
+REPORTED_GAP_SHARE = 0.2
+"""Ratio of a gap that is reported to a gap at which rows are dropped [-]."""
 
 LONGEST_RUN = 3
-"""Rows in succession that a wrong reading may last."""
+"""Largest number of successive rows with a wrong reading."""
 
 LEAST_OTHERS = 3
-"""Distinct values that the other rows must have."""
+"""Least number of distinct values of the other rows."""
 
-SAMPLED = 10_000
-"""Rows, evenly spread, that show the range of most values."""
+MOST_SAMPLED_ROWS = 10_000
+"""Largest number of rows, evenly spread, for the range of most values."""
 
-NAMED = 3
-"""Rows that a finding names."""
+MOST_NAMED_ROWS = 3
+"""Largest number of rows that a finding names."""
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a range may exceed the largest number; it is refused later
@@ -68,10 +69,9 @@ def without_isolated(recordings: Sequence[Recording]) -> tuple[list[Recording], 
         columns.append((name, np.concatenate([recording.inputs[:, index] for recording in recordings])))
     dropped = np.zeros(len(position), dtype=bool)
     findings: list[Finding] = []
-    units = recordings[0].units
     for name, values in columns:
-        dropped |= _judged(name, values, ~dropped, None, findings, units.get(name, ""))
-    dropped |= _judged("force", force, ~dropped, position, findings, units["force"])
+        dropped |= _judged(name, values, ~dropped, None, findings, recordings[0].file_unit(name))
+    dropped |= _judged("force", force, ~dropped, position, findings, recordings[0].file_unit("force"))
     if not dropped.any():
         return list(recordings), findings
     apart = np.split(dropped, np.cumsum(counts)[:-1])
@@ -112,11 +112,11 @@ def refuse_isolated(position: Float1D, count: Float1D, width: float) -> None:
         Names the positions of these rows.
     """
     total = float(count.sum())
-    apart = isolated(position, GAP, FEW * total, count, width)
+    apart = isolated(position, ISOLATED_GAP_RATIO, MOST_ISOLATED_SHARE * total, count, width)
     if not apart.any():
         return
     low, high = float(position[~apart].min()) - width, float(position[~apart].max()) + width
-    named = ", ".join(f"{value:.4g}" for value in position[apart][:NAMED])
+    named = ", ".join(f"{value:.4g}" for value in position[apart][:MOST_NAMED_ROWS])
     raise InputError(
         f"{int(count[apart].sum())} of {int(total)} rows have a position ({named}) far outside the range of "
         f"the others, {low:.4g} to {high:.4g}. They are likely wrong readings: remove them, or identify "
@@ -138,7 +138,7 @@ def _judged(
     given: NDArray[np.bool_],
     position: Float1D | None,
     findings: list[Finding],
-    unit: str = "",
+    unit: Unit,
 ) -> NDArray[np.bool_]:
     """Rows (n,) to be dropped for their values, among the given ones; adds findings."""
     found = np.zeros(len(values), dtype=bool)
@@ -146,10 +146,12 @@ def _judged(
         return found
     rows = np.flatnonzero(given)
     sparse = len(rows) < LEAST_ROWS
-    gap, most = (SPARSE_GAP, 1) if sparse else (GAP, int(FEW * len(rows)))
+    gap, most = (
+        (SPARSE_GAP_RATIO, 1) if sparse else (ISOLATED_GAP_RATIO, int(MOST_ISOLATED_SHARE * len(rows)))
+    )
     if len(rows) <= LEAST_OTHERS + 1:
         return found
-    for limit, drop in ((gap, True), (STRETCHED * gap, False)):
+    for limit, drop in ((gap, True), (REPORTED_GAP_SHARE * gap, False)):
         apart = isolated(values[rows], limit, most)
         if position is not None:
             apart &= _bracketed(position[rows], apart)
@@ -159,8 +161,8 @@ def _judged(
         count, ratio = len(here), _gap(values[here], others)
         drop = drop and _longest_run(apart) <= LONGEST_RUN
         found[here] = drop
-        named = ", ".join(f"row {row} at {values[row]:.4g}" for row in here[:NAMED])
-        more = ", ..." if count > NAMED else ""
+        named = ", ".join(f"row {row} at {unit.text(values[row])}" for row in here[:MOST_NAMED_ROWS])
+        more = ", ..." if count > MOST_NAMED_ROWS else ""
         result = (
             "They are likely wrong readings and were dropped"
             if drop
@@ -169,7 +171,7 @@ def _judged(
         findings.append(
             usable(
                 f"{count} of {len(rows)} rows ({named}{more}) have a {name} outside the range of the others, "
-                f"{others.min():.4g} to {amount(float(others.max()), unit)}, by {ratio:.3g} times its width. "
+                f"{unit.interval(others.min(), others.max())}, by {ratio:.3g} times its width. "
                 f"{result}"
             )
         )
@@ -179,8 +181,12 @@ def _judged(
 
 def _stretched(values: Float1D) -> bool:
     """True if the range is so much larger than that of most values (n,) that rows may be isolated."""
-    low, high = np.quantile(values[:: max(1, len(values) // SAMPLED)], (FEW, 1.0 - FEW))
-    return len(values) < LEAST_ROWS or float(np.ptp(values)) > STRETCHED * GAP * float(high - low)
+    low, high = np.quantile(
+        values[:: max(1, len(values) // MOST_SAMPLED_ROWS)], (MOST_ISOLATED_SHARE, 1.0 - MOST_ISOLATED_SHARE)
+    )
+    return len(values) < LEAST_ROWS or float(
+        np.ptp(values)
+    ) > REPORTED_GAP_SHARE * ISOLATED_GAP_RATIO * float(high - low)
 
 
 def _gap(values: Float1D, others: Float1D) -> float:
@@ -201,23 +207,24 @@ def _longest_run(rows: NDArray[np.bool_]) -> int:
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
-BEND = 2.0
-"""k: on data without outliers 99 % of the efficiency of least squares is kept."""
+HUBER_THRESHOLD = 2.0
+"""k of Huber's loss [standard deviations]: keeps 99 % of the efficiency of least squares on data without
+outliers."""
 
-FAR = 8.0
-"""Standard deviations from the neighbours, and from the model, beyond which a row is left out [-]"""
+OUTLIER_STANDARD_DEVIATIONS = 8.0
+"""Distance from the neighbours, and from the model, above which a row is dropped [standard deviations]."""
 
-NEIGHBOURS = 3
-"""Rows before a row, and after it, whose median it is compared with."""
+NEIGHBOUR_ROWS = 3
+"""Number of previous rows, and of next rows, whose median a row is compared with."""
 
-ROUNDS = 4
-"""Fits, each with better weights."""
+MOST_FITS = 4
+"""Largest number of fits, each with better weights."""
 
-SETTLED = 1e-3
-"""Mean change of the weights below which they are good."""
+SETTLED_WEIGHT_CHANGE = 1e-3
+"""Mean change of the weights below which no further fit is needed [-]."""
 
-MOST_LEFT_OUT = 0.2
-"""Share of the rows left out above which they cannot be outliers, and the model is unfit."""
+MOST_OUTLIER_SHARE = 0.2
+"""Largest share of dropped rows [-]. More cannot be outliers, and the model is unfit."""
 
 
 def standard_deviation(residual: Float1D) -> float:
@@ -237,7 +244,7 @@ def from_neighbours(
     """
     known = np.flatnonzero(trusted)
     if box.shape[1] > 1:
-        near = known[np.asarray(cKDTree(box[known]).query(box, k=2 * NEIGHBOURS + 1)[1])[:, 1:]]
+        near = known[np.asarray(cKDTree(box[known]).query(box, k=2 * NEIGHBOUR_ROWS + 1)[1])[:, 1:]]
         return np.asarray(force - np.median(force[near], axis=1))
     keys = (box[:, 0],) if side is None else (box[:, 0], side)
     found = []
@@ -249,7 +256,10 @@ def from_neighbours(
         after = np.searchsorted(place[sequence], place, side="right")
         apart = [
             force - np.median(force[sequence[np.clip(first[:, None] + step, 0, len(sequence) - 1)]], axis=1)
-            for first, step in ((before, -np.arange(1, NEIGHBOURS + 1)), (after, np.arange(NEIGHBOURS)))
+            for first, step in (
+                (before, -np.arange(1, NEIGHBOUR_ROWS + 1)),
+                (after, np.arange(NEIGHBOUR_ROWS)),
+            )
         ]
         found.append(np.where(np.abs(apart[0]) < np.abs(apart[1]), *apart))
     return min(found, key=standard_deviation)
@@ -260,13 +270,13 @@ def suspects(box: Float2D, force: Float1D, side: Float1D | None, weight: Float1D
     given = np.ones(len(force), dtype=bool) if weight is None else weight > 0.0
     low, high = np.quantile(force[given], (0.05, 0.95))
     found = np.zeros(len(force), dtype=bool)
-    for _ in range(ROUNDS):
+    for _ in range(MOST_FITS):
         trusted, before = given & ~found, found
-        if np.count_nonzero(trusted) <= 2 * NEIGHBOURS + 1:
+        if np.count_nonzero(trusted) <= 2 * NEIGHBOUR_ROWS + 1:
             break
         apart = from_neighbours(box, force, side, trusted)
-        scale = max(standard_deviation(apart[trusted]), RESOLVED * float(high - low))
-        found = given & (np.abs(apart) > FAR * scale)
+        scale = max(standard_deviation(apart[trusted]), FORCE_RESOLUTION * float(high - low))
+        found = given & (np.abs(apart) > OUTLIER_STANDARD_DEVIATIONS * scale)
         if np.array_equal(found, before):
             break
     return found
@@ -282,19 +292,20 @@ class Robust:
     """(n,) rows that were left out"""
     note: str
 
-    def findings(self, residual: Float1D, force_unit: str = "") -> list[Finding]:
+    def findings(self, residual: Float1D, force_unit: Unit = UNSTATED_UNIT) -> list[Finding]:
         """A finding on the dropped rows; residual (n,) is that of all rows."""
         count = int(np.count_nonzero(self.outliers))
         if not count:
             return []
         share = count / len(self.outliers)
-        judge = no if share > MOST_LEFT_OUT else usable
+        judge = no if share > MOST_OUTLIER_SHARE else usable
         largest = float(np.abs(residual[self.outliers]).max())
         return [
             judge(
-                f"{count} rows ({100 * share:.2g} %) differ by more than {FAR:g} standard deviations from "
-                f"the model and from their neighbours, at most by {amount(largest, force_unit)}. They are "
-                "likely wrong readings and were dropped; the error is that of the other rows"
+                f"{count} rows ({100 * share:.2g} %) differ by more than {OUTLIER_STANDARD_DEVIATIONS:g} "
+                "standard deviations from the model and from their neighbours, at most by "
+                f"{force_unit.text(largest)}. They are likely wrong readings and were dropped; the error "
+                "is that of the other rows"
             )
         ]
 
@@ -321,19 +332,19 @@ def robust_weights(
     """
     given = np.ones(len(force)) if weight is None else weight
     modelled, share = first, np.where(suspect, 0.0, 1.0)
-    for _ in range(ROUNDS):
+    for _ in range(MOST_FITS):
         residual = np.abs(force - modelled)
         scale = standard_deviation(residual[given > 0.0])
         before = share
-        share = np.minimum(1.0, BEND * scale / np.maximum(residual, np.finfo(float).tiny))
-        share[suspect & (residual > FAR * scale)] = 0.0
-        if scale == 0.0 or np.abs(share - before).mean() <= SETTLED:
+        share = np.minimum(1.0, HUBER_THRESHOLD * scale / np.maximum(residual, np.finfo(float).tiny))
+        share[suspect & (residual > OUTLIER_STANDARD_DEVIATIONS * scale)] = 0.0
+        if scale == 0.0 or np.abs(share - before).mean() <= SETTLED_WEIGHT_CHANGE:
             break
         modelled = fit(given * share)
     outliers = (share == 0.0) & (given > 0.0)
     far = int(np.count_nonzero(share < 0.5))
     note = (
-        f"{far} rows differ by more than {2 * BEND:g} standard deviations from the model and have less "
-        f"weight; {np.count_nonzero(outliers)} of them were dropped."
+        f"{far} rows differ by more than {2 * HUBER_THRESHOLD:g} standard deviations from the model and have "
+        f"less weight; {np.count_nonzero(outliers)} of them were dropped."
     )
     return Robust(given * share, outliers, note)

@@ -14,19 +14,20 @@ from ..._core.dynamics import environment_filters, paper_sample_time_s
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...recording import Recording
-from ...recording.comparison import amount
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
 from ...recording.motion import Piece, pieces, velocity
+from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
 from ..decision import Decision
 from ..options import IdentifyOptions
-from .compression import EVERY, held_out_rows
+from .compression import HELD_OUT_EVERY, held_out_rows
 from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, position_noise, repeated
 from .outliers import Robust
 from .strokes import strokes_of
 
-LARGEST = 1e100
-"""Largest absolute value, and the inverse of the smallest travel and force, that is identified."""
+LARGEST_MAGNITUDE = 1e100
+"""Largest absolute value, and inverse of the smallest travel and force, that is identified: its square does
+not overflow."""
 
 
 def require_in_range(name: str, values: Float1D) -> None:
@@ -37,8 +38,10 @@ def require_in_range(name: str, values: Float1D) -> None:
     InputError
         Names the largest value and the limit.
     """
-    if (largest := float(np.abs(values).max())) > LARGEST:
-        raise InputError(f"{name} reaches {largest:.3g}: must be at most {LARGEST:g}. Use another unit")
+    if (largest := float(np.abs(values).max())) > LARGEST_MAGNITUDE:
+        raise InputError(
+            f"{name} reaches {largest:.3g}: must be at most {LARGEST_MAGNITUDE:g}. Use another unit"
+        )
 
 
 @dataclass(frozen=True)
@@ -76,10 +79,10 @@ class Rows:
     """Limits of the information in the rows"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) least and largest corner of the box; None: those of the positions"""
-    position_unit: str = ""
-    """For messages; empty if not known"""
-    force_unit: str = ""
-    """For messages; empty if not known, or if the forces are scaled"""
+    position_unit: Unit = UNSTATED_UNIT
+    """For messages"""
+    force_unit: Unit = UNSTATED_UNIT
+    """For messages; not stated if the forces are scaled"""
 
     @cached_property
     def lower(self) -> Float1D:
@@ -122,7 +125,7 @@ class Rows:
         if self.weight is not None:
             counted = np.flatnonzero(self.weight > 0.0)
             held_out &= self.weight > 0.0
-            if 2 * EVERY * np.count_nonzero(held_out) < len(counted):
+            if 2 * HELD_OUT_EVERY * np.count_nonzero(held_out) < len(counted):
                 # rows that repeat others can fill every place that is held out
                 held_out[:] = False
                 held_out[counted] = held_out_rows(len(counted), self.starts)
@@ -142,7 +145,7 @@ class Rows:
             force=scale.scaled(self.force),
             within=self.within * scale.factor**2,
             parts=[replace(part, force=scale.scaled(part.force)) for part in self.parts],
-            force_unit=self.force_unit if scale.factor == 1.0 else "",
+            force_unit=self.force_unit if scale.factor == 1.0 else UNSTATED_UNIT,
         )
 
     def limited(self) -> Rows:
@@ -184,15 +187,16 @@ def require_usable(rows: Rows, options: IdentifyOptions) -> None:
             )
     for name, column in zip((*names, "force"), (*positions.T, force), strict=True):
         require_in_range(name, column)
-    if 0.0 < (largest := float(np.abs(force).max())) < 1.0 / LARGEST:
+    if 0.0 < (largest := float(np.abs(force).max())) < 1.0 / LARGEST_MAGNITUDE:
         raise InputError(
-            f"the largest |force| is {largest:.3g}: must be at least {1.0 / LARGEST:g}, or 0. Use another "
-            "unit"
+            f"the largest |force| is {largest:.3g}: must be at least {1.0 / LARGEST_MAGNITUDE:g}, or 0. Use "
+            "another unit"
         )
     for name, column in zip(names, positions.T, strict=True):
-        if 0.0 < (travel := float(np.ptp(column))) < 1.0 / LARGEST:
+        if 0.0 < (travel := float(np.ptp(column))) < 1.0 / LARGEST_MAGNITUDE:
             raise InputError(
-                f"{name} has a range of {travel:.3g}: must be at least {1.0 / LARGEST:g}. Use another unit"
+                f"{name} has a range of {travel:.3g}: must be at least {1.0 / LARGEST_MAGNITUDE:g}. Use "
+                "another unit"
             )
         if column.min() == column.max():
             raise InputError(f"every {name} is {column[0]:g}: must vary")
@@ -262,8 +266,8 @@ def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
         decisions=decisions,
         notes=notes,
         findings=findings,
-        position_unit=recordings[0].units["position"],
-        force_unit=recordings[0].units["force"],
+        position_unit=recordings[0].file_unit("position"),
+        force_unit=recordings[0].file_unit("force"),
     )
 
 
@@ -368,7 +372,7 @@ def period_notes(position: Float1D, period: float, unit: str = "") -> tuple[str,
     if travel <= period:
         gap = period - travel
         note = (
-            f"The positions leave a gap of {amount(gap, unit)}, {100 * gap / period:.2g} % of the period of "
+            f"The positions leave a gap of {_exact(gap, unit)}, {100 * gap / period:.2g} % of the period of "
             f"{_exact(period, unit)}. The model closes it."
         )
     box = np.sort(modulo((position - lower) / period))

@@ -17,34 +17,36 @@ from ...recording.motion import ordered_strokes, turns_of
 from ...verdict import Finding, usable
 from ..decision import Decision
 
-CELLS = 32
-"""Cells of the travel in which the strokes are compared."""
+TRAVEL_CELLS = 32
+"""Number of cells of the travel in which the strokes are compared."""
 
-SIGNIFICANT = 4.0
-"""Standard errors by which the strokes must differ: with fewer, hysteresis is not accepted [-]."""
+SIGNIFICANT_STANDARD_ERRORS = 4.0
+"""Least difference of the strokes for hysteresis [standard errors]."""
 
-CONSISTENT = 0.9
-"""Share of the cells in which one stroke's force must be the higher, to be taken for the press [-]."""
+LEAST_CONSISTENT_SHARE = 0.9
+"""Least share of the cells in which the press force is the higher one [-]."""
 
-APART = 0.05
-"""Mean difference that two strokes must have then, as a share of the force's standard deviation: repeated
-measurements of one stroke differ by 0.02 or less [-]."""
+LEAST_MEAN_DIFFERENCE = 0.05
+"""Least mean difference of two such strokes [standard deviations of the force]. Repeated measurements of one
+stroke differ by at most 0.02."""
 
-WINDOW = 16
-"""Neighbouring rows, in order of position, that are parted in two groups of force."""
+WINDOW_ROWS = 16
+"""Neighbouring rows, in order of position, that are divided into two groups of force."""
 
 LEAST_WINDOWS = 5
-"""Fewer windows show nothing."""
+"""Least number of windows for a statement on the strokes."""
 
-TWO_BRANCHES = 0.85
-"""Share of a window's variance between its two groups: 0.68 for noise, 1 for two separate forces [-]."""
+LEAST_GROUP_VARIANCE = 0.85
+"""Least share of a window's variance between its two groups for two forces [-]: 0.68 for noise, 1 for two
+separate forces."""
 
-SPREAD_SHARE = 0.02
-"""Spread at one position, as a share of the force's range, from which rows in no order are reported [-]."""
+REPORTED_SPREAD = 0.02
+"""Spread of the force at one position from which it is reported for rows in no order [share of the range]."""
 
-CURE = (
+DIRECTION_CURE = (
     "keep the rows in the order of the recording, or add a column direction with the words press and release"
 )
+"""Cure of unknown strokes in messages."""
 
 
 @dataclass(frozen=True)
@@ -94,18 +96,18 @@ def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
         if press is None:
             return _untested(position, force, unit, None)
         side = np.concatenate([np.full(len(part), up) for part, up in zip(recordings, press, strict=True)])
-        harder, softer = _names(recordings, press > 0), _names(recordings, press < 0)
+        press_files, release_files = _names(recordings, press > 0), _names(recordings, press < 0)
         difference = float(np.nanmean(_Cells.of(position, force, side).difference))
-        note = f"{harder} is taken as press and {softer} as release: the press force is higher"
+        note = f"{press_files} is taken as press and {release_files} as release: the press force is higher"
         findings = (
             usable(
                 f"{note} by {difference:.3g}{unit} on average. There is no direction column, and all "
                 "positions change in the same direction. If these are two objects, identify each one "
-                f"separately. If they repeat one stroke, give --inputs position. Else {CURE}"
+                f"separately. If they repeat one stroke, give --inputs position. Else {DIRECTION_CURE}"
             ),
         )
     elif not named and not _Cells.of(position, force, side).differ:
-        reason = f"press and release do not differ by {SIGNIFICANT:g} standard errors"
+        reason = f"press and release do not differ by {SIGNIFICANT_STANDARD_ERRORS:g} standard errors"
         return Strokes(None, (f"{note}.",), decisions=(Decision("hysteresis", "not accepted", reason),))
     return Strokes(side, (f"{note}.",), findings)
 
@@ -128,10 +130,10 @@ class _Cells:
         if not upper > lower:
             return cls(np.empty(0), np.empty(0))
         x, f = (position[rows] - lower) / (upper - lower), force[rows] - force[rows].mean()
-        cell = np.minimum((x * CELLS).astype(np.int64), CELLS - 1)
+        cell = np.minimum((x * TRAVEL_CELLS).astype(np.int64), TRAVEL_CELLS - 1)
         group = 2 * cell + press[rows]
         count, f_sum, x_sum, xx, xf, ff = (
-            np.bincount(group, values, 2 * CELLS).reshape(CELLS, 2)
+            np.bincount(group, values, 2 * TRAVEL_CELLS).reshape(TRAVEL_CELLS, 2)
             for values in (None, f, x, x * x, x * f, f * f)
         )
         mean_x, mean_f = (total / np.maximum(count, 1) for total in (x_sum, f_sum))
@@ -140,7 +142,7 @@ class _Cells:
             np.sum(square - count * one * other, axis=1)
             for square, one, other in ((xx, mean_x, mean_x), (xf, mean_x, mean_f), (ff, mean_f, mean_f))
         )
-        slope = np.divide(xf, xx, out=np.zeros(CELLS), where=xx > 0)
+        slope = np.divide(xf, xx, out=np.zeros(TRAVEL_CELLS), where=xx > 0)
         difference = mean_f[:, 1] - mean_f[:, 0] - slope * (mean_x[:, 1] - mean_x[:, 0])
         n_out, n_in = count.T
         used = (n_in >= 2) & (n_out >= 2) & (n_in + n_out > 4)
@@ -158,7 +160,9 @@ class _Cells:
         mean = float(weight @ self.difference / np.sqrt(weight.sum()))
         squares = float(np.sum((self.difference / self.error) ** 2))
         m = len(self.difference)
-        return abs(mean) > SIGNIFICANT or squares > m + SIGNIFICANT * np.sqrt(2.0 * m)
+        return abs(mean) > SIGNIFICANT_STANDARD_ERRORS or squares > m + SIGNIFICANT_STANDARD_ERRORS * np.sqrt(
+            2.0 * m
+        )
 
 
 def _press(recordings: Sequence[Recording]) -> Float1D | None:
@@ -172,18 +176,18 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
         force = np.concatenate([one.force, other.force])
         side = np.repeat([1.0, -1.0], [len(one), len(other)])
         apart = _Cells.of(position, force, side).difference
-        if len(apart) < CELLS // 2 or abs(apart.mean()) < APART * force.std():
+        if len(apart) < TRAVEL_CELLS // 2 or abs(apart.mean()) < LEAST_MEAN_DIFFERENCE * force.std():
             return 0
         sign = int(np.sign(apart.mean()))
-        return sign if np.mean(np.sign(apart) == sign) >= CONSISTENT else 0
+        return sign if np.mean(np.sign(apart) == sign) >= LEAST_CONSISTENT_SHARE else 0
 
     first = np.array([above(recording, recordings[0]) for recording in recordings])
     if not first.any() or ((first > 0).any() and (first < 0).any()):
         return None
     high = first >= 0 if (first < 0).any() else first > 0
-    harder = [recording for recording, up in zip(recordings, high, strict=True) if up]
-    softer = [recording for recording, up in zip(recordings, high, strict=True) if not up]
-    if not all(above(one, other) > 0 for one, other in product(harder, softer)):
+    press_files = [recording for recording, up in zip(recordings, high, strict=True) if up]
+    release_files = [recording for recording, up in zip(recordings, high, strict=True) if not up]
+    if not all(above(one, other) > 0 for one, other in product(press_files, release_files)):
         return None
     return np.where(high, 1.0, -1.0)
 
@@ -194,27 +198,27 @@ def _untested(position: Float1D, force: Float1D, unit: str, why: str | None) -> 
     decisions = (Decision("hysteresis", "not tested", reason),)
     # Repetitions of a row would be groups of one force.
     rows = np.unique(position + 1j * force)
-    if len(rows) < LEAST_WINDOWS * WINDOW:
+    if len(rows) < LEAST_WINDOWS * WINDOW_ROWS:
         return Strokes(None, decisions=decisions)
     reach = float(np.ptp(force)) or 1.0
     shares, gaps, spreads = _two_groups(rows.real, rows.imag)
     gap, most, spread = float(np.median(gaps)), float(np.quantile(gaps, 0.95)), float(np.median(spreads))
     levels = np.diff(np.unique(force))
     step = float(levels[levels > 1e-9 * reach].min(initial=reach))
-    if np.median(shares) > TWO_BRANCHES and gap > max(SPREAD_SHARE / 2 * reach, 1.5 * step):
+    if np.median(shares) > LEAST_GROUP_VARIANCE and gap > max(REPORTED_SPREAD / 2 * reach, 1.5 * step):
         evidence = (
             f"At the same position the force has two values, typically {gap:.3g}{unit} and up to "
             f"{most:.3g}{unit} apart ({gap / reach:.1%} and {most / reach:.1%} of its range), as for press "
             "and release. The model lies between them"
         )
-    elif why is not None and spread > SPREAD_SHARE * reach:
+    elif why is not None and spread > REPORTED_SPREAD * reach:
         evidence = (
             f"At the same position the force has a standard deviation of {spread:.3g}{unit} "
             f"({spread / reach:.1%} of its range), from noise or from a difference between press and release"
         )
     else:
         return Strokes(None, decisions=decisions)
-    finding = usable(f"hysteresis was not tested: {reason}. {evidence}. Cure: {CURE}")
+    finding = usable(f"hysteresis was not tested: {reason}. {evidence}. Cure: {DIRECTION_CURE}")
     return Strokes(None, findings=(finding,), decisions=decisions)
 
 
@@ -222,20 +226,20 @@ def _two_groups(x: Float1D, f: Float1D) -> tuple[Float1D, Float1D, Float1D]:
     """For windows of rows in order of position: the share of the variance between two groups of force, the
     distance of their means, and the standard deviation, each (windows,).
     """
-    rows = len(x) // WINDOW * WINDOW
-    x, f = x[:rows].reshape(-1, WINDOW), f[:rows].reshape(-1, WINDOW)
+    rows = len(x) // WINDOW_ROWS * WINDOW_ROWS
+    x, f = x[:rows].reshape(-1, WINDOW_ROWS), f[:rows].reshape(-1, WINDOW_ROWS)
     dx, df = x - x.mean(axis=1, keepdims=True), f - f.mean(axis=1, keepdims=True)
     xx = np.sum(dx * dx, axis=1)
     slope = np.divide(np.sum(dx * df, axis=1), xx, out=np.zeros(len(xx)), where=xx > 0)
     rest = np.sort(df - slope[:, None] * dx, axis=1)
     total = np.maximum(np.sum(rest * rest, axis=1), 1e-30)
-    low = np.arange(1, WINDOW)
+    low = np.arange(1, WINDOW_ROWS)
     sums = np.cumsum(rest, axis=1)[:, :-1]
-    parted = sums**2 * (1.0 / low + 1.0 / (WINDOW - low))
+    parted = sums**2 * (1.0 / low + 1.0 / (WINDOW_ROWS - low))
     best = np.argmax(parted, axis=1)
     at = np.arange(len(best)), best
-    gap = -sums[at] * (1.0 / low[best] + 1.0 / (WINDOW - low[best]))
-    return parted[at] / total, gap, np.sqrt(total / (WINDOW - 2))
+    gap = -sums[at] * (1.0 / low[best] + 1.0 / (WINDOW_ROWS - low[best]))
+    return parted[at] / total, gap, np.sqrt(total / (WINDOW_ROWS - 2))
 
 
 def _names(recordings: Sequence[Recording], which: Sequence[bool] | NDArray[np.bool_]) -> str:

@@ -67,11 +67,11 @@ class Resolution:
 COARSEST_CANDIDATE = 1.0
 """Dilation of the frame's coarsest level [1/box]."""
 
-LIBRARY_ENTRIES = 2**23
-"""Numbers that a library may hold: with many rows it has fewer candidates."""
+MOST_LIBRARY_ENTRIES = 2**23
+"""Largest number of values in a library, 32 MiB. With many rows it has fewer candidates."""
 
-NEGLIGIBLE = 1e-14
-"""Spectral products below this share of the first one cannot change a printed digit of the bounds."""
+NEGLIGIBLE_SHARE = 1e-14
+"""Spectral products below this share of the first one cannot change a printed digit of the bounds [-]."""
 
 
 def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
@@ -125,7 +125,7 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
             )
             cross += 2.0 * overlap
             first = max(first, overlap)
-            if overlap <= NEGLIGIBLE * first or overlap < np.finfo(float).tiny:
+            if overlap <= NEGLIGIBLE_SHARE * first or overlap < np.finfo(float).tiny:
                 break
             shift += 1
     unit = 2.0 * np.pi / b0

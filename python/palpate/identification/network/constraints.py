@@ -23,26 +23,28 @@ from ..data.compression import Compressed
 from .basis import Basis
 from .separable import SeparableProblem, Solution, factored
 
-MARGIN = 1e-2
-"""A bound is imposed tighter than it is certified by this share of the RMS error, so that certifying ends."""
+IMPOSED_MARGIN = 1e-2
+"""Margin by which an imposed bound is tighter than the certified one, as a share of the RMS error [-].
+Without it certification may not end."""
 
 POINT_TOLERANCE = 1e-9
-"""Share of the force's range by which a fixed force may be missed."""
+"""Largest deviation from a fixed force, as a share of the range of the force [-]: rounding."""
 
-ROUNDS = 60
-"""Rounds of imposing and certifying; the rest is mixed with a network that keeps all bounds."""
+MOST_ROUNDS = 60
+"""Largest number of rounds of imposing and certifying. After it the solution is mixed with one that keeps all
+bounds."""
 
-CELLS = 256
-"""Cells over the domain that certification starts from."""
+FIRST_CELLS = 256
+"""Number of cells over the domain at the start of a certification."""
 
-HALVINGS = 40
-"""Halvings after which an undecided cell counts as violated."""
+MOST_HALVINGS = 40
+"""Halvings after which an undecided cell counts as violated: its width is then a rounding error."""
 
-GRID = 4096
-"""Cells of the grid on which a force law is projected onto slope bounds."""
+PROJECTION_CELLS = 4096
+"""Number of cells of the grid on which a force is projected onto slope bounds."""
 
-ALTERNATIONS = 50
-"""Most alternating projections onto the lower and the upper slope bound."""
+MOST_ALTERNATIONS = 50
+"""Largest number of alternating projections onto the lower and the upper slope bound."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ def moved_to_bounds(
     the bounded force law needs them. h is projected pointwise, h := max(h, 0), slopes by isotonic regression.
     """
     bounds = [bound for bound in bounds if not bound.seam]
-    grid = np.linspace(0.0, 1.0, GRID + 1)
+    grid = np.linspace(0.0, 1.0, PROJECTION_CELLS + 1)
     readings = problem.readout @ solution.coefficients @ _columns(solution.basis, False, grid).T
     before = readings.copy()
     if any(not bound.of_slope and bound.at is None for bound in bounds):
@@ -145,11 +147,11 @@ def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -
 
     The free solution itself is returned if it keeps them.
     """
-    margin = MARGIN * problem.resolved_rmse(free)
+    margin = IMPOSED_MARGIN * problem.resolved_rmse(free)
     rows: list[Float2D] = []
     limits: list[Float1D] = []
     current = free
-    for _ in range(ROUNDS):
+    for _ in range(MOST_ROUNDS):
         found = [(bound, violated_positions(problem, current, bound)) for bound in bounds]
         if not any(len(x) for _, x in found):
             return current
@@ -173,11 +175,11 @@ def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bou
     if bound.at is not None or bound.seam:
         here = np.array([bound.at or 0.0])
         return here[excess(here) < -POINT_TOLERANCE * problem.force_range]
-    edges = np.linspace(0.0, 1.0, CELLS + 1)
+    edges = np.linspace(0.0, 1.0, FIRST_CELLS + 1)
     left, right = edges[:-1], edges[1:]
     at_left, at_right = excess(edges)[:-1], excess(edges)[1:]
     violated: list[NDArray[np.float64]] = []
-    for halving in range(HALVINGS + 1):
+    for halving in range(MOST_HALVINGS + 1):
         lowest = np.minimum(at_left, at_right)
         bend = derivative_bounds(
             alpha=solution.basis.alpha,
@@ -190,7 +192,7 @@ def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bou
             order=3 if bound.of_slope else 2,
         )
         undecided = (lowest >= 0.0) & (lowest < bend * (right - left) ** 2 / 8.0)
-        shown = undecided | (lowest < 0.0) if halving == HALVINGS else lowest < 0.0
+        shown = undecided | (lowest < 0.0) if halving == MOST_HALVINGS else lowest < 0.0
         violated.append(np.stack([left[shown], right[shown]]))
         if shown[undecided].all():
             break
@@ -250,7 +252,7 @@ def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Flo
     """Nearest force (k,) with slope within [low, high]: alternating isotonic regressions (Dykstra 1983)."""
     current = force
     lower_memory, upper_memory = np.zeros_like(force), np.zeros_like(force)
-    for _ in range(ALTERNATIONS):
+    for _ in range(MOST_ALTERNATIONS):
         start = current
         if np.isfinite(low):
             wanted = current + lower_memory
@@ -296,14 +298,14 @@ def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequ
     return problem.with_coefficients(solution, mixed)
 
 
-PLACES = 2048
-"""Places that are looked at."""
+COMPARED_POSITIONS = 2048
+"""Number of positions at which press and release are compared."""
 
-WORTH_REPORTING = 3.0
-"""RMS errors that release has to lie above press."""
+REPORTED_HEIGHT = 3.0
+"""Least height of release above press that is reported [RMS errors]: larger than noise."""
 
-STEEP = 2.0
-"""Ratio of the slope where release lies above press to the mean slope, from which a force is late."""
+LATE_SLOPE_RATIO = 2.0
+"""Ratio of the slope where release lies above press to the mean slope, from which the force is late [-]."""
 
 
 def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
@@ -311,7 +313,7 @@ def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
 
     A force that is late by t makes h smaller by the slope times speed and t.
     """
-    places = np.linspace(0.0, 1.0, PLACES)
+    places = np.linspace(0.0, 1.0, COMPARED_POSITIONS)
     columns = wavelet_columns(places, free.basis.alpha, free.basis.beta)
     slopes = wavelet_slope_columns(places, free.basis.alpha, free.basis.beta)
     (_, slope, *of_g), (bias, tilt, *of_h) = problem.readout @ free.coefficients
@@ -319,7 +321,7 @@ def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
     above = np.maximum(-(bias + tilt * places + columns @ np.asarray(of_h)), 0.0)
     if not above.any():
         return False
-    return bool(np.average(steepness, weights=above**2) > STEEP * np.mean(steepness))
+    return bool(np.average(steepness, weights=above**2) > LATE_SLOPE_RATIO * np.mean(steepness))
 
 
 @dataclass(frozen=True)
@@ -343,14 +345,14 @@ def crossing(problem: SeparableProblem, free: Solution) -> Crossing | None:
     last = min(float(block.positions.max()) for block in problem.blocks)
     if len(problem.readout) < 2 or last <= first:
         return None
-    places = np.linspace(first, last, PLACES)
+    places = np.linspace(first, last, COMPARED_POSITIONS)
     columns = wavelet_columns(places, free.basis.alpha, free.basis.beta)
     bias, slope, *weights = problem.readout[1] @ free.coefficients
     above = -2.0 * (bias + slope * places + columns @ np.asarray(weights))
     deepest = int(np.argmax(above))
-    if above[deepest] < WORTH_REPORTING * problem.resolved_rmse(free):
+    if above[deepest] < REPORTED_HEIGHT * problem.resolved_rmse(free):
         return None
     within = np.flatnonzero(above <= 0.0)
     start = within[within < deepest].max(initial=-1) + 1
-    end = within[within > deepest].min(initial=PLACES) - 1
+    end = within[within > deepest].min(initial=COMPARED_POSITIONS) - 1
     return Crossing(float(above[deepest]), float(places[start]), float(places[end]))

@@ -28,11 +28,11 @@ from scipy.optimize import Bounds, minimize
 from ..._core.model import wavelet_columns, wavelet_jacobian, wavelet_steps
 from ..._typing import Float1D, Float2D
 from ..data.compression import Compressed, HeldOutRows
-from ..data.limits import NO_LIMITS, RESOLVED, RowLimits
+from ..data.limits import FORCE_RESOLUTION, NO_LIMITS, RowLimits
 from .basis import Basis, Resolution
 
 RIDGE = 1e-11
-"""Relative ridge on unit-norm columns: keeps a nearly dependent basis solvable, far below any noise."""
+"""Ridge on columns of unit norm [-]: keeps a nearly dependent basis solvable, far below any noise."""
 
 
 def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -68,19 +68,20 @@ def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
         ridge *= 100.0
 
 
-CORE = float(np.sqrt(3.0))
-"""|u| of a wavelet's side lobe, the limit of the core that data must resolve."""
+CORE_RADIUS = float(np.sqrt(3.0))
+"""|u| at a wavelet's side lobe, the limit of the core that the data must resolve [-]."""
 
-NOISE_WIDTHS = 5.0
-"""Standard deviations of the position's noise that half of a wavelet's core holds at least [-]"""
+HALF_CORE_NOISE_RATIO = 5.0
+"""Least half width of a wavelet's core in standard deviations of the position noise [-]."""
 
-STRUCTURED = 3.0
-"""Standard errors of the correlation of neighbouring residuals above which they are structure."""
+SIGNIFICANT_CORRELATION = 3.0
+"""Correlation of neighbouring residuals above which they are structure [standard errors]."""
 
-SLIDES = 0.9
-"""Hysteresis input s beyond which a row belongs to its stroke [-]"""
+LEAST_SLIDING_INPUT = 0.9
+"""Hysteresis input |s| above which a row belongs to its stroke [-]."""
 
 TINY = float(np.finfo(float).tiny)
+"""Smallest positive number, which replaces 0 in quotients and logarithms."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ class Block:
         if self.n_channels == 1:
             return [self.positions]
         side = self.channels[:, 1] / self.channels[:, 0]
-        sliding = [self.positions[sign * side > SLIDES] for sign in (1.0, -1.0)]
+        sliding = [self.positions[sign * side > LEAST_SLIDING_INPUT] for sign in (1.0, -1.0)]
         return [rows if len(rows) else self.positions for rows in sliding]
 
     def design(self, wavelets: Float2D) -> Float2D:
@@ -189,7 +190,7 @@ class SeparableProblem:
 
     def total(self, rss: float) -> float:
         """Error over all samples [force^2] as a criterion sees it: never less than a sensor resolves."""
-        least = max(RESOLVED * self.force_range, self.limits.force_error)
+        least = max(FORCE_RESOLUTION * self.force_range, self.limits.force_error)
         return max(rss + self.within, least**2 * self.samples, TINY)
 
     @property
@@ -210,18 +211,19 @@ class SeparableProblem:
         residual = np.abs(np.concatenate(solution.residuals))
         return 1.4826 * float(np.median(residual)) / max(float(np.sqrt(np.mean(residual**2))), TINY)
 
-    def likeness(self, solution: Solution) -> float:
+    def neighbour_correlation(self, solution: Solution) -> float:
         """Correlation of residuals at neighbouring positions, in standard errors; one channel, d = 1."""
         if self.dimension > 1 or self.n_channels > 1:
             return 0.0
         (residual,) = solution.residuals
-        alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), TINY)
-        return alike * float(np.sqrt(len(residual)))
+        correlation = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), TINY)
+        return correlation * float(np.sqrt(len(residual)))
 
     def structured(self, solution: Solution) -> bool:
         """True if residuals at neighbouring rows of some block are correlated."""
         return any(
-            float(left[1:] @ left[:-1]) * float(np.sqrt(len(left))) > STRUCTURED * float(left @ left)
+            float(left[1:] @ left[:-1]) * float(np.sqrt(len(left)))
+            > SIGNIFICANT_CORRELATION * float(left @ left)
             for left in solution.residuals
         )
 
@@ -241,8 +243,8 @@ class SeparableProblem:
     def finest(self, beta: Float2D) -> Float2D:
         """Largest dilation (N, 1) that the data around each translation resolve, on every stroke."""
         reach = np.max([each.reach(beta, self.resolved_by) for each in self.resolutions], axis=0)
-        least = max(NOISE_WIDTHS * self.limits.position_noise, 1e-9)
-        return np.asarray(CORE / np.maximum(reach, least))[:, None]
+        least = max(HALF_CORE_NOISE_RATIO * self.limits.position_noise, 1e-9)
+        return np.asarray(CORE_RADIUS / np.maximum(reach, least))[:, None]
 
     def solve(self, basis: Basis) -> Solution:
         """Weights, slopes and biases of all channels for this basis."""
@@ -357,55 +359,58 @@ def problem_of(
     )
 
 
-COARSEST = 0.5
+LEAST_DILATION = 0.5
 """Smallest dilation [1/box]: over the unit box a wider wavelet is a parabola, as this one nearly is."""
 
-REACH = 0.3
-"""Largest distance of a translation from the unit box [box]."""
+LARGEST_OVERHANG = 0.3
+"""Largest distance of a translation from the unit box [box]. From further away a wavelet is nearly straight
+in the box."""
 
 LONGEST_STEP = 0.7
-"""Longest step of log(alpha) and of alpha beta: beyond it the basis changes too much to be linearised."""
+"""Longest step of log(alpha) and of alpha beta [-]. A longer one is not linear in the basis."""
 
-IDLE_STEPS = 2
-"""Steps in a row with next to no gain after which refinement ends."""
+MOST_IDLE_STEPS = 2
+"""Steps in succession with a smaller gain than the tolerance after which refinement ends."""
 
 
 def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
     """Lower the objective from start by at most `steps` accepted or tried steps.
 
-    It ends early after IDLE_STEPS steps in a row that each lowered the deviance by less than tolerance.
+    It ends early after MOST_IDLE_STEPS steps in a row that each lowered the deviance by less than tolerance.
     """
     best, linearised = start, None
     if len(start.basis) == 0:
         return best
-    damping, idle, finest = 1e-2, 0, problem.finest(best.basis.beta)
+    step_damping, idle, finest = 1e-2, 0, problem.finest(best.basis.beta)
     for _ in range(steps):
         if linearised is not best:
             matrix, gradient = problem.normal_equations(best)
             linearised = best
-        step = _bounded_step(best.basis, finest, matrix, gradient, damping)
+        step = _bounded_step(best.basis, finest, matrix, gradient, step_damping)
         basis, finest_there = _moved(problem, best.basis, step)
         trial = problem.solve(basis)
         if trial.objective < best.objective:
             gain = problem.samples * (best.objective - trial.objective) / problem.total(trial.rss)
-            best, finest, damping = trial, finest_there, max(damping / 5.0, 1e-9)
+            best, finest, step_damping = trial, finest_there, max(step_damping / 5.0, 1e-9)
             idle = idle + 1 if gain < tolerance else 0
         else:
-            damping *= 6.0
-        if idle >= IDLE_STEPS or damping > 1e8:
+            step_damping *= 6.0
+        if idle >= MOST_IDLE_STEPS or step_damping > 1e8:
             break
     return best
 
 
 def _bounded_step(
-    basis: Basis, finest: Float2D, matrix: Float2D, gradient: Float1D, damping: float
+    basis: Basis, finest: Float2D, matrix: Float2D, gradient: Float1D, step_damping: float
 ) -> Float1D:
     """Levenberg-Marquardt step over the unknowns that bounds leave free."""
     d = basis.alpha.shape[1]
     push_alpha, push_beta = gradient.reshape(2, d, len(basis)).transpose(0, 2, 1)
     held_alpha = (push_alpha > 0) & (basis.alpha >= finest * (1 - 1e-9))
-    held_alpha |= (push_alpha < 0) & (basis.alpha <= COARSEST * (1 + 1e-9))
-    held_beta = (push_beta > 0) & (basis.beta >= 1 + REACH) | (push_beta < 0) & (basis.beta <= -REACH)
+    held_alpha |= (push_alpha < 0) & (basis.alpha <= LEAST_DILATION * (1 + 1e-9))
+    held_beta = (push_beta > 0) & (basis.beta >= 1 + LARGEST_OVERHANG) | (push_beta < 0) & (
+        basis.beta <= -LARGEST_OVERHANG
+    )
     free = np.flatnonzero(~np.stack([held_alpha.T, held_beta.T]).ravel())
     step = np.zeros(len(gradient))
     if len(free) == 0:
@@ -415,11 +420,11 @@ def _bounded_step(
     floor = 1e-6 * diagonal.max() + np.finfo(float).tiny
     while True:
         damped = system.copy()
-        np.einsum("ii->i", damped)[:] += damping * np.maximum(diagonal, floor)
+        np.einsum("ii->i", damped)[:] += step_damping * np.maximum(diagonal, floor)
         factor, failed = dpotrf(damped, lower=1)
         if not failed:
             break
-        damping = 10.0 * damping + 1e-12
+        step_damping = 10.0 * step_damping + 1e-12
     step[free] = dpotrs(factor, gradient[free], lower=1)[0]
     return np.clip(step, -LONGEST_STEP, LONGEST_STEP)
 
@@ -427,14 +432,14 @@ def _bounded_step(
 def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> tuple[Basis, Float2D]:
     """The basis after a step, brought back to its bounds, and the largest dilations there (N, 1)."""
     grow, shift = step.reshape(2, problem.dimension, len(basis)).transpose(0, 2, 1)
-    beta = np.clip(basis.beta + shift / basis.alpha, -REACH, 1 + REACH)
+    beta = np.clip(basis.beta + shift / basis.alpha, -LARGEST_OVERHANG, 1 + LARGEST_OVERHANG)
     finest = problem.finest(beta)
-    alpha = np.clip(basis.alpha * np.exp(grow), COARSEST, np.maximum(finest, COARSEST))
+    alpha = np.clip(basis.alpha * np.exp(grow), LEAST_DILATION, np.maximum(finest, LEAST_DILATION))
     return Basis(alpha, beta), finest
 
 
-STEPS_FOR_ONE = 10
-"""Quasi-Newton steps that are taken for each requested step of variable projection."""
+QUASI_NEWTON_STEPS = 10
+"""Quasi-Newton steps for each requested step of variable projection: they are shorter."""
 
 
 def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
@@ -472,8 +477,12 @@ def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolera
 
     ceiling = np.broadcast_to(np.maximum(problem.finest(basis.beta), basis.alpha), basis.alpha.shape)
     free = np.full(coefficients, np.inf)
-    low = [-free, np.full(basis.alpha.size, np.log(COARSEST)), (-REACH * basis.alpha).ravel()]
-    high = [free, np.log(ceiling).ravel(), ((1.0 + REACH) * basis.alpha).ravel()]
+    low = [
+        -free,
+        np.full(basis.alpha.size, np.log(LEAST_DILATION)),
+        (-LARGEST_OVERHANG * basis.alpha).ravel(),
+    ]
+    high = [free, np.log(ceiling).ravel(), ((1.0 + LARGEST_OVERHANG) * basis.alpha).ravel()]
     begin = [
         (start.coefficients / scale).ravel(),
         np.log(basis.alpha).ravel(),
@@ -485,10 +494,13 @@ def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolera
         jac=True,
         method="L-BFGS-B",
         bounds=Bounds(np.concatenate(low), np.concatenate(high)),
-        options={"maxiter": STEPS_FOR_ONE * steps, "ftol": tolerance / problem.samples / STEPS_FOR_ONE},
+        options={
+            "maxiter": QUASI_NEWTON_STEPS * steps,
+            "ftol": tolerance / problem.samples / QUASI_NEWTON_STEPS,
+        },
     )
     _, moved = apart(found.x)
-    resolved = np.maximum(problem.finest(moved.beta), COARSEST)
+    resolved = np.maximum(problem.finest(moved.beta), LEAST_DILATION)
     best = problem.solve(Basis(np.minimum(moved.alpha, resolved), moved.beta))
     return best if best.objective < start.objective else start
 

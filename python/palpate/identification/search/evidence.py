@@ -28,7 +28,7 @@ from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...verdict import Finding
 from ..data.compression import (
-    TRIM,
+    TRIMMED_SHARE,
     Compressed,
     Compressor,
     HeldOutRows,
@@ -44,16 +44,18 @@ from ..network.fitted import FittedNetwork, PathPoint
 from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
 
-BINNING_SHARE = 0.05
-"""Error that cells of positions may add, as a share of the RMS error; above it the cells are halved."""
+MOST_BINNING_SHARE = 0.05
+"""Largest error from gathering positions in cells, as a share of the RMS error [-]. Above it the cells are
+halved."""
 
-ROBUST_GAIN = 0.5
-"""Fall of the squared error, as a share, that a trimmed mean must show to outweigh a mean that shows none."""
+LEAST_TRIMMED_GAIN = 0.5
+"""Least fall of the trimmed squared error, as a share, that replaces a mean without a fall [-]. Half of the
+error cannot come from the few trimmed groups."""
 
 LEAST_HELD_OUT = 20
-"""Held-out rows below which they are too few to refuse a model class."""
+"""Least number of held-out rows that can refuse a model class. Fewer are too uncertain."""
 
-ALL = slice(None)
+ALL_ROWS = slice(None)
 """Every row."""
 
 CRITERIA: dict[str, Callable[[float, int], float]] = {
@@ -129,7 +131,7 @@ def criterion_of(
 
 def held_out_deviance(criterion: str, rows: HeldOutRows, errors: Float1D) -> float:
     """Criterion of a network that leaves these errors on held-out rows."""
-    counted = rows.felt(errors) if criterion == "perceptual" else errors
+    counted = rows.in_jnd(errors) if criterion == "perceptual" else errors
     smallest = (1e-12 * float(np.ptp(rows.force))) ** 2 * len(counted)
     return deviance(criterion, max(float(counted @ counted), smallest, TINY), len(counted), 0)
 
@@ -271,9 +273,11 @@ class Candidate:
         basis, weights = self.solution.basis, self.solution.coefficients[:, 1 + self.problem.dimension :]
         bends = wavelet_curvature_columns(self.rows.positions, basis.alpha, basis.beta)
         curvature = np.column_stack([np.abs(bend @ weights.T).max(axis=1) for bend in bends])
-        return binning_error(self.rows, curvature) > BINNING_SHARE * self.problem.resolved_rmse(self.solution)
+        return binning_error(self.rows, curvature) > MOST_BINNING_SHARE * self.problem.resolved_rmse(
+            self.solution
+        )
 
-    def force_at(self, rows: slice = ALL) -> Float1D:
+    def force_at(self, rows: slice = ALL_ROWS) -> Float1D:
         """Force over position at every row (n,), or at some."""
         return self._force(self.data.box[rows], None if self.side is None else self.side[rows])
 
@@ -342,7 +346,7 @@ class Report:
     """Those on the signs of position and force"""
 
     def replaces(self, other: Report, note: str) -> None:
-        """Begins with the path of a climb that this one replaces, and with the reason."""
+        """Begins with the path of a selection that this one replaces, and with the reason."""
         self.path[:0] = other.path
         self.notes.insert(0, note)
 
@@ -393,7 +397,7 @@ class Samples:
             known = strokes.known if only is None else only & strokes.known
             rows = self._compressor.rows(strokes.side, known)
             if not strokes.known.all():
-                rows = rows.standing_for(self._compressor.samples(only))
+                rows = rows.reweighted_to(self._compressor.samples(only))
         return rows if self.data.period is None else around_seam(rows)
 
     def problem(self, rows: Compressed, strokes: HysteresisInput | None = None) -> SeparableProblem:
@@ -417,7 +421,7 @@ class Samples:
         strokes = above.strokes
         if strokes is None or strokes.known.all() or self._for_criterion:
             return below
-        rows = self._compressor.rows(below.side, strokes.known).standing_for(above.rows.samples)
+        rows = self._compressor.rows(below.side, strokes.known).reweighted_to(above.rows.samples)
         problem = self.problem(rows)
         solved = problem.solve(below.solution.basis)
         solution = problem.with_coefficients(solved, below.solution.coefficients)
@@ -443,17 +447,17 @@ class Samples:
         share, error = gain(*errors)
         if share > error:
             return share, error
-        trimmed = gain(*errors, trim=TRIM)
-        return trimmed if trimmed[0] > max(trimmed[1], ROBUST_GAIN) else (share, error)
+        trimmed = gain(*errors, trim=TRIMMED_SHARE)
+        return trimmed if trimmed[0] > max(trimmed[1], LEAST_TRIMMED_GAIN) else (share, error)
 
 
 @dataclass(frozen=True)
 class Judgement:
     """The comparison of two candidates."""
 
-    earned: bool
+    accepted: bool
     """The upper one is accepted"""
-    why: str
+    reason: str
     """Its gain, in words"""
     criterion_falls: bool
     """The criterion falls by enough: if it is not accepted, held-out rows refuse it"""
@@ -480,17 +484,17 @@ class Judge:
 
     def better(self, below: Candidate, above: Candidate) -> Candidate:
         """The upper candidate if it is accepted, else the lower one; adds a note on its gain."""
-        return above if self.noted(below, above).earned else below
+        return above if self.noted(below, above).accepted else below
 
     def noted(self, below: Candidate, above: Candidate, *, errors: float = 1.0) -> Judgement:
         """The comparison of two candidates, with a note."""
         judged = self.compared(below, above, errors=errors)
-        self._report.decisions.append(decided(above.model_class, judged.earned, judged.why))
+        self._report.decisions.append(decided(above.model_class, judged.accepted, judged.reason))
         return judged
 
-    def earned(self, below: Candidate, above: Candidate) -> bool:
+    def accepts(self, below: Candidate, above: Candidate) -> bool:
         """True if the upper candidate is accepted."""
-        return self.compared(below, above).earned
+        return self.compared(below, above).accepted
 
     def fall(self, below: Candidate, above: Candidate) -> float:
         """Fall of the criterion from one candidate to another, on the rows that both know."""

@@ -12,49 +12,52 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._typing import Float1D
-from ..data.limits import RESOLVED
-from ..network.basis import COARSEST_CANDIDATE, LIBRARY_ENTRIES, Basis, truncated_frame
+from ..data.limits import FORCE_RESOLUTION
+from ..network.basis import COARSEST_CANDIDATE, MOST_LIBRARY_ENTRIES, Basis, truncated_frame
 from ..network.fitted import PathPoint
 from ..network.separable import SeparableProblem, Solution, refine, refine_all
 from ..options import IdentifyOptions
 from .evidence import CRITERIA, ON_HELD_OUT_ROWS, choice, criterion_of, enough, report
 from .selection import Library, orthogonal_gains, residual_gains, select_backward
 
-PRUNE_CANDIDATES = 3
-"""Wavelets tried for removal before pruning gives up."""
+MOST_PRUNE_TRIALS = 3
+"""Largest number of wavelets tried for removal in succession. The cheapest ones come first, so more rarely
+succeed."""
 
-PRUNE_HOPE = 6.0
-"""A removal is tried if refinement would have to win back at most this many times the wavelet's own price."""
+MOST_REMOVAL_COST = 6.0
+"""Largest cost of a removal before refinement, in prices of one wavelet, that is tried [-]. Refinement seldom
+recovers more."""
 
-WITHOUT_NOISE = 5
-"""Positions that a wavelet's core must hold where noise is too small to be taken for structure."""
+LEAST_CORE_POSITIONS = 5
+"""Least number of positions in a wavelet's core if noise is too small to be taken for structure."""
 
-LEAST_EVENNESS = 0.5
-"""Evenness of a residual from which it is noise, and finer wavelets are not tried."""
+LEAST_NOISE_EVENNESS = 0.5
+"""Least evenness of a residual that is noise [-]: 1 for normal noise. Finer wavelets are then not tried."""
 
-WORTH_FINER = 4.0
-"""Factor by which the error must fall by wavelets finer than noise would allow."""
+FINER_ERROR_RATIO = 4.0
+"""Least factor by which finer wavelets must reduce the error [-]. Fitted noise reduces it by less."""
 
 SIGNIFICANT_CORRELATION = 3.0
-"""Standard errors of the correlation of neighbouring residuals from which they are structure."""
+"""Correlation of neighbouring residuals above which they are structure [standard errors]."""
 
-SMOOTH = 0.25
-"""Share of the positions that a core holds at least while a force over several inputs is tried as smooth."""
+SMOOTH_CORE_SHARE = 0.25
+"""Least share of the positions in a core while a smooth force over several inputs is tried [-]."""
 
-STRETCHED = 64
-"""Members of the frame that are tried stretched along each input, where there are several."""
+MOST_STRETCHED = 64
+"""Largest number of frame members that are also tried stretched along each of several inputs."""
 
-STARTS = 5
-"""Of these, candidates that are refined before one is taken."""
+MOST_REFINED_CANDIDATES = 5
+"""Largest number of these candidates that are refined before one is chosen."""
 
-FIRST_STEPS = 4
-"""Refinement steps that they are judged by."""
+CANDIDATE_STEPS = 4
+"""Refinement steps of each of these candidates: enough to compare them."""
 
 GROWING_TOLERANCE = 0.4
-"""While the size is open, refinement ends at steps that lower the deviance by less."""
+"""Fall of the deviance by one step below which refinement ends during growth [-]: far below the price of a
+wavelet."""
 
 FINAL_TOLERANCE = 0.04
-"""The same for the accepted network."""
+"""The same for the accepted network [-]."""
 
 
 @dataclass(frozen=True)
@@ -112,20 +115,20 @@ class Growth:
         library = library or self.library(problem)
         found = self._grown(problem, library, start, model_class, most, wide=wide)
         problem = found.problem
-        settled = wide and _little(problem, problem.rmse(found.solution))
+        settled = wide and _below_resolution(problem, problem.rmse(found.solution))
         if not free or settled or len(found.solution.basis) == 0:
             return found
         limits = problem.limits
-        if limits.independent < 1.0 or problem.rmse(found.solution) <= WORTH_FINER * limits.force_error:
+        if limits.independent < 1.0 or problem.rmse(found.solution) <= FINER_ERROR_RATIO * limits.force_error:
             return found
-        alike = problem.likeness(found.solution) > SIGNIFICANT_CORRELATION
-        even = problem.evenness(found.solution) >= LEAST_EVENNESS
-        if problem.resolved_by <= WITHOUT_NOISE or (even and not alike):
+        correlated = problem.neighbour_correlation(found.solution) > SIGNIFICANT_CORRELATION
+        is_even = problem.evenness(found.solution) >= LEAST_NOISE_EVENNESS
+        if problem.resolved_by <= LEAST_CORE_POSITIONS or (is_even and not correlated):
             return found
-        fine = replace(problem, resolved_by=WITHOUT_NOISE)
+        fine = replace(problem, resolved_by=LEAST_CORE_POSITIONS)
         finer = self._grown(fine, self.library(fine), found.solution.basis, model_class, most)
-        earned = alike and finer.criterion + search.evidence < found.criterion
-        if earned or problem.rmse(finer.solution) * WORTH_FINER < problem.rmse(found.solution):
+        accepted = correlated and finer.criterion + search.evidence < found.criterion
+        if accepted or problem.rmse(finer.solution) * FINER_ERROR_RATIO < problem.rmse(found.solution):
             return replace(finer, path=(*found.path[:-1], finer.path[-1]))
         return replace(found, problem=problem.with_prior(found.solution.rss))
 
@@ -139,7 +142,7 @@ class Growth:
             finest=float(problem.finest(positions).max()),
             frame_scale=search.frame_scale,
             frame_step=search.frame_step,
-            max_candidates=max(1, min(search.max_candidates, LIBRARY_ENTRIES // len(positions))),
+            max_candidates=max(1, min(search.max_candidates, MOST_LIBRARY_ENTRIES // len(positions))),
         )
         return Library(problem, frame)
 
@@ -148,18 +151,20 @@ class Growth:
 
         The prior of the problem that is returned is that of the last trial.
         """
-        current, value = start, self._judged(problem, start)
+        current, value = start, self._criterion_of(problem, start)
         removed = True
         while removed and len(current.basis):
             removed = False
             costs = problem.removal_costs(current)
-            for index in np.argsort(costs)[:PRUNE_CANDIDATES]:
+            for index in np.argsort(costs)[:MOST_PRUNE_TRIALS]:
                 rest = problem.solve(current.basis.without(int(index)))
-                if self._judged(problem, rest) > value + PRUNE_HOPE * self._price(problem, current):
+                if self._criterion_of(problem, rest) > value + MOST_REMOVAL_COST * self._price(
+                    problem, current
+                ):
                     break
                 problem, trial = self._improved(problem, rest, self._search.refine_steps)
-                if self._judged(problem, trial) < value:
-                    current, value, removed = trial, self._judged(problem, trial), True
+                if self._criterion_of(problem, trial) < value:
+                    current, value, removed = trial, self._criterion_of(problem, trial), True
                     break
         return problem, current
 
@@ -171,7 +176,7 @@ class Growth:
         model_class: str,
         most: int,
         *,
-        starts: int = STARTS,
+        starts: int = MOST_REFINED_CANDIDATES,
         wide: bool = False,
     ) -> Grown:
         """Grows from the wavelets of start until the criterion stops it, prunes, refines to the end.
@@ -194,7 +199,7 @@ class Growth:
             if enough(criterion, path[-1].criterion) or search.selection == "backward":
                 stop_reason = criterion
                 break
-            if wide and problem.rmse(current) <= np.sqrt(RESOLVED) * problem.force_range:
+            if wide and problem.rmse(current) <= np.sqrt(FORCE_RESOLUTION) * problem.force_range:
                 wide = False
                 if (smooth := self._smooth(problem, start, model_class, most)) is not None:
                     return smooth
@@ -228,12 +233,12 @@ class Growth:
         inputs, so that a network of them fits the rows well and errs between them. Wide ones
         cannot. Where rows of one cell differ by more, they are not tried.
         """
-        if not _little(problem, np.sqrt(problem.within / problem.samples)):
+        if not _below_resolution(problem, np.sqrt(problem.within / problem.samples)):
             return None
-        held = max(problem.resolved_by, int(SMOOTH * len(problem.blocks[0].positions)))
+        held = max(problem.resolved_by, int(SMOOTH_CORE_SHARE * len(problem.blocks[0].positions)))
         smooth = replace(problem, resolved_by=held)
         found = self._grown(smooth, self.library(smooth), start, model_class, most, starts=1)
-        if not _little(problem, problem.rmse(found.solution)):
+        if not _below_resolution(problem, problem.rmse(found.solution)):
             return None
         return replace(found, problem=replace(found.problem, resolved_by=problem.resolved_by))
 
@@ -260,13 +265,14 @@ class Growth:
         gains = measured(library, current)
         several = problem.dimension > 1 and search.refine
         if several:
-            library = library.stretched(problem, _falling(gains)[:STRETCHED])
+            library = library.stretched(problem, _falling(gains)[:MOST_STRETCHED])
             gains = measured(library, current)
-        chosen = library.unlike(_falling(gains), starts if several else 1)
+        chosen = library.distinct(_falling(gains), starts if several else 1)
         tried = [problem.solve(current.basis.joined(library.members([index]))) for index in chosen]
         if len(tried) > 1:
             tried = [
-                self._refine(problem, each, steps=FIRST_STEPS, tolerance=GROWING_TOLERANCE) for each in tried
+                self._refine(problem, each, steps=CANDIDATE_STEPS, tolerance=GROWING_TOLERANCE)
+                for each in tried
             ]
         return min(tried, key=lambda solution: solution.objective, default=None)
 
@@ -279,18 +285,18 @@ class Growth:
         problem = problem.with_prior(solution.rss)
         return problem, problem.solve(solution.basis)
 
-    def _judged(self, problem: SeparableProblem, solution: Solution) -> float:
+    def _criterion_of(self, problem: SeparableProblem, solution: Solution) -> float:
         return criterion_of(problem, solution, self._criterion)
 
     def _point(self, problem: SeparableProblem, solution: Solution, model_class: str) -> PathPoint:
         return PathPoint(
-            model_class, len(solution.basis), problem.rmse(solution), self._judged(problem, solution)
+            model_class, len(solution.basis), problem.rmse(solution), self._criterion_of(problem, solution)
         )
 
 
-def _little(problem: SeparableProblem, error: float) -> bool:
+def _below_resolution(problem: SeparableProblem, error: float) -> bool:
     """True if an error is so near to the resolution of a sensor that finer wavelets are not worth trying."""
-    return bool(error <= WORTH_FINER * RESOLVED * problem.force_range)
+    return bool(error <= FINER_ERROR_RATIO * FORCE_RESOLUTION * problem.force_range)
 
 
 def _falling(gains: Float1D) -> NDArray[np.intp]:

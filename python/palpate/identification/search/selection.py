@@ -17,21 +17,21 @@ from numpy.typing import NDArray
 from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
 from ..network.basis import Basis
-from ..network.separable import COARSEST, SeparableProblem, Solution, half_solved
+from ..network.separable import LEAST_DILATION, SeparableProblem, Solution, half_solved
 from .evidence import deviance
 
-DEPENDENT = 1e-5
-"""Share of a candidate's squared norm that must lie outside the design for it to be a new direction: more
-than the rounding of seven digits."""
+LEAST_NEW_SHARE = 1e-5
+"""Least share of a candidate's squared norm outside the design [-]: above the rounding of seven digits."""
 
-AT_ONCE = 64
-"""Candidates whose columns are computed at a time: as many as a processor's cache holds."""
+CANDIDATES_AT_ONCE = 64
+"""Candidates whose columns are computed in one step: as many as the cache of a processor holds."""
 
-UNLIKE = 1.0
-"""Distance in units of a wavelet, or difference of log(alpha), from which two may end in different minima."""
+LEAST_DISTANCE = 1.0
+"""Distance of two candidates, in widths or as difference of log(alpha), from which refinement may end in
+different minima [-]."""
 
-STRETCHES = (0.25, 0.5, 2.0, 4.0)
-"""Factors of the dilation of a candidate along one input."""
+STRETCH_FACTORS = (0.25, 0.5, 2.0, 4.0)
+"""Factors of the dilation of a candidate along one input [-]."""
 
 
 class Library:
@@ -50,8 +50,8 @@ class Library:
         for block in problem.blocks:
             self.columns.append(np.empty((block.n_channels, len(self), len(block.target)), np.float32))
             self.grams.append(np.empty((block.n_channels, block.n_channels, len(self))))
-            for first in range(0, len(self), AT_ONCE):
-                part = slice(first, first + AT_ONCE)
+            for first in range(0, len(self), CANDIDATES_AT_ONCE):
+                part = slice(first, first + CANDIDATES_AT_ONCE)
                 wavelets = wavelet_columns(block.positions, self.basis.alpha[part], self.basis.beta[part])
                 weighted = wavelets.T * block.channels.T[:, None]
                 self.columns[-1][:, part] = weighted
@@ -68,14 +68,14 @@ class Library:
     def stretched(self, problem: SeparableProblem, order: Sequence[int] | NDArray[np.intp]) -> "Library":
         """The candidates of these numbers, and each with its dilation along one input changed."""
         chosen, d = self.members(order), problem.dimension
-        combinations = [(factor, k) for k in range(d) for factor in STRETCHES]
+        combinations = [(factor, k) for k in range(d) for factor in STRETCH_FACTORS]
         factors = np.ones((1 + len(combinations), 1, d))
         for place, (factor, k) in enumerate(combinations, start=1):
             factors[place, :, k] = factor
-        alpha = np.maximum(chosen.alpha * factors, COARSEST).reshape(-1, d)
+        alpha = np.maximum(chosen.alpha * factors, LEAST_DILATION).reshape(-1, d)
         return Library(problem, Basis(alpha, np.tile(chosen.beta, (len(factors), 1))))
 
-    def unlike(self, order: NDArray[np.intp], count: int) -> list[int]:
+    def distinct(self, order: NDArray[np.intp], count: int) -> list[int]:
         """The first of these numbers, so many at most, that lie apart or differ in a dilation."""
         chosen: list[int] = []
         while len(order) and len(chosen) < count:
@@ -83,7 +83,7 @@ class Library:
             one, others = self.members(order[:1]), self.members(order)
             shift = np.abs(one.beta - others.beta) * np.sqrt(one.alpha * others.alpha)
             stretch = np.abs(np.log(one.alpha / others.alpha))
-            order = order[np.maximum(shift, stretch).max(axis=1) > UNLIKE]
+            order = order[np.maximum(shift, stretch).max(axis=1) > LEAST_DISTANCE]
         return chosen
 
 
@@ -124,7 +124,8 @@ class OrthogonalSelection:
                 fresh = fresh - factor @ (factor.T @ fresh)
             basis, triangle = np.linalg.qr(fresh)
             basis = basis[
-                :, np.abs(np.diag(triangle)) > np.sqrt(DEPENDENT) * np.maximum(norm, np.finfo(float).tiny)
+                :,
+                np.abs(np.diag(triangle)) > np.sqrt(LEAST_NEW_SHARE) * np.maximum(norm, np.finfo(float).tiny),
             ]
             shadows = _products(basis.T, columns)
             along = basis.T @ self._residuals[b]
@@ -142,13 +143,13 @@ def _falls(gram: Float2D, left: Float2D, product: Float2D) -> Float1D:
     Directions in which a candidate does not lie outside the design do not count.
     """
     if len(product) == 1:
-        new = left[0, 0] > DEPENDENT * gram[0, 0]
+        new = left[0, 0] > LEAST_NEW_SHARE * gram[0, 0]
         return np.asarray(np.where(new, product[0] ** 2 / np.where(new, left[0, 0], 1.0), 0.0))
     own = np.maximum(np.einsum("kkn->nk", gram), np.finfo(float).tiny)
     root = np.sqrt(own)
     value, vector = np.linalg.eigh(left.transpose(2, 0, 1) / (root[:, :, None] * root[:, None, :]))
     along = np.einsum("nkj,nk->nj", vector, product.T / root)
-    new = value > DEPENDENT
+    new = value > LEAST_NEW_SHARE
     return np.asarray(np.sum(np.where(new, along**2 / np.where(new, value, 1.0), 0.0), axis=1))
 
 
@@ -174,7 +175,7 @@ def residual_gains(library: Library, current: Solution) -> Float1D:
     total = np.zeros(len(library))
     for columns, gram, residual in zip(library.columns, library.grams, current.residuals, strict=True):
         along = _products(residual[None], columns)[:, 0]
-        inverse = np.linalg.pinv(gram.transpose(2, 0, 1), rcond=DEPENDENT, hermitian=True)
+        inverse = np.linalg.pinv(gram.transpose(2, 0, 1), rcond=LEAST_NEW_SHARE, hermitian=True)
         total += np.einsum("kn,nkj,jn->n", along, inverse, along)
     return total
 

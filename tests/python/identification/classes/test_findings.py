@@ -11,9 +11,9 @@ import palpate
 from imperfect import Array, line, noise, recorded, strokes, sweep, wall
 from palpate import WaveletNetworkRegressor
 from palpate.identification.classes.findings import (
-    disagreement,
+    cell_findings,
     explained_findings,
-    extreme_forces,
+    extreme_force_findings,
     likely_cause,
     unexplained_variance,
 )
@@ -43,7 +43,7 @@ def test_force_of_any_size_gives_the_same_model(scale: float) -> None:
 
 
 @pytest.mark.parametrize("offset", [1e6, 1e9, -1e12])
-def test_offset_of_the_force_does_not_hide_the_wall(offset: float) -> None:
+def test_wall_is_found_with_force_offset(offset: float) -> None:
     model = palpate.identify(recorded(X, Y + offset))
     assert model.n_wavelets == PLAIN.n_wavelets
     assert model.fit.nrmse == pytest.approx(PLAIN.fit.nrmse, rel=0.01)
@@ -51,7 +51,7 @@ def test_offset_of_the_force_does_not_hide_the_wall(offset: float) -> None:
 
 
 @pytest.mark.parametrize("offset", [1e6, 1e9])
-def test_offset_of_the_position_does_not_hide_the_wall(offset: float) -> None:
+def test_wall_is_found_with_position_offset(offset: float) -> None:
     model = palpate.identify(recorded(X + offset, Y))
     assert model.n_wavelets >= 3
     assert model.fit.nrmse == pytest.approx(PLAIN.fit.nrmse, rel=0.01)
@@ -77,13 +77,13 @@ def test_slope_bounds_hold_for_huge_forces() -> None:
     ("x", "y", "words"),
     [
         (X, Y * 1e150, "force reaches"),
-        (X, Y * 1e-150, "the largest force is"),
+        (X, Y * 1e-150, "the largest .force. is"),
         (X * 1e200, Y, "position reaches"),
-        (X * 1e-200, Y, "position spans"),
+        (X * 1e-200, Y, "position has a range of"),
     ],
 )
 def test_numbers_beyond_the_bound_are_refused_with_it(x: Array, y: Array, words: str) -> None:
-    with pytest.raises(palpate.InputError, match=rf"{words} .*e[+-]\d+; .*Use another unit"):
+    with pytest.raises(palpate.InputError, match=rf"{words} .*e[+-]\d+: .*Use another unit"):
         palpate.identify(recorded(x, y))
 
 
@@ -96,9 +96,9 @@ def test_a_file_of_forces_beyond_the_bound_is_refused_without_warnings(
     side = np.tile(np.repeat([0.1, -0.1], 400), 2)
     table = np.column_stack([x, scale * (np.sin(5.0 * x) + 2.0 * x - 3.0 + side)])
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="depth_mm,force_N", comments="")
-    with pytest.raises(palpate.InputError, match=r"force reaches .*; the limit is 1e\+100"):
+    with pytest.raises(palpate.InputError, match=r"force reaches .*: must be at most 1e\+100"):
         (palpate.identify_files if out_of_core else palpate.identify)(tmp_path / "a.csv")
-    with pytest.raises(palpate.InputError, match=r"force reaches .*; the limit is 1e\+100"):
+    with pytest.raises(palpate.InputError, match=r"force reaches .*: must be at most 1e\+100"):
         palpate.verify(PLAIN, tmp_path / "a.csv")
 
 
@@ -107,21 +107,21 @@ def test_few_extreme_forces_do_not_hide_the_error_of_the_others() -> None:
     residual = np.concatenate([noise(990), np.zeros(10)])
     error = RowError(residual, force, np.ones(1000))
     assert error.nrmse < 1e-3
-    (finding,) = extreme_forces(error)
+    (finding,) = extreme_force_findings(error)
     assert finding.level == "no"
-    assert "without the 1% of most extreme force" in finding.sentence
-    assert extreme_forces(RowError(0.01 * residual, force, np.ones(1000))) == []
+    assert "without the 1% with the most extreme forces" in finding.sentence
+    assert extreme_force_findings(RowError(0.01 * residual, force, np.ones(1000))) == []
 
 
-def test_error_on_rows_far_above_that_on_cells_is_a_no() -> None:
+def test_error_on_rows_far_above_error_on_cells_gives_verdict_no() -> None:
     error = RowError(noise(1000), line(sweep(1000)), np.ones(1000))
-    (finding,) = disagreement(error, 0.1 * error.rmse, 0.6, 1024)
+    (finding,) = cell_findings(error, 0.1 * error.rmse, 0.6, 1024)
     assert finding.level == "no"
-    assert "raise max_positions" in finding.sentence
-    assert disagreement(error, 0.9 * error.rmse, 0.6, 1024) == []
+    assert "increase max_positions" in finding.sentence
+    assert cell_findings(error, 0.9 * error.rmse, 0.6, 1024) == []
 
 
-def test_few_rows_for_many_numbers_are_reported() -> None:
+def test_too_few_rows_per_parameter_are_reported() -> None:
     rows = 30
     model = palpate.identify(recorded(sweep(rows), wall(sweep(rows)) + noise(rows)))
     assert model.n_parameters > rows / 3
@@ -140,7 +140,7 @@ def test_noise_alone_gives_no_wavelet() -> None:
     assert model.verdict.level == "no"
 
 
-def test_a_force_far_beyond_the_recorded_ones_between_the_rows_is_no_good_model() -> None:
+def test_force_far_beyond_the_recorded_range_between_rows_is_not_good() -> None:
     """The motion reverses at the start of the play: the rows contain no pressed force there."""
     time = 1e-3 * np.arange(8000)
     x = 2.0 * np.pi * (1.0 - np.cos(2.0 * np.pi * time / 4.0))
@@ -150,8 +150,8 @@ def test_a_force_far_beyond_the_recorded_ones_between_the_rows_is_no_good_model(
     model = palpate.identify(palpate.Recording.from_arrays(x, force, time), period=2.0 * np.pi)
     q = np.linspace(0.0, 0.02, 200)
     largest = max(np.abs(model.force(q, direction=np.full(200, side))).max() for side in (1.0, -1.0))
-    told = any("between the rows the model's force reaches" in reason for reason in model.verdict.reasons)
-    assert told == (largest > 1.25 * float(np.ptp(force)))
+    reported = any("between the rows the force of the model is" in reason for reason in model.verdict.reasons)
+    assert reported == (largest > 1.25 * float(np.ptp(force)))
     assert model.verdict.level == "no" or largest < 2.0 * float(np.ptp(force))
 
 

@@ -21,7 +21,7 @@ def wandering(n: int, seed: int) -> np.ndarray:
     return np.interp(np.arange(n) / 200.0, np.arange(len(turns)), turns)
 
 
-def test_where_the_input_is_known_no_history_before_the_motion_changes_it() -> None:
+def test_known_hysteresis_input_does_not_depend_on_earlier_motion() -> None:
     rng = np.random.default_rng(3)
     for seed in range(MOTIONS):
         motion, radius = wandering(1500, seed), float(rng.uniform(0.001, 0.3))
@@ -49,7 +49,7 @@ def test_a_motion_that_begins_in_the_middle_of_its_play_is_fitted_to_its_noise()
 
 @pytest.mark.parametrize("radius", [0.0033, 0.0071])
 @pytest.mark.parametrize("noise", [0.0, 2e-3], ids=["rendered", "measured"])
-def test_a_play_between_those_tried_is_found_and_costs_no_wavelets(radius: float, noise: float) -> None:
+def test_play_radius_between_the_options_is_found_without_more_wavelets(radius: float, noise: float) -> None:
     """Wavelets grown at a wrong radius model the error of the radius without limit."""
     x = 0.45 * wandering(10_000, 1)
     side = HysteresisInput.of_play([x], radius).side
@@ -82,7 +82,7 @@ def test_one_play_radius_is_taken_as_given() -> None:
     assert model.play_radius == pytest.approx(0.02 * np.ptp(x))
 
 
-def test_models_of_several_inputs_are_not_laid_beside_each_other() -> None:
+def test_models_of_several_inputs_are_not_compared() -> None:
     rng = np.random.default_rng(0)
     X = rng.uniform(0.0, 1.0, (400, 2))
     recording = Recording.from_arrays(X[:, 0], X.sum(axis=1), inputs={"temperature": X[:, 1]})

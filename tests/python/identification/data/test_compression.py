@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from palpate.identification.data.compression import (
-    BLOCKS,
+    HELD_OUT_BLOCKS,
     Compressed,
     Compressor,
     binning_error,
@@ -49,7 +49,7 @@ def test_rows_of_different_sides_are_kept_apart() -> None:
     assert rows.within == 0.0
 
 
-def test_what_stays_within_cells_is_noise_and_not_the_slope_across_them() -> None:
+def test_variance_within_cells_excludes_the_slope_across_them() -> None:
     random = np.random.default_rng(1)
     x = random.uniform(0.0, 1.0, 50_000)
     noise = random.normal(0.0, 0.02, len(x))
@@ -92,14 +92,14 @@ def test_a_million_rows_compress_to_a_bounded_number() -> None:
     assert rows.weight.sum() == 1_000_000
 
 
-def test_fresh_stretches_of_a_motion_are_not_scattered_rows() -> None:
+def test_held_out_rows_of_a_motion_are_stretches() -> None:
     scattered, stretches = held_out_rows(10_000, None), held_out_rows(10_000, (0,))
     assert scattered.mean() == pytest.approx(0.2)
     assert stretches.mean() == pytest.approx(0.2)
-    assert np.count_nonzero(np.diff(stretches.astype(int))) == 2 * BLOCKS / 5
+    assert np.count_nonzero(np.diff(stretches.astype(int))) == 2 * HELD_OUT_BLOCKS / 5
 
 
-def test_a_gain_has_an_error_of_its_own() -> None:
+def test_gain_has_a_standard_error() -> None:
     random = np.random.default_rng(0)
     noise = random.normal(size=50_000)
     share, error = gain(2.0 * noise, noise)
@@ -110,7 +110,7 @@ def test_a_gain_has_an_error_of_its_own() -> None:
     assert gain(np.zeros(100), np.zeros(100)) == (0.0, 0.0)
 
 
-def test_a_trimmed_gain_leaves_out_groups_at_both_ends() -> None:
+def test_trimmed_gain_drops_groups_at_both_ends() -> None:
     below, above = np.full(1000, 2.0), np.ones(1000)
     above[:60] = 100.0
     share, error = gain(below, above)

@@ -66,7 +66,7 @@ IMPERFECT: dict[str, Callable[[Law], palpate.Recording]] = {
 
 
 @pytest.mark.parametrize("name", IMPERFECT)
-def test_line_stays_a_line(name: str) -> None:
+def test_straight_line_is_found_in_imperfect_rows(name: str) -> None:
     model = palpate.identify(IMPERFECT[name](line))
     assert model.n_wavelets <= 1
     assert true_nrmse(model, line) < 0.01
@@ -126,7 +126,7 @@ def test_position_noise_is_that_of_pauses() -> None:
 
 def test_correlation_is_named_in_the_notes() -> None:
     model = palpate.identify(correlated(0.9)(wall))
-    assert any("the noise is correlated" in note for note in model.notes["identification"])
+    assert any("The noise is correlated" in note for note in model.notes["identification"])
     assert model.fit.nrmse == pytest.approx(NOISE / np.std(wall(sweep(N))), rel=0.25)
 
 

@@ -45,7 +45,7 @@ def test_a_force_of_position_and_velocity_is_identified_and_verified_on_fresh_da
     assert fresh.nrmse == pytest.approx(0.01, rel=0.1)
 
 
-def test_each_input_has_a_dilation_of_its_own_after_refinement() -> None:
+def test_refinement_gives_each_input_a_separate_dilation() -> None:
     random = np.random.default_rng(1)
     X = random.uniform(0.0, 1.0, (3000, 2))
     r2 = (20.0 * (X[:, 0] - 0.4)) ** 2 + (4.0 * (X[:, 1] - 0.6)) ** 2
@@ -56,7 +56,7 @@ def test_each_input_has_a_dilation_of_its_own_after_refinement() -> None:
     assert network.beta[0] == pytest.approx([0.4, 0.6], abs=0.005)
 
 
-def test_an_input_without_influence_earns_no_wavelet() -> None:
+def test_input_without_influence_gets_no_wavelet() -> None:
     random = np.random.default_rng(2)
     X = random.uniform(0.0, 1.0, (2000, 3))
     network = fit_environment(X, 3.0 * X[:, 0] - X[:, 1] + random.normal(0.0, 0.1, len(X)))
@@ -99,7 +99,7 @@ def test_columns_are_named_as_in_the_file_and_their_units_converted(
     assert found["nrmse"] < 0.05
 
 
-def test_velocity_comes_from_time_where_it_is_no_column() -> None:
+def test_velocity_is_derived_from_time_without_a_column() -> None:
     t = np.arange(0.0, 20.0, 1e-3)
     x = 0.5 - 0.5 * np.cos(2.0 * np.pi * (0.5 * t + 0.02 * t**2))
     v = np.gradient(x, t)
@@ -115,11 +115,11 @@ def test_velocity_comes_from_time_where_it_is_no_column() -> None:
     ("inputs", "reported"),
     [
         ("position,place", "has no input place, only position, velocity; read the recording with"),
-        ("position,hysteresis,velocity", "hysteresis is identified over position alone"),
+        ("position,hysteresis,velocity", "hysteresis needs position as the only other input"),
         ("position,position", "inputs is 'position,position'"),
     ],
 )
-def test_an_input_that_cannot_be_had_is_refused_in_one_sentence(inputs: str, reported: str) -> None:
+def test_unavailable_input_is_refused_in_one_sentence(inputs: str, reported: str) -> None:
     with pytest.raises(InputError, match=reported):
         identify(contact(0, 100), inputs=inputs)
 
@@ -130,7 +130,7 @@ def test_a_velocity_without_time_is_refused() -> None:
         identify(Recording.from_arrays(x, x), inputs="position,velocity")
 
 
-def test_strokes_that_one_recording_does_not_state_leave_hysteresis_untested_and_say_so() -> None:
+def test_hysteresis_is_not_tested_if_one_recording_lacks_direction() -> None:
     x = np.concatenate([np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)])
     side = np.repeat([1.0, -1.0], 200)
     force = x + 0.2 * side + np.random.default_rng(0).normal(0.0, 0.01, 400)
@@ -138,7 +138,7 @@ def test_strokes_that_one_recording_does_not_state_leave_hysteresis_untested_and
     order = np.random.default_rng(1).permutation(400)
     shuffled = Recording.from_arrays(x[order], force[order])
     reported = str(identify([stated, shuffled]).verdict)
-    assert "hysteresis was not tested: recording 2 has no direction" in reported
+    assert "hysteresis was not tested: the rows of recording 2 have no direction" in reported
     assert identify([stated, stated]).kind == "hysteresis"
     assert identify([stated, Recording.from_arrays(x, force)]).kind == "hysteresis"
 
@@ -165,11 +165,15 @@ def knob(turns: float, n: int = 400, *, end: bool = False, seed: int = 0) -> Rec
     return Recording.from_arrays(x, force)
 
 
-def test_a_turn_that_lacks_one_step_is_closed_and_the_gap_is_reported(tmp_path: Path) -> None:
+def test_period_with_a_missing_step_is_closed_and_the_gap_reported(tmp_path: Path) -> None:
     model = identify(knob(1.0), period=TURN)
     assert float(model.upper[0] - model.lower[0]) == pytest.approx(TURN, rel=1e-12)
     assert model.fit.nrmse < 0.03
-    (note,) = (note for note in model.notes["identification"] if note.startswith("the gap of 0.01571"))
+    (note,) = (
+        note
+        for note in model.notes["identification"]
+        if note.startswith("The positions leave a gap of 0.01571")
+    )
     assert "0.25 % of the period" in note
     assert model.verdict.level == "good"
     again = load_model(model.save(tmp_path / "knob.json"))
@@ -221,12 +225,12 @@ def test_a_period_of_several_inputs_is_refused() -> None:
     random = np.random.default_rng(0)
     X = random.uniform(0.0, 1.0, (200, 2))
     with pytest.raises(
-        InputError, match="period is for a force over position alone, not over position, load"
+        InputError, match="the inputs are position, load: period needs position as the only input"
     ):
         fit_environment(X, X.sum(axis=1), None, IdentifyOptions(period=1.0), names=("position", "load"))
 
 
-def test_every_measured_turn_takes_its_period(data: Path) -> None:
+def test_measured_turns_are_identified_with_their_period(data: Path) -> None:
     for path in sorted((data / "motor_cogging").glob("map_*.csv")):
         kept, held = read_recording(path, position="angle_rad", force="hold_current_A").split(5)
         model = identify(kept, period=6.283185307179586)
@@ -254,7 +258,7 @@ def test_a_slow_motion_leaves_the_static_force(filters: str, mass: float, dampin
     assert wrong < 0.1 * np.abs(recording.force - 3.0 * recording.position).max() + 0.01
 
 
-def test_the_target_is_the_force_less_the_filtered_motion() -> None:
+def test_target_is_force_minus_filtered_motion() -> None:
     recording = spring(20.0)
     options = IdentifyOptions(
         search=SearchOptions(filters="paper-explicit", assumed_mass=0.01, assumed_damping=0.2)
@@ -290,9 +294,9 @@ def test_matched_identification_of_a_moving_object_is_closer_to_its_force() -> N
 
 def test_other_periods_than_the_papers_are_refused() -> None:
     x = np.linspace(0.0, 1.0, 100)
-    with pytest.raises(InputError, match=r"filters need time"):
+    with pytest.raises(InputError, match=r"the recording has no time, which the paper's filters need"):
         identify(Recording.from_arrays(x, x), search=SearchOptions(filters="paper-implicit"))
-    with pytest.raises(InputError, match=r"made for steps of 0.001 s; the recording's are from 0.01 to 0.01"):
+    with pytest.raises(InputError, match=r"are 0.01 to 0.01 s: the paper's filters need 0.001 s"):
         identify(
             Recording.from_arrays(x, x, time=0.01 * np.arange(100)),
             search=SearchOptions(filters="paper-explicit"),

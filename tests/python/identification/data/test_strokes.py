@@ -29,7 +29,7 @@ def bare(rows: np.ndarray, force: np.ndarray) -> Recording:
 
 
 def notes(model: Model) -> str:
-    return "\n".join(model.notes["identification"])
+    return "\n".join([*model.notes["model_selection"], *model.notes["identification"]])
 
 
 PRESS, RELEASE = np.arange(400), np.arange(400, 800)
@@ -40,7 +40,7 @@ def test_strokes_come_from_the_order_of_rows_and_are_reported() -> None:
     found = identify(Recording.from_arrays(IN_AND_OUT, loop()))
     assert found.kind == "hysteresis"
     assert found.fit.nrmse == stated.fit.nrmse
-    assert "direction is taken from the order of rows: 1 turn" in notes(found)
+    assert "The direction is taken from the order of rows: 1 turn." in notes(found)
     assert str(found.verdict) == "good"
 
 
@@ -68,7 +68,7 @@ def test_one_file_for_each_stroke_is_not_taken_for_two_objects(stated: bool) -> 
 
 def test_two_files_parted_by_their_force_are_not_taken_for_two_objects() -> None:
     recordings = [bare(PRESS, loop(h=1.0)), bare(RELEASE[::-1], loop(h=1.0))]
-    assert "recording 1 is taken as press, recording 2 as release" in str(identify(recordings).verdict)
+    assert "recording 1 is taken as press and recording 2 as release" in str(identify(recordings).verdict)
     assert "probably of two objects" not in str(identify(recordings).verdict)
     assert "probably of two objects" in str(identify(recordings, inputs="position").verdict)
 
@@ -86,16 +86,16 @@ def test_two_files_sorted_by_position_are_parted_by_their_force(first: np.ndarra
     half = (found.force(x, direction=np.ones(3)) - found.force(x, direction=-np.ones(3))) / 2
     assert half == pytest.approx(0.2, abs=0.02)
     press = 1 if first is PRESS else 2
-    assert f"recording {press} is taken as press, recording {3 - press} as release" in str(found.verdict)
+    assert f"recording {press} is taken as press and recording {3 - press} as release" in str(found.verdict)
     assert found.verdict.level == "usable"
 
 
-def test_repetitions_of_one_stroke_are_no_loop() -> None:
+def test_repetitions_of_one_stroke_are_not_hysteresis() -> None:
     repeats = [bare(PRESS, loop(seed) + 0.02 * seed) for seed in range(3)]
     found = identify(repeats)
     assert found.kind == "position"
     assert str(found.verdict) == "good"
-    assert "hysteresis was not tested: the position never turns back" in notes(found)
+    assert "hysteresis: not tested (the position never turns back in the order of rows)" in notes(found)
 
 
 def test_two_repetitions_of_both_strokes_are_parted_in_pairs() -> None:
@@ -114,7 +114,7 @@ def test_two_strokes_in_one_file_without_order_are_reported_with_their_differenc
     found = identify(Recording.from_arrays(IN_AND_OUT[rows], loop()[rows], units={"force": "N"}))
     reported = str(found.verdict)
     assert reported.startswith("usable: hysteresis was not tested")
-    assert "two values at the same position, typically 0.39" in reported
+    assert "At the same position the force has two values, typically 0.39" in reported
     assert " N apart" in reported
     assert "add a column direction" in reported
     stated = Recording.from_arrays(IN_AND_OUT[rows], loop()[rows], direction=SIDE[rows])
@@ -125,7 +125,7 @@ def test_a_difference_below_the_noise_is_bounded_where_rows_are_in_no_order() ->
     rows = np.random.default_rng(5).permutation(800)
     reported = str(identify(bare(rows, loop(h=0.05, noise=0.2))).verdict)
     assert (
-        "its rows are in no order. At the same position the force has a standard deviation of 0.19"
+        "are not in recorded order. At the same position the force has a standard deviation of 0.19"
         in reported
     )
 
@@ -145,11 +145,11 @@ def test_repeated_rows_of_one_stroke_with_noise_give_no_finding(times: int) -> N
         assert not strokes_of([bare(rows, IN_AND_OUT + loop(seed, noise=0.3))], named=False).findings
 
 
-def test_strokes_that_do_not_differ_leave_the_model_as_it_was() -> None:
+def test_equal_strokes_do_not_change_the_model() -> None:
     """Equal to the last bit to the model of the same rows without order."""
     force = loop(h=0.0)
     ordered = identify(Recording.from_arrays(IN_AND_OUT, force))
-    assert "1 turn; press and release do not differ" in notes(ordered)
+    assert "hysteresis: not accepted (press and release do not differ by 4 standard errors)" in notes(ordered)
     rows = np.random.default_rng(5).permutation(800)
     shuffled = strokes_of([bare(rows, force)], named=False)
     assert shuffled.side is None
@@ -162,11 +162,11 @@ def test_verify_takes_strokes_from_the_order_of_rows() -> None:
     stated = verify(model, Recording.from_arrays(IN_AND_OUT, loop(1), direction=SIDE))
     found = verify(model, Recording.from_arrays(IN_AND_OUT, loop(1)))
     assert found.nrmse == stated.nrmse
-    assert "direction is taken from the order of rows: 1 turn" in found.notes
+    assert "The direction is taken from the order of rows: 1 turn." in found.notes
     for rows, word in ((PRESS, "press"), (RELEASE, "release"), (RELEASE[::-1], "release")):
         one = verify(model, bare(rows, loop(1)))
         assert one.nrmse == pytest.approx(stated.nrmse, rel=0.2)
-        assert any(f"all rows are taken as {word}" in note for note in one.notes)
+        assert any(f"All rows are taken as {word}" in note for note in one.notes)
 
 
 @pytest.mark.parametrize("hold_out", [[], ["--hold-out-every", "5"]], ids=["all_rows", "held_out"])

@@ -74,7 +74,7 @@ def test_every_member_of_the_truncated_frame_has_data_within_it(dimension: int) 
     assert nearest.max() <= 0.75 * np.sqrt(dimension) + 1e-12
 
 
-def test_the_truncated_frame_ends_within_the_level_that_would_not_fit() -> None:
+def test_truncated_frame_ends_within_first_level_above_the_limit() -> None:
     positions = np.linspace(0.0, 1.0, 1000)[:, None]
     frame = truncated_frame(
         positions, coarsest=1.0, finest=400.0, frame_scale=2.0, frame_step=0.5, max_candidates=100
@@ -85,7 +85,7 @@ def test_the_truncated_frame_ends_within_the_level_that_would_not_fit() -> None:
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 @pytest.mark.parametrize("count", [1, 2, 7, 40])
-def test_so_many_positions_are_within_reach_and_no_fewer(dimension: int, count: int) -> None:
+def test_reach_contains_the_given_number_of_positions(dimension: int, count: int) -> None:
     random = np.random.default_rng(count)
     positions = random.normal(size=(40, dimension)).round(6)
     places = np.concatenate([random.normal(scale=2.0, size=(200, dimension)), positions[:5]])

@@ -131,7 +131,7 @@ def test_the_bounded_least_squares_is_the_best_one() -> None:
     assert best <= kept.rss <= best * 1.01
 
 
-def test_hysteresis_that_vanishes_with_noise_stays_non_negative_at_no_price() -> None:
+def test_vanishing_noisy_hysteresis_stays_nonnegative_without_error() -> None:
     x = np.linspace(0.0, 0.004, 300)
     positions, force, side = strokes(0.05 * np.clip(1.0 - x / 0.002, 0.0, None), x, 0.002)
     bounded = fit_environment(positions, force, side)
@@ -140,10 +140,10 @@ def test_hysteresis_that_vanishes_with_noise_stays_non_negative_at_no_price() ->
     assert g_and_h(bounded, fine)[1].min() >= 0.0
     assert g_and_h(free, fine)[1].min() < 0.0
     assert bounded.rmse <= 1.02 * free.rmse
-    assert any("h >= 0" in note for note in bounded.notes)
+    assert any("press force >= release force imposed" in note for note in bounded.notes)
 
 
-def test_a_stroke_that_crosses_over_is_met_half_way_where_it_does() -> None:
+def test_crossing_strokes_are_replaced_by_their_mean() -> None:
     """If the release is above the press, h = 0 and g is their mean; elsewhere nothing changes."""
     x = np.linspace(0.0, 0.004, 400)
     h = 0.05 * np.sin(np.pi * x / 0.002)
@@ -194,11 +194,14 @@ def test_a_monotone_force_never_falls() -> None:
     fine = np.linspace(0.0, 1.0, 100_001)
     columns = wavelet_slope_columns(fine, network.alpha, network.beta)
     assert (columns @ network.weight + network.linear[0]).min() >= 0.0
-    assert any("slope bounds imposed over the domain, RMS error" in note for note in network.notes)
+    assert any(
+        "slope bounds imposed over the whole domain, which changes the RMS error from" in note
+        for note in network.notes
+    )
 
 
 @pytest.mark.parametrize("hysteresis", [False, True], ids=["one-force", "two-strokes"])
-def test_a_fixed_force_is_met_and_costs_little(hysteresis: bool) -> None:
+def test_fixed_force_is_kept_with_small_error(hysteresis: bool) -> None:
     random = np.random.default_rng(5)
     x = np.tile(np.linspace(0.0, 0.6, 600), 2)
     side = np.repeat([1.0, -1.0], 600) if hysteresis else None
@@ -214,7 +217,9 @@ def test_a_fixed_force_is_met_and_costs_little(hysteresis: bool) -> None:
 
 def test_a_fixed_force_outside_the_data_is_refused() -> None:
     x = np.linspace(0.0, 1.0, 50)
-    with pytest.raises(InputError, match="fixed_force is at 2, outside the positions from 0 to 1"):
+    with pytest.raises(
+        InputError, match="fixed_force is at position 2: must be within the recorded positions, 0 to 1"
+    ):
         fit_environment(x[:, None], x, None, IdentifyOptions(fixed_force=(2.0, 0.0)))
 
 
@@ -240,14 +245,14 @@ def reported(recording: Recording) -> list[str]:
     assert recording.direction is not None
     network = fit_environment(recording.position[:, None], recording.force, recording.direction.astype(float))
     assert network.model_class == "hysteresis"
-    return [note for note in network.notes if "release lies above press" in note]
+    return [note for note in network.notes if "release is up to" in note]
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_late_force_crosses_its_strokes_and_the_notes_say_where(seed: int) -> None:
+def test_notes_give_position_where_a_late_force_crosses_its_strokes(seed: int) -> None:
     recording = pressed_onto_a_wall(LATE_S, seed)
     (note,) = reported(recording)
-    found = re.search(r"by up to (\S+) between (\S+) and (\S+), ", note)
+    found = re.search(r"release is up to (\S+) above press between (\S+) and (\S+); ", note)
     assert found is not None
     depth, near, far = map(float, found.groups())
     # the wall moves by 2 v late = 0.06 mm between the strokes
@@ -258,5 +263,5 @@ def test_a_late_force_crosses_its_strokes_and_the_notes_say_where(seed: int) -> 
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_strokes_that_only_touch_are_not_told(seed: int) -> None:
+def test_touching_strokes_are_not_reported(seed: int) -> None:
     assert reported(pressed_onto_a_wall(0.0, seed)) == []

@@ -10,8 +10,8 @@ from palpate.identification import IdentifyOptions
 from palpate.identification.data.compression import Compressor
 from palpate.identification.network.basis import Basis, truncated_frame
 from palpate.identification.network.separable import (
-    COARSEST,
-    REACH,
+    LARGEST_OVERHANG,
+    LEAST_DILATION,
     SeparableProblem,
     _gradient,
     problem_of,
@@ -75,9 +75,9 @@ def test_refinement_is_never_worse_than_its_start_and_keeps_its_bounds(seed: int
     start = problem.solve(any_basis(seed, 8))
     refined = descend(problem, start, steps=25, tolerance=0.0)
     assert refined.objective <= start.objective
-    assert np.all(refined.basis.alpha >= COARSEST)
-    assert np.all(refined.basis.alpha <= np.maximum(problem.finest(refined.basis.beta), COARSEST))
-    assert np.all((refined.basis.beta >= -REACH) & (refined.basis.beta <= 1 + REACH))
+    assert np.all(refined.basis.alpha >= LEAST_DILATION)
+    assert np.all(refined.basis.alpha <= np.maximum(problem.finest(refined.basis.beta), LEAST_DILATION))
+    assert np.all((refined.basis.beta >= -LARGEST_OVERHANG) & (refined.basis.beta <= 1 + LARGEST_OVERHANG))
 
 
 @pytest.mark.parametrize("kind", ["one force", "two strokes", "play"])
@@ -98,7 +98,7 @@ def test_quasi_newton_descends_along_the_gradient_of_all_parameters(kind: str) -
     assert (value(1e-6) - value(-1e-6)) / 2e-6 == pytest.approx(slope, rel=1e-5)
 
 
-def test_refinement_finds_the_wavelet_that_made_the_force() -> None:
+def test_refinement_finds_the_generating_wavelet() -> None:
     x = np.linspace(0.0, 1.0, 400)
     problem = problem_from(x, 2.0 * x - 1.0 + 0.7 * hat(x, 13.0, 0.37))
     start = problem.solve(Basis(np.array([[8.0]]), np.array([[0.41]])))
@@ -107,7 +107,7 @@ def test_refinement_finds_the_wavelet_that_made_the_force() -> None:
     assert refined.basis.beta[0, 0] == pytest.approx(0.37, abs=1e-7)
 
 
-def test_no_dilation_runs_away_on_a_jump() -> None:
+def test_dilations_stay_bounded_on_a_jump() -> None:
     """A discontinuity pulls dilations to infinity; the resolution of the data limits them."""
     x = np.linspace(0.0, 1.0, 300)
     problem = problem_from(x, np.where(x < 0.5, 0.0, 1.0))
@@ -128,7 +128,7 @@ def test_one_of_two_coincident_wavelets_is_removed_at_no_cost() -> None:
     assert pruned.rss <= doubled.rss * (1 + 1e-6)
 
 
-def test_growth_settles_on_the_number_of_wavelets_that_made_the_force() -> None:
+def test_growth_finds_the_number_of_generating_wavelets() -> None:
     x = np.linspace(0.0, 1.0, 1000)
     y = 3.0 * x + hat(x, 20.0, 0.3) - 0.5 * hat(x, 9.0, 0.7)
     y = y + np.random.default_rng(1).normal(0.0, 0.01, len(x))
@@ -144,7 +144,7 @@ def test_growth_settles_on_the_number_of_wavelets_that_made_the_force() -> None:
     assert sorted(grown.solution.basis.beta[:, 0]) == pytest.approx([0.3, 0.7], abs=2e-3)
 
 
-def test_growth_says_that_the_largest_network_stopped_it() -> None:
+def test_stop_reason_is_max_wavelets_at_the_limit() -> None:
     x = np.linspace(0.0, 1.0, 300)
     problem = problem_from(x, np.sin(30.0 * x))
     frame = truncated_frame(

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stopping on held-out rows, model classes accepted on them, and outliers."""
 
+import re
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,14 @@ def wall(n: int, seed: int, noise: float = 0.02) -> tuple[np.ndarray, np.ndarray
     return x, truth, truth + random.normal(0.0, noise, n)
 
 
-def test_the_one_standard_error_rule_takes_the_smallest_network_that_is_no_worse() -> None:
+def test_one_standard_error_rule_takes_smallest_network_within_one_error() -> None:
     values = [500.0, 60.0, 9.0, 4.0, 5.0]
     assert standard_error(50) == 10.0
     assert choice("fresh", values, 50) == 2
     assert choice("bic", values, 50) == 3
 
 
-def test_the_perceptual_rule_takes_the_first_network_that_is_not_told_apart() -> None:
+def test_perceptual_rule_takes_first_network_below_noticeable_difference() -> None:
     assert choice("perceptual", [500.0, -3.0, -80.0], 50) == 1
     assert choice("perceptual", [500.0, 30.0, 40.0], 50) == 1
     assert enough("perceptual", -3.0)
@@ -38,11 +39,11 @@ def test_the_perceptual_rule_takes_the_first_network_that_is_not_told_apart() ->
 
 def test_a_difference_is_felt_above_seven_percent_or_one_percent_of_the_largest() -> None:
     rows = HeldOutRows(np.zeros((3, 1)), np.array([0.0, 1.0, 10.0]), None)
-    np.testing.assert_allclose(rows.felt(np.array([0.1, 0.1, 0.7])), [1.0, 1.0, 1.0])
+    np.testing.assert_allclose(rows.in_jnd(np.array([0.1, 0.1, 0.7])), [1.0, 1.0, 1.0])
 
 
 @pytest.mark.parametrize("criterion", ["fresh", "perceptual"])
-def test_rules_on_fresh_rows_stop_earlier_and_say_so(criterion: str) -> None:
+def test_criteria_on_held_out_rows_stop_earlier_and_set_stop_reason(criterion: str) -> None:
     x, _, y = wall(4000, 0)
     network = fit_environment(x[:, None], y, None, IdentifyOptions(criterion=criterion))
     plain = fit_environment(x[:, None], y)
@@ -53,7 +54,7 @@ def test_rules_on_fresh_rows_stop_earlier_and_say_so(criterion: str) -> None:
     assert fitted[-1].n_wavelets <= max(point.n_wavelets for point in fitted)
 
 
-def test_held_back_rows_outside_the_fitted_range_refuse_no_network() -> None:
+def test_held_out_rows_outside_fitted_range_do_not_refuse_a_network() -> None:
     """One held-out stretch continues into a wall without fitted rows."""
     n = 2000
     x = 0.5 - 0.5 * np.cos(20.0 * np.pi * np.arange(n) / n)
@@ -69,7 +70,7 @@ def test_held_back_rows_outside_the_fitted_range_refuse_no_network() -> None:
     assert network.nrmse < 0.02
 
 
-def test_a_smaller_network_is_tried_if_held_back_rows_refuse_a_larger_one(
+def test_smaller_network_is_tried_if_held_out_rows_refuse_a_larger_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def gains(_: Samples, below: object, above: Any) -> tuple[float, float]:
@@ -80,16 +81,16 @@ def test_a_smaller_network_is_tried_if_held_back_rows_refuse_a_larger_one(
     network = fit_environment(x[:, None], y)
     assert (network.model_class, network.stop_reason) == ("position", "held-out rows")
     assert 1 <= len(network.weight) <= 3
-    assert sum(note.startswith("position refused: bic falls by") for note in network.notes) >= 1
+    assert [str(decision) for decision in network.decisions][-1].startswith("curve over position: accepted (")
+    replaced = "Replaced decision: curve over position: not accepted (squared error on held-out rows +100 "
+    assert sum(note.startswith(replaced) for note in network.notes) >= 1
 
 
-def test_what_each_model_class_gains_on_held_out_rows_stands_in_the_notes() -> None:
-    notes = identify(sample_recording(1, duration_s=20.0)).notes["identification"]
-    assert any(
-        note.startswith("linear accepted: bic falls by ") and "held-out rows falls by" in note
-        for note in notes
-    )
-    assert any(note.startswith("position accepted: bic falls by ") for note in notes)
+def test_decisions_report_gain_of_each_model_class_on_held_out_rows() -> None:
+    straight, curve, *_ = identify(sample_recording(1, duration_s=20.0)).notes["model_selection"]
+    reason = r"accepted \(squared error on held-out rows -\S+ \+- \S+ %, BIC -\d+\)"
+    assert re.fullmatch(f"straight line: {reason}", straight)
+    assert re.fullmatch(f"curve over position: {reason}", curve)
 
 
 @pytest.mark.parametrize("selection", ["orthogonal", "residual", "backward"])
@@ -121,8 +122,8 @@ def test_outliers_do_not_move_the_force_under_hubers_loss() -> None:
     assert error("squares") > 3.0 * robust
 
 
-def test_hubers_loss_costs_little_where_there_are_no_outliers() -> None:
+def test_hubers_loss_changes_error_little_without_outliers() -> None:
     x, _, y = wall(3000, 4)
     network = fit_environment(x[:, None], y, None, IdentifyOptions(loss="huber"))
     assert network.rmse == pytest.approx(0.02, rel=0.15)
-    assert any("were weighed down" in note for note in network.notes)
+    assert any("have less weight" in note for note in network.notes)

@@ -11,10 +11,16 @@ from palpate._core.model import wavelet_columns
 from palpate._typing import Float1D
 from palpate.identification import IdentifyOptions
 from palpate.identification.data.compression import Compressor
-from palpate.identification.data.limits import RESOLVED
+from palpate.identification.data.limits import FORCE_RESOLUTION
 from palpate.identification.network.basis import Basis
-from palpate.identification.network.separable import COARSEST, CORE, SeparableProblem, problem_of
-from palpate.identification.search.growth import SMOOTH, WITHOUT_NOISE, WORTH_FINER, Grown, Growth
+from palpate.identification.network.separable import CORE_RADIUS, LEAST_DILATION, SeparableProblem, problem_of
+from palpate.identification.search.growth import (
+    FINER_ERROR_RATIO,
+    LEAST_CORE_POSITIONS,
+    SMOOTH_CORE_SHARE,
+    Grown,
+    Growth,
+)
 
 OPTIONS = IdentifyOptions()
 
@@ -33,11 +39,11 @@ def grown(problem: SeparableProblem) -> Grown:
     return Growth(OPTIONS).grow(problem, Basis.empty(problem.dimension), "position")
 
 
-def test_without_noise_wavelets_become_as_fine_as_a_kink_needs() -> None:
+def test_without_noise_wavelets_resolve_a_kink() -> None:
     problem = kinked(0.0)
     coarse = problem.finest(np.array([[0.25]]))[0, 0]
     found = grown(problem)
-    assert found.problem.resolved_by == WITHOUT_NOISE
+    assert found.problem.resolved_by == LEAST_CORE_POSITIONS
     assert found.solution.basis.alpha.max() > 1.05 * coarse
     assert problem.rmse(found.solution) < 1e-3
 
@@ -75,22 +81,22 @@ def errors_between_rows(found: Grown, law: Callable[[Float1D, Float1D], Float1D]
     return np.asarray(np.column_stack([np.ones(len(x)), x, wavelets]) @ coefficients - law(x[:, 0], x[:, 1]))
 
 
-def test_a_smooth_force_over_two_inputs_is_left_to_wide_wavelets(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_smooth_force_over_two_inputs_has_wide_wavelets(monkeypatch: pytest.MonkeyPatch) -> None:
     """Between distant rows, their error is less than half that of the network that fits the rows best."""
     problem = over_two_inputs(smooth, 200)
     found = grown(problem)
-    assert problem.rmse(found.solution) <= WORTH_FINER * RESOLVED * problem.force_range
+    assert problem.rmse(found.solution) <= FINER_ERROR_RATIO * FORCE_RESOLUTION * problem.force_range
     assert found.problem.resolved_by == OPTIONS.search.resolved_by
-    problem = replace(problem, resolved_by=int(SMOOTH * 200))
+    problem = replace(problem, resolved_by=int(SMOOTH_CORE_SHARE * 200))
     widest = problem.finest(found.solution.basis.beta)
-    assert np.all(found.solution.basis.alpha <= np.maximum(widest, COARSEST) * (1.0 + 1e-9))
+    assert np.all(found.solution.basis.alpha <= np.maximum(widest, LEAST_DILATION) * (1.0 + 1e-9))
     monkeypatch.setattr(Growth, "_smooth", lambda *_: None)
     narrow = grown(over_two_inputs(smooth, 200))
     ours, theirs = (np.linalg.norm(errors_between_rows(each, smooth)) for each in (found, narrow))
     assert ours < 0.5 * theirs
 
 
-def test_what_is_not_smooth_is_grown_as_if_wide_wavelets_had_not_been_tried(
+def test_force_with_a_kink_is_grown_as_without_wide_wavelets(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     tried, wide = [], Growth._smooth
@@ -113,7 +119,7 @@ def test_wide_wavelets_are_not_tried_where_there_is_noise(monkeypatch: pytest.Mo
 def detents(noise: float, seed: int = 0) -> SeparableProblem:
     """Returns a knob with 20 detents of either sign, each five samples wide."""
     random, x = np.random.default_rng(seed), np.linspace(0.0, 1.0, 300)
-    alpha, beta = np.full((20, 1), 2.0 * CORE / (5.0 / len(x))), np.linspace(0.03, 0.97, 20)[:, None]
+    alpha, beta = np.full((20, 1), 2.0 * CORE_RADIUS / (5.0 / len(x))), np.linspace(0.03, 0.97, 20)[:, None]
     y = wavelet_columns(x[:, None], alpha, beta) @ random.choice([-1.0, 1.0], 20)
     y = y + random.normal(0.0, noise, len(x))
     return problem_of(
@@ -121,16 +127,16 @@ def detents(noise: float, seed: int = 0) -> SeparableProblem:
     )
 
 
-def test_where_neighbours_agree_about_what_is_left_wavelets_become_finer() -> None:
+def test_correlated_residuals_lead_to_finer_wavelets() -> None:
     problem = detents(0.1)
     found = grown(problem)
-    assert found.problem.resolved_by == WITHOUT_NOISE
+    assert found.problem.resolved_by == LEAST_CORE_POSITIONS
     assert len(found.solution.basis) == 20
     assert problem.rmse(found.solution) < 0.11
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_neighbours_do_not_agree_about_noise(seed: int) -> None:
+def test_noise_has_no_neighbour_correlation(seed: int) -> None:
     problem = kinked(0.03, seed)
     assert problem.likeness(grown(problem).solution) < 3.0
     assert problem.likeness(problem.solve(Basis.empty(1))) > 10.0

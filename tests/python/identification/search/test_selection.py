@@ -12,8 +12,8 @@ from palpate.identification.network.basis import Basis, truncated_frame
 from palpate.identification.network.separable import SeparableProblem, problem_of
 from palpate.identification.search.evidence import CRITERIA, ON_HELD_OUT_ROWS, deviance
 from palpate.identification.search.selection import (
-    STRETCHES,
-    UNLIKE,
+    LEAST_DISTANCE,
+    STRETCH_FACTORS,
     Library,
     OrthogonalSelection,
     orthogonal_gains,
@@ -42,7 +42,7 @@ def library_of(problem: SeparableProblem, rows: Compressed) -> Library:
 
 
 @pytest.mark.parametrize("kind", SIDES)
-def test_gains_are_what_a_new_least_squares_would_gain(kind: str) -> None:
+def test_gains_equal_those_of_a_new_least_squares(kind: str) -> None:
     rows = rows_of(kind)
     problem = problem_of(rows, resolved_by=5)
     library = library_of(problem, rows)
@@ -78,7 +78,7 @@ def test_updated_factors_give_the_error_of_a_new_least_squares_along_the_whole_p
     assert path.best == int(np.argmin(path.criterion))
 
 
-def test_a_candidate_that_is_already_there_gains_nothing_and_is_never_taken_twice() -> None:
+def test_candidate_in_the_design_has_zero_gain_and_is_not_taken_twice() -> None:
     rows = rows_of("one force")
     problem = problem_of(rows, resolved_by=5)
     twice = Basis(np.array([[8.0], [8.0], [3.0]]), np.array([[0.4], [0.4], [0.6]]))
@@ -87,7 +87,7 @@ def test_a_candidate_that_is_already_there_gains_nothing_and_is_never_taken_twic
     assert 2 in path.order
 
 
-def test_selection_finds_the_wavelets_that_made_the_force() -> None:
+def test_selection_finds_the_generating_wavelets() -> None:
     x = np.linspace(0.0, 1.0, 300)
     u, v = 16.0 * (x - 0.5), 8.0 * (x - 0.25)
     y = 1.0 + 2.0 * x + 3.0 * (u * u - 1) * np.exp(-u * u / 2) - 2.0 * (v * v - 1) * np.exp(-v * v / 2)
@@ -106,30 +106,30 @@ def test_stretched_members_differ_from_a_member_in_one_dilation() -> None:
         problem, Basis(np.array([[2.0, 2.0], [4.0, 4.0]]), np.array([[0.3, 0.5], [0.7, 0.2]]))
     )
     stretched = round_ones.stretched(problem, [1, 0]).basis
-    assert len(stretched) == 2 * (1 + 2 * len(STRETCHES))
+    assert len(stretched) == 2 * (1 + 2 * len(STRETCH_FACTORS))
     for alpha, beta in zip(stretched.alpha, stretched.beta, strict=True):
         own = int(np.flatnonzero((round_ones.basis.beta == beta).all(axis=1))[0])
         changed = alpha != round_ones.basis.alpha[own]
         assert changed.sum() <= 1
-        assert set(alpha[changed] / round_ones.basis.alpha[own][changed]) <= set(STRETCHES)
+        assert set(alpha[changed] / round_ones.basis.alpha[own][changed]) <= set(STRETCH_FACTORS)
 
 
-def test_wavelets_that_are_tried_beside_each_other_are_unlike() -> None:
+def test_distinct_candidates_differ_in_position_or_dilation() -> None:
     rows = rows_of("one force")
     library = library_of(problem_of(rows, resolved_by=5), rows)
-    chosen = library.unlike(np.arange(len(library)), 8)
+    chosen = library.distinct(np.arange(len(library)), 8)
     assert len(chosen) == 8
     for first, second in itertools.combinations(chosen, 2):
         alpha, beta = library.basis.alpha[[first, second], 0], library.basis.beta[[first, second], 0]
         apart = abs(beta[0] - beta[1]) * np.sqrt(alpha[0] * alpha[1])
-        assert max(apart, abs(np.log(alpha[0] / alpha[1]))) > UNLIKE
+        assert max(apart, abs(np.log(alpha[0] / alpha[1]))) > LEAST_DISTANCE
 
 
 @pytest.mark.parametrize("criterion", sorted(set(CRITERIA) - set(ON_HELD_OUT_ROWS)))
-def test_every_criterion_charges_for_parameters_and_rewards_a_smaller_error(criterion: str) -> None:
+def test_every_criterion_rises_with_parameters_and_falls_with_error(criterion: str) -> None:
     assert deviance(criterion, 1.0, 100, 5) < deviance(criterion, 1.0, 100, 6)
     assert deviance(criterion, 0.9, 100, 5) < deviance(criterion, 1.0, 100, 5)
 
 
-def test_bic_charges_the_logarithm_of_the_number_of_samples() -> None:
+def test_bic_price_is_the_logarithm_of_the_number_of_samples() -> None:
     assert deviance("bic", 50.0, 1000, 7) == pytest.approx(1000 * np.log(0.05) + 7 * np.log(1000))

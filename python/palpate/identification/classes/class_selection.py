@@ -16,7 +16,6 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import InputError
-from ...recording.comparison import amount
 from ..data.compression import Compressed
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
@@ -29,24 +28,24 @@ from ..search.evidence import Candidate, Judge, Report, Samples, criterion_of
 from ..search.growth import Grown, Growth
 from .dynamics import Dynamics
 
-WORTH_REGROWING = 1.01
-"""Ratio of the RMS errors with and without constraints from which wavelets are grown to suit them."""
+REGROWTH_ERROR_RATIO = 1.01
+"""Ratio of the RMS errors with and without constraints above which wavelets are grown to suit them [-]."""
 
-SMALLER_ERRORS = 3.0
-"""Standard errors by which a smaller network must improve on held-out rows: each further try may succeed by
-chance."""
+SMALLER_NETWORK_STANDARD_ERRORS = 3.0
+"""Fall of the error on held-out rows that a smaller network must show [standard errors]. It is more than 1
+because each further trial may succeed by chance."""
 
-HELD_OUT = "held-out rows"
-"""Reason for which growth stopped, if held-out rows refused a larger network."""
+HELD_OUT_STOP_REASON = "held-out rows"
+"""Stop reason of growth if held-out rows refused a larger network."""
 
 VELOCITY_INPUTS = ("position", "velocity")
 """Inputs of a force that depends on the motion."""
 
-NETWORKS = {("position",): "position", VELOCITY_INPUTS: "velocity"}
+NETWORK_CLASSES = {("position",): "position", VELOCITY_INPUTS: "velocity"}
 """Inputs of a network and the name of its model class; others: network."""
 
 
-class Climb:
+class ClassSelection:
     """One model selection over the rows of one recording, and the best candidate so far.
 
     Parameters
@@ -57,8 +56,8 @@ class Climb:
         Tried in this order, the simplest first.
     cells : int
         Distinct positions that are kept apart.
-    before : Climb, optional
-        A climb over nearly the same rows: growth begins with the wavelets that it ended with.
+    previous : ClassSelection, optional
+        A selection over nearly the same rows: growth begins with the wavelets that it ended with.
     on_held_out : bool
         False: the criterion alone decides, not the held-out rows.
     """
@@ -69,13 +68,13 @@ class Climb:
         options: IdentifyOptions,
         classes: Sequence[type[ModelClass]],
         cells: int,
-        before: Climb | None = None,
+        previous: ClassSelection | None = None,
         *,
         on_held_out: bool = True,
     ) -> None:
         self.data, self.options, self.classes, self.cells = data, options, classes, cells
-        self.report: Report = Report(list(before.report.path) if before else [])
-        self.begun: dict[str, Basis] = dict(before.begun) if before else {}
+        self.report: Report = Report(list(previous.report.path) if previous else [])
+        self.start_basis: dict[str, Basis] = dict(previous.start_basis) if previous else {}
         """Wavelets of each model class that growth begins with"""
         self.samples = Samples(data, options, cells)
         self.judge = Judge(self.samples, options, self.report, on_held_out=on_held_out)
@@ -88,17 +87,17 @@ class Climb:
             self.report.notes.append(f"{self.samples.used} of {given} rows are used, evenly spread.")
         self.best = constant(self)
         """The candidate of the highest class that the judge accepted"""
-        self.take(classes)
+        self.try_classes(classes)
 
-    def take(self, classes: Sequence[type[ModelClass]]) -> None:
+    def try_classes(self, classes: Sequence[type[ModelClass]]) -> None:
         """Tries model classes one after the other, each above the best candidate so far."""
         for model_class in classes:
             if model_class.possible(self):
                 self.best = model_class(self).better(self.best)
 
-    def again(self, data: Rows, *, cells: int | None = None, keep: bool = False) -> Climb:
-        """Climbs the same classes over changed rows. With keep, growth begins where this climb ended."""
-        return Climb(
+    def repeated(self, data: Rows, *, cells: int | None = None, keep: bool = False) -> ClassSelection:
+        """Selects the same classes over changed rows. With keep, growth begins where this selection ended."""
+        return ClassSelection(
             data,
             self.options,
             self.classes,
@@ -162,11 +161,11 @@ class Climb:
         kept = impose(problem, candidate.solution, bounds)
         if kept is candidate.solution:
             return candidate
-        if problem.rmse(kept) > WORTH_REGROWING * candidate.rmse and any(bound.seam for bound in bounds):
+        if problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse and any(bound.seam for bound in bounds):
             # Equal slopes at both ends of a period may cost more than the corner that they avoid.
             bounds = [bound for bound in bounds if not (bound.seam and bound.of_slope)]
             kept = impose(problem, candidate.solution, bounds)
-        worse = problem.rmse(kept) > WORTH_REGROWING * candidate.rmse
+        worse = problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse
         if options.search.refine and worse and len(kept.basis) and not all(bound.seam for bound in bounds):
             moved = moved_to_bounds(problem, candidate.rows, candidate.solution, bounds)
             compatible = self.samples.problem(moved, candidate.strokes)
@@ -182,18 +181,17 @@ class Climb:
         """Sentences on imposed bounds: their cost, and the largest height of release above press."""
         names, unit = " and ".join(dict.fromkeys(bound.name for bound in bounds)), self.data.force_unit
         note = (
-            f"{in_words(free.model_class)}: {names} imposed over the whole domain, which changes the RMS error "
-            f"from {amount(free.rmse, unit)} to {amount(rmse, unit)}."
+            f"{in_words(free.model_class)}: {names} imposed over the whole domain, which changes the RMS "
+            f"error from {unit.interval(free.rmse, rmse)}."
         )
         above = crossing(free.problem, free.solution) if self.options.hysteresis_nonnegative else None
         if above is None:
             return note
         lower, reach, position = float(self.data.lower[0]), float(self.data.reach[0]), self.data.position_unit
         return (
-            f"{note} Without this constraint release is up to {amount(above.height, unit)} above press between "
-            f"{amount(lower + reach * above.start, position)} and "
-            f"{amount(lower + reach * above.end, position)}; a passive object cannot do that. The force may "
-            "be recorded late: try --force-late-s."
+            f"{note} Without this constraint release is up to {unit.text(above.height)} above press at "
+            f"{position.interval(lower + reach * above.start, lower + reach * above.end)}; a passive "
+            "object cannot do that. The force may be recorded late: try --force-late-s."
         )
 
     def bounds(self, problem: SeparableProblem) -> list[Bound]:
@@ -228,11 +226,11 @@ class Climb:
 class ModelClass(ABC):
     """A kind of force law that may be accepted above the candidates of simpler classes."""
 
-    def __init__(self, climb: Climb) -> None:
-        self._climb = climb
+    def __init__(self, selection: ClassSelection) -> None:
+        self._selection = selection
 
     @classmethod
-    def possible(cls, climb: Climb) -> bool:
+    def possible(cls, selection: ClassSelection) -> bool:
         """True if the options and the rows allow this class."""
         return True
 
@@ -245,71 +243,73 @@ class Linear(ModelClass):
     """A straight line over every input, where there are rows enough."""
 
     def better(self, below: Candidate) -> Candidate:
-        climb = self._climb
+        selection = self._selection
         if below.problem.n_parameters(0) >= below.problem.samples:
             return below
-        return climb.judge.better(below, climb.recorded(climb.constrained(straight_line(climb))))
+        return selection.judge.better(
+            below, selection.recorded(selection.constrained(straight_line(selection)))
+        )
 
 
 class Network(ModelClass):
     """A wavelet network over the inputs, named after them."""
 
-    def __init__(self, climb: Climb) -> None:
-        super().__init__(climb)
-        self.name = NETWORKS.get(climb.data.names, "network")
+    def __init__(self, selection: ClassSelection) -> None:
+        super().__init__(selection)
+        self.name = NETWORK_CLASSES.get(selection.data.names, "network")
 
     @classmethod
-    def possible(cls, climb: Climb) -> bool:
+    def possible(cls, selection: ClassSelection) -> bool:
         """True if the options allow wavelets."""
-        return climb.options.max_wavelets > 0
+        return selection.options.max_wavelets > 0
 
     def better(self, below: Candidate) -> Candidate:
         """The network that is accepted, or the candidate below.
 
         If held-out rows refuse a network that the criterion prefers, networks of half its size are tried.
         """
-        size, errors = self._climb.options.max_wavelets, 1.0
+        size, errors = self._selection.options.max_wavelets, 1.0
         if below.problem.n_parameters(1) >= below.problem.samples:
             return below
         while size > 0:
             above = self._of_size(size)
-            judged = self._climb.judge.noted(below, above, errors=errors)
-            if judged.earned:
+            judged = self._selection.judge.noted(below, above, errors=errors)
+            if judged.accepted:
                 return above
             size = above.n_wavelets // 2 if judged.criterion_falls else 0
-            errors = SMALLER_ERRORS
+            errors = SMALLER_NETWORK_STANDARD_ERRORS
         return below
 
     def _of_size(self, size: int) -> Candidate:
         """A network of at most that many wavelets, with its constraints."""
-        climb = self._climb
-        whole = size == climb.options.max_wavelets
-        problem = climb.samples.problem(climb.rows)
+        selection = self._selection
+        whole = size == selection.options.max_wavelets
+        problem = selection.samples.problem(selection.rows)
         start = Basis.empty(problem.dimension)
         if whole:
-            start = climb.begun.get(self.name, start)
-        grown = climb.grown(problem, start, self.name, size)
+            start = selection.start_basis.get(self.name, start)
+        grown = selection.grown(problem, start, self.name, size)
         if whole:
-            climb.begun[self.name] = grown.solution.basis
-        reason = grown.stop_reason if whole else HELD_OUT
-        return climb.constrained(climb.candidate(self.name, grown.problem, grown.solution, reason))
+            selection.start_basis[self.name] = grown.solution.basis
+        reason = grown.stop_reason if whole else HELD_OUT_STOP_REASON
+        return selection.constrained(selection.candidate(self.name, grown.problem, grown.solution, reason))
 
 
-def constant(climb: Climb) -> Candidate:
-    """The mean force, which every climb starts from."""
-    straight = straight_line(climb)
+def constant(selection: ClassSelection) -> Candidate:
+    """The mean force, which every selection starts from."""
+    straight = straight_line(selection)
     rows, problem = straight.rows, straight.problem
     coefficients = np.zeros_like(straight.solution.coefficients)
     coefficients[0, 0] = float(np.average(rows.force, weights=rows.weight))
     level = problem.with_coefficients(straight.solution, coefficients)
     reason = "data" if problem.n_parameters(0) >= problem.samples else straight.stop_reason
-    return climb.recorded(
+    return selection.recorded(
         replace(straight, model_class="constant", solution=level, n_parameters=1, stop_reason=reason)
     )
 
 
-def straight_line(climb: Climb) -> Candidate:
+def straight_line(selection: ClassSelection) -> Candidate:
     """The straight line without its constraints."""
-    problem = climb.samples.problem(climb.rows)
+    problem = selection.samples.problem(selection.rows)
     solution = problem.solve(Basis.empty(problem.dimension))
-    return climb.candidate("linear", problem, solution, climb.options.criterion)
+    return selection.candidate("linear", problem, solution, selection.options.criterion)
