@@ -248,7 +248,7 @@ class Plan:
         if self.certificate is None:
             return (usable("the plan has no certificate: make a plan for a device with palpate plan"),)
         if self.certificate.refused:
-            cure = f"; the object {self.needs}" if self.needs else ""
+            cure = f". The object {self.needs}" if self.needs else ""
             reason = "" if self.needs else f": {self.certificate.reason}"
             return (no(f"no structure can render the model on this device{cure}{reason}"),)
         if not self.certificate.certified:
@@ -263,23 +263,23 @@ class Plan:
 
     def _force_findings(self) -> tuple[Finding, ...]:
         error = self.force_error
-        if error.share <= FORCE_FLOOR:
+        refused = self.certificate is not None and self.certificate.refused
+        if refused or error.share <= FORCE_FLOOR:
             return ()
         unit = self.model.units["force"] or "in the model's unit"
         difference = (
-            f"the felt force differs from the identified force by up to {error.largest:.3g} {unit}, "
-            f"{_percent(error.share)} of its range"
+            f"the force error is up to {error.largest:.3g} {unit}, {_percent(error.share)} of the force range"
         )
         if error.share <= ACCEPTED_FORCE_ERROR:
             return (usable(difference),)
         if error.share <= self.accept_force_error:
-            return (usable(f"{difference}; at most {_percent(self.accept_force_error)} are accepted"),)
-        cause = f"; the object {self.needs}" if self.needs else ""
+            return (usable(f"{difference}; at most {_percent(self.accept_force_error)} is accepted"),)
+        cause = f". The object {self.needs}" if self.needs else ""
         share = math.ceil(100.0 * error.share) / 100.0
         return (
             no(
-                f"{difference}; at most {_percent(self.accept_force_error)} are accepted{cause}; "
-                f"to accept this error, give --accept-force-error {share:g} (in Python accept_force_error)"
+                f"{difference}: at most {_percent(self.accept_force_error)} is accepted{cause}. To accept "
+                f"this error, give --accept-force-error {share:g} (in Python accept_force_error)"
             ),
         )
 

@@ -137,7 +137,7 @@ def test_requested_prediction_is_used_or_refused() -> None:
     assert weak.verdict.level == "no"
     assert weak.scheme.predict == 1
     assert "b >= T B(M, s_, m) needs 0.04" in weak.refused[0]
-    assert weak.needs.startswith("needs b >= 0.04")
+    assert weak.needs.startswith("needs device damping b >= 0.04")
     for wrong in ("on", -1, 17, 2.0, True):
         with pytest.raises(InputError, match="predict is"):
             plan(model, KNOB, predict=wrong)  # type: ignore[arg-type]
