@@ -187,8 +187,8 @@ class Plan:
         steepest = max(0.0, self.certificate.bounds.slope_max)
         if not self.scheme.has_coupling:
             return steepest, steepest
-        softened = slope_behind_coupling(steepest, self.scheme.coupling_stiffness)
-        return softened, softened if self.scheme.compensated else steepest
+        rendered_slope = slope_behind_coupling(steepest, self.scheme.coupling_stiffness)
+        return rendered_slope, rendered_slope if self.scheme.compensated else steepest
 
     def summary(self) -> dict[str, str]:
         """Returns the main properties of a certified plan for display, by name."""
@@ -196,9 +196,9 @@ class Plan:
         error, certificate = self.force_error, self.certificate
         rows = {"structure": self.description}
         unit = self.model.units["force"] or "in the model's unit"
-        softened, steepest = self.slopes_behind_coupling
-        if softened < steepest:
-            rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {softened:.4g}"
+        rendered_slope, steepest = self.slopes_behind_coupling
+        if rendered_slope < steepest:
+            rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {rendered_slope:.4g}"
         rows["force error"] = (
             f"up to {error.largest:.4g} {unit}, "
             f"{100.0 * error.share:.3g} % of the range; RMS {100.0 * error.rms_share:.3g} % of the spread"
