@@ -284,17 +284,7 @@ def findings(text: Text) -> Iterator[tuple[str, str]]:
 
 
 READERS = {".py": python_texts, ".cpp": cpp_texts, ".hpp": cpp_texts, ".md": page_texts}
-SCRIPTS = (
-    ".sh",
-    ".cmake",
-    ".toml",
-    ".yml",
-    "run",
-    "Makefile",
-    "CMakeLists.txt",
-    ".clang-tidy",
-    ".clang-format",
-)
+SCRIPTS = (".sh", ".cmake", ".toml", ".clang-tidy", ".clang-format", "Makefile", "CMakeLists.txt", "run")
 READERS |= dict.fromkeys(SCRIPTS, script_texts)
 """Reader for each suffix or name of a file"""
 
@@ -336,5 +326,5 @@ if __name__ == "__main__":
         sys.stdout.flush()
     except BrokenPipeError:  # the reader of the output has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        status = 1
+        sys.exit(1)
     sys.exit(status)

@@ -5,8 +5,8 @@ python bench/identification/compare_methods.py [P1 ...] [--draws 12] [--json FIL
 
 Each draw has different positions and noise. Numbers are medians of the draws; error, wavelets and parameters
 also have their range. All methods run one after the other in every draw, so a busy machine slows all of them.
-The slowest run in the first draws only. "over ours" is the median ratio of a method's fit and tuning time to
-the time of palpate.
+The slowest run in the first draws only. "over palpate" is the median ratio of a method's fit and tuning time
+to the time of palpate.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from bench.identification.methods import METHODS, Fitted, Method
 from bench.identification.problems import NAMES, TITLES, Problem, problem
 from bench.studies import SCALE, count, write_results
 
-OURS = METHODS[0].name
+PALPATE = METHODS[0].name
 
-SLOW = 5.0
-"""Time relative to palpate above which a method runs in the first FEW draws only"""
+SLOW_TIME_RATIO = 5.0
+"""Time relative to palpate above which a method runs in the first DRAWS_OF_SLOW_METHODS draws only"""
 
-FEW = 3
+DRAWS_OF_SLOW_METHODS = 3
 
 
-def skipped(method: Method, rows: Problem) -> str | None:
+def reason_to_skip(method: Method, rows: Problem) -> str | None:
     """Returns the reason why a method skips a problem, or None."""
     if rows.X.shape[1] not in method.inputs:
         return "one input only"
@@ -43,44 +43,53 @@ def skipped(method: Method, rows: Problem) -> str | None:
     return None
 
 
-def measured(name: str, wanted: int, methods: Sequence[Method]) -> list[dict[str, Any]]:
+def measure(name: str, n_draws: int, methods: Sequence[Method]) -> list[dict[str, Any]]:
     """Returns medians and ranges over the draws for each method, or the reason why it was skipped."""
-    found: dict[str, list[tuple[float, Fitted]]] = {method.name: [] for method in methods}
+    results: dict[str, list[tuple[float, Fitted]]] = {method.name: [] for method in methods}
     reasons: dict[str, str] = {}
-    for draw in range(wanted):
+    for draw in range(n_draws):
         rows = problem(name, draw)
         for method in methods:
-            if (reason := reasons.get(method.name) or skipped(method, rows)) is not None:
+            if (reason := reasons.get(method.name) or reason_to_skip(method, rows)) is not None:
                 reasons[method.name] = reason
                 continue
-            if _sits_out(found[method.name], found.get(OURS)):
+            if is_skipped_as_slow(results[method.name], results.get(PALPATE)):
                 continue
             try:
                 fitted = method.fit(rows.X, rows.y)
             except ImportError as missing:
                 reasons[method.name] = f"needs {missing.name}"
                 continue
-            found[method.name].append((rows.nrmse(fitted.predict(rows.X_test)), fitted))
+            results[method.name].append((rows.nrmse(fitted.predict(rows.X_test)), fitted))
     return [
         {"problem": name, "method": method.name, "skipped": reasons[method.name]}
         if method.name in reasons
-        else {"problem": name, "method": method.name, **_medians(found[method.name], found.get(OURS))}
+        else {"problem": name, "method": method.name, **_medians(results[method.name], results.get(PALPATE))}
         for method in methods
     ]
 
 
-def _sits_out(theirs: Sequence[tuple[float, Fitted]], ours: Sequence[tuple[float, Fitted]] | None) -> bool:
+def is_skipped_as_slow(
+    results: Sequence[tuple[float, Fitted]], palpate_results: Sequence[tuple[float, Fitted]] | None
+) -> bool:
     """Returns true if a method is so slow that it runs in the first draws only."""
-    return len(theirs) >= FEW and ours is not None and _medians(theirs, ours)["over_ours"] > SLOW
+    return (
+        len(results) >= DRAWS_OF_SLOW_METHODS
+        and palpate_results is not None
+        and _medians(results, palpate_results)["time_over_palpate"] > SLOW_TIME_RATIO
+    )
 
 
 def _medians(
-    theirs: Sequence[tuple[float, Fitted]], ours: Sequence[tuple[float, Fitted]] | None
+    results: Sequence[tuple[float, Fitted]], palpate_results: Sequence[tuple[float, Fitted]] | None
 ) -> dict[str, Any]:
-    over = [each.seconds / own.seconds for (_, each), (_, own) in zip(theirs, ours or theirs, strict=False)]
-    errors = [error for error, _ in theirs]
-    sizes = [each.n_parameters for _, each in theirs]
-    wavelets = [each.n_wavelets for _, each in theirs if each.n_wavelets is not None]
+    time_ratios = [
+        each.seconds / reference.seconds
+        for (_, each), (_, reference) in zip(results, palpate_results or results, strict=False)
+    ]
+    errors = [error for error, _ in results]
+    sizes = [each.n_parameters for _, each in results]
+    wavelets = [each.n_wavelets for _, each in results if each.n_wavelets is not None]
     return {
         "nrmse": median(errors),
         "nrmse_range": [min(errors), max(errors)],
@@ -88,11 +97,11 @@ def _medians(
         "n_parameters_range": [min(sizes), max(sizes)],
         "n_wavelets": int(median(wavelets)) if wavelets else None,
         "n_wavelets_range": [min(wavelets), max(wavelets)] if wavelets else None,
-        "fit_s": median(each.fit_seconds for _, each in theirs),
-        "tuning_s": median(each.tuning_seconds for _, each in theirs),
-        "over_ours": median(over),
-        "setting": theirs[0][1].setting,
-        "draws": len(theirs),
+        "fit_s": median(each.fit_seconds for _, each in results),
+        "tuning_s": median(each.tuning_seconds for _, each in results),
+        "time_over_palpate": median(time_ratios),
+        "setting": results[0][1].setting,
+        "draws": len(results),
     }
 
 
@@ -102,12 +111,12 @@ def line(row: dict[str, Any]) -> str:
     low, high = row["nrmse_range"]
     return (
         f"{row['method']:28}{row['nrmse']:10.2e}{f'{low:.2e} to {high:.2e}':>23}"
-        f"{_sized(row, 'n_wavelets'):>16}{_sized(row, 'n_parameters'):>16}{row['fit_s']:9.3f}"
-        f"{row['tuning_s']:10.2f}{row['over_ours']:11.2f}{row['draws']:7d}  {row['setting']}"
+        f"{_with_range(row, 'n_wavelets'):>16}{_with_range(row, 'n_parameters'):>16}{row['fit_s']:9.3f}"
+        f"{row['tuning_s']:10.2f}{row['time_over_palpate']:13.2f}{row['draws']:7d}  {row['setting']}"
     )
 
 
-def _sized(row: dict[str, Any], key: str) -> str:
+def _with_range(row: dict[str, Any], key: str) -> str:
     """Returns median and range of a count."""
     if row[key] is None:
         return ""
@@ -117,8 +126,8 @@ def _sized(row: dict[str, Any], key: str) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    chosen = NAMES if SCALE >= 0.1 else ("P1", "P4")
-    parser.add_argument("problems", nargs="*", default=list(chosen), metavar="P1 ...")
+    default_problems = NAMES if SCALE >= 0.1 else ("P1", "P4")
+    parser.add_argument("problems", nargs="*", default=list(default_problems), metavar="P1 ...")
     parser.add_argument("--draws", type=int, default=count(12))
     parser.add_argument("--only", nargs="*", default=None, help="names of methods")
     parser.add_argument("--json", type=Path, default=None)
@@ -130,10 +139,10 @@ def main() -> None:
             print(f"\n{name}: {TITLES[name]}")
             print(
                 f"{'':28}{'nrmse':>10}{'range':>23}{'wavelets':>16}{'parameters':>16}{'fit s':>9}"
-                f"{'tuning s':>10}{'over ours':>11}{'draws':>7}  setting",
+                f"{'tuning s':>10}{'over palpate':>13}{'draws':>7}  setting",
                 flush=True,
             )
-            rows = measured(name, options.draws, methods)
+            rows = measure(name, options.draws, methods)
             results.extend(rows)
             print("\n".join(map(line, rows)), flush=True)
             write_results(options.json, results)

@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.identification.lagged import SWEEPS, Lagged
+from bench.identification.lagged import N_FITS, Lagged
 from bench.studies import SCALE, measured_data, write_results
 
 from palpate import WaveletNetworkRegressor
@@ -75,7 +75,7 @@ def rms(error: Array) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-def scored(
+def score(
     kind: Set,
     form: str,
     model: Lagged,
@@ -86,9 +86,11 @@ def scored(
     rows = []
     for test_set, (u, y) in tests.items():
         measured = y[model.start :]
-        errors = [way(u, y) - measured for way in (model.one_step, model.free_run)]
-        one, free = (kind.factor * rms(error[kind.skip :]) for error in errors)
-        rows.append(Row(kind.name, test_set, form, model.n_parameters, one, free, kind.unit, kind.comparable))
+        errors = [predict(u, y) - measured for predict in (model.one_step, model.free_run)]
+        one_step, free_run = (kind.factor * rms(error[kind.skip :]) for error in errors)
+        rows.append(
+            Row(kind.name, test_set, form, model.n_parameters, one_step, free_run, kind.unit, kind.comparable)
+        )
     return rows
 
 
@@ -105,8 +107,8 @@ def silverbox(folder: Path) -> list[Row]:
     }
     kind = Set("silverbox", "mV", 1e3, 50)
     return [
-        *scored(kind, "physical", Lagged(3, 3, (0,)), data, tests),
-        *scored(kind, "black box", Lagged(3, 2, None), data, tests),
+        *score(kind, "physical", Lagged(3, 3, (0,)), data, tests),
+        *score(kind, "black box", Lagged(3, 2, None), data, tests),
     ]
 
 
@@ -118,12 +120,12 @@ def cascaded_tanks(folder: Path) -> list[Row]:
     )
     kind = Set("cascaded_tanks", "V")
     return [
-        *scored(kind, "linear + f(level)", Lagged(3, 3, (0,)), data, {"test": test}),
-        *scored(kind, "black box", Lagged(2, 3, None), data, {"test": test}),
+        *score(kind, "linear + f(level)", Lagged(3, 3, (0,)), data, {"test": test}),
+        *score(kind, "black box", Lagged(2, 3, None), data, {"test": test}),
     ]
 
 
-def halves(name: str, file: str, inputs: str, output: str, lags: int) -> Callable[[Path], list[Row]]:
+def study_of_halves(name: str, file: str, inputs: str, output: str, lags: int) -> Callable[[Path], list[Row]]:
     """Returns the study of a file without a published split; fits one half and tests the other."""
 
     def rows(folder: Path) -> list[Row]:
@@ -133,8 +135,8 @@ def halves(name: str, file: str, inputs: str, output: str, lags: int) -> Callabl
         data, tests = (u[:half], y[:half]), {"second half": (u[half:], y[half:])}
         kind = Set(name, "data units", comparable=False)
         return [
-            *scored(kind, "linear + f(output)", Lagged(lags, lags, (0,)), data, tests),
-            *scored(kind, "black box", Lagged(lags, lags, None), data, tests),
+            *score(kind, "linear + f(output)", Lagged(lags, lags, (0,)), data, tests),
+            *score(kind, "black box", Lagged(lags, lags, None), data, tests),
         ]
 
     return rows
@@ -148,49 +150,53 @@ def emps(folder: Path) -> list[Row]:
     """
     files = {"estimation": "emps_estimation_250hz.csv", "test": "emps_validation_pulses_250hz.csv"}
     tables = {name: pd.read_csv(folder / "sysid_benchmarks" / file) for name, file in files.items()}
-    learned = tables["estimation"]
-    period = float(np.median(np.diff(learned.time_s)))
-    x = learned.position_m.to_numpy()
+    estimation_rows = tables["estimation"]
+    period = float(np.median(np.diff(estimation_rows.time_s)))
+    x = estimation_rows.position_m.to_numpy()
     force, velocity, acceleration = (
-        smooth(learned.motor_force_N.to_numpy(), period, 0),
+        smooth(estimation_rows.motor_force_N.to_numpy(), period, 0),
         smooth(x, period, 1),
         smooth(x, period, 2),
     )
     mass, friction = DRIVE_MASS, WaveletNetworkRegressor(max_wavelets=16)
-    for _ in range(SWEEPS):
+    for _ in range(N_FITS):
         friction.fit(velocity[:, None], force - mass * acceleration)
-        left = force - friction.predict(velocity[:, None])
-        mass = float(acceleration @ left / (acceleration @ acceleration))
+        remaining_force = force - friction.predict(velocity[:, None])
+        mass = float(acceleration @ remaining_force / (acceleration @ acceleration))
     rows = []
     for test_set, table in tables.items():
-        x, driven = table.position_m.to_numpy(), table.motor_force_N.to_numpy()
-        if "pulse_force_N" in table and not holds_pulses(learned, table, period):
-            driven = driven + table.pulse_force_N.to_numpy()
+        x, motor_force = table.position_m.to_numpy(), table.motor_force_N.to_numpy()
+        if "pulse_force_N" in table and not includes_pulses(estimation_rows, table, period):
+            motor_force = motor_force + table.pulse_force_N.to_numpy()
         v = smooth(x, period, 1)
-        a = (driven - friction.predict(v[:, None])) / mass
-        ahead = x[:-1] + v[:-1] * period + 0.5 * period**2 * a[:-1]
-        free = simulated(driven, x[0], mass, friction.network_.force, period)
-        one_step, free_run = 1e3 * rms(ahead - x[1:]), 1e3 * rms(free - x)
+        a = (motor_force - friction.predict(v[:, None])) / mass
+        predicted = x[:-1] + v[:-1] * period + 0.5 * period**2 * a[:-1]
+        free_run_motion = simulate(motor_force, x[0], mass, friction.network_.force, period)
+        one_step, free_run = 1e3 * rms(predicted - x[1:]), 1e3 * rms(free_run_motion - x)
         n_parameters = friction.n_parameters_ + 1
         rows.append(Row("emps", test_set, "physical", n_parameters, one_step, free_run, "mm", False))
     return rows
 
 
-def holds_pulses(learned: pd.DataFrame, table: pd.DataFrame, period: float) -> bool:
+def includes_pulses(estimation_rows: pd.DataFrame, table: pd.DataFrame, period: float) -> bool:
     """Returns true if the voltage of the motor rises with the pulses beyond the command of the controller.
 
     The controller, voltage over position error and both velocities, is fitted to the file without pulses,
     without a model of the motion. Pulses that act on the drive from outside do not change its law.
     """
 
-    def wanted(rows: pd.DataFrame) -> Array:
-        goal, x = rows.reference_position_m.to_numpy(), rows.position_m.to_numpy()
-        return np.column_stack([goal - x, smooth(goal, period, 1), smooth(x, period, 1), np.ones(len(x))])
+    def controller_inputs(rows: pd.DataFrame) -> Array:
+        reference, x = rows.reference_position_m.to_numpy(), rows.position_m.to_numpy()
+        return np.column_stack(
+            [reference - x, smooth(reference, period, 1), smooth(x, period, 1), np.ones(len(x))]
+        )
 
-    law = np.linalg.lstsq(wanted(learned), learned.motor_voltage_V.to_numpy(), rcond=None)[0]
-    beyond = table.motor_voltage_V.to_numpy() - wanted(table) @ law
+    controller = np.linalg.lstsq(
+        controller_inputs(estimation_rows), estimation_rows.motor_voltage_V.to_numpy(), rcond=None
+    )[0]
+    remaining_voltage = table.motor_voltage_V.to_numpy() - controller_inputs(table) @ controller
     pulses = table.pulse_force_N.to_numpy()
-    share = float(np.polyfit(pulses, beyond, 1)[0])
+    share = float(np.polyfit(pulses, remaining_voltage, 1)[0])
     print(f"{'':20}motor voltage includes {share:.2f} V for each unit of the pulses", flush=True)
     return share > 0.5
 
@@ -200,15 +206,15 @@ def smooth(signal: Array, period: float, derivative: int) -> Array:
     return np.asarray(savgol_filter(signal, 25, 3, deriv=derivative, delta=period))
 
 
-def simulated(
+def simulate(
     force: Array, start: float, mass: float, friction: Callable[[float], float], period: float
 ) -> Array:
     """Solves m dv/dt = F - f(v) by semi-implicit Euler steps."""
     position, velocity, result, step = start, 0.0, np.empty(len(force)), period / SUBSTEPS
-    for k, held in enumerate(force):
+    for k, force_of_sample in enumerate(force):
         result[k] = position
         for _ in range(SUBSTEPS):
-            velocity += step * (held - float(friction(velocity))) / mass
+            velocity += step * (force_of_sample - float(friction(velocity))) / mass
             position += step * velocity
     return result
 
@@ -217,9 +223,11 @@ SETS: dict[str, Callable[[Path], list[Row]]] = {
     "silverbox": silverbox,
     "cascaded_tanks": cascaded_tanks,
     "emps": emps,
-    "coupled_drives": halves("coupled_drives", "coupled_drives_prbs_amp1.csv", "input_V", "speed_out", 3),
-    "ball_and_beam": halves("ball_and_beam", "ball_and_beam.csv", "beam_angle", "ball_position", 2),
-    "flexible_robot_arm": halves(
+    "coupled_drives": study_of_halves(
+        "coupled_drives", "coupled_drives_prbs_amp1.csv", "input_V", "speed_out", 3
+    ),
+    "ball_and_beam": study_of_halves("ball_and_beam", "ball_and_beam.csv", "beam_angle", "ball_position", 2),
+    "flexible_robot_arm": study_of_halves(
         "flexible_robot_arm", "flexible_robot_arm.csv", "reaction_torque", "acceleration", 4
     ),
 }
@@ -229,28 +237,28 @@ def with_published(folder: Path, row: Row) -> Row:
     """Returns the row with the published errors of its test set, if there are any."""
     table = pd.read_csv(folder / "sysid_benchmarks" / "published_results.csv")
     rows = table[(table.benchmark == row.benchmark) & (table.test_set == row.test_set)]
-    found = rows[(rows.metric == "RMSE") & (rows.unit == row.unit)].set_index("method").value
-    told = ", ".join(f"{name} {found[name]}" for name in PUBLISHED if name in found.index)
-    if told and not row.comparable:
-        told = f"other rows: {told}"
-    return Row(**{**asdict(row), "published": told})
+    errors = rows[(rows.metric == "RMSE") & (rows.unit == row.unit)].set_index("method").value
+    published = ", ".join(f"{name} {errors[name]}" for name in PUBLISHED if name in errors.index)
+    if published and not row.comparable:
+        published = f"other rows: {published}"
+    return Row(**{**asdict(row), "published": published})
 
 
 def line(row: Row) -> str:
-    free = "diverges" if np.isnan(row.free_run) else f"{row.free_run:.4g}"
+    free_run = "diverges" if np.isnan(row.free_run) else f"{row.free_run:.4g}"
     return (
         f"{row.benchmark:20}{row.test_set:24}{row.form:20}{row.n_parameters:10d}{row.one_step:11.4g}"
-        f"{free:>11}  {row.unit:12}{row.published}"
+        f"{free_run:>11}  {row.unit:12}{row.published}"
     )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    chosen = SETS if SCALE >= 0.1 else ("cascaded_tanks",)
-    parser.add_argument("sets", nargs="*", default=list(chosen), metavar="SET ...")
+    default_sets = SETS if SCALE >= 0.1 else ("cascaded_tanks",)
+    parser.add_argument("sets", nargs="*", default=list(default_sets), metavar="SET ...")
     parser.add_argument("--json", type=Path, default=None)
     options = parser.parse_args()
-    if (place := measured_data()) is None:
+    if (folder := measured_data()) is None:
         return
     print(
         f"{'RMSE':20}{'test set':24}{'form':20}{'parameters':>10}{'one step':>11}{'free run':>11}  "
@@ -259,8 +267,8 @@ def main() -> None:
     rows: list[Row] = []
     with threadpool_limits(limits=1):
         for name in options.sets:
-            for row in SETS[name](place):
-                rows.append(with_published(place, row))
+            for row in SETS[name](folder):
+                rows.append(with_published(folder, row))
                 print(line(rows[-1]), flush=True)
     write_results(options.json, [asdict(row) for row in rows])
 

@@ -33,16 +33,16 @@ from palpate.plotting.look import grid
 ANY_SIGN, EARLIER = "_h_of_any_sign", "_force_25_ms_earlier"
 """Suffixes of sets that repeat another set with other options."""
 
-LIMIT = 1.3
+WORST_SPLINE_RATIO = 1.3
 """Ratio of the error to that of the splines above which a file is counted."""
 
-LOOKS = (
+METHOD_STYLES = (
     ("o", "black"),
     ("s", "0.55"),
     ("D", "0.55"),
     *((marker, "white") for marker in "^v<>pP*Xhd8"),
 )
-"""Marker and filling: palpate, its selection alone, its quasi-Newton refinement, then the other methods."""
+"""Marker and face color: palpate, its selection alone, its quasi-Newton refinement, then other methods."""
 
 DASHES = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (5, 2, 1, 2)), (0, (8, 3)))
 
@@ -54,14 +54,14 @@ def results_of(folder: Path, name: str) -> tuple[Any, str] | None:
     path = folder / f"{name}.json"
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        where = content["where"]
-        measured = (
-            f"{where['date']}, {where['machine']}, load {where['load']:g}, Python {where['python']}, "
-            f"commit {where['commit']}"
+        machine = content["where"]
+        source = (
+            f"{machine['date']}, {machine['machine']}, load {machine['load']:g}, Python {machine['python']}, "
+            f"commit {machine['commit']}"
         )
-        if where["scale"] < 1.0:
-            measured += f", scale {where['scale']:g}: not for comparison"
-        return content["results"], measured
+        if machine["scale"] < 1.0:
+            source += f", scale {machine['scale']:g}: not for comparison"
+        return content["results"], source
     except FileNotFoundError:
         return None
     except (OSError, ValueError, KeyError, TypeError) as error:
@@ -91,7 +91,7 @@ def problems(rows: Sequence[Row]) -> str:
                 with_range(row, "n_parameters", "d"),
                 number(row["fit_s"]),
                 number(row["tuning_s"]),
-                f"{row['over_ours']:.3g}",
+                f"{row['time_over_palpate']:.3g}",
                 str(row["draws"]),
             )
             for row in rows
@@ -112,19 +112,23 @@ def measured_objects(sets: Mapping[str, Sequence[Row]]) -> str:
     """Returns medians over the files of each set of recordings, for each method."""
     lines = []
     for name, files in sets.items():
-        good = [row for row in files if "nrmse" in row]
-        if not good:
+        measured_rows = [row for row in files if "nrmse" in row]
+        if not measured_rows:
             continue
-        ratios = worst(good, "splines"), worst(good, "passive_splines")
-        lines.append(set_row(f"{name} ({len(good)} files), palpate", good, ratios))
-        for baseline in dict.fromkeys(key for row in good for key in row["baselines"]):
-            theirs = [row["baselines"][baseline] for row in good if baseline in row["baselines"]]
-            finite = [each for each in theirs if each["nrmse"] is not None and math.isfinite(each["nrmse"])]
-            of = "" if len(finite) == len(good) else f" ({len(finite)} files)"
-            if finite:
-                lines.append(set_row(f"{name}, {baseline}{of}", finite, ("", "")))
-    over = "worst file over its splines", "over splines with h >= 0"
-    return markdown_table(("recordings, method", "NRMSE", "parameters", "s per file", *over), lines)
+        ratios = worst_ratio(measured_rows, "splines"), worst_ratio(measured_rows, "passive_splines")
+        lines.append(row_of_set(f"{name} ({len(measured_rows)} files), palpate", measured_rows, ratios))
+        for baseline in dict.fromkeys(key for row in measured_rows for key in row["baselines"]):
+            baseline_rows = [
+                row["baselines"][baseline] for row in measured_rows if baseline in row["baselines"]
+            ]
+            finite_results = [
+                each for each in baseline_rows if each["nrmse"] is not None and math.isfinite(each["nrmse"])
+            ]
+            of = "" if len(finite_results) == len(measured_rows) else f" ({len(finite_results)} files)"
+            if finite_results:
+                lines.append(row_of_set(f"{name}, {baseline}{of}", finite_results, ("", "")))
+    ratio_columns = "worst file over its splines", "over splines with h >= 0"
+    return markdown_table(("recordings, method", "NRMSE", "parameters", "s per file", *ratio_columns), lines)
 
 
 def crossings(sets: Mapping[str, Sequence[Row]]) -> str:
@@ -137,7 +141,9 @@ def crossings(sets: Mapping[str, Sequence[Row]]) -> str:
             if other in sets
         ]
         if len(variants) == 2:
-            lines += [crossing_row(row, *(each.get(row["file"], {}) for each in variants)) for row in files]
+            lines += [
+                row_of_crossing(row, *(each.get(row["file"], {}) for each in variants)) for row in files
+            ]
     header = (
         "file",
         "palpate",
@@ -152,7 +158,7 @@ def crossings(sets: Mapping[str, Sequence[Row]]) -> str:
     return markdown_table(header, lines)
 
 
-def crossing_row(row: Row, any_sign: Row, earlier: Row) -> tuple[str, ...]:
+def row_of_crossing(row: Row, any_sign: Row, earlier: Row) -> tuple[str, ...]:
     def error(of: Row | None) -> str:
         return f"{of['nrmse']:.4f}" if of and "nrmse" in of else ""
 
@@ -169,23 +175,27 @@ def crossing_row(row: Row, any_sign: Row, earlier: Row) -> tuple[str, ...]:
     )
 
 
-def worst(files: Sequence[Row], splines: str) -> str:
+def worst_ratio(files: Sequence[Row], splines: str) -> str:
     """Returns the largest ratio of a model's error to that of its splines, and the number above the limit."""
-    pairs = [(row["nrmse"], row[splines]["nrmse"]) for row in files if row[splines]]
-    ratios = [own / theirs for own, theirs in pairs if theirs is not None and theirs > 0]
+    errors = [(row["nrmse"], row[splines]["nrmse"]) for row in files if row[splines]]
+    ratios = [
+        error / splines_error
+        for error, splines_error in errors
+        if splines_error is not None and splines_error > 0
+    ]
     if not ratios:
         return ""
-    over = sum(ratio > LIMIT for ratio in ratios)
-    return f"{max(ratios):.2f}" + (f" ({over} above {LIMIT:g})" if over else "")
+    n_above = sum(ratio > WORST_SPLINE_RATIO for ratio in ratios)
+    return f"{max(ratios):.2f}" + (f" ({n_above} above {WORST_SPLINE_RATIO:g})" if n_above else "")
 
 
-def set_row(name: str, each: Sequence[Row], worst: tuple[str, str]) -> tuple[str, ...]:
+def row_of_set(name: str, each: Sequence[Row], ratios: tuple[str, str]) -> tuple[str, ...]:
     return (
         name,
         f"{median(row['nrmse'] for row in each):.4f}",
         f"{median(row['n_parameters'] for row in each):.0f}",
         number(median(row["seconds"] for row in each)),
-        *worst,
+        *ratios,
     )
 
 
@@ -229,35 +239,35 @@ TABLES: Mapping[str, Callable[[Any], str]] = {
 """Tables of studies that may not have run; crossing is the second table of real_data."""
 
 
-def draw_reached(path: Path, rows: Sequence[Row], label: str, spent: Callable[[Row], float]) -> None:
+def draw_error_over(path: Path, rows: Sequence[Row], label: str, cost: Callable[[Row], float]) -> None:
     """Draws the error of each method over its size or time, one panel per problem; lower left is best."""
-    good = [row for row in rows if "nrmse" in row]
-    methods = list(dict.fromkeys(row["method"] for row in good))
-    problems = list(dict.fromkeys(row["problem"] for row in good))
+    measured_rows = [row for row in rows if "nrmse" in row]
+    methods = list(dict.fromkeys(row["method"] for row in measured_rows))
+    problems = list(dict.fromkeys(row["problem"] for row in measured_rows))
     lines = math.ceil(len(problems) / 2)
     with figure_file(path, height_inches=1.0 + 1.2 * lines, rows=[1.0] * lines, columns=2) as panels:
         for axes, problem in zip(panels, problems, strict=False):
-            of = [row for row in good if row["problem"] == problem]
-            for row in of:
-                marker, filling = LOOKS[methods.index(row["method"]) % len(LOOKS)]
+            problem_rows = [row for row in measured_rows if row["problem"] == problem]
+            for row in problem_rows:
+                marker, face_color = METHOD_STYLES[methods.index(row["method"]) % len(METHOD_STYLES)]
                 axes.plot(
-                    spent(row),
+                    cost(row),
                     row["nrmse"],
                     linestyle="none",
                     marker=marker,
                     markersize=4.5,
                     color="black",
-                    markerfacecolor=filling,
+                    markerfacecolor=face_color,
                     markeredgewidth=0.7,
                     label=row["method"],
                     clip_on=False,
                     # above the others
-                    zorder=3 if filling == "black" else 2,
+                    zorder=3 if face_color == "black" else 2,
                 )
             axes.set_xscale("log")
             axes.set_yscale("log")
-            axes.set_xlim(*decades(spent(row) for row in of))
-            axes.set_ylim(*decades(row["nrmse"] for row in of))
+            axes.set_xlim(*decades(cost(row) for row in problem_rows))
+            axes.set_ylim(*decades(row["nrmse"] for row in problem_rows))
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_major_locator(LogLocator(numticks=9))
                 axis.set_minor_locator(NullLocator())
@@ -286,8 +296,8 @@ def draw_legend(panels: Sequence[Axes], methods: Sequence[str]) -> None:
 def draw_over_speed(path: Path, rows: Sequence[Row]) -> None:
     """Draws the error over the speed of the motion, one line for each way to identify."""
     with figure_file(path, height_inches=3.4) as (axes,):
-        looks = zip(LOOKS, DASHES, (6.5, 5.5, 4.5, 4.0, 3.5), strict=False)
-        for row, ((marker, filling), dash, size) in zip(rows, looks, strict=False):
+        styles = zip(METHOD_STYLES, DASHES, (6.5, 5.5, 4.5, 4.0, 3.5), strict=False)
+        for row, ((marker, face_color), dash, size) in zip(rows, styles, strict=False):
             axes.plot(
                 row["fastest_hz"],
                 row["nrmse"],
@@ -296,14 +306,14 @@ def draw_over_speed(path: Path, rows: Sequence[Row]) -> None:
                 linestyle=dash,
                 marker=marker,
                 markersize=size,
-                markerfacecolor=filling,
+                markerfacecolor=face_color,
                 markeredgewidth=0.7,
                 label=row["way"],
             )
         axes.set_xscale("log")
         axes.set_yscale("log")
-        places = sorted({float(at) for row in rows for at in row["fastest_hz"]})
-        axes.set_xticks(places, [f"{at:g}" for at in places])
+        frequencies = sorted({float(at) for row in rows for at in row["fastest_hz"]})
+        axes.set_xticks(frequencies, [f"{at:g}" for at in frequencies])
         axes.xaxis.set_minor_locator(NullLocator())
         axes.set_ylim(*decades(error for row in rows for error in row["nrmse"]))
         grid(axes)
@@ -323,33 +333,33 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="folder of the JSON files of make bench")
     parser.add_argument("--to", type=Path, required=True, help="folder of figures/ and of the page")
-    given = parser.parse_args(arguments)
-    methods = results_of(given.folder, "compare_methods")
+    options = parser.parse_args(arguments)
+    methods = results_of(options.folder, "compare_methods")
     if methods is None:
-        raise SystemExit(f"{given.folder / 'compare_methods.json'} does not exist; make bench writes it")
-    figures = given.to / "figures"
+        raise SystemExit(f"{options.folder / 'compare_methods.json'} does not exist; make bench writes it")
+    figures = options.to / "figures"
     figures.mkdir(parents=True, exist_ok=True)
-    rows, where = methods
-    draw_reached(
+    rows, source = methods
+    draw_error_over(
         figures / "identification-parameters.png", rows, "parameters", lambda row: float(row["n_parameters"])
     )
-    draw_reached(
+    draw_error_over(
         figures / "identification-time.png",
         rows,
         "fit and tuning [s]",
         lambda row: float(row["fit_s"] + row["tuning_s"]),
     )
     draws = max(row["draws"] for row in rows if "nrmse" in row)
-    drawn = f"median (least to largest) of up to {draws} draws"
-    tables = {"compare_methods": f"{problems(rows)}\n{where}; {drawn}\n"}
+    caption = f"median (least to largest) of up to {draws} draws"
+    tables = {"compare_methods": f"{problems(rows)}\n{source}; {caption}\n"}
     for name, table in TABLES.items():
-        found = results_of(given.folder, "real_data" if name == "crossing" else name)
-        if found is not None:
-            tables[name] = f"{table(found[0])}\n{found[1]}\n"
+        study = results_of(options.folder, "real_data" if name == "crossing" else name)
+        if study is not None:
+            tables[name] = f"{table(study[0])}\n{study[1]}\n"
             if name == "filters":
-                draw_over_speed(figures / "identification-filters.png", found[0])
+                draw_over_speed(figures / "identification-filters.png", study[0])
     print(f"wrote the figures of identification to {figures}")
-    fill_tables(given.to / "identification.md", tables)
+    fill_tables(options.to / "identification.md", tables)
 
 
 if __name__ == "__main__":

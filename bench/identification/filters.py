@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.identification.moving import moved
+from bench.identification.moving import simulate_recording
 from bench.studies import count, write_results
 
 from palpate import Model, SearchOptions, identify
@@ -31,7 +31,7 @@ MASS, DAMPING = 1e-3, 0.06
 FASTEST_HZ = (0.5, 1.0, 2.0, 4.0, 8.0)
 """Highest frequency of the hand; the lowest is a tenth of it."""
 
-WAYS: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
+CASES: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
     "matched, mass": ({"mass": MASS}, {}),
     "paper (figure 11), mass": (
         {"mass": MASS},
@@ -46,9 +46,13 @@ WAYS: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
 """Mass and damping of the object, and the options of its identification."""
 
 
-def error(there: dict[str, float], options: dict[str, Any], fastest_hz: float, draw: int) -> float:
+def error(
+    object_properties: dict[str, float], options: dict[str, Any], fastest_hz: float, draw: int
+) -> float:
     """Returns the NRMSE of the identified f over the visited positions."""
-    recording = moved(draw, seconds=20.0, slowest_hz=fastest_hz / 10.0, fastest_hz=fastest_hz, **there)
+    recording = simulate_recording(
+        draw, seconds=20.0, slowest_hz=fastest_hz / 10.0, fastest_hz=fastest_hz, **object_properties
+    )
     model = identify(recording, **options)
     margin = 0.01 * (UPPER - LOWER)
     x = np.linspace(LOWER + margin, UPPER - margin, 2001)
@@ -60,7 +64,7 @@ def mean_force(model: Model, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns f, or the mean of press and release of a model with (wrongly identified) hysteresis."""
     if not model.hysteretic:
         return np.asarray(model.force(x))
-    strokes = [np.asarray(model.force(x, direction=np.full(len(x), side))) for side in (1.0, -1.0)]
+    strokes = [np.asarray(model.force(x, direction=np.full(len(x), direction))) for direction in (1.0, -1.0)]
     return 0.5 * (strokes[0] + strokes[1])
 
 
@@ -72,8 +76,11 @@ def main() -> None:
     speeds = FASTEST_HZ[-count(len(FASTEST_HZ)) :]
     print(f"{'nrmse of f, the hand up to [Hz]':38}" + "".join(f"{hz:>10g}" for hz in speeds), flush=True)
     results = []
-    for name, (there, settings) in WAYS.items():
-        errors = [median(error(there, settings, hz, draw) for draw in range(options.draws)) for hz in speeds]
+    for name, (object_properties, settings) in CASES.items():
+        errors = [
+            median(error(object_properties, settings, hz, draw) for draw in range(options.draws))
+            for hz in speeds
+        ]
         print(f"{name:38}" + "".join(f"{each:10.2e}" for each in errors), flush=True)
         results.append({"way": name, "fastest_hz": list(speeds), "nrmse": errors})
     write_results(options.json, results)

@@ -11,10 +11,10 @@ from palpate._core.model import wavelet_columns
 
 Array = NDArray[np.float64]
 
-SWEEPS = 8
+N_FITS = 8
 """Number of alternating fits of the linear part and of the network"""
 
-OUTSIDE = 3.0
+DIVERGENCE_LIMIT = 3.0
 """Distance from zero at which a free run counts as diverged [ranges of its data]"""
 
 
@@ -47,15 +47,15 @@ class Lagged:
             self._network.fit(X, target)
             self._linear = np.zeros(X.shape[1])
             return self
-        curved = np.zeros((len(target), 0))
-        for _ in range(SWEEPS):
+        wavelets = np.zeros((len(target), 0))
+        for _ in range(N_FITS):
             # lags and wavelets are nearly collinear: alternating fits would converge slowly
-            columns = np.concatenate([X, np.ones((len(X), 1)), curved], axis=1)
+            columns = np.concatenate([X, np.ones((len(X), 1)), wavelets], axis=1)
             self._linear = np.linalg.lstsq(columns, target, rcond=1e-10)[0][: X.shape[1]]
             # with the sign of a force, whose continuation outside the data rises with position
             self._network.fit(X[:, list(self._state)], X @ self._linear - target)
             network = self._network.network_
-            curved = wavelet_columns(
+            wavelets = wavelet_columns(
                 X[:, [self._state[c] for c in self._network.columns_]], network.alpha, network.beta
             )
         return self
@@ -68,15 +68,15 @@ class Lagged:
 
     def free_run(self, u: Array, y: Array) -> Array:
         """Predicts all rows past the start from the first measured outputs and the input; NaN: diverged."""
-        limit = OUTSIDE * float(np.ptp(y))
+        limit = DIVERGENCE_LIMIT * float(np.ptp(y))
         simulated = y.copy()
         simulated[self.start :] = np.nan
         model, columns = self._network.network_, self._network.columns_
         state = np.arange(len(self._linear)) if self._state is None else np.array(self._state)
-        taken = state[columns]
+        network_inputs = state[columns]
         for k in range(self.start, len(y)):
             lags = np.concatenate([simulated[k - self._p : k][::-1], u[k - self._q : k + 1][::-1]])
-            value = lags @ self._linear + self._sign * model.predict(lags[taken][None, :])[0]
+            value = lags @ self._linear + self._sign * model.predict(lags[network_inputs][None, :])[0]
             if not abs(value) < limit:
                 break
             simulated[k] = value

@@ -72,33 +72,33 @@ def _tuned(
 ) -> Fitted:
     """Chooses the setting on every fifth row, then fits all rows."""
     start = time.perf_counter()
-    held = np.arange(len(y)) % 5 == 4
+    held_out = np.arange(len(y)) % 5 == 4
     scores = []
     for setting in settings:
         try:
-            predict, _ = fit(setting, X[~held], y[~held])
+            predict, _ = fit(setting, X[~held_out], y[~held_out])
         except (ValueError, np.linalg.LinAlgError):
             continue
-        scores.append((float(np.mean((predict(X[held]) - y[held]) ** 2)), setting))
+        scores.append((float(np.mean((predict(X[held_out]) - y[held_out]) ** 2)), setting))
     best = min(scores, key=lambda score: score[0])[1]
-    tuned = time.perf_counter()
+    tuned_at_s = time.perf_counter()
     predict, n_parameters = fit(best, X, y)
-    return Fitted(predict, n_parameters, time.perf_counter() - tuned, tuned - start, str(best))
+    return Fitted(predict, n_parameters, time.perf_counter() - tuned_at_s, tuned_at_s - start, str(best))
 
 
 def _sorted_means(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    distinct, place, count = np.unique(x, return_inverse=True, return_counts=True)
-    return distinct, np.bincount(place, y) / count, count.astype(float)
+    positions, index_of_position, count = np.unique(x, return_inverse=True, return_counts=True)
+    return positions, np.bincount(index_of_position, y) / count, count.astype(float)
 
 
 def lsq_spline(X: Array, y: Array) -> Fitted:
     def fit(pieces: int, X: Array, y: Array) -> tuple[Predict, int]:
         order = np.argsort(X[:, 0], kind="stable")
         x, force = X[order, 0], y[order]
-        inner = np.linspace(x[0], x[-1], pieces + 1)[1:-1]
-        knots = np.r_[(x[0],) * 4, inner, (x[-1],) * 4]
+        inner_knots = np.linspace(x[0], x[-1], pieces + 1)[1:-1]
+        knots = np.r_[(x[0],) * 4, inner_knots, (x[-1],) * 4]
         spline = make_lsq_spline(x, force, knots, k=3)
-        return lambda at: spline(np.clip(at[:, 0], x[0], x[-1])), len(spline.c)
+        return lambda x_new: spline(np.clip(x_new[:, 0], x[0], x[-1])), len(spline.c)
 
     return _tuned(fit, (8, 16, 24, 32, 41, 50, 64, 80, 100, 130), X, y)
 
@@ -107,14 +107,14 @@ def univariate_spline(X: Array, y: Array) -> Fitted:
     def fit(share: float, X: Array, y: Array) -> tuple[Predict, int]:
         x, mean, count = _sorted_means(X[:, 0], y)
         order = np.argsort(X[:, 0], kind="stable")
-        apart = np.diff(y[order], 2)
-        noise = float(np.mean(apart**2)) / 6.0
-        within = float(np.sum((y - mean[np.searchsorted(x, X[:, 0])]) ** 2))
+        second_differences = np.diff(y[order], 2)
+        noise = float(np.mean(second_differences**2)) / 6.0
+        error_within_positions = float(np.sum((y - mean[np.searchsorted(x, X[:, 0])]) ** 2))
         spline = UnivariateSpline(
-            x, mean, w=np.sqrt(count), s=max(share * len(y) * noise - within, 0.0), ext=3
+            x, mean, w=np.sqrt(count), s=max(share * len(y) * noise - error_within_positions, 0.0), ext=3
         )
         interior = len(spline.get_knots()) - 2
-        return lambda at: spline(at[:, 0]), len(spline.get_coeffs()) + interior
+        return lambda x_new: spline(x_new[:, 0]), len(spline.get_coeffs()) + interior
 
     # without noise the spline interpolates; with many rows FITPACK would take minutes
     shares = (0.98, 0.99, 1.0, 1.005, 1.01, 1.02, 1.05, 1.1)
@@ -129,19 +129,19 @@ def spline_ridge(X: Array, y: Array) -> Fitted:
         splines = SplineTransformer(n_knots=knots, degree=3, include_bias=True)
         ridge = Ridge(alpha=penalty, fit_intercept=False)
         if X.shape[1] == 1:
-            chain = make_pipeline(splines, ridge).fit(X, y)
-            return chain.predict, len(chain[-1].coef_)
+            pipeline = make_pipeline(splines, ridge).fit(X, y)
+            return pipeline.predict, len(pipeline[-1].coef_)
         splines.fit(X)
 
-        def products(at: Array) -> Array:
-            each = splines.transform(at).reshape(len(at), at.shape[1], -1)
-            table = each[:, 0]
-            for k in range(1, at.shape[1]):
-                table = np.einsum("ni,nj->nij", table, each[:, k]).reshape(len(at), -1)
-            return table
+        def products(x_new: Array) -> Array:
+            each = splines.transform(x_new).reshape(len(x_new), x_new.shape[1], -1)
+            product = each[:, 0]
+            for k in range(1, x_new.shape[1]):
+                product = np.einsum("ni,nj->nij", product, each[:, k]).reshape(len(x_new), -1)
+            return product
 
         ridge.fit(products(X), y)
-        return lambda at: ridge.predict(products(at)), len(ridge.coef_)
+        return lambda x_new: ridge.predict(products(x_new)), len(ridge.coef_)
 
     knots = (25, 50, 100, 150) if X.shape[1] == 1 else (5, 8, 12, 18)
     return _tuned(fit, [(k, a) for k in knots for a in (1e-8, 1e-4, 1e-2)], X, y)
@@ -149,46 +149,54 @@ def spline_ridge(X: Array, y: Array) -> Fitted:
 
 def frame_pursuit(X: Array, y: Array) -> Fitted:
     """Fits by orthogonal matching pursuit on the frame of palpate's selection."""
-    low, reach = X.min(axis=0), np.ptp(X, axis=0)
+    lower, width = X.min(axis=0), np.ptp(X, axis=0)
 
-    def columns(atoms: Any, at: Array) -> Array:
-        box = np.clip((at - low) / reach, 0.0, 1.0)
-        return np.concatenate([box, wavelet_columns(box, atoms.alpha, atoms.beta)], axis=1)
+    def columns(atoms: Any, x_new: Array) -> Array:
+        scaled = np.clip((x_new - lower) / width, 0.0, 1.0)
+        return np.concatenate([scaled, wavelet_columns(scaled, atoms.alpha, atoms.beta)], axis=1)
 
     start = time.perf_counter()
-    thin = (X - low)[:: max(1, len(X) // 20_000)] / reach
+    thinned = (X - lower)[:: max(1, len(X) // 20_000)] / width
     finest = 128.0 if X.shape[1] == 1 else 16.0
     atoms = truncated_frame(
-        thin, coarsest=1.0, finest=finest, frame_scale=2.0, frame_step=0.5, max_candidates=1200
+        thinned, coarsest=1.0, finest=finest, frame_scale=2.0, frame_step=0.5, max_candidates=1200
     )
-    held = np.arange(len(y)) % 5 == 4
-    table = columns(atoms, X)
-    built = time.perf_counter()
+    held_out = np.arange(len(y)) % 5 == 4
+    columns_at_rows = columns(atoms, X)
+    built_at_s = time.perf_counter()
     scores = []
-    for atoms_taken in (8, 16, 24, 32, 48, 64, 96, 128):
-        pursuit = OrthogonalMatchingPursuit(n_nonzero_coefs=min(atoms_taken, len(y) // 3))
+    for n_tried in (8, 16, 24, 32, 48, 64, 96, 128):
+        pursuit = OrthogonalMatchingPursuit(n_nonzero_coefs=min(n_tried, len(y) // 3))
         with warnings.catch_warnings():
             # warns at the end of the dictionary
             warnings.simplefilter("ignore", RuntimeWarning)
-            pursuit.fit(table[~held], y[~held])
-        scores.append((float(np.mean((pursuit.predict(table[held]) - y[held]) ** 2)), atoms_taken))
-    tuned = time.perf_counter()
-    taken = min(min(scores)[1], len(y) // 3)
-    pursuit = OrthogonalMatchingPursuit(n_nonzero_coefs=taken).fit(table, y)
-    fitted = time.perf_counter()
+            pursuit.fit(columns_at_rows[~held_out], y[~held_out])
+        scores.append(
+            (float(np.mean((pursuit.predict(columns_at_rows[held_out]) - y[held_out]) ** 2)), n_tried)
+        )
+    tuned_at_s = time.perf_counter()
+    n_atoms = min(min(scores)[1], len(y) // 3)
+    pursuit = OrthogonalMatchingPursuit(n_nonzero_coefs=n_atoms).fit(columns_at_rows, y)
+    fitted_at_s = time.perf_counter()
     # each atom counts its dilation, its translations and its weight
-    count = taken * (X.shape[1] + 2) + 1
-    fit_seconds = (built - start) + (fitted - tuned)
+    count = n_atoms * (X.shape[1] + 2) + 1
+    fit_seconds = (built_at_s - start) + (fitted_at_s - tuned_at_s)
     return Fitted(
-        lambda at: pursuit.predict(columns(atoms, at)), count, fit_seconds, tuned - built, f"{taken} atoms"
+        lambda x_new: pursuit.predict(columns(atoms, x_new)),
+        count,
+        fit_seconds,
+        tuned_at_s - built_at_s,
+        f"{n_atoms} atoms",
     )
 
 
 def kernel_ridge(X: Array, y: Array) -> Fitted:
     def fit(setting: tuple[float, float], X: Array, y: Array) -> tuple[Predict, int]:
         gamma, penalty = setting
-        chain = make_pipeline(MinMaxScaler(), KernelRidge(kernel="rbf", gamma=gamma, alpha=penalty)).fit(X, y)
-        return chain.predict, len(y)
+        pipeline = make_pipeline(MinMaxScaler(), KernelRidge(kernel="rbf", gamma=gamma, alpha=penalty)).fit(
+            X, y
+        )
+        return pipeline.predict, len(y)
 
     return _tuned(
         fit, [(g, a) for g in (1.0, 3.0, 10.0, 30.0, 100.0) for a in (1e-12, 1e-10, 1e-8, 1e-5)], X, y
@@ -197,25 +205,27 @@ def kernel_ridge(X: Array, y: Array) -> Fitted:
 
 def gaussian_process(X: Array, y: Array) -> Fitted:
     start = time.perf_counter()
-    scale = MinMaxScaler().fit(X)
-    width = 0.1 * np.ones(X.shape[1])
+    scaler = MinMaxScaler().fit(X)
+    length_scale = 0.1 * np.ones(X.shape[1])
     processes = []
-    for shape in (RBF(width, (1e-3, 1e2)), Matern(width, (1e-3, 1e2), nu=2.5)):
+    for shape in (RBF(length_scale, (1e-3, 1e2)), Matern(length_scale, (1e-3, 1e2), nu=2.5)):
         kernel = ConstantKernel(1.0, (1e-3, 1e6)) * shape + WhiteKernel(1e-6, (1e-14, 1.0))
         process = GaussianProcessRegressor(kernel, normalize_y=True, random_state=0)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)
-            processes.append(process.fit(scale.transform(X), y))
+            processes.append(process.fit(scaler.transform(X), y))
     process = max(processes, key=lambda each: each.log_marginal_likelihood_value_)
     seconds = time.perf_counter() - start
-    return Fitted(lambda at: process.predict(scale.transform(at)), len(y), seconds, 0.0, "")
+    return Fitted(lambda x_new: process.predict(scaler.transform(x_new)), len(y), seconds, 0.0, "")
 
 
 def polynomial_ridge(X: Array, y: Array) -> Fitted:
     def fit(degree: int, X: Array, y: Array) -> tuple[Predict, int]:
-        chain = make_pipeline(MinMaxScaler((-1, 1)), PolynomialFeatures(degree), Ridge(1e-10, solver="svd"))
-        chain.fit(X, y)
-        return chain.predict, len(chain[-1].coef_)
+        pipeline = make_pipeline(
+            MinMaxScaler((-1, 1)), PolynomialFeatures(degree), Ridge(1e-10, solver="svd")
+        )
+        pipeline.fit(X, y)
+        return pipeline.predict, len(pipeline[-1].coef_)
 
     return _tuned(fit, (3, 5, 7, 9, 12), X, y)
 

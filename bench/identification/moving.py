@@ -9,11 +9,11 @@ from palpate import Recording, _core
 from palpate.recording import sample_force
 from palpate.recording.sample import ENCODER_STEP, FORCE_NOISE, LOWER, SAMPLE_PERIOD, UPPER
 
-PLAY = 0.005
+PLAY_RADIUS = 0.005
 """Play radius of the hysteresis [rad]."""
 
 
-def moved(
+def simulate_recording(
     seed: int,
     *,
     seconds: float = 10.0,
@@ -25,18 +25,18 @@ def moved(
 ) -> Recording:
     """Returns F = f(x) + m a + B v + h s, with the sample's force f, along a sweep with varying frequency.
 
-    mass [N*m*s^2/rad], damping [N*m*s/rad], hysteresis h [N*m] over the play of PLAY.
+    mass [N*m*s^2/rad], damping [N*m*s/rad], hysteresis h [N*m] over the play radius PLAY_RADIUS.
     """
     random = np.random.default_rng(seed)
     time = np.arange(round(seconds / SAMPLE_PERIOD)) * SAMPLE_PERIOD
-    wander = np.sin(2.0 * np.pi * (0.31 * time[:, None] * [0.1, 0.23, 0.41] + random.uniform(0, 1, 3)))
-    frequency = slowest_hz * (fastest_hz / slowest_hz) ** ((1.0 + wander.mean(axis=1)) / 2.0)
+    variation = np.sin(2.0 * np.pi * (0.31 * time[:, None] * [0.1, 0.23, 0.41] + random.uniform(0, 1, 3)))
+    frequency = slowest_hz * (fastest_hz / slowest_hz) ** ((1.0 + variation.mean(axis=1)) / 2.0)
     phase = 2.0 * np.pi * SAMPLE_PERIOD * np.cumsum(frequency)
     x = (LOWER + UPPER) / 2 + (UPPER - LOWER) / 2 * np.sin(phase)
     v = np.gradient(x, time)
     force = sample_force(x) + mass * np.gradient(v, time) + damping * v
     if hysteresis:
-        force = force + hysteresis * np.clip((x - _core.model.play(x, PLAY)) / PLAY, -1.0, 1.0)
+        force = force + hysteresis * np.clip((x - _core.model.play(x, PLAY_RADIUS)) / PLAY_RADIUS, -1.0, 1.0)
     return Recording.from_arrays(
         np.round(x / ENCODER_STEP) * ENCODER_STEP,
         force + random.normal(0.0, FORCE_NOISE, len(x)),

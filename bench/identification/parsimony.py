@@ -16,7 +16,7 @@ from joblib import Parallel, delayed
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.identification.moving import moved
+from bench.identification.moving import simulate_recording
 from bench.studies import count, write_results
 
 from palpate import Model, Recording, identify
@@ -24,7 +24,7 @@ from palpate import Model, Recording, identify
 MASS, DAMPING = 1e-3, 0.06
 """True values of the moving object [N*m*s^2/rad, N*m*s/rad]."""
 
-WITHIN = 0.05
+TOLERANCE = 0.05
 """Allowed relative error of mass and damping."""
 
 
@@ -38,17 +38,17 @@ def spring(draw: int) -> Recording:
     return Recording.from_arrays(np.round(x / 1e-4) * 1e-4, force, time=1e-3 * np.arange(n))
 
 
-def velocity_is_there(model: Model) -> bool:
+def has_velocity(model: Model) -> bool:
     return model.damping is not None or "velocity" in model.inputs
 
 
-def recovered(model: Model) -> bool:
+def has_true_mass_and_damping(model: Model) -> bool:
     """Returns true if mass and damping are those of the object."""
     return (
         model.mass is not None
         and model.damping is not None
-        and abs(model.mass / MASS - 1.0) < WITHIN
-        and abs(model.damping / DAMPING - 1.0) < WITHIN
+        and abs(model.mass / MASS - 1.0) < TOLERANCE
+        and abs(model.damping / DAMPING - 1.0) < TOLERANCE
     )
 
 
@@ -56,33 +56,33 @@ CLAIMS: dict[str, tuple[int, Callable[[int], Recording], Callable[[Model], bool]
     "linear spring: no wavelet": (
         100,
         spring,
-        lambda model: model.n_wavelets == 0 and model.kind == "position" and not velocity_is_there(model),
+        lambda model: model.n_wavelets == 0 and model.kind == "position" and not has_velocity(model),
     ),
-    "velocity present: accepted": (100, lambda draw: moved(draw, damping=0.03), velocity_is_there),
-    "velocity absent: rejected": (100, moved, lambda model: not velocity_is_there(model)),
+    "velocity present: accepted": (100, lambda draw: simulate_recording(draw, damping=0.03), has_velocity),
+    "velocity absent: rejected": (100, simulate_recording, lambda model: not has_velocity(model)),
     "hysteresis present: accepted": (
         100,
-        lambda draw: moved(draw, hysteresis=0.1),
+        lambda draw: simulate_recording(draw, hysteresis=0.1),
         lambda model: model.kind == "hysteresis",
     ),
     "hysteresis absent: rejected": (
         100,
-        lambda draw: moved(draw, damping=0.03),
+        lambda draw: simulate_recording(draw, damping=0.03),
         lambda model: model.kind != "hysteresis",
     ),
-    f"mass and damping from 60 s: within {100 * WITHIN:g} %": (
+    f"mass and damping from 60 s: within {100 * TOLERANCE:g} %": (
         20,
-        lambda draw: moved(draw, seconds=60.0, mass=MASS, damping=DAMPING),
-        recovered,
+        lambda draw: simulate_recording(draw, seconds=60.0, mass=MASS, damping=DAMPING),
+        has_true_mass_and_damping,
     ),
 }
 """Number of draws, recording of a draw, and test of its model."""
 
 
-def is_right(claim: str, draw: int) -> bool:
+def is_correct_draw(claim: str, draw: int) -> bool:
     """Returns true if the model of one draw is correct."""
-    _, recording, right = CLAIMS[claim]
-    return right(identify(recording(draw)))
+    _, recording, is_correct = CLAIMS[claim]
+    return is_correct(identify(recording(draw)))
 
 
 def main() -> None:
@@ -92,10 +92,10 @@ def main() -> None:
     options = parser.parse_args()
     results = []
     print(f"{'':44}{'correct':>7}{'of':>5}", flush=True)
-    for claim, (full, _, _) in CLAIMS.items():
-        draws = min(options.draws or full, count(full))
-        found = Parallel(n_jobs=-1)(delayed(is_right)(claim, draw) for draw in range(draws))
-        wrong = [draw for draw, each in enumerate(found) if not each]
+    for claim, (all_draws, _, _) in CLAIMS.items():
+        draws = min(options.draws or all_draws, count(all_draws))
+        results_by_draw = Parallel(n_jobs=-1)(delayed(is_correct_draw)(claim, draw) for draw in range(draws))
+        wrong = [draw for draw, each in enumerate(results_by_draw) if not each]
         reported = f"  wrong in draws {', '.join(map(str, wrong))}" if wrong else ""
         print(f"{claim:44}{draws - len(wrong):7d}{draws:5d}{reported}", flush=True)
         results.append({"claim": claim, "right": draws - len(wrong), "draws": draws})

@@ -56,9 +56,9 @@ def problem(name: str, draw: int = 0) -> Problem:
         x = hand(np.random.default_rng([12, draw]), 10_000, 0.0, 4.0)
         return _one_input(name, x, tactile_switch, 0.005, noise, seed=902)
     if name == "P3":
-        low, high = [-0.002, -0.2], [0.01, 0.2]
-        X = np.random.default_rng([103, draw]).uniform(low, high, (20_000, 2))
-        X_test = np.random.default_rng(903).uniform(low, high, (10_000, 2))
+        lower, upper = [-0.002, -0.2], [0.01, 0.2]
+        X = np.random.default_rng([103, draw]).uniform(lower, upper, (20_000, 2))
+        X_test = np.random.default_rng(903).uniform(lower, upper, (10_000, 2))
         force = _hunt_crossley(X)
         y = force + noise.normal(0.0, 0.01 * force.std(), len(force))
         return Problem(name, X, y, X_test, _hunt_crossley(X_test))
@@ -83,15 +83,15 @@ def _one_input(name: str, x: Array, force, sigma: float, noise: np.random.Genera
     )
 
 
-def hand(random: np.random.Generator, n: int, low: float, high: float) -> Array:
+def hand(random: np.random.Generator, n: int, lower: float, upper: float) -> Array:
     """Returns positions of a hand at 1 kHz: slow sweeps with varying frequency and width and with jitter."""
-    knots = max(8, n // 1500)
-    at, knot = np.arange(n), np.linspace(0, n, knots)
-    frequency = np.interp(at, knot, random.uniform(0.2, 0.9, knots))
-    width = np.interp(at, knot, random.uniform(0.42, 0.53, knots))
+    n_knots = max(8, n // 1500)
+    row, knot_rows = np.arange(n), np.linspace(0, n, n_knots)
+    frequency = np.interp(row, knot_rows, random.uniform(0.2, 0.9, n_knots))
+    width = np.interp(row, knot_rows, random.uniform(0.42, 0.53, n_knots))
     jitter = lfilter([1.0], [1.0, -0.995], random.normal(0.0, 4e-4, n))
     u = np.abs(0.5 - width * np.cos(2.0 * np.pi * np.cumsum(frequency) * 1e-3) + jitter)
-    return low + (high - low) * (1.0 - np.abs(1.0 - u))
+    return lower + (upper - lower) * (1.0 - np.abs(1.0 - u))
 
 
 def spring_wall(x: Array) -> Array:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.identification.figures import LIMIT
+from bench.identification.figures import WORST_SPLINE_RATIO
 from bench.studies import SCALE, count, measured_data, write_results
 
 import palpate
@@ -53,7 +53,7 @@ class Set:
     options: Mapping[str, Any] = field(default_factory=dict)
     folder: str = ""
     """Folder, if its name is not that of the set"""
-    beside: bool = True
+    with_baselines: bool = True
     """False if the baselines are those of another set"""
 
 
@@ -61,7 +61,7 @@ SETS = {
     "keyswitches": Set(),
     "rubber_domes": Set(),
     "rubber_domes_h_of_any_sign": Set(
-        options={"hysteresis_nonnegative": False}, folder="rubber_domes", beside=False
+        options={"hysteresis_nonnegative": False}, folder="rubber_domes", with_baselines=False
     ),
     "rubber_domes_force_25_ms_earlier": Set(reading={"force_late_s": 0.025}, folder="rubber_domes"),
     "switch_springs": Set(),
@@ -90,33 +90,37 @@ class Crossing:
     floor: float
     """NRMSE of the best force with h >= 0: the measured strokes, replaced by their mean where they cross. It
     is fitted to the judged rows with their noise."""
-    above: float
+    excess: float
     """Largest difference of release and press [force]"""
     at_turn: Rows
     """(n,) rows in the last hundredth of the travel"""
 
     @staticmethod
-    def of(recording: palpate.Recording, judged: Rows) -> Crossing | None:
+    def of(recording: palpate.Recording, compared: Rows) -> Crossing | None:
         """Evaluates the judged rows (n,); returns None without two strokes."""
         x, direction, force = recording.position, recording.direction, recording.force
         if direction is None or not {-1, 1} <= set(direction.tolist()):
             return None
         press, release = (_stroke(recording, side) for side in (1, -1))
-        both = (x >= max(press[0][0], release[0][0])) & (x <= min(press[0][-1], release[0][-1]))
-        above = np.where(both, np.maximum(np.interp(x, *release) - np.interp(x, *press), 0.0), 0.0)
-        floor = float(np.sqrt(np.mean(above[judged] ** 2))) / 2.0 / float(np.std(force[judged]))
-        return Crossing(floor, float(above.max()), x > x.max() - AT_TURN * np.ptp(x))
+        in_both_strokes = (x >= max(press[0][0], release[0][0])) & (x <= min(press[0][-1], release[0][-1]))
+        excess = np.where(
+            in_both_strokes, np.maximum(np.interp(x, *release) - np.interp(x, *press), 0.0), 0.0
+        )
+        floor = float(np.sqrt(np.mean(excess[compared] ** 2))) / 2.0 / float(np.std(force[compared]))
+        return Crossing(floor, float(excess.max()), x > x.max() - AT_TURN * np.ptp(x))
 
 
 def _stroke(recording: palpate.Recording, side: int) -> tuple[Array, Array]:
     """Returns the distinct positions of one stroke and the mean forces there."""
     assert recording.direction is not None
-    on = recording.direction == side
-    places, where = np.unique(recording.position[on], return_inverse=True)
-    return places, np.bincount(where, recording.force[on]) / np.bincount(where)
+    in_stroke = recording.direction == side
+    positions, index_of_position = np.unique(recording.position[in_stroke], return_inverse=True)
+    return positions, np.bincount(index_of_position, recording.force[in_stroke]) / np.bincount(
+        index_of_position
+    )
 
 
-def ours(
+def fit_palpate(
     recording: palpate.Recording, train: palpate.Recording, options: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Identifies the kept rows and tests the held-out rows of the baselines.
@@ -129,16 +133,16 @@ def ours(
     seconds = time.perf_counter() - start
     check = palpate.verify(model, recording)
     held_out = np.arange(len(recording)) % EVERY == EVERY - 1
-    judged = held_out & comparable(recording) & check.rows
-    error = check.residual[judged[check.rows]]
-    nrmse = normalised(root_mean_square(error), recording.force[judged])
-    crossed: dict[str, float] = {}
-    if (crossing := Crossing.of(recording, judged)) is not None:
-        late = error[crossing.at_turn[judged]]
-        crossed = {
+    compared = held_out & comparable(recording) & check.rows
+    error = check.residual[compared[check.rows]]
+    nrmse = normalised(root_mean_square(error), recording.force[compared])
+    crossing_numbers: dict[str, float] = {}
+    if (crossing := Crossing.of(recording, compared)) is not None:
+        error_at_turn = error[crossing.at_turn[compared]]
+        crossing_numbers = {
             "floor": crossing.floor,
-            "release_above_press": crossing.above,
-            "share_at_turn": float(late @ late / (error @ error)),
+            "release_above_press": crossing.excess,
+            "share_at_turn": float(error_at_turn @ error_at_turn / (error @ error)),
         }
     return {
         "nrmse": nrmse,
@@ -147,92 +151,99 @@ def ours(
         "model_class": model.fit.model_class,
         "seconds": seconds,
         "finite": bool(np.isfinite(nrmse) and nrmse < 1.5),
-        **crossed,
+        **crossing_numbers,
     }
 
 
-def row_of(path: Path, kind: Set) -> dict[str, Any]:
+def row_of(path: Path, recording_set: Set) -> dict[str, Any]:
     """Returns the results of palpate and of every baseline on the same rows of one file."""
-    reading = dict(kind.reading)
+    reading = dict(recording_set.reading)
     try:
         recording = palpate.read_recording(path, **reading)
-    except palpate.InputError as first:
+    except palpate.InputError as first_error:
         # The files of one folder have different columns, so the reader chooses.
         reading.pop("position", None)
         try:
             recording = palpate.read_recording(path, **reading)
         except palpate.InputError:
-            return {"file": path.stem, "refused": str(first)}
-    if "velocity" in kind.options.get("inputs", ""):
+            return {"file": path.stem, "refused": str(first_error)}
+    if "velocity" in recording_set.options.get("inputs", ""):
         # computed before rows are held out, because a derivative needs neighbouring rows
         speed, _ = velocity(recording)
         recording = replace(recording, inputs=speed[:, None], input_names=("velocity",))
     train, _ = recording.split(EVERY)
     try:
-        found = ours(recording, train, kind.options)
+        numbers = fit_palpate(recording, train, recording_set.options)
     except palpate.InputError as error:
-        found = {"refused": str(error)}
-    others = {each.name: each for each in compare([recording], EVERY)}
-    splines = others["smoothing spline" if "smoothing spline" in others else "smoothing spline, two strokes"]
+        numbers = {"refused": str(error)}
+    baselines = {each.name: each for each in compare([recording], EVERY)}
+    splines = baselines[
+        "smoothing spline" if "smoothing spline" in baselines else "smoothing spline, two strokes"
+    ]
     return {
         "file": path.stem,
-        **found,
+        **numbers,
         "splines": _numbers(splines),
-        "passive_splines": _numbers(others[PASSIVE_SPLINE]) if PASSIVE_SPLINE in others else None,
-        "baselines": {name: _numbers(each) for name, each in others.items()} if kind.beside else {},
+        "passive_splines": _numbers(baselines[PASSIVE_SPLINE]) if PASSIVE_SPLINE in baselines else None,
+        "baselines": {name: _numbers(each) for name, each in baselines.items()}
+        if recording_set.with_baselines
+        else {},
     }
 
 
 def _numbers(each: Compared) -> dict[str, Any]:
-    told = {"nrmse": each.nrmse, "n_parameters": each.n_parameters, "seconds": each.seconds}
-    return told if each.refused is None else {**told, "refused": each.refused}
+    numbers = {"nrmse": each.nrmse, "n_parameters": each.n_parameters, "seconds": each.seconds}
+    return numbers if each.refused is None else {**numbers, "refused": each.refused}
 
 
 def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
     """Prints the medians of one set, refused files and diverged models."""
-    good = [row for row in rows if "nrmse" in row]
+    measured_rows = [row for row in rows if "nrmse" in row]
     for row in rows:
-        for who, told in (
+        for prefix, numbers in (
             ("", row),
             *((f"{name}: ", each) for name, each in row.get("baselines", {}).items()),
         ):
-            if "refused" in told:
-                print(f"  {row['file']} is refused, {who}{told['refused']}")
-    if not good:
+            if "refused" in numbers:
+                print(f"  {row['file']} is refused, {prefix}{numbers['refused']}")
+    if not measured_rows:
         return
-    title = f"median of {len(good)} files"
+    title = f"median of {len(measured_rows)} files"
     print(f"  {title:52}{'nrmse':>9}{'worst':>9}{'parameters':>12}{'seconds':>9}")
-    _report_line("palpate", good, len(good))
-    for method in dict.fromkeys(key for row in good for key in row["baselines"]):
-        theirs = [row["baselines"][method] for row in good if method in row["baselines"]]
-        _report_line(method, [each for each in theirs if np.isfinite(each["nrmse"])], len(good))
-    _report_ratios("the splines'", {row["file"]: (row, row["splines"]) for row in good})
-    passive = {row["file"]: (row, row["passive_splines"]) for row in good if row["passive_splines"]}
+    _report_line("palpate", measured_rows, len(measured_rows))
+    for method in dict.fromkeys(key for row in measured_rows for key in row["baselines"]):
+        results = [row["baselines"][method] for row in measured_rows if method in row["baselines"]]
+        _report_line(method, [each for each in results if np.isfinite(each["nrmse"])], len(measured_rows))
+    _report_ratios("the splines'", {row["file"]: (row, row["splines"]) for row in measured_rows})
+    passive = {row["file"]: (row, row["passive_splines"]) for row in measured_rows if row["passive_splines"]}
     _report_ratios("that of the splines with h >= 0", passive)
-    diverged = [row["file"] for row in good if not row["finite"]]
+    diverged = [row["file"] for row in measured_rows if not row["finite"]]
     print(f"  diverged: {', '.join(diverged) if diverged else 'none'}")
 
 
-def _report_line(method: str, each: Sequence[Mapping[str, Any]], of: int) -> None:
+def _report_line(method: str, each: Sequence[Mapping[str, Any]], n_files: int) -> None:
     """Prints medians, with the number of files if some are missing."""
     if each:
-        told = method if len(each) == of else f"{method} ({len(each)} files)"
-        nrmse, size, seconds = ([row[key] for row in each] for key in ("nrmse", "n_parameters", "seconds"))
-        print(f"  {told:52}{median(nrmse):9.4f}{max(nrmse):9.4f}{median(size):12.0f}{median(seconds):9.2f}")
+        name = method if len(each) == n_files else f"{method} ({len(each)} files)"
+        nrmse, sizes, seconds = ([row[key] for row in each] for key in ("nrmse", "n_parameters", "seconds"))
+        print(f"  {name:52}{median(nrmse):9.4f}{max(nrmse):9.4f}{median(sizes):12.0f}{median(seconds):9.2f}")
 
 
-def _report_ratios(than: str, pairs: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]]) -> None:
+def _report_ratios(reference: str, pairs: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]]) -> None:
     """Prints the ratio of errors, file by file."""
     ratios = {
-        file: own["nrmse"] / other["nrmse"] for file, (own, other) in pairs.items() if other["nrmse"] > 0.0
+        file: palpate_row["nrmse"] / spline_row["nrmse"]
+        for file, (palpate_row, spline_row) in pairs.items()
+        if spline_row["nrmse"] > 0.0
     }
     if not ratios:
         return
     worst = max(ratios, key=lambda file: ratios[file])
-    over = sum(ratio > LIMIT for ratio in ratios.values())
+    n_above = sum(ratio > WORST_SPLINE_RATIO for ratio in ratios.values())
     print(
-        f"  error over {than}: median {median(ratios.values()):.2f}, worst {ratios[worst]:.2f} ({worst}); "
-        f"above {LIMIT}: {over} of {len(ratios)}"
+        f"  error over {reference}: median {median(ratios.values()):.2f}, "
+        f"worst {ratios[worst]:.2f} ({worst}); "
+        f"above {WORST_SPLINE_RATIO}: {n_above} of {len(ratios)}"
     )
 
 

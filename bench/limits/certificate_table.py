@@ -22,32 +22,36 @@ ROW = re.compile(
 )
 
 
-def table_of(printed: str) -> str:
+def table_of(search_output: str) -> str:
     """Returns the Markdown table of the printed search, and the number of scenes."""
     by_line: dict[tuple[str, str], dict[str, re.Match[str]]] = {}
     scenes = 0
-    for row in ROW.finditer(printed):
+    for row in ROW.finditer(search_output):
         by_line.setdefault((row["line"], row["scenes"]), {})[row["delay"]] = row
         scenes += int(row["number"])
     header = ["line", "scenes", *(f"delay {float(delay):g}" for delay in DELAYS), "found at 0.95"]
     rows = []
-    for (line, name), found in by_line.items():
-        first = found.get(DELAYS[0]) or found["1.00"]
+    for (line, name), rows_by_delay in by_line.items():
+        reference_row = rows_by_delay.get(DELAYS[0]) or rows_by_delay["1.00"]
         cells = [
-            f"{found[delay]['median']} / {found[delay]['worst']}" if delay in found else "–"
+            f"{rows_by_delay[delay]['median']} / {rows_by_delay[delay]['worst']}"
+            if delay in rows_by_delay
+            else "–"
             for delay in DELAYS
         ]
-        rows.append([f"`{line}`", name, *cells, f"{first['found']} of {first['number']}"])
-    return f"{markdown_table(header, rows)}\nOf {scenes} certified scenes, {printed.splitlines()[-1]}.\n"
+        rows.append([f"`{line}`", name, *cells, f"{reference_row['found']} of {reference_row['number']}"])
+    return (
+        f"{markdown_table(header, rows)}\nOf {scenes} certified scenes, {search_output.splitlines()[-1]}.\n"
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("printed", type=Path, help="output of certificate_search")
     parser.add_argument("--to", type=Path, required=True, help="folder of the page")
-    given = parser.parse_args()
-    table = table_of(given.printed.read_text(encoding="utf-8"))
-    fill_tables(given.to / "certificate.md", {"search": table})
+    options = parser.parse_args()
+    table = table_of(options.printed.read_text(encoding="utf-8"))
+    fill_tables(options.to / "certificate.md", {"search": table})
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ PAGE = "where-each-method-fails.md"
 
 MARKERS = "os^Dv"
 DASHES = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (5, 2, 1, 2)), (0, (8, 3)))
-LONGEST_OF_TWO_COLUMNS = 30
+LONGEST_NAME_IN_TWO_COLUMNS = 30
 """Longest name in a legend of two columns [characters]"""
 
 Map = Mapping[str, Any]
@@ -52,15 +52,15 @@ def values(line: Map, key: str) -> NDArray[np.float64]:
     return np.array(line[key], dtype=np.float64)
 
 
-def draw_map(axes: Axes, drawn: Map) -> None:
+def draw_map(axes: Axes, failure_map: Map) -> None:
     """Draws measured limits as markers and theory as lines, both axes logarithmic unless the map is linear.
 
     A filled marker shows the largest tried value if no value failed.
     """
-    lines, searched = drawn["lines"], drawn["searched"]
+    lines, largest_tried = failure_map["lines"], failure_map["searched"]
     for line, marker, dash in zip(lines, MARKERS, DASHES, strict=False):
         at, measured, theory = (values(line, key) for key in ("at", "measured", "theory"))
-        look = {"marker": marker, "markersize": 4.5, "color": "black"}
+        marker_style = {"marker": marker, "markersize": 4.5, "color": "black"}
         axes.plot(at, theory, color="0.45", linewidth=1.0, linestyle=dash, zorder=1)
         axes.plot(
             at,
@@ -69,71 +69,81 @@ def draw_map(axes: Axes, drawn: Map) -> None:
             linewidth=0.6,
             markerfacecolor="white",
             markeredgewidth=0.8,
-            label=in_print(line["name"]),
-            **look,
+            label=printed_form(line["name"]),
+            **marker_style,
         )
-        held = np.isnan(measured) & np.isfinite(theory)
-        if searched > 0.0 and held.any():
-            name = f"{in_print(line['name'])}: still holds"
-            axes.plot(at[held], searched * theory[held], linestyle="none", label=name, **look)
+        still_stable = np.isnan(measured) & np.isfinite(theory)
+        if largest_tried > 0.0 and still_stable.any():
+            name = f"{printed_form(line['name'])}: still holds"
+            axes.plot(
+                at[still_stable],
+                largest_tried * theory[still_stable],
+                linestyle="none",
+                label=name,
+                **marker_style,
+            )
     axes.set_xscale("log")
     label_decades(axes.xaxis)
-    if not drawn["linear"]:
+    if not failure_map["linear"]:
         axes.set_yscale("log")
         label_decades(axes.yaxis)
     grid(axes)
-    axes.set_xlabel(in_print(drawn["along"]))
-    axes.set_ylabel(in_print(drawn["limit"]))
+    axes.set_xlabel(printed_form(failure_map["along"]))
+    axes.set_ylabel(printed_form(failure_map["limit"]))
     handles, _ = axes.get_legend_handles_labels()
-    shown = [
+    drawn_handles = [
         handle for handle in handles if isinstance(handle, Line2D) and np.isfinite(handle.get_ydata()).any()
     ]
     if any(np.isfinite(values(line, "theory")).any() for line in lines):
-        shown.append(Line2D([], [], color="0.45", linewidth=1.0, label="theory"))
-    longest = max(len(str(handle.get_label())) for handle in shown)
-    columns = 2 if longest <= LONGEST_OF_TWO_COLUMNS else 1
-    axes.figure.legend(handles=shown, frameon=False, loc="outside lower center", ncols=columns)
+        drawn_handles.append(Line2D([], [], color="0.45", linewidth=1.0, label="theory"))
+    longest = max(len(str(handle.get_label())) for handle in drawn_handles)
+    columns = 2 if longest <= LONGEST_NAME_IN_TWO_COLUMNS else 1
+    axes.figure.legend(handles=drawn_handles, frameon=False, loc="outside lower center", ncols=columns)
 
 
 def label_decades(axis: Axis) -> None:
     """Labels powers of ten; below two decades also 1, 2 and 5 as plain numbers."""
-    low, high = axis.get_view_interval()
+    lower, upper = axis.get_view_interval()
     axis.set_minor_formatter(NullFormatter())
-    if high < 100.0 * low:
+    if upper < 100.0 * lower:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
-def in_print(text: str) -> str:
+def printed_form(text: str) -> str:
     """Replaces products, squares and indices by their printed form."""
     text = text.replace("*", "·").replace("^2", "²")
     return re.sub(r"\b([A-Za-z])_([a-z])\b", r"$\1_\2$", text)
 
 
-def map_table(shown: Map) -> str:
+def map_table(failure_map: Map) -> str:
     """Returns measured over theory for each line, or measured values if the theory is unknown."""
-    lines = shown["lines"]
-    if not shown["linear"] and any(np.isfinite(values(line, "theory")).any() for line in lines):
+    lines = failure_map["lines"]
+    if not failure_map["linear"] and any(np.isfinite(values(line, "theory")).any() for line in lines):
         return markdown_table(
-            ("", "measured over theory"), [(line["name"], spread(line, shown["searched"])) for line in lines]
+            ("", "measured over theory"),
+            [(line["name"], spread(line, failure_map["searched"])) for line in lines],
         )
-    places = lines[0]["at"]
-    chosen = np.unique(np.linspace(0, len(places) - 1, 5).round().astype(int))
+    positions = lines[0]["at"]
+    columns = np.unique(np.linspace(0, len(positions) - 1, 5).round().astype(int))
     return markdown_table(
-        (shown["along"], *(number(places[k]) for k in chosen)),
-        [(line["name"], *(number(values(line, "measured")[k]) for k in chosen)) for line in lines],
+        (failure_map["along"], *(number(positions[k]) for k in columns)),
+        [(line["name"], *(number(values(line, "measured")[k]) for k in columns)) for line in lines],
     )
 
 
-def spread(line: Map, searched: float) -> str:
+def spread(line: Map, largest_tried: float) -> str:
     """Returns smallest and largest ratio of measured over theory, or the largest value without failure."""
     measured, theory = values(line, "measured"), values(line, "theory")
-    known = np.isfinite(measured) & np.isfinite(theory) & (theory != 0.0)
-    ratio, none = measured[known] / theory[known], f"nothing failed up to {number(searched)}"
+    comparable = np.isfinite(measured) & np.isfinite(theory) & (theory != 0.0)
+    ratio, without_failure = (
+        measured[comparable] / theory[comparable],
+        f"nothing failed up to {number(largest_tried)}",
+    )
     if not ratio.size:
-        return none
-    found = f"{ratio.min():.4f} to {ratio.max():.4f}"
-    return f"{found}; elsewhere {none}" if np.isnan(measured).any() else found
+        return without_failure
+    text = f"{ratio.min():.4f} to {ratio.max():.4f}"
+    return f"{text}; elsewhere {without_failure}" if np.isnan(measured).any() else text
 
 
 def guard_table(guards: Sequence[Mapping[str, Any]]) -> str:
@@ -153,22 +163,22 @@ def guard_table(guards: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def write(printed: Mapping[str, Any], to: Path, seconds: float) -> None:
+def write(program_output: Mapping[str, Any], to: Path, seconds: float) -> None:
     """Draws the maps, writes the printed numbers, and fills the tables of the page."""
     measured = {
         **where(),
         "seconds": round(seconds, 1),
         "simulated": "device and hands are simulated; no number was measured on hardware",
-        **printed,
+        **program_output,
     }
-    for each in printed["maps"]:
+    for each in program_output["maps"]:
         path = to / "figures" / f"failure-{each['name']}.png"
         path.parent.mkdir(parents=True, exist_ok=True)
         with figure_file(path, height_inches=3.2) as (axes,):
             draw_map(axes, each)
     write_json(to / "figures" / "failure-maps.json", measured)
-    tables = {each["name"]: map_table(each) for each in printed["maps"]}
-    tables["guards"] = guard_table(printed["guards"])
+    tables = {each["name"]: map_table(each) for each in program_output["maps"]}
+    tables["guards"] = guard_table(program_output["guards"])
     tables["where"] = (
         f"Measured by `python bench/limits/failure_maps.py --to docs`: palpate {measured['palpate']}, "
         f"{measured['date']}, {measured['machine']}, {measured['seconds']} s.\n"
@@ -180,12 +190,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--to", type=Path, required=True, help="folder of figures/ and of the page")
     parser.add_argument("--points", type=int, default=9, help="values along each axis")
-    given = parser.parse_args()
+    options = parser.parse_args()
     if not PROGRAM.exists():
         raise SystemExit(f"{PROGRAM} does not exist: cmake --build --preset release --target failure_maps")
     start = time.perf_counter()
-    run = subprocess.run([PROGRAM, str(given.points)], stdout=subprocess.PIPE, check=True)
-    write(json.loads(run.stdout), given.to, time.perf_counter() - start)
+    completed = subprocess.run([PROGRAM, str(options.points)], stdout=subprocess.PIPE, check=True)
+    write(json.loads(completed.stdout), options.to, time.perf_counter() - start)
 
 
 if __name__ == "__main__":

@@ -62,8 +62,8 @@ class PredictionGain:
 
     def spread(self, error: str) -> tuple[float, float, float]:
         """Returns the median, 10 % and 90 % quantile of a ratio."""
-        low, middle, high = np.quantile(self.ratio[error], (0.1, 0.5, 0.9))
-        return float(middle), float(low), float(high)
+        lower, middle, upper = np.quantile(self.ratio[error], (0.1, 0.5, 0.9))
+        return float(middle), float(lower), float(upper)
 
     @property
     def name(self) -> str:
@@ -80,7 +80,7 @@ class PredictionGain:
         }
 
 
-def measured() -> list[PredictionGain]:
+def measure() -> list[PredictionGain]:
     """Renders identified and random objects under several hands with each number of samples."""
     device = DeviceProfile()
     knob = identify(sample_recording(seed=1))
@@ -89,13 +89,13 @@ def measured() -> list[PredictionGain]:
         for model in objects(knob)
         for hand in hands(model)
     ]
-    at_two_hertz = Hand(frequency_hz=2.0)
+    hand_at_2_hz = Hand(frequency_hz=2.0)
     return [
         PredictionGain(
             samples,
             (damping(samples, 0.0), damping(samples, 1.0)),
             friction(samples),
-            errors(knob, samples, device, at_two_hertz, 4.0),
+            errors(knob, samples, device, hand_at_2_hz, 4.0),
             {name: np.array([abs(case[0][name] / case[k][name]) for case in cases]) for name in ERRORS},
         )
         for k, samples in enumerate(PREDICTIONS)
@@ -139,16 +139,16 @@ def hands(model: Model) -> Iterator[Hand]:
         )
 
 
-def certificate(samples: int, falling: float, device: DeviceProfile) -> dict[str, float]:
-    """Returns the right side of each inequality for slopes from -falling to 1."""
-    bounds = ForceBounds(slope_min=-falling, slope_max=1.0, steepest=1.0, sliding=1.0)
+def certificate(samples: int, steepest_fall: float, device: DeviceProfile) -> dict[str, float]:
+    """Returns the right side of each inequality for slopes from -steepest_fall to 1."""
+    bounds = ForceBounds(slope_min=-steepest_fall, slope_max=1.0, steepest=1.0, sliding=1.0)
     scheme = Scheme(structure="direct", predict=samples)
     return {line.id: line.right for line in certify_bounds(bounds, scheme, device).inequalities}
 
 
-def damping(samples: int, falling: float) -> float:
+def damping(samples: int, steepest_fall: float) -> float:
     device = DeviceProfile()
-    return certificate(samples, falling, device)["damping-hold"] / device.period_s
+    return certificate(samples, steepest_fall, device)["damping-hold"] / device.period_s
 
 
 def friction(samples: int) -> float:
@@ -160,15 +160,15 @@ def friction(samples: int) -> float:
 def draw_prediction(axes: Axes, gains: Sequence[PredictionGain]) -> None:
     """Draws force errors over that without prediction, with their 10 to 90 % range, over the damping."""
     x = np.array([gain.damping[1] for gain in gains])
-    for name, error, marker, filled, shift in (
+    for name, error, marker, filled, sign in (
         ("mean of a tick", "mean", "o", "white", -1),
         ("below 50 Hz", "band", "s", "black", 1),
     ):
-        middle, low, high = 1.0 / np.array([gain.spread(error) for gain in gains]).T
+        middle, lower, upper = 1.0 / np.array([gain.spread(error) for gain in gains]).T
         axes.errorbar(
-            x * (1.0 + 0.006 * shift),
+            x * (1.0 + 0.006 * sign),
             middle,
-            yerr=(middle - high, low - middle),
+            yerr=(middle - upper, lower - middle),
             linestyle="none",
             marker=marker,
             markersize=4.5,
@@ -183,9 +183,9 @@ def draw_prediction(axes: Axes, gains: Sequence[PredictionGain]) -> None:
     grid(axes)
     axes.set_xlabel("certified damping b / (T M), slopes from −M to M")
     axes.set_ylabel("force error over that without prediction")
-    above = axes.secondary_xaxis("top")
-    above.set_xticks(x, [str(gain.samples) for gain in gains])
-    above.set_xlabel("samples m of the prediction")
+    top_axis = axes.secondary_xaxis("top")
+    top_axis.set_xticks(x, [str(gain.samples) for gain in gains])
+    top_axis.set_xlabel("samples m of the prediction")
     axes.figure.legend(frameon=False, loc="outside lower center", ncols=2)
 
 
@@ -224,8 +224,8 @@ def gain_table(gains: Sequence[PredictionGain]) -> str:
 def spread(gain: PredictionGain, error: str) -> str:
     if not gain.samples:
         return "1"
-    middle, low, high = gain.spread(error)
-    return f"{middle:.1f} ({low:.1f} to {high:.1f})"
+    middle, lower, upper = gain.spread(error)
+    return f"{middle:.1f} ({lower:.1f} to {upper:.1f})"
 
 
 def write(gains: Sequence[PredictionGain], to: Path) -> None:
@@ -241,7 +241,7 @@ def write(gains: Sequence[PredictionGain], to: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--to", type=Path, required=True, help="folder of figures/ and of the page")
-    write(measured(), parser.parse_args().to)
+    write(measure(), parser.parse_args().to)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ from bench.studies import fill_tables, markdown_table, where, write_json
 
 WORST_RATIO = 1.2
 
-ERRORS = (
+ERROR_COLUMNS = (
     "object",
     "device",
     "plan",
@@ -40,7 +40,7 @@ ERRORS = (
     "best at rest, proved or not",
     "error",
 )
-WEAK = (
+LIMITED_PLAN_COLUMNS = (
     "object",
     "device",
     "force error, RMS [% of range]",
@@ -52,44 +52,44 @@ WEAK = (
 )
 
 
-def tables(rows: list[Row], left_out: str) -> dict[str, str]:
+def tables(rows: list[Row], omitted: str) -> dict[str, str]:
     """Returns the tables of the page by their marks."""
-    errors, weak = [], []
+    errors, limited_plans = [], []
     for row in rows:
-        percent = 100.0 / row.force_range
+        percent_of_range = 100.0 / row.force_range
         errors.append(
             (
                 row.object,
                 row.device,
                 row.plan,
-                f"{percent * row.error:.3g}",
+                f"{percent_of_range * row.error:.3g}",
                 row.best,
-                f"{percent * row.best_error:.3g}",
+                f"{percent_of_range * row.best_error:.3g}",
                 f"{row.ratio:.3f}",
                 row.best_at_rest,
-                f"{percent * row.best_at_rest_error:.3g}",
+                f"{percent_of_range * row.best_at_rest_error:.3g}",
             )
         )
-        if row.loss_rms is not None:
-            weak.append(
+        if row.force_error_rms is not None:
+            limited_plans.append(
                 (
                     row.object,
                     row.device,
-                    f"{percent * row.loss_rms:.3g}",
-                    f"{percent * row.loss_largest:.3g}",
-                    f"{100.0 * row.kept:.0f}",
-                    f"{percent * row.kept_departure:.2g}",
-                    "oscillates" if row.shakes else "at rest",
-                    "oscillates" if row.direct_shakes else "at rest",
+                    f"{percent_of_range * row.force_error_rms:.3g}",
+                    f"{percent_of_range * row.force_error_largest:.3g}",
+                    f"{100.0 * row.unchanged_share:.0f}",
+                    f"{percent_of_range * row.unchanged_force_error:.2g}",
+                    "oscillates" if row.oscillates else "at rest",
+                    "oscillates" if row.direct_oscillates else "at rest",
                 )
             )
-    measured = where()
+    machine = where()
     return {
         "where": "Measured by `python bench/plans/plan_against_trial.py --to docs`: "
-        f"palpate {measured['palpate']}, {measured['date']}, {measured['machine']}. "
-        f"Worst of plan over best certified: {max(row.ratio for row in rows):.3f}.{left_out}\n",
-        "errors": markdown_table(ERRORS, errors, text_columns=(0, 1, 2, 4, 7)),
-        "weak": markdown_table(WEAK, weak, text_columns=(0, 1, 6, 7)),
+        f"palpate {machine['palpate']}, {machine['date']}, {machine['machine']}. "
+        f"Worst of plan over best certified: {max(row.ratio for row in rows):.3f}.{omitted}\n",
+        "errors": markdown_table(ERROR_COLUMNS, errors, text_columns=(0, 1, 2, 4, 7)),
+        "weak": markdown_table(LIMITED_PLAN_COLUMNS, limited_plans, text_columns=(0, 1, 6, 7)),
     }
 
 
@@ -101,24 +101,24 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=2.0)
     parser.add_argument("--switches", type=int, default=5)
     parser.add_argument("--grid", type=int, default=4)
-    given = parser.parse_args()
-    left_out = ""
-    if len(measured_switches(given.switches)) < given.switches:
-        left_out = " Left out: the measured switches, which need the folder that PALPATE_DATA names."
+    options = parser.parse_args()
+    omitted = ""
+    if len(measured_switches(options.switches)) < options.switches:
+        omitted = " Omitted: the measured switches, which need the folder that PALPATE_DATA names."
     rows = []
-    for name, model, devices in objects(given.switches):
+    for name, model, devices in objects(options.switches):
         for device in devices:
-            rows.append(compare(name, model, device, given.seconds, given.grid))
+            rows.append(compare(name, model, device, options.seconds, options.grid))
             print(f"{name} on {device.id}: plan / best {rows[-1].ratio:.3f}", file=sys.stderr, flush=True)
-    written = tables(rows, left_out)
-    print("\n".join(written.values()))
-    write_json(given.to / "figures" / "plan-against-trial.json", [asdict(row) for row in rows])
-    fill_tables(given.to / "plan-against-trial.md", written)
-    missed = [row for row in rows if not row.ratio <= WORST_RATIO or row.shakes]
-    for row in missed:
-        why = "does not come to rest" if row.shakes else f"exceeds {WORST_RATIO} times the best error"
-        print(f"{row.object} on {row.device}: the plan {why}", file=sys.stderr)
-    return 1 if missed else 0
+    page_tables = tables(rows, omitted)
+    print("\n".join(page_tables.values()))
+    write_json(options.to / "figures" / "plan-against-trial.json", [asdict(row) for row in rows])
+    fill_tables(options.to / "plan-against-trial.md", page_tables)
+    failed = [row for row in rows if not row.ratio <= WORST_RATIO or row.oscillates]
+    for row in failed:
+        reason = "does not come to rest" if row.oscillates else f"exceeds {WORST_RATIO} times the best error"
+        print(f"{row.object} on {row.device}: the plan {reason}", file=sys.stderr)
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

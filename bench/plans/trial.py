@@ -20,20 +20,22 @@ from palpate.planning.limited_network import renderable_slopes
 from palpate.recording import Recording
 
 SAMPLES = 1001
-PUSH = 0.01
+PUSH_SHARE = 0.01
 """Displacement of the hand before it is released [share of the travel]"""
-SWING = 4.0
+LARGEST_OSCILLATION = 4.0
 """Largest oscillation at rest after four seconds [encoder steps]"""
-ANGLE = (
+ROTARY_DEVICES = (
     DeviceProfile(id="knob", coulomb_friction=0.005),
     DeviceProfile(id="weak knob", viscous_damping=0.005, coulomb_friction=0.002),
     DeviceProfile(id="late knob", coulomb_friction=0.01, delay_s=1e-3),
 )
-LENGTH = {"position_unit": "m", "inertia": 0.05, "encoder_step": 1e-6, "force_limit": 20.0}
-TRAVEL = (
-    DeviceProfile(id="slide", viscous_damping=6.0, coulomb_friction=0.05, **LENGTH),
-    DeviceProfile(id="weak slide", viscous_damping=1.0, coulomb_friction=0.01, **LENGTH),
-    DeviceProfile(id="late slide", viscous_damping=6.0, coulomb_friction=0.05, **LENGTH, delay_s=1e-3),
+LINEAR_PROPERTIES = {"position_unit": "m", "inertia": 0.05, "encoder_step": 1e-6, "force_limit": 20.0}
+LINEAR_DEVICES = (
+    DeviceProfile(id="slide", viscous_damping=6.0, coulomb_friction=0.05, **LINEAR_PROPERTIES),
+    DeviceProfile(id="weak slide", viscous_damping=1.0, coulomb_friction=0.01, **LINEAR_PROPERTIES),
+    DeviceProfile(
+        id="late slide", viscous_damping=6.0, coulomb_friction=0.05, **LINEAR_PROPERTIES, delay_s=1e-3
+    ),
 )
 
 
@@ -52,16 +54,16 @@ class Row:
     best_at_rest: str
     """Best candidate that comes to rest, proved or not"""
     best_at_rest_error: float
-    shakes: bool
+    oscillates: bool
     """The plan does not come to rest"""
-    direct_shakes: bool
+    direct_oscillates: bool
     """The identified model, rendered directly, does not come to rest"""
     force_range: float
-    loss_rms: float | None
-    loss_largest: float | None
-    kept: float | None
+    force_error_rms: float | None
+    force_error_largest: float | None
+    unchanged_share: float | None
     """Share of the travel without a limited slope"""
-    kept_departure: float | None
+    unchanged_force_error: float | None
     """Largest force error there"""
 
     @property
@@ -69,7 +71,7 @@ class Row:
         return self.error / self.best_error
 
 
-def analytic(force: np.ndarray, x: np.ndarray) -> Model:
+def model_of(force: np.ndarray, x: np.ndarray) -> Model:
     """Returns the model of an object that is known exactly."""
     return identify(
         Recording.from_arrays(x, force, units={"position": "rad", "force": "N*m"}), inputs=("position",)
@@ -79,23 +81,27 @@ def analytic(force: np.ndarray, x: np.ndarray) -> Model:
 def objects(switches: int) -> Iterator[tuple[str, Model, tuple[DeviceProfile, ...]]]:
     """Yields name, model and the devices of its unit."""
     x = np.linspace(0.0, 0.47, 3000)
-    yield "spring and wall", analytic(2.0 * x + 0.24 * np.logaddexp(0.0, (x - 0.4) / 0.004), x), ANGLE
-    yield "snap-through", analytic(4.0 * x + 0.5 * np.exp(-(((x - 0.2) / 0.03) ** 2)), x), ANGLE
+    yield (
+        "spring and wall",
+        model_of(2.0 * x + 0.24 * np.logaddexp(0.0, (x - 0.4) / 0.004), x),
+        ROTARY_DEVICES,
+    )
+    yield "snap-through", model_of(4.0 * x + 0.5 * np.exp(-(((x - 0.2) / 0.03) ** 2)), x), ROTARY_DEVICES
     for file in measured_switches(switches):
-        yield file.stem.replace("__", ": ").replace("_", " "), identify(read_recording(file)), TRAVEL
+        yield file.stem.replace("__", ": ").replace("_", " "), identify(read_recording(file)), LINEAR_DEVICES
 
 
-def measured_switches(wanted: int) -> list[Path]:
+def measured_switches(n_files: int) -> list[Path]:
     """Returns evenly spaced files of the measured switches; an empty list without measured data."""
-    given = os.environ.get("PALPATE_DATA")
-    files = sorted((Path(given) / "keyswitches").glob("*.csv")) if given else []
-    return files[:: max(1, len(files) // max(1, wanted))][:wanted]
+    data_folder = os.environ.get("PALPATE_DATA")
+    files = sorted((Path(data_folder) / "keyswitches").glob("*.csv")) if data_folder else []
+    return files[:: max(1, len(files) // max(1, n_files))][:n_files]
 
 
 def strokes(model: Model, x: np.ndarray) -> np.ndarray:
     """Returns the force (1, n), or press and release (2, n)."""
     return np.array(
-        [model.force(x, direction=side) for side in ((1.0, -1.0) if model.hysteretic else (None,))]
+        [model.force(x, direction=direction) for direction in ((1.0, -1.0) if model.hysteretic else (None,))]
     )
 
 
@@ -104,8 +110,8 @@ def sweep(model: Model, device: DeviceProfile) -> Hand:
     lower, upper = float(model.lower[0]), float(model.upper[0])
     x = np.linspace(lower + 0.02 * (upper - lower), upper - 0.02 * (upper - lower), 500)
     force = strokes(model, x)[0]
-    held = np.abs(force) < 0.8 * device.force_limit
-    x, force = x[held], force[held]
+    within_limit = np.abs(force) < 0.8 * device.force_limit
+    x, force = x[within_limit], force[within_limit]
     stiffness = max(2.0 * float(np.abs(force).max()) / (upper - lower), 1e-6)
     target = x + force / stiffness
     return Hand(
@@ -125,12 +131,12 @@ def error(
     end = np.asarray(trace["handle_end"])
     if not np.isfinite(end).all() or np.abs(end).max() > 1e3:
         return float("inf")
-    felt = Scheme(structure="direct", play_radius=scheme.play_radius if model.hysteretic else 0.0)
-    truth = motion_driven(model, felt, end, device.period_s)["force"]
-    return float(np.sqrt(np.mean((np.asarray(trace["force"]) - truth) ** 2)))
+    direct = Scheme(structure="direct", play_radius=scheme.play_radius if model.hysteretic else 0.0)
+    identified_force = motion_driven(model, direct, end, device.period_s)["force"]
+    return float(np.sqrt(np.mean((np.asarray(trace["force"]) - identified_force) ** 2)))
 
 
-def shakes(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile) -> bool:
+def oscillates(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile) -> bool:
     """Returns True if a hand without damping on the steepest part keeps oscillating after a push.
 
     One hand is massless. The other is so heavy that the force is 0.03 rad of the oscillation late.
@@ -139,13 +145,13 @@ def shakes(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile)
     x = np.linspace(lower, upper, SAMPLES)
     force = strokes(model, x)[0]
     slope = np.where(np.abs(force) < 0.8 * device.force_limit, np.gradient(force, x), -np.inf)
-    place, steepest = float(x[np.argmax(slope)]), float(slope.max())
-    late = 0.5 * device.period_s + device.delay_s
+    steepest_position, steepest = float(x[np.argmax(slope)]), float(slope.max())
+    delay_s = 0.5 * device.period_s + device.delay_s
     stiffness = 0.05 * steepest
-    target = place + float(strokes(rendered, np.array([place]))[0, 0]) / stiffness
+    target = steepest_position + float(strokes(rendered, np.array([steepest_position]))[0, 0]) / stiffness
     hand = Hand(stiffness=stiffness, damping=0.0, lower=target, upper=target)
-    for inertia in (device.inertia, max(device.inertia, steepest * (late / 0.03) ** 2)):
-        held = DeviceProfile(
+    for inertia in (device.inertia, max(device.inertia, steepest * (delay_s / 0.03) ** 2)):
+        loaded_device = DeviceProfile(
             inertia=inertia,
             viscous_damping=device.viscous_damping,
             coulomb_friction=device.coulomb_friction,
@@ -154,89 +160,91 @@ def shakes(model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile)
             force_limit=device.force_limit,
             position_unit=device.position_unit,
         )
-        start = place + PUSH * (upper - lower)
-        trace = simulate(rendered, scheme, held, hand, 4.0, start_position=start)
-        if not np.ptp(np.asarray(trace["handle_end"])[-500:]) <= SWING * device.encoder_step:
+        start = steepest_position + PUSH_SHARE * (upper - lower)
+        trace = simulate(rendered, scheme, loaded_device, hand, 4.0, start_position=start)
+        if not np.ptp(np.asarray(trace["handle_end"])[-500:]) <= LARGEST_OSCILLATION * device.encoder_step:
             return True
     return False
 
 
-def candidates(model: Model, device: DeviceProfile, radius: float, grid: int) -> Iterator[Scheme]:
+def candidates(model: Model, device: DeviceProfile, play_radius: float, grid: int) -> Iterator[Scheme]:
     """Yields every structure over couplings, masses and dampings around the limit of the device."""
-    play = {"play_radius": radius}
+    play = {"play_radius": play_radius}
     yield Scheme(structure="direct", **play)
-    held = 2.0 * device.viscous_damping / device.period_s
-    for stiffness, share in itertools.product(np.geomspace(0.05 * held, 2.0 * held, grid), (0.0, 2e-4)):
-        coupling = {"coupling_stiffness": stiffness, "coupling_damping": share * stiffness, **play}
+    stiffness_limit = 2.0 * device.viscous_damping / device.period_s
+    for stiffness, damping_share in itertools.product(
+        np.geomspace(0.05 * stiffness_limit, 2.0 * stiffness_limit, grid), (0.0, 2e-4)
+    ):
+        coupling = {"coupling_stiffness": stiffness, "coupling_damping": damping_share * stiffness, **play}
         yield Scheme(structure="massless", **coupling)
         if not model.hysteretic:
             yield Scheme(structure="massless", compensated=True, **coupling)
-        for structure, reserve, ratio in itertools.product(
+        for structure, stability_factor, ratio in itertools.product(
             ("implicit", "energy-consistent", "explicit"), (0.02, 2.0), (0.0, 0.5)
         ):
-            mass = reserve * (held + stiffness) * device.period_s**2
+            mass = stability_factor * (stiffness_limit + stiffness) * device.period_s**2
             yield Scheme(
                 structure=structure, mass=mass, object_damping=ratio * mass / device.period_s, **coupling
             )
 
 
-def kept(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, float]:
+def unchanged_part(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, float]:
     """Returns the share of the travel without a limited slope, and the largest force error there.
 
     h / r counts as slope.
     """
     x = np.linspace(float(model.lower[0]), float(model.upper[0]), SAMPLES)
-    stick = force_bounds(chosen.rendered, chosen.scheme.play_radius).loss_per_play
-    low, high = renderable_slopes(device, stick, model)
+    hysteresis_slope = force_bounds(chosen.rendered, chosen.scheme.play_radius).loss_per_play
+    lowest_slope, highest_slope = renderable_slopes(device, hysteresis_slope, model)
     forces = strokes(model, x)
     unchanged = np.ones(SAMPLES, dtype=bool)
     for force in forces:
-        nearest = slope_limited(x, force, low, high)
+        nearest = slope_limited(x, force, lowest_slope, highest_slope)
         unchanged &= np.abs(nearest - force) <= 1e-6 * np.ptp(force)
     # Kinks are rounded over 0.5 % of the travel, so six times this length does not count as unchanged.
     margin = round(0.03 * SAMPLES)
     unchanged = np.convolve(~unchanged, np.ones(2 * margin + 1), mode="same") < 0.5
-    departure = np.abs(strokes(chosen.rendered, x) - forces).max(axis=0)
-    return float(unchanged.mean()), float(departure[unchanged].max(initial=0.0))
+    force_error = np.abs(strokes(chosen.rendered, x) - forces).max(axis=0)
+    return float(unchanged.mean()), float(force_error[unchanged].max(initial=0.0))
 
 
 def compare(name: str, model: Model, device: DeviceProfile, seconds: float, grid: int) -> Row:
     chosen = plan(model, device)
     certificate = chosen.certificate
-    loss = None if chosen.limited is None else chosen.force_error
+    limited_error = None if chosen.limited is None else chosen.force_error
     assert certificate is not None
     hand = sweep(chosen.rendered, device)
-    proved = at_rest = (float("inf"), "none")
-    rendered = {"": model} if loss is None else {"": model, ", slope limited": chosen.rendered}
-    for (words, shown), scheme in itertools.product(
+    best_certified = at_rest = (float("inf"), "none")
+    rendered = {"": model} if limited_error is None else {"": model, ", slope limited": chosen.rendered}
+    for (suffix, rendered_model), scheme in itertools.product(
         rendered.items(), candidates(model, device, chosen.scheme.play_radius, grid)
     ):
         try:
-            known = not certify(shown, scheme, device).refused
+            is_certified = not certify(rendered_model, scheme, device).refused
         except ValueError:
             continue  # a compensated model can be too steep for its coupling
-        found = error(model, shown, scheme, device, hand, seconds), scheme.structure + words
-        if known:
-            proved = min(proved, found)
-        if found[0] < at_rest[0] and not shakes(model, shown, scheme, device):
-            at_rest = found
-    share, departure = (None, None) if loss is None else kept(model, chosen, device)
+        candidate = error(model, rendered_model, scheme, device, hand, seconds), scheme.structure + suffix
+        if is_certified:
+            best_certified = min(best_certified, candidate)
+        if candidate[0] < at_rest[0] and not oscillates(model, rendered_model, scheme, device):
+            at_rest = candidate
+    share, force_error = (None, None) if limited_error is None else unchanged_part(model, chosen, device)
     direct = Scheme(structure="direct", play_radius=chosen.scheme.play_radius)
     return Row(
         object=name,
         device=device.id,
-        plan=chosen.structure + ("" if loss is None else ", slope limited"),
+        plan=chosen.structure + ("" if limited_error is None else ", slope limited"),
         verdict=certificate.verdict,
         error=error(model, chosen.rendered, chosen.scheme, device, hand, seconds),
-        best=proved[1],
-        best_error=proved[0],
+        best=best_certified[1],
+        best_error=best_certified[0],
         best_at_rest=at_rest[1],
         best_at_rest_error=at_rest[0],
-        shakes=shakes(model, chosen.rendered, chosen.scheme, device),
-        direct_shakes=shakes(model, model, direct, device),
+        oscillates=oscillates(model, chosen.rendered, chosen.scheme, device),
+        direct_oscillates=oscillates(model, model, direct, device),
         force_range=float(np.ptp(strokes(model, np.linspace(model.lower[0], model.upper[0], SAMPLES)))),
-        loss_rms=None if loss is None else loss.rms,
-        loss_largest=None if loss is None else loss.largest,
-        kept=share,
-        kept_departure=departure,
+        force_error_rms=None if limited_error is None else limited_error.rms,
+        force_error_largest=None if limited_error is None else limited_error.largest,
+        unchanged_share=share,
+        unchanged_force_error=force_error,
     )

@@ -34,32 +34,32 @@ def timed(
 
     The clock is wall time, for calls that use several processors, or time.process_time_ns.
     """
-    counts = {name: _count(call, block_s, clock) for name, call in calls.items()}
-    found: dict[str, list[float]] = {name: [] for name in calls}
+    n_calls = {name: _count(call, block_s, clock) for name, call in calls.items()}
+    times: dict[str, list[float]] = {name: [] for name in calls}
     for _ in range(REPETITIONS):
         for name, call in calls.items():
-            found[name].append(_nanoseconds(call, counts[name], clock))
-    return found
+            times[name].append(_nanoseconds(call, n_calls[name], clock))
+    return times
 
 
 def _count(call: Callable[[], object], block_s: float, clock: Callable[[], int]) -> int:
-    count = 1
+    n_calls = 1
     while True:
-        seconds = 1e-9 * _nanoseconds(call, count, clock) * count
+        seconds = 1e-9 * _nanoseconds(call, n_calls, clock) * n_calls
         if seconds >= 0.5 * block_s:
-            return count
-        count = max(2 * count, int(count * block_s / max(seconds, 1e-9) / 2))
+            return n_calls
+        n_calls = max(2 * n_calls, int(n_calls * block_s / max(seconds, 1e-9) / 2))
 
 
-def _nanoseconds(call: Callable[[], object], count: int, clock: Callable[[], int]) -> float:
-    rounds = range(count)
+def _nanoseconds(call: Callable[[], object], n_calls: int, clock: Callable[[], int]) -> float:
+    rounds = range(n_calls)
     start = clock()
     for _ in rounds:
         call()
-    return (clock() - start) / count
+    return (clock() - start) / n_calls
 
 
-def row(name: str, nanoseconds: float, **counters: float) -> dict[str, Any]:
+def result_row(name: str, nanoseconds: float, **counters: float) -> dict[str, Any]:
     """Returns one repetition in the format of Google Benchmark."""
     return {
         "name": name,

@@ -22,7 +22,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from bench.identification.problems import TITLES, problem
-from bench.solvers.blocks import row, scaled, timed, write_results
+from bench.solvers.blocks import result_row, scaled, timed, write_results
 from bench.studies import SCALE
 
 from palpate import WaveletNetworkRegressor
@@ -44,12 +44,12 @@ Predict = Callable[[np.ndarray], np.ndarray]
 
 def models(X: np.ndarray, y: np.ndarray) -> Iterator[tuple[str, int, int, Predict]]:
     """Yields method, wavelets (0: none), parameters and prediction."""
-    seen = set()
-    for most in WAVELETS:
-        network = WaveletNetworkRegressor(max_wavelets=most).fit(X, y)
-        if network.n_wavelets_ in seen:
+    used_sizes = set()
+    for max_wavelets in WAVELETS:
+        network = WaveletNetworkRegressor(max_wavelets=max_wavelets).fit(X, y)
+        if network.n_wavelets_ in used_sizes:
             continue
-        seen.add(network.n_wavelets_)
+        used_sizes.add(network.n_wavelets_)
         force = network.network_.force
         yield (
             "wavelet network",
@@ -73,16 +73,16 @@ def main() -> None:
     rows = []
     start = time.perf_counter()
     for name in PROBLEMS:
-        given = problem(name)
-        found = list(models(given.X, given.y))
-        calls = {str(k): partial(each[3], given.X_test) for k, each in enumerate(found)}
+        rows_of_problem = problem(name)
+        methods = list(models(rows_of_problem.X, rows_of_problem.y))
+        calls = {str(k): partial(each[3], rows_of_problem.X_test) for k, each in enumerate(methods)}
         times = timed(calls, scaled(0.02), time.process_time_ns)
         print(f"{name}: {TITLES[name]}")
-        for k, (method, wavelets, parameters, predict) in enumerate(found):
-            ns = median(times[str(k)]) / len(given.truth)
-            error = given.nrmse(predict(given.X_test))
+        for k, (method, wavelets, parameters, predict) in enumerate(methods):
+            ns = median(times[str(k)]) / len(rows_of_problem.truth)
+            error = rows_of_problem.nrmse(predict(rows_of_problem.X_test))
             rows.append(
-                row(
+                result_row(
                     f"{TITLES[name].split(',')[0]}/{method}/{k}",
                     ns,
                     nrmse=error,

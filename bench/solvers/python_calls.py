@@ -16,7 +16,7 @@ from scipy.interpolate import make_interp_spline
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.solvers.blocks import row, scaled, timed, write_results
+from bench.solvers.blocks import result_row, scaled, timed, write_results
 
 from palpate import load_model
 
@@ -25,34 +25,34 @@ MODEL = Path(__file__).parent / "click_and_wall.json"
 
 def main() -> None:
     model = load_model(MODEL)
-    low, high = model.domain[0][0], model.domain[1][0]
-    entries = np.linspace(low, high, 64)
+    lower, upper = model.domain[0][0], model.domain[1][0]
+    entries = np.linspace(lower, upper, 64)
     forces = model.force(entries)
     spline = make_interp_spline(entries, forces, k=3)
-    x = 0.5 * (low + high)
-    many = np.random.default_rng(5).uniform(low, high, 1_000_000)
+    position = 0.5 * (lower + upper)
+    positions = np.random.default_rng(5).uniform(lower, upper, 1_000_000)
 
-    design = model.alpha[:, 0] * (many[:1000, None] - model.beta[:, 0])
-    waves = (design**2 - 1.0) * np.exp(-0.5 * design**2) @ model.weight
-    plain = waves + model.linear[0] * many[:1000] + model.bias
-    worst = float(np.abs(model.force(many)[:1000] - plain).max())
-    if not worst <= 1e-12 * float(np.abs(forces).max()):
-        raise SystemExit(f"wrong by {worst}")
+    u = model.alpha[:, 0] * (positions[:1000, None] - model.beta[:, 0])
+    wavelet_sum = (u**2 - 1.0) * np.exp(-0.5 * u**2) @ model.weight
+    expected = wavelet_sum + model.linear[0] * positions[:1000] + model.bias
+    largest_error = float(np.abs(model.force(positions)[:1000] - expected).max())
+    if not largest_error <= 1e-12 * float(np.abs(forces).max()):
+        raise SystemExit(f"wrong by {largest_error}")
 
     rows = []
-    one = {
-        "predict_one": lambda: model.force(x),
-        "np_interp_one": lambda: np.interp(x, entries, forces),
-        "bspline_one": lambda: spline(x),
+    single_calls = {
+        "predict_one": lambda: model.force(position),
+        "np_interp_one": lambda: np.interp(position, entries, forces),
+        "bspline_one": lambda: spline(position),
     }
-    batch = {
-        "predict_many": lambda: model.force(many),
-        "np_interp_many": lambda: np.interp(many, entries, forces),
-        "bspline_many": lambda: spline(many),
+    array_calls = {
+        "predict_many": lambda: model.force(positions),
+        "np_interp_many": lambda: np.interp(positions, entries, forces),
+        "bspline_many": lambda: spline(positions),
     }
-    for calls in (one, batch):
+    for calls in (single_calls, array_calls):
         for name, times in timed(calls, scaled(0.2)).items():
-            rows += [row(name, each, max_error=worst) for each in times]
+            rows += [result_row(name, each, max_error=largest_error) for each in times]
             print(f"{name:20} {median(times):14.1f} ns")
     write_results(Path(sys.argv[1]), rows)
 

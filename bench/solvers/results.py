@@ -59,10 +59,10 @@ class BenchmarkResults:
 
     def of(self, benchmark: str) -> list[Row]:
         """Returns the rows NAME/ARGUMENTS of one benchmark, in their order."""
-        found = [row for row in self.rows if str(row["name"]).split("/")[0] == benchmark]
-        if not found:
+        rows = [row for row in self.rows if str(row["name"]).split("/")[0] == benchmark]
+        if not rows:
             raise SystemExit(f"{self.path} lacks the benchmark {benchmark}; run make bench again")
-        return found
+        return rows
 
     def where(self) -> str:
         """Returns machine, date, compiler and commit as one line."""
@@ -72,12 +72,12 @@ class BenchmarkResults:
             for each in context.get("caches", ())
             if each.get("type") != "Instruction"
         )
-        words = ("processor", "compiler", "flags", "versions")
+        context_keys = ("processor", "compiler", "flags", "versions")
         parts = [
             f"{context.get('num_cpus')} cores at {context.get('mhz_per_cpu')} MHz"
             + (f" ({cache})" if cache else ""),
             str(context.get("date", ""))[:10],
-            *(f"{key} {context[key]}".replace("_", " ") for key in words if key in context),
+            *(f"{key} {context[key]}".replace("_", " ") for key in context_keys if key in context),
             f"commit {context.get('commit', 'unknown')}",
         ]
         return "; ".join(parts)

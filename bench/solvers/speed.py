@@ -42,11 +42,11 @@ THIN_LINE: dict[str, Any] = {
 }
 
 
-def words(name: object) -> str:
+def readable_name(name: object) -> str:
     return str(name).replace("_", " ")
 
 
-def finish(axes: Axes, x: str, y: str) -> None:
+def finish_axes(axes: Axes, x: str, y: str) -> None:
     """Sets logarithmic axes with a grid and labels."""
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -64,7 +64,7 @@ def work_precision(results: BenchmarkResults, path: Path) -> str:
     """Draws the error of the motion over computing time, one line per time step, one marker per period."""
     points = [
         (
-            words(str(row["name"]).split("/")[0]),
+            readable_name(str(row["name"]).split("/")[0]),
             results.number(row, "period_s"),
             nanoseconds(row),
             results.number(row, "motion_error_rad"),
@@ -73,14 +73,18 @@ def work_precision(results: BenchmarkResults, path: Path) -> str:
         for row in results.rows
     ]
     names = list(dict.fromkeys(name for name, *_ in points))
-    ceiling = 3.0 * max(error for *_, error, diverges in points if not diverges)
+    top_error = 3.0 * max(error for *_, error, diverges in points if not diverges)
     with figure_file(path, height_inches=3.9) as (axes,):
         for marker, name in zip(MARKERS, names, strict=False):
-            of = [(time * PERIOD_S / T, error, bad) for each, T, time, error, bad in points if each == name]
-            good = [(work, error) for work, error, bad in of if not bad]
-            axes.plot(*zip(*good, strict=True), marker=marker, label=name, **THIN_LINE)
-            bad = [work for work, _, bad in of if bad]
-            axes.plot(bad, [ceiling] * len(bad), marker, markersize=4.0, color="black")
+            points_of_name = [
+                (time * PERIOD_S / period, error, diverged)
+                for each, period, time, error, diverged in points
+                if each == name
+            ]
+            finite = [(work, error) for work, error, diverged in points_of_name if not diverged]
+            axes.plot(*zip(*finite, strict=True), marker=marker, label=name, **THIN_LINE)
+            diverged = [work for work, _, diverged in points_of_name if diverged]
+            axes.plot(diverged, [top_error] * len(diverged), marker, markersize=4.0, color="black")
         if any(diverges for *_, diverges in points):
             axes.text(
                 0.99,
@@ -90,8 +94,8 @@ def work_precision(results: BenchmarkResults, path: Path) -> str:
                 ha="right",
                 va="top",
             )
-        finish(axes, "computing time for 1 ms of motion [ns]", "error of the motion, RMS [rad]")
-        axes.set_ylim(top=2.5 * ceiling)
+        finish_axes(axes, "computing time for 1 ms of motion [ns]", "error of the motion, RMS [rad]")
+        axes.set_ylim(top=2.5 * top_error)
         legend_below(axes)
     return markdown_table(
         ("time step", "period [ms]", "a step [ns]", "1 ms of motion [ns]", "error, RMS [rad]"),
@@ -111,23 +115,23 @@ def work_precision(results: BenchmarkResults, path: Path) -> str:
 def rendered_force(results: BenchmarkResults, path: Path) -> str:
     """Draws the force error over the time of a tick, one point per structure and solver."""
     keys = ("evaluations", "force_error_end_Nm", "force_error_instant_Nm", "force_rms_Nm")
-    shown = [
-        (words(row["name"]), nanoseconds(row), *(results.number(row, key) for key in keys))
+    points = [
+        (readable_name(row["name"]), nanoseconds(row), *(results.number(row, key) for key in keys))
         for row in results.rows
     ]
-    direct = next((each for each in shown if each[0].startswith("direct")), None)
+    direct = next((each for each in points if each[0].startswith("direct")), None)
     if direct is None:
         raise SystemExit(
             f"{results.path} contains no direct rendering for the comparison; run make bench again"
         )
-    _, _, _, hold, encoder, force = direct
+    _, _, _, hold_error, encoder_error, force = direct
     limits = {
         f"JND: {100 * FORCE_JND:g} % of the force": FORCE_JND * force,
-        "hold over a tick": hold,
-        "encoder step": encoder,
+        "hold over a tick": hold_error,
+        "encoder step": encoder_error,
     }
     with figure_file(path, height_inches=4.3) as (axes,):
-        for k, (name, time, _, error, *_) in enumerate(shown):
+        for k, (name, time, _, error, *_) in enumerate(points):
             axes.plot(
                 time,
                 error,
@@ -139,7 +143,7 @@ def rendered_force(results: BenchmarkResults, path: Path) -> str:
                 markeredgewidth=0.7,
                 label=name,
             )
-        finish(axes, "time of a tick [ns]", "force error, RMS [N·m]")
+        finish_axes(axes, "time of a tick [ns]", "force error, RMS [N·m]")
         axes.set_ylim(bottom=0.5 * min(limits.values()))
         for name, limit in limits.items():
             axes.axhline(limit, color="0.4", linewidth=0.7, linestyle=(0, (4, 2)))
@@ -165,7 +169,7 @@ def rendered_force(results: BenchmarkResults, path: Path) -> str:
         header,
         [
             (name, number(time), f"{evaluations:.3g}", number(end), number(instant))
-            for name, time, evaluations, end, instant, _ in shown
+            for name, time, evaluations, end, instant, _ in points
         ],
     )
 
@@ -175,7 +179,7 @@ def ticks(results: BenchmarkResults) -> str:
         ("structure", "mean [ns]", "median [ns]", "99.9th percentile [ns]"),
         [
             (
-                words(str(row["name"]).removeprefix("tick/")),
+                readable_name(str(row["name"]).removeprefix("tick/")),
                 number(nanoseconds(row)),
                 number(results.number(row, "p50_ns")),
                 number(results.number(row, "p999_ns")),
@@ -204,11 +208,17 @@ def model_error(results: BenchmarkResults, by_size: Path, by_time: Path) -> str:
     ):
         with figure_file(path, height_inches=4.6, rows=(1.0,) * len(problems)) as panels:
             for axes, problem in zip(panels, problems, strict=True):
-                of = [point for point in points if point[0] == problem]
-                methods = list(dict.fromkeys(point[1] for point in of))
+                points_of_problem = [point for point in points if point[0] == problem]
+                methods = list(dict.fromkeys(point[1] for point in points_of_problem))
                 for marker, method in zip(MARKERS, methods, strict=False):
-                    draw_method(axes, method, marker, [point for point in of if point[1] == method], column)
-                finish(axes, cost, "NRMSE")
+                    draw_method(
+                        axes,
+                        method,
+                        marker,
+                        [point for point in points_of_problem if point[1] == method],
+                        column,
+                    )
+                finish_axes(axes, cost, "NRMSE")
                 axes.margins(x=0.08, y=0.12)
                 axes.set_title(problem, loc="right")
             legend_below(panels[0])
@@ -222,15 +232,15 @@ def model_error(results: BenchmarkResults, by_size: Path, by_time: Path) -> str:
 
 
 def draw_method(axes: Axes, method: str, marker: str, points: Sequence[Any], column: int) -> None:
-    ours = any(point[2] for point in points)
+    is_network = any(point[2] for point in points)
     axes.plot(
         [point[column] for point in points],
         [point[5] for point in points],
-        color="black" if ours else "0.55",
-        linewidth=1.0 if ours else 0.5,
+        color="black" if is_network else "0.55",
+        linewidth=1.0 if is_network else 0.5,
         marker=marker,
         markersize=4.0,
-        markerfacecolor="black" if ours else "white",
+        markerfacecolor="black" if is_network else "white",
         markeredgecolor="black",
         markeredgewidth=0.7,
         label=method,
@@ -271,14 +281,14 @@ def over_wavelets(
     quantities: Sequence[tuple[str, Callable[[Row], float]]],
 ) -> str:
     """Draws quantities of benchmarks over the number of wavelets, one panel for each quantity."""
-    found = {name: results.of(benchmark) for benchmark, name in names.items()}
+    rows_by_name = {name: results.of(benchmark) for benchmark, name in names.items()}
     height = 2.6 + 1.4 * (len(quantities) - 1)
     with figure_file(path, height_inches=height, rows=(1.0,) * len(quantities)) as panels:
         for axes, (quantity, value) in zip(panels, quantities, strict=True):
-            for marker, (name, rows) in zip(MARKERS, found.items(), strict=False):
+            for marker, (name, rows) in zip(MARKERS, rows_by_name.items(), strict=False):
                 wavelets = np.array([arguments(row)["wavelets"] for row in rows])
                 axes.plot(wavelets, [value(row) for row in rows], marker=marker, label=name, **THIN_LINE)
-            finish(axes, "wavelets", quantity)
+            finish_axes(axes, "wavelets", quantity)
             axes.set_xscale("log", base=2)
             axes.xaxis.set_major_formatter("{x:g}")
         legend_below(panels[0])
@@ -286,7 +296,7 @@ def over_wavelets(
         ("", "wavelets", *(quantity for quantity, _ in quantities)),
         [
             (name, f"{arguments(row)['wavelets']:g}", *(number(value(row)) for _, value in quantities))
-            for name, rows in found.items()
+            for name, rows in rows_by_name.items()
             for row in rows
         ],
     )
@@ -296,8 +306,8 @@ def claims(folder: Path) -> str:
     return markdown_table(
         ("ratio or number", "measured", "required, at most"),
         [
-            (text, number(measured), number(most))
-            for text, measured, most in measured_claims(folder)
+            (text, number(measured), number(required))
+            for text, measured, required in measured_claims(folder)
             if measured is not None
         ],
     )
@@ -345,23 +355,25 @@ def sections(folder: Path, to: Path) -> Iterable[str]:
         "![Model error over the time of an evaluation](model-error-time.png)\n\n"
         f"{model_error(models, to / 'model-error-size.png', to / 'model-error-time.png')}\n{models.where()}\n"
     )
-    times = over_wavelets(
+    evaluation_table = over_wavelets(
         evaluations, EVALUATIONS, to / "evaluation.png", [("value and slope [ns]", nanoseconds)]
     )
     yield (
         "## Evaluation: value and slope on a dependent chain\n\n"
         "The object is a spring with a wall. The error of the compiled network is at most 10⁻¹² of the "
         "largest force. Table and spline have 4096 cells.\n\n"
-        f"![Time of an evaluation over the number of wavelets](evaluation.png)\n\n{times}\n"
+        f"![Time of an evaluation over the number of wavelets](evaluation.png)\n\n{evaluation_table}\n"
         f"{evaluations.where()}\n"
     )
     excess = ("excess [%]", lambda row: 100.0 * bounds.number(row, "excess"))
-    tight = over_wavelets(bounds, BOUNDS, to / "bounds.png", [("time of a bound [ns]", nanoseconds), excess])
+    bounds_table = over_wavelets(
+        bounds, BOUNDS, to / "bounds.png", [("time of a bound [ns]", nanoseconds), excess]
+    )
     yield (
         "## Proved bounds of the slope\n\n"
         "The excess is the proved bound minus the slope found by a dense search, relative to the steepest "
         "slope. The networks are random.\n\n"
-        f"![Time and excess of proved bounds over the number of wavelets](bounds.png)\n\n{tight}\n"
+        f"![Time and excess of proved bounds over the number of wavelets](bounds.png)\n\n{bounds_table}\n"
         f"{bounds.where()}\n"
     )
 
@@ -370,9 +382,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="folder of the JSON files of make bench")
     parser.add_argument("--to", type=Path, required=True, help="folder of the figures and of speed.md")
-    given = parser.parse_args(arguments)
-    write_text(given.to / "speed.md", "\n".join(sections(given.folder, given.to)))
-    print(f"wrote {given.to / 'speed.md'} and its figures")
+    options = parser.parse_args(arguments)
+    write_text(options.to / "speed.md", "\n".join(sections(options.folder, options.to)))
+    print(f"wrote {options.to / 'speed.md'} and its figures")
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ void bind_bounds(py::module_& module) {
         "Returns proved bounds of a model of one position, or of position and velocity, on a device with a\n"
         "force limit. A play_radius above 0 replaces the model's own.");
     module.def(
-        "balancing_shift", py::overload_cast<const ForceModel&, double>(&passive_shift), "model"_a,
+        "passive_shift", py::overload_cast<const ForceModel&, double>(&passive_shift), "model"_a,
         "force_limit"_a,
         "Returns the shift of a periodic force for which the mean of the limited force is not active; 0\n"
         "for other models. Add it to the bias of the network.");

@@ -75,7 +75,7 @@ def model_with(**changes: Any) -> Model:
 
 Call = Callable[[Any], object]
 
-# Arguments for which some of the wrong values are right.
+# Public callables with one argument under test; some of the wrong values are right for it.
 CALLS: dict[str, tuple[Call, str, set[str]]] = {
     # name: (call, argument that the message names, values that are right there)
     "identify": (identify, "recording|frame", set()),

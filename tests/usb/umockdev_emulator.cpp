@@ -110,8 +110,8 @@ class Emulation {
         const std::string first = settings_.preload_first;
         ::setenv("LD_PRELOAD", (first + (first.empty() ? "" : ":") + preload).c_str(), 1);
         if (settings_.denied && ::getuid() == 0) {
-            constexpr uid_t nobody = 65'534;
-            if (::setgid(nobody) != 0 || ::setuid(nobody) != 0) {
+            constexpr uid_t unprivileged = 65'534;
+            if (::setgid(unprivileged) != 0 || ::setuid(unprivileged) != 0) {
                 ::_exit(126);
             }
         }
@@ -193,11 +193,11 @@ int main(int count, char** words) {
         ::execv("/proc/self/exe", words);
     }
     try {
-        const bool asks = count == 2 && std::string(words[1]) == "--help";
-        emulator::Settings settings = asks ? emulator::Settings{} : emulator::read_settings(count, words);
+        const bool help_only = count == 2 && std::string(words[1]) == "--help";
+        emulator::Settings settings = help_only ? emulator::Settings{} : emulator::read_settings(count, words);
         if (settings.command.empty()) {
             std::cerr << "Usage: umockdev_emulator [OPTIONS] -- COMMAND...\n\n" << emulator::options_text;
-            return asks ? 0 : 2;
+            return help_only ? 0 : 2;
         }
         emulator::Emulation emulation{std::move(settings)};
         return emulation.run();

@@ -8,7 +8,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'balancing_shift', 'certify', 'certify_bounds', 'device_difference', 'explicit_scheme', 'felt_slope', 'force_bounds', 'narrowest_play', 'renderable_slopes', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share']
+__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'passive_shift', 'certify', 'certify_bounds', 'device_difference', 'explicit_scheme', 'slope_behind_coupling', 'force_bounds', 'narrowest_play', 'renderable_slopes', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share']
 class ForceBounds:
     """
     Proved bounds of a force over every position that can be reached, continuations included.
@@ -87,7 +87,7 @@ class Inequality:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, id: str, left: typing.SupportsFloat | typing.SupportsIndex, right: typing.SupportsFloat | typing.SupportsIndex, name: str = '', formula: str = '', rests_on: str = 'proved', source: str = '', strict: bool = False) -> None:
+    def __init__(self, *, id: str, left: typing.SupportsFloat | typing.SupportsIndex, right: typing.SupportsFloat | typing.SupportsIndex, name: str = '', formula: str = '', basis: str = 'proved', source: str = '', strict: bool = False) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -126,7 +126,7 @@ class Inequality:
         Subject in words.
         """
     @property
-    def rests_on(self) -> str:
+    def basis(self) -> str:
         """
         proved, linear (the linearised system only) or none (no bound is known beyond).
         """
@@ -153,7 +153,7 @@ class Certificate:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, model: str, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile, bounds: ForceBounds, inequalities: collections.abc.Sequence[Inequality], verdict: str, longest_period_s: typing.SupportsFloat | typing.SupportsIndex, fingerprint: str, why: str = '') -> None:
+    def __init__(self, *, model: str, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile, bounds: ForceBounds, inequalities: collections.abc.Sequence[Inequality], verdict: str, longest_period_s: typing.SupportsFloat | typing.SupportsIndex, fingerprint: str, reason: str = '') -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -214,11 +214,11 @@ class Certificate:
         certified, stable-locally or refused.
         """
     @property
-    def why(self) -> str:
+    def reason(self) -> str:
         """
         One sentence.
         """
-def balancing_shift(model: palpate._core.model.ForceModel, force_limit: typing.SupportsFloat | typing.SupportsIndex) -> float:
+def passive_shift(model: palpate._core.model.ForceModel, force_limit: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     Shift of a force that repeats with which the limited force does not push on average; 0 for other
     models. Add it to the bias of the network.
@@ -242,7 +242,7 @@ def explicit_scheme(bounds: ForceBounds, device: palpate._core.device.DeviceProf
     last one tried if none is. mass, damping, coupling_stiffness, coupling_damping and play_radius by
     keyword, None: chosen.
     """
-def felt_slope(slope: typing.SupportsFloat | typing.SupportsIndex, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex) -> float:
+def slope_behind_coupling(slope: typing.SupportsFloat | typing.SupportsIndex, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
     K_c k / (K_c + k): the slope that is felt through a coupling where the object's is k > -K_c.
     """
@@ -268,7 +268,7 @@ def steepest_stick(device: palpate._core.device.DeviceProfile) -> float:
     """
     Slope h / r that leaves half of what the device holds to sliding.
     """
-def stiffest_coupling(*, damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: palpate._core.device.DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 0.95) -> float:
+def stiffest_coupling(*, coupling_damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: palpate._core.device.DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 0.95) -> float:
     """
     Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is none.
     `damping` is B_c; `falling` the steepest fall of the object's force.

@@ -33,11 +33,11 @@ class Status:
     
       Ramp : the force is still on its way up from zero after the start
     
-      Drained : the rendering had given all the energy it may; a force that gives more was scaled down
+      EnergyLimited : the rendering had given all the energy it may; a force that gives more was scaled down
     
-      Softened : the handle buzzed; all forces are scaled down from then on
+      LimitCycleScaled : the handle buzzed; all forces are scaled down from then on
     """
-    Drained: typing.ClassVar[Status]
+    EnergyLimited: typing.ClassVar[Status]
     Fault: typing.ClassVar[Status]
     Frozen: typing.ClassVar[Status]
     Jump: typing.ClassVar[Status]
@@ -48,7 +48,7 @@ class Status:
     NotUnique: typing.ClassVar[Status]
     Ok: typing.ClassVar[Status]
     Ramp: typing.ClassVar[Status]
-    Softened: typing.ClassVar[Status]
+    LimitCycleScaled: typing.ClassVar[Status]
     Timeout: typing.ClassVar[Status]
     __members__: typing.ClassVar[dict[str, Status]]
     @typing.overload
@@ -85,4 +85,4 @@ class Status:
     @property
     def value(self) -> int:
         ...
-status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start', 'Drained': 'the rendering had given all the energy it may; a force that gives more was scaled down', 'Softened': 'the handle buzzed; all forces are scaled down from then on'}
+status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start', 'EnergyLimited': 'the rendering had given all the energy it may; a force that gives more was scaled down', 'LimitCycleScaled': 'the handle buzzed; all forces are scaled down from then on'}

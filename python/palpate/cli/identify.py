@@ -80,6 +80,9 @@ HELP = {
 _METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE", "inputs": "NAMES"}
 """Name of the value of an option."""
 
+_MOST_DECISIONS = 7
+"""Decisions of the model selection that the summary prints; a model of several inputs has more"""
+
 _GROUP = {"inputs": "Model", "monotone": "Constraints"}
 """Groups of the options in the help; all others are for experts."""
 
@@ -245,7 +248,7 @@ def identify(
                     "model": f"{output}: {model.fit.model_class}, {model.n_wavelets} wavelets, "
                     f"{model.n_parameters} parameters",
                     "error": f"{_rms_text(verified)}NRMSE {number(nrmse)} on {judged}",
-                    **dict(_decision(note) for note in model.notes.get("model_selection", ())),
+                    **dict(note.split(": ", 1) for note in model.notes["model_selection"][-_MOST_DECISIONS:]),
                     "time": f"{seconds:.2f} s",
                 }
             )
@@ -272,13 +275,7 @@ def _rms_text(verified: Sequence[tuple[Recording, Verification]]) -> str:
     if not verified:
         return ""
     rms = float(np.sqrt(np.mean(np.concatenate([found.residual for _, found in verified]) ** 2)))
-    return f"RMS {verified[0][0].in_file_unit('force', rms)}, "
-
-
-def _decision(note: str) -> tuple[str, str]:
-    """Splits a decision of the model selection into the model class and the rest."""
-    model_class, _, decision = note.partition(": ")
-    return model_class, decision
+    return f"RMS {verified[0][0].file_unit('force').text(rms)}, "
 
 
 def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:

@@ -116,10 +116,10 @@ def verify(
 def _summary(recording: Recording, found: Verification) -> dict[str, str]:
     """Returns the main numbers, in the units of the file."""
     worst = int(np.argmax(np.abs(found.residual)))
-    position = recording.in_file_unit("position", float(recording.position[found.rows][worst]))
+    position = recording.file_unit("position").text(float(recording.position[found.rows][worst]))
     return {
-        "error": f"RMS {recording.in_file_unit('force', found.rmse)}, NRMSE {number(found.nrmse)}",
-        "largest": f"{recording.in_file_unit('force', found.worst)} at position {position}",
+        "error": f"RMS {recording.file_unit('force').text(found.rmse)}, NRMSE {number(found.nrmse)}",
+        "largest": f"{recording.file_unit('force').text(found.worst)} at position {position}",
         "not felt": f"{100 * found.within_jnd:.3g} % of the rows have an error that a hand does not feel",
         "rows": f"{found.n} of {len(recording)} compared, {found.extrapolated} outside the model's domain",
         "recording": "fresh" if found.fresh else "not fresh: the model was identified on it",
@@ -133,7 +133,7 @@ def _further_numbers(recording: Recording, found: Verification) -> list[str]:
         f"lag-1 autocorrelation of the residuals {found.whiteness:.3g} (0 is white), "
         f"Durbin-Watson statistic {found.durbin_watson:.3g} (2 is white)",
         "a hand does not feel a force error up to "
-        f"{FORCE_JND:.0%} of the force, or {recording.in_file_unit('force', found.jnd_floor)}",
+        f"{FORCE_JND:.0%} of the force, or {recording.file_unit('force').text(found.jnd_floor)}",
     ]
     if found.stiffness_within_jnd is not None:
         numbers.append(

@@ -232,16 +232,18 @@ def _windows(applied: Float1D, position: Float1D, time: Float1D) -> tuple[Float2
 def _start_values(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[float, float]:
     """Returns the logarithms of J and b from the impulse, displacement and duration of a push."""
     impulse = float(np.median(np.abs((applied * seconds).sum(axis=1))))
-    way = float(np.median(np.abs(moved).max(axis=1)))
+    displacement = float(np.median(np.abs(moved).max(axis=1)))
     duration = float(np.median(seconds.sum(axis=1)))
-    return float(np.log(0.25 * impulse * duration / way)), float(np.log(0.5 * impulse / way))
+    return float(np.log(0.25 * impulse * duration / displacement)), float(
+        np.log(0.5 * impulse / displacement)
+    )
 
 
 def _displacement(
     applied: Float2D, seconds: Float2D, inertia: float, damping: float, friction: float
 ) -> Float2D:
     """Returns the displacement (p, n + 1) of a handle at rest under held forces (p, n), in closed form."""
-    way = np.zeros((len(applied), applied.shape[1] + 1))
+    displacement = np.zeros((len(applied), applied.shape[1] + 1))
     velocity = np.zeros(len(applied))
     decay = inertia / damping
     for k in range(applied.shape[1]):
@@ -253,6 +255,6 @@ def _displacement(
             until_rest = np.where(velocity * final < 0.0, decay * np.log1p(-velocity / final), np.inf)
         moves = np.minimum(duration, until_rest)
         approach = -np.expm1(-moves / decay)
-        way[:, k + 1] = way[:, k] + final * moves + (velocity - final) * decay * approach
+        displacement[:, k + 1] = displacement[:, k] + final * moves + (velocity - final) * decay * approach
         velocity = np.where(until_rest <= duration, 0.0, velocity + (final - velocity) * approach)
-    return way
+    return displacement

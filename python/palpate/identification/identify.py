@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..model import Model
 from ..recording import Source
 from ..recording.reading import RecordingLike, recordings_from
+from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
 from .classes.findings import identified, verdict_of
@@ -124,7 +125,7 @@ def fit_environment(
     names: Sequence[str] | None = None,
     weight: Float1D | None = None,
     within: float = 0.0,
-    units: Mapping[str, str] | None = None,
+    units: Mapping[str, Unit] | None = None,
 ) -> FittedNetwork:
     """Identify a force law from arrays.
 
@@ -146,7 +147,7 @@ def fit_environment(
         Samples that each row represents, above 0; 1 without it.
     within : float
         Sum of squares of the force inside rows that represent several samples.
-    units : mapping, optional
+    units : mapping of str to Unit, optional
         Units of position and force, for the messages.
 
     Returns

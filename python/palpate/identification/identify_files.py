@@ -35,6 +35,7 @@ from ..recording.conversion import mirror_notes
 from ..recording.motion import strokes_from_order
 from ..recording.reading import PART_ROWS, LongRecording, open_long_recording
 from ..recording.rows import LeftOut
+from ..recording.units import Unit
 from ..verdict import Finding, usable
 from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
@@ -242,7 +243,7 @@ def _identified(
         else:
             side = None
             decisions = (Decision("hysteresis", "not tested", UNKNOWN_STROKES),)
-            findings.append(_untested(summary, recordings[0].units["force"]))
+            findings.append(_untested(summary, recordings[0].file_unit("force")))
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_environment(
             summary.position[:, None],
@@ -251,7 +252,7 @@ def _identified(
             settings,
             weight=summary.count,
             within=summary.within,
-            units=recordings[0].units,
+            units={role: recordings[0].file_unit(role) for role in ("position", "force")},
         )
     spread = float(np.sqrt(summary.variance))
     rmse = _error_on_rows(summary, network, side, settings.period)
@@ -282,13 +283,13 @@ def _known_strokes(summary: Summary) -> bool:
     return min(press, release) > 0.0 and press + release >= LEAST_KNOWN_SHARE * summary.rows
 
 
-def _untested(summary: Summary, force_unit: str) -> Finding:
+def _untested(summary: Summary, force_unit: Unit) -> Finding:
     """Hysteresis could not be tested; reports the largest difference that the rows allow."""
     scatter = summary.scatter
     reach = float(np.ptp(summary.force)) or 1.0
     return usable(
         f"hysteresis was not tested: {UNKNOWN_STROKES}. At the same position the force has a standard "
-        f"deviation of {f'{scatter:.3g} {force_unit}'.rstrip()} ({scatter / reach:.1%} of its range), from "
+        f"deviation of {force_unit.text(scatter)} ({scatter / reach:.1%} of its range), from "
         "noise or from a difference between press and release. Cure: add a column direction with the words "
         "press and release"
     )

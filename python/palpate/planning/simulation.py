@@ -20,8 +20,7 @@ from ..arguments import instance_of, real_of
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording
-from ..recording.comparison import amount
-from ..recording.units import COLUMN_SUFFIX
+from ..recording.units import COLUMN_SUFFIX, Unit
 from ..verdict import Finding, Verdict, no, usable
 from .plan import Plan, describe
 
@@ -205,11 +204,9 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
     if failed := status["NonFinite"]:
         return Verdict((no(f"the rendering diverged: {failed} of {ticks} ticks had no finite force"),))
     lower, upper = float(rendered.position.min()), float(rendered.position.max())
-    position_unit = plan.model.units["position"]
+    position_unit = Unit.of_si(plan.model.units["position"])
     if not rendered.force.any():
-        still = no(
-            f"every force was zero: the handle stayed between {lower:.4g} and {amount(upper, position_unit)}"
-        )
+        still = no(f"every force was zero: the handle stayed at {position_unit.interval(lower, upper)}")
         return Verdict((still,))
     domain = float(plan.model.upper[0]) - float(plan.model.lower[0])
     covered = (upper - lower) / domain

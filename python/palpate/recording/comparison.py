@@ -37,11 +37,6 @@ SPIKE_PERCENT = 0.5
 """Percentage of the rows at each end that may be position spikes."""
 
 
-def amount(value: float, unit: str) -> str:
-    """Returns a value with its unit for sentences; the value alone if the unit is not stated."""
-    return f"{value:.4g} {unit}".rstrip()
-
-
 @dataclass(frozen=True)
 class Travel:
     """Range of the position without spikes, and the rows inside it."""
@@ -228,28 +223,28 @@ def _change_findings(recording: Recording, cells: CellRows) -> list[Finding]:
     count, force, place = sums(None), sums(cells.residual), sums(cells.place)
     before, after = count[:-1], count[-1] - count[:-1]
     one, other = np.maximum(before, 1.0), np.maximum(after, 1.0)
-    apart = force[:-1] / one - (force[-1] - force[:-1]) / other
-    moved = place[:-1] / one - (place[-1] - place[:-1]) / other
-    both = (
+    force_difference = force[:-1] / one - (force[-1] - force[:-1]) / other
+    place_difference = place[:-1] / one - (place[-1] - place[:-1]) / other
+    compared_cells = (
         (before >= LEAST_COMPARED_ROWS)
         & (after >= LEAST_COMPARED_ROWS)
-        & (np.abs(moved) <= LARGEST_MEAN_OFFSET)
+        & (np.abs(place_difference) <= LARGEST_MEAN_OFFSET)
     )
-    between = np.where(both, before * after / (one + other) * apart**2, 0.0)
-    explained = between.sum(axis=1) / total
+    explained_scatter = np.where(compared_cells, before * after / (one + other) * force_difference**2, 0.0)
+    explained = explained_scatter.sum(axis=1) / total
     best = int(np.argmax(explained))
-    shared = both[best]
+    shared = compared_cells[best]
     if not shared.any():
         return []
     rows = (before[best] + after[best])[shared]
-    distance = float(np.sqrt(np.average(apart[best][shared] ** 2, weights=rows)))
+    distance = float(np.sqrt(np.average(force_difference[best][shared] ** 2, weights=rows)))
     if explained[best] < LEAST_EXPLAINED_SHARE or distance < LEAST_PART_DISTANCE * spread:
         return []
     split = (best + 1) * len(recording) // SPLIT_BLOCKS
     return [
         usable(
             f"near row {split} the force at the same position and stroke changes by "
-            f"{amount(distance, recording.units['force'])}, {distance / spread:.0%} of its spread. The file "
+            f"{recording.file_unit('force').text(distance)}, {distance / spread:.0%} of its spread. The file "
             "probably holds two objects or two zeros, or the object changed (drift, settling): identify "
             f"each part separately with --rows 0:{split} and --rows {split}:{len(recording)}"
         )
@@ -312,11 +307,11 @@ def scale_findings(recordings: Sequence[Recording], side: Float1D | None = None)
     ends = np.cumsum([len(recording) for recording in recordings])[:-1]
     directions = [None] * len(recordings) if side is None else np.split(side, ends)
     strokes = [_Strokes.of(*each) for each in zip(recordings, directions, strict=True)]
-    apart = [
+    differences = [
         [min(_difference(one, other), 1.0) for other in strokes[:MOST_COMPARED_RECORDINGS]]
         for one in strokes[:MOST_COMPARED_RECORDINGS]
     ]
-    reference = int(np.argmin(np.sum(apart, axis=1)))
+    reference = int(np.argmin(np.sum(differences, axis=1)))
     found = []
     for index, each in enumerate(strokes):
         if index == reference:
@@ -398,17 +393,17 @@ def _curve_difference(one: Curve, other: Curve) -> float:
         or spread == 0.0
     ):
         return float("inf")
-    apart = force[shared] - np.interp(at[shared], x, f)
-    return float(np.sqrt(np.mean(apart**2))) / spread
+    difference = force[shared] - np.interp(at[shared], x, f)
+    return float(np.sqrt(np.mean(difference**2))) / spread
 
 
 def _ratio(one: Curve, other: Curve) -> tuple[str, float, str] | None:
     """Returns the role and the ratio of two units that explain the difference best, or None."""
     x, f = other
-    tried = []
+    candidates = []
     for ratio, units in UNIT_RATIOS.items():
         for by in (ratio, 1.0 / ratio):
-            tried.append((_curve_difference(one, (by * x, f)), "position", by, units))
-            tried.append((_curve_difference(one, (x, by * f)), "force", by, units))
-    best = min(tried, key=lambda each: each[0])
+            candidates.append((_curve_difference(one, (by * x, f)), "position", by, units))
+            candidates.append((_curve_difference(one, (x, by * f)), "force", by, units))
+    best = min(candidates, key=lambda each: each[0])
     return best[1:] if best[0] <= LARGEST_EXPLAINED_DIFFERENCE else None

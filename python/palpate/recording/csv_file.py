@@ -66,12 +66,11 @@ class FileBytes(io.RawIOBase):
     def seekable(self) -> bool:
         return True
 
-    def tell(self) -> int:
-        return self._stream.tell() - self._start
-
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        if whence == io.SEEK_CUR:  # `tell` of the base class uses it
+            return self._stream.seek(offset, whence) - self._start
         if whence != io.SEEK_SET:
-            raise io.UnsupportedOperation("only from the start")
+            raise io.UnsupportedOperation("only from the start or the current position")
         return self._stream.seek(self._start + offset) - self._start
 
     def readinto(self, buffer: Any) -> int:
@@ -330,8 +329,8 @@ class CsvFile(LongTable):
     def _refuse_extra_cells(self, cells: Any, before: int, part: tuple[int, int] | None) -> None:
         """Refuses a row that has more cells than the header has names."""
         if any(str(word).strip() for word in cells.cat.categories):
-            more = cells.notna() & (cells.astype(str).str.strip() != "")
-            row = before + int(np.flatnonzero(more)[0])
+            extra = cells.notna() & (cells.astype(str).str.strip() != "")
+            row = before + int(np.flatnonzero(extra)[0])
             line, found = self._find(row + (self.rows_before(part) if part else 0))
             raise self._too_many_cells(line, len(found))
 

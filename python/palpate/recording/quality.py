@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .._typing import Float1D
 from ..verdict import Finding, usable
-from .comparison import CellRows, Travel, amount, cell_rows, merged_findings, scale_findings, sides
+from .comparison import CellRows, Travel, cell_rows, merged_findings, scale_findings, sides
 from .conversion import MIN_ROWS, mirror_notes
 from .motion import GAP_RATIO
 from .recording import Recording
@@ -127,23 +127,23 @@ def quality_findings(recording: Recording) -> list[Finding]:
 
 def magnitude_findings(recording: Recording, travel: Travel) -> list[Finding]:
     """Returns findings on an implausible travel or force range. Unstated units are not checked."""
-    position, force = recording.units["position"], recording.units["force"]
+    position, force = recording.file_unit("position"), recording.file_unit("force")
     inner = recording.force[travel.inside]
-    force_bounds = PLAUSIBLE_FORCE_RANGE.get(force)
-    if position == "m" and force == "N":
+    force_bounds = PLAUSIBLE_FORCE_RANGE.get(force.si)
+    if position.si == "m" and force.si == "N":
         force_bounds = MICROSCOPE_FORCE_RANGE if travel.length < MICROSCOPE_TRAVEL else USUAL_FORCE_RANGE
     found = []
     for role, value, unit, bounds in (
-        ("travel", travel.length, position, PLAUSIBLE_TRAVEL.get(position)),
+        ("travel", travel.length, position, PLAUSIBLE_TRAVEL.get(position.si)),
         ("range of the force", float(np.ptp(inner)), force, force_bounds),
     ):
         if bounds is None or value == 0.0 or bounds[0] <= value <= bounds[1]:
             continue
         side, bound = ("below", bounds[0]) if value < bounds[0] else ("above", bounds[1])
-        over = "" if role == "travel" else f" over a travel of {amount(travel.length, position)}"
+        over = "" if role == "travel" else f" over a travel of {position.text(travel.length)}"
         found.append(
             usable(
-                f"the {role} is {amount(value, unit)}{over}, {side} {amount(bound, unit)}: the unit of "
+                f"the {role} is {unit.text(value)}{over}, {side} {unit.text(bound)}: the unit of "
                 "position or force is probably wrong; name the right one with --units"
             )
         )
@@ -172,7 +172,7 @@ def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) 
         late = "" if recording.time is None else "; if the force was recorded late, --force-late-s SECONDS"
         return [
             usable(
-                f"on average the force on release is {amount(-mean, recording.units['force'])} above that "
+                f"on average the force on release is {recording.file_unit('force').text(-mean)} above that "
                 "on press; a passive object cannot do that. If a sign is reversed, give --negate force or "
                 f"--negate position{late}; for a latch or a stored spring, --no-hysteresis-nonnegative"
             )
@@ -216,10 +216,10 @@ def saturation_findings(recording: Recording, travel: Travel) -> list[Finding]:
         ):
             found.append(
                 usable(
-                    f"the {name} force, {amount(value, recording.units['force'])}, occurs in {len(rows)} "
+                    f"the {name} force, {recording.file_unit('force').text(value)}, occurs in {len(rows)} "
                     f"rows ({len(rows) / len(f):.2g} of all) while the position changes from "
-                    f"{x[rows].min():.4g} to {x[rows].max():.4g}: the force sensor or its converter is "
-                    "probably clipped there; record with a larger force range or press less far"
+                    f"{recording.file_unit('position').interval(x[rows].min(), x[rows].max())}: the force "
+                    "sensor or its converter is probably clipped there; record with a larger force range or press less far"
                 )
             )
     return [*found, *_constant_position_findings(recording, travel, force_range)]
@@ -230,7 +230,7 @@ def _constant_position_findings(recording: Recording, travel: Travel, force_rang
     x, f = recording.position, recording.force
     noise = float(np.median(np.abs(np.diff(f)))) / 0.954
     bound = max(LEAST_FORCE_CHANGE_SHARE * force_range, LEAST_FORCE_CHANGE_NOISE * noise)
-    unit = recording.units["position"]
+    unit = recording.file_unit("position")
     for value, name in ((travel.upper, "largest"), (travel.lower, "least")):
         rows = np.flatnonzero(x == value)
         if len(rows) >= max(LEAST_CLIPPED_ROWS, LEAST_CLIPPED_RATIO * _usual_count(x, value, travel)):
@@ -238,9 +238,9 @@ def _constant_position_findings(recording: Recording, travel: Travel, force_rang
             if change > bound:
                 return [
                     usable(
-                        f"the {name} position, {amount(value, unit)}, occurs in {len(rows)} rows while the "
-                        f"force changes by {change:.3g} and returns: the position sensor is probably "
-                        "clipped there; record with a larger range of position"
+                        f"the {name} position, {unit.text(value)}, occurs in {len(rows)} rows while the "
+                        f"force changes by {recording.file_unit('force').text(change)} and returns: the "
+                        "position sensor is probably clipped there; record with a larger range of position"
                     )
                 ]
     step = np.diff(x)
@@ -259,7 +259,8 @@ def _constant_position_findings(recording: Recording, travel: Travel, force_rang
             return [
                 usable(
                     f"the position is constant in rows {start} to {stop - 1}, then jumps by "
-                    f"{amount(jump, unit)}, while the force changes by {_inner_range(f[start:stop]):.3g}: "
+                    f"{unit.text(jump)}, while the force changes by "
+                    f"{recording.file_unit('force').text(_inner_range(f[start:stop]))}: "
                     "the position sensor was probably stuck; use the rows before or after with --rows "
                     f"0:{start} or --rows {stop}:{len(x)}"
                 )
@@ -360,9 +361,9 @@ def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
         at = np.unique(recording.position[rows])
         if len(at) < 10:
             continue
-        apart = np.diff(at)
-        bound = max(LEAST_GAP_SHARE * travel.length, LEAST_GAP_RATIO * float(np.percentile(apart, 90.0)))
-        for k in np.flatnonzero(apart > bound).tolist():
+        distances = np.diff(at)
+        bound = max(LEAST_GAP_SHARE * travel.length, LEAST_GAP_RATIO * float(np.percentile(distances, 90.0)))
+        for k in np.flatnonzero(distances > bound).tolist():
             if (at[k], at[k + 1]) not in reported:
                 reported.add((at[k], at[k + 1]))
                 found.append(_gap(recording, travel, name, float(at[k]), float(at[k + 1])))
@@ -374,9 +375,9 @@ def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
 
 
 def _gap(recording: Recording, travel: Travel, name: str, start: float, stop: float) -> Finding:
-    unit, share = recording.units["position"], (stop - start) / travel.length
+    unit, share = recording.file_unit("position"), (stop - start) / travel.length
     return usable(
-        f"the {name} has no rows from {start:.4g} to {amount(stop, unit)}, {share:.0%} of the travel: the "
+        f"the {name} has no rows from {unit.interval(start, stop)}, {share:.0%} of the travel: the "
         "model is interpolated there; record this interval too"
     )
 

@@ -22,6 +22,7 @@ from .formats import open_table
 from .recording import Recording
 from .rows import LeftOut
 from .table import LongTable, Places, Table
+from .units import Unit
 
 RecordingLike: TypeAlias = Recording | str | os.PathLike[str] | pd.DataFrame
 """A recording, or data that can be read as one."""
@@ -240,6 +241,10 @@ class LongRecording:
     def units(self) -> Mapping[str, str]:
         """SI unit of position and force."""
         return self.conversion.units
+
+    def file_unit(self, role: str) -> Unit:
+        """Returns the unit of "position" or "force" for messages, as that of a recording."""
+        return self.conversion.file_units.get(role, Unit.of_si(self.units[role]))
 
     def blocks(self, part: tuple[int, int]) -> Iterator[Block]:
         """Yields position, force and direction of the rows of a part in blocks.

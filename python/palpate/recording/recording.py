@@ -217,9 +217,9 @@ class Recording:
     def __len__(self) -> int:
         return len(self.position)
 
-    def in_file_unit(self, role: Literal["position", "force"], value: float) -> str:
-        """Returns a position or force [SI] as text in the unit of the file, such as "4.14 mm"."""
-        return self.file_units.get(role, Unit(self.units[role], self.units[role], 1.0)).text(value)
+    def file_unit(self, role: str) -> Unit:
+        """Returns the unit of "position" or "force" for messages: that of the file, else the SI unit."""
+        return self.file_units.get(role, Unit.of_si(self.units.get(role, "")))
 
     @property
     def motion(self) -> Motion:

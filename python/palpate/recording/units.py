@@ -26,8 +26,24 @@ class Unit:
 
     def text(self, value: float) -> str:
         """Returns an SI value in this unit, with four significant digits and the symbol."""
-        return f"{value / self.factor:.4g} {self.si if self.factor == 1.0 else self.symbol}".rstrip()
+        return f"{value / self.factor:.4g} {self._shown}".rstrip()
 
+    def interval(self, low: float, high: float) -> str:
+        """Returns two SI values in this unit, as "0.1 to 0.3 mm"."""
+        return f"{low / self.factor:.4g} to {self.text(high)}"
+
+    @property
+    def _shown(self) -> str:
+        return self.si if self.factor == 1.0 else self.symbol
+
+    @staticmethod
+    def of_si(symbol: str) -> Unit:
+        """Returns an SI unit; an empty symbol is a unit that is not stated."""
+        return Unit(symbol, symbol, 1.0)
+
+
+UNSTATED_UNIT = Unit.of_si("")
+"""Unit of a quantity in SI whose unit is not stated."""
 
 _FACTORS: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "cm": 1e-2, "in": 0.0254},

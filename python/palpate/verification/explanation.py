@@ -11,8 +11,7 @@ import numpy as np
 from .._typing import Float1D
 from ..model import Model
 from ..recording import Recording
-from ..recording.comparison import amount
-from ..recording.units import UNITS
+from ..recording.units import UNITS, Unit
 from .metrics import normalised, root_mean_square
 from .prediction import Prediction
 
@@ -57,7 +56,7 @@ def explanation(model: Model, recording: Recording, prediction: Prediction) -> E
     if float(np.std(force)) == 0.0:
         return None
     nrmse = _share(modelled - force, force)
-    unit = recording.units["force"] or model.units["force"]
+    unit = recording.file_unit("force") if recording.units["force"] else Unit.of_si(model.units["force"])
     tried = [*_of_force(force, modelled, unit)]
     if model.dimension == 1 and model.mass is None and model.damping is None:
         side = None if prediction.side is None else prediction.side[few]
@@ -75,7 +74,7 @@ def _share(error: Float1D, force: Float1D) -> float:
     return normalised(root_mean_square(error), force)
 
 
-def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanation]:
+def _of_force(force: Float1D, modelled: Float1D, unit: Unit) -> Iterator[Explanation]:
     """Yields the sign, an offset and a factor of the force."""
     yield Explanation(
         _share(modelled + force, force),
@@ -85,14 +84,14 @@ def _of_force(force: Float1D, modelled: Float1D, unit: str) -> Iterator[Explanat
     offset = float(np.mean(force - modelled))
     yield Explanation(
         _share(modelled - (force - offset), force),
-        f"the model fits if {amount(offset, unit)} is subtracted from the recorded force: the sensor may "
+        f"the model fits if {unit.text(offset)} is subtracted from the recorded force: the sensor may "
         "have an offset. Give --zero START:STOP, the rows without contact",
         order=2,
     )
     factor = float(modelled @ force) / float(force @ force)
     if factor == 0.0 or float(np.std(modelled)) == 0.0:
         return
-    known = _unit_of(factor, unit)
+    known = _unit_of(factor, unit.si)
     cause = f"{known}. Give its unit with --units" if known else "the gain may differ"
     yield Explanation(
         _share(modelled - factor * force, modelled),
@@ -143,8 +142,9 @@ def _of_position(
         step *= 4.0 / (OFFSETS_PER_GRID - 1)
     yield Explanation(
         left(position + best, side),
-        f"the model fits if {amount(abs(best), unit)} is {'added to' if best > 0.0 else 'subtracted from'} "
-        "the recorded position: its zero may have moved. Correct it in the file",
+        f"the model fits if {recording.file_unit('position').text(abs(best))} is "
+        f"{'added to' if best > 0.0 else 'subtracted from'} the recorded position: its zero may have moved. "
+        "Correct it in the file",
         order=5,
     )
 

@@ -17,7 +17,6 @@ from ..identification.classes.findings import USABLE_NRMSE, error_findings
 from ..identification.data.rows import require_in_range
 from ..model import Model
 from ..recording import Recording, Source
-from ..recording.comparison import amount
 from ..recording.reading import RecordingLike, recording_from
 from ..verdict import FORCE_JND, GOOD, Finding, Verdict, no, usable
 from .explanation import explanation
@@ -221,7 +220,8 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
         findings.append(
             judge(
                 f"{found.extrapolated} of {found.n} rows ({outside:.0%}) lie outside the model's domain"
-                f"{_domain(model)}, where the force is extrapolated: identify on a recording of this range"
+                f"{_domain(model, recording)}, where the force is extrapolated: identify on a recording of "
+                "this range"
             )
         )
     if flight_of(recording).object_position is not None:
@@ -271,7 +271,7 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
     return findings
 
 
-def _domain(model: Model) -> str:
+def _domain(model: Model, recording: Recording) -> str:
     if model.dimension > 1:
         return ""
-    return f" from {float(model.lower[0]):.4g} to {amount(float(model.upper[0]), model.units['position'])}"
+    return f" from {recording.file_unit('position').interval(float(model.lower[0]), float(model.upper[0]))}"

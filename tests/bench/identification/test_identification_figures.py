@@ -13,8 +13,8 @@ from bench.identification.figures import main
 PNG = b"\x89PNG"
 
 
-def _left(folder: Path, name: str, results: Any) -> None:
-    where = {
+def write_results(folder: Path, name: str, results: Any) -> None:
+    machine = {
         "machine": "2 cores",
         "python": "3",
         "date": "2026-01-02",
@@ -22,12 +22,12 @@ def _left(folder: Path, name: str, results: Any) -> None:
         "scale": 1.0,
         "load": 0.5,
     }
-    (folder / f"{name}.json").write_text(json.dumps({"where": where, "results": results}))
+    (folder / f"{name}.json").write_text(json.dumps({"where": machine, "results": results}))
 
 
-def _reached(problem: str, method: str, nrmse: float, n_parameters: int) -> dict[str, Any]:
-    times = {"fit_s": 0.25, "tuning_s": 0.5, "over_ours": 3.0, "draws": 12}
-    ours = method == "palpate"
+def result_row(problem: str, method: str, nrmse: float, n_parameters: int) -> dict[str, Any]:
+    times = {"fit_s": 0.25, "tuning_s": 0.5, "time_over_palpate": 3.0, "draws": 12}
+    is_palpate = method == "palpate"
     return {
         "problem": problem,
         "method": method,
@@ -35,36 +35,36 @@ def _reached(problem: str, method: str, nrmse: float, n_parameters: int) -> dict
         "nrmse_range": [nrmse / 2, 2 * nrmse],
         "n_parameters": n_parameters,
         "n_parameters_range": [n_parameters - 3, n_parameters + 3],
-        "n_wavelets": 6 if ours else None,
-        "n_wavelets_range": [5, 7] if ours else None,
+        "n_wavelets": 6 if is_palpate else None,
+        "n_wavelets_range": [5, 7] if is_palpate else None,
         **times,
     }
 
 
 @pytest.fixture
-def identified(tmp_path: Path) -> Path:
+def results_folder(tmp_path: Path) -> Path:
     """Returns the folder of benchmark results without measured data."""
     rows = [
-        _reached("P1", "palpate", 3e-4, 20),
-        _reached("P1", "splines", 5e-4, 44),
+        result_row("P1", "palpate", 3e-4, 20),
+        result_row("P1", "splines", 5e-4, 44),
         {"problem": "P1", "method": "MARS", "skipped": "needs pyearth"},
-        _reached("P3", "palpate", 8e-4, 58),
+        result_row("P3", "palpate", 8e-4, 58),
     ]
-    _left(tmp_path, "compare_methods", rows)
-    _left(tmp_path, "filters", [{"way": "matched", "fastest_hz": [1.0, 2.0], "nrmse": [1e-3, 2e-3]}])
-    _left(tmp_path, "parsimony", [{"claim": "no wavelet", "right": 99, "draws": 100, "seconds": 0.1}])
+    write_results(tmp_path, "compare_methods", rows)
+    write_results(tmp_path, "filters", [{"way": "matched", "fastest_hz": [1.0, 2.0], "nrmse": [1e-3, 2e-3]}])
+    write_results(tmp_path, "parsimony", [{"claim": "no wavelet", "right": 99, "draws": 100, "seconds": 0.1}])
     return tmp_path
 
 
-def test_draws_figures_and_fills_tables_of_the_page(identified: Path) -> None:
+def test_draws_figures_and_fills_tables_of_the_page(results_folder: Path) -> None:
     names = ("compare_methods", "filters", "parsimony", "real_data", "dynamic")
-    page = identified / "identification.md"
+    page = results_folder / "identification.md"
     tables = "".join(f"<!-- {name} -->\nold {name}\n<!-- end -->\n" for name in names)
     # a new table is empty
     page.write_text(tables.replace("old filters\n", ""))
-    main([str(identified), "--to", str(identified)])
+    main([str(results_folder), "--to", str(results_folder)])
     for name in ("parameters", "time", "filters"):
-        assert (identified / "figures" / f"identification-{name}.png").read_bytes().startswith(PNG)
+        assert (results_folder / "figures" / f"identification-{name}.png").read_bytes().startswith(PNG)
     text = page.read_text(encoding="utf-8")
     assert "| P1, palpate | 3.00e-04 (1.50e-04 to 6.00e-04) | 6 (5 to 7) | 20 (17 to 23) |" in text
     assert "| P1, splines | 5.00e-04 (2.50e-04 to 1.00e-03) |  | 44 (41 to 47) | 0.25 |" in text
@@ -78,21 +78,26 @@ def test_draws_figures_and_fills_tables_of_the_page(identified: Path) -> None:
     assert text.count("| matched |") == 1
 
 
-def _measured(nrmse: float, **more: Any) -> dict[str, Any]:
+def measured_row(nrmse: float, **fields: Any) -> dict[str, Any]:
     splines = {"nrmse": 0.01, "n_parameters": 200, "seconds": 0.1}
     row = {"file": "dome", "nrmse": nrmse, "n_parameters": 100, "seconds": 1.0, "finite": True}
-    both = {"splines": splines, "passive_splines": {**splines, "nrmse": 0.02}}
-    return {**row, **both, "baselines": {"splines": splines}, **more}
+    spline_results = {"splines": splines, "passive_splines": {**splines, "nrmse": 0.02}}
+    return {**row, **spline_results, "baselines": {"splines": splines}, **fields}
 
 
-def test_fills_the_tables_of_measured_objects_and_of_crossing_strokes(identified: Path) -> None:
-    domes = [_measured(0.015, floor=0.009, share_at_turn=0.8), _measured(0.03)]
-    variants = {"domes_h_of_any_sign": [_measured(0.011)], "domes_force_25_ms_earlier": [_measured(0.006)]}
-    _left(identified, "real_data", {"domes": domes, **variants, "springs": [_measured(0.009)]})
-    page = identified / "identification.md"
+def test_fills_the_tables_of_measured_objects_and_of_crossing_strokes(results_folder: Path) -> None:
+    dome_rows = [measured_row(0.015, floor=0.009, share_at_turn=0.8), measured_row(0.03)]
+    variants = {
+        "domes_h_of_any_sign": [measured_row(0.011)],
+        "domes_force_25_ms_earlier": [measured_row(0.006)],
+    }
+    write_results(
+        results_folder, "real_data", {"domes": dome_rows, **variants, "springs": [measured_row(0.009)]}
+    )
+    page = results_folder / "identification.md"
     names = ("compare_methods", "filters", "parsimony", "real_data", "crossing")
     page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in names))
-    main([str(identified), "--to", str(identified)])
+    main([str(results_folder), "--to", str(results_folder)])
     text = page.read_text(encoding="utf-8")
     assert "| domes (2 files), palpate | 0.0225 | 100 | 1 | 3.00 (2 above 1.3) | 1.50 (1 above 1.3) |" in text
     assert "| springs (1 files), palpate | 0.0090 | 100 | 1 | 0.90 | 0.45 |" in text

@@ -3,16 +3,16 @@
 
 import numpy as np
 import pytest
-from bench.identification.compare_methods import measured
+from bench.identification.compare_methods import measure
 from bench.identification.methods import METHODS
 from bench.identification.problems import problem
 
 
 @pytest.mark.parametrize("name", ["P1", "P2", "P3", "P4", "P5"])
 def test_draws_differ_in_positions_and_share_the_test_rows(name: str) -> None:
-    first, again, other = problem(name, 1), problem(name, 1), problem(name, 2)
-    assert np.array_equal(first.X, again.X)
-    assert np.array_equal(first.y, again.y)
+    first, repeated, other = problem(name, 1), problem(name, 1), problem(name, 2)
+    assert np.array_equal(first.X, repeated.X)
+    assert np.array_equal(first.y, repeated.y)
     assert first.X.shape == other.X.shape
     assert not np.array_equal(first.X, other.X)
     if name in ("P3", "P4", "P5"):
@@ -27,9 +27,9 @@ def test_draws_without_noise_keep_the_ends_of_the_grid() -> None:
 
 
 def test_measured_row_has_median_and_range_over_the_draws() -> None:
-    (row,) = measured("P4", 3, METHODS[:1])
-    low, high = row["nrmse_range"]
-    assert low < row["nrmse"] < high
+    (row,) = measure("P4", 3, METHODS[:1])
+    lower, upper = row["nrmse_range"]
+    assert lower < row["nrmse"] < upper
     assert row["n_wavelets_range"][0] <= row["n_wavelets"] <= row["n_wavelets_range"][1]
     assert row["n_parameters_range"][0] <= row["n_parameters"] <= row["n_parameters_range"][1]
     assert row["draws"] == 3

@@ -18,21 +18,21 @@ NUMBERS = json.loads((PAGE.parent / "figures" / "failure-maps.json").read_text(e
 NAMES = [each["name"] for each in NUMBERS["maps"]]
 
 
-def printed(*names: str) -> dict[str, Any]:
+def program_output(*names: str) -> dict[str, Any]:
     """Returns the output of the program with some of its maps."""
     maps = [each for each in NUMBERS["maps"] if each["name"] in names]
     return {"maps": maps, "guards": NUMBERS["guards"]}
 
 
 def test_writes_figures_numbers_and_tables(tmp_path: Path) -> None:
-    quick = ("encoder", "pole", "guard")
+    names = ("encoder", "pole", "guard")
     page = tmp_path / PAGE.name
-    page.write_text("".join(f"<!-- {name} -->\nold\n<!-- end -->\n" for name in (*quick, "guards", "where")))
-    write(printed(*quick), tmp_path, 1.25)
-    for name in quick:
+    page.write_text("".join(f"<!-- {name} -->\nold\n<!-- end -->\n" for name in (*names, "guards", "where")))
+    write(program_output(*names), tmp_path, 1.25)
+    for name in names:
         assert (tmp_path / "figures" / f"failure-{name}.png").stat().st_size > 5000
     numbers = json.loads((tmp_path / "figures" / "failure-maps.json").read_text())
-    assert [each["name"] for each in numbers["maps"]] == list(quick)
+    assert [each["name"] for each in numbers["maps"]] == list(names)
     assert numbers["seconds"] == 1.2
     assert {"machine", "date", "palpate", "simulated"} <= set(numbers)
     text = page.read_text()
@@ -45,17 +45,24 @@ def test_refuses_a_page_without_marks(tmp_path: Path) -> None:
     page = tmp_path / PAGE.name
     page.write_text("nothing to fill\n")
     with pytest.raises(SystemExit, match="'<!-- pole -->'"):
-        write(printed("pole"), tmp_path, 1.0)
+        write(program_output("pole"), tmp_path, 1.0)
     assert page.read_text() == "nothing to fill\n"
 
 
 def test_table_states_the_ratio_and_the_largest_value_without_failure() -> None:
     line = {"name": "one", "at": [1, 2, 3], "measured": [4.0, 6.0, None], "theory": [4.0, 5.0, 6.0]}
-    shown = {"name": "map", "along": "x", "limit": "y", "searched": 10.0, "linear": False, "lines": [line]}
-    assert "| one | 1.0000 to 1.2000; elsewhere nothing failed up to 10 |" in map_table(shown)
-    shown |= {"linear": True}
-    assert map_table(shown).startswith("| x | 1 | 2 | 3 |\n")
-    assert "| one | 4 | 6 | nan |" in map_table(shown)
+    failure_map = {
+        "name": "map",
+        "along": "x",
+        "limit": "y",
+        "searched": 10.0,
+        "linear": False,
+        "lines": [line],
+    }
+    assert "| one | 1.0000 to 1.2000; elsewhere nothing failed up to 10 |" in map_table(failure_map)
+    failure_map |= {"linear": True}
+    assert map_table(failure_map).startswith("| x | 1 | 2 | 3 |\n")
+    assert "| one | 4 | 6 | nan |" in map_table(failure_map)
 
 
 def test_fills_empty_tables(tmp_path: Path) -> None:
@@ -72,9 +79,9 @@ def test_missing_program_names_its_build_target(tmp_path: Path) -> None:
     studies = ROOT / "bench" / "studies.py"
     (tmp_path / "bench" / studies.name).write_text(studies.read_text(encoding="utf-8"), encoding="utf-8")
     command = [sys.executable, str(script), "--to", str(tmp_path)]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert run.returncode == 1
-    assert "--target failure_maps" in run.stderr
+    completed = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert completed.returncode == 1
+    assert "--target failure_maps" in completed.stderr
 
 
 def test_page_has_a_figure_and_a_table_for_every_map() -> None:

@@ -23,13 +23,15 @@ def test_runs_without_measured_data_and_names_the_omitted_objects(tmp_path: Path
         "--to",
         str(tmp_path),
     ]
-    quick = ["--grid", "0", "--seconds", "1"]
-    run = subprocess.run([*command, *quick], capture_output=True, text=True, env=environment, check=False)
-    assert run.returncode == 0, run.stderr
-    assert "Left out: the measured switches" in page.read_text(encoding="utf-8")
+    options = ["--grid", "0", "--seconds", "1"]
+    completed = subprocess.run(
+        [*command, *options], capture_output=True, text=True, env=environment, check=False
+    )
+    assert completed.returncode == 0, completed.stderr
+    assert "Omitted: the measured switches" in page.read_text(encoding="utf-8")
     rows = json.loads((tmp_path / "figures" / NUMBERS.name).read_text(encoding="utf-8"))
     assert {row["object"] for row in rows} == {"spring and wall", "snap-through"}
-    assert not any(row["shakes"] for row in rows)
+    assert not any(row["oscillates"] for row in rows)
 
 
 def test_page_shows_seven_objects_on_three_devices_each() -> None:
@@ -41,8 +43,10 @@ def test_page_shows_seven_objects_on_three_devices_each() -> None:
 
 
 def test_on_a_weak_device_the_plan_comes_to_rest_and_direct_rendering_oscillates() -> None:
-    weak = [row for row in json.loads(NUMBERS.read_text(encoding="utf-8")) if "weak" in row["device"]]
-    assert len(weak) == 7
-    for row in weak:
-        assert not row["shakes"]
-        assert row["direct_shakes"], row
+    weak_device_rows = [
+        row for row in json.loads(NUMBERS.read_text(encoding="utf-8")) if "weak" in row["device"]
+    ]
+    assert len(weak_device_rows) == 7
+    for row in weak_device_rows:
+        assert not row["oscillates"]
+        assert row["direct_oscillates"], row

@@ -14,7 +14,7 @@ from bench.solvers.speed import BOUNDS, main
 PNG = b"\x89PNG"
 
 
-def _step(name: str, period_s: float, nanoseconds: float, error: float) -> dict[str, Any]:
+def step_row(name: str, period_s: float, nanoseconds: float, error: float) -> dict[str, Any]:
     diverges = error == 0.0
     return {
         "name": f"{name}/period_ns:{round(1e9 * period_s)}",
@@ -25,7 +25,7 @@ def _step(name: str, period_s: float, nanoseconds: float, error: float) -> dict[
     }
 
 
-def _force(name: str, nanoseconds: float, end: float, instant: float) -> dict[str, Any]:
+def force_row(name: str, nanoseconds: float, end: float, instant: float) -> dict[str, Any]:
     return {
         "name": name,
         "cpu_time": nanoseconds,
@@ -36,7 +36,7 @@ def _force(name: str, nanoseconds: float, end: float, instant: float) -> dict[st
     }
 
 
-def _model(name: str, wavelets: int, error: float) -> dict[str, Any]:
+def model_row(name: str, wavelets: int, error: float) -> dict[str, Any]:
     return {
         "name": name,
         "cpu_time": 3.0 + wavelets,
@@ -46,15 +46,23 @@ def _model(name: str, wavelets: int, error: float) -> dict[str, Any]:
     }
 
 
-def _sized(name: str, **counters: float) -> list[dict[str, Any]]:
+def rows_of_both_sizes(name: str, **counters: float) -> list[dict[str, Any]]:
     """Returns a benchmark for 8 and 16 wavelets, with three repetitions and their mean."""
     rows: list[dict[str, Any]] = []
     for wavelets in (8, 16):
-        of = f"{name}/wavelets:{wavelets}"
+        benchmark = f"{name}/wavelets:{wavelets}"
         for time in (1.0, 2.0, 30.0):
-            row = {"name": of, "run_name": of, "run_type": "iteration", "cpu_time": time, "time_unit": "us"}
+            row = {
+                "name": benchmark,
+                "run_name": benchmark,
+                "run_type": "iteration",
+                "cpu_time": time,
+                "time_unit": "us",
+            }
             rows.append({**row, **counters})
-        rows.append({"name": f"{of}_mean", "run_name": of, "run_type": "aggregate", "cpu_time": 11.0})
+        rows.append(
+            {"name": f"{benchmark}_mean", "run_name": benchmark, "run_type": "aggregate", "cpu_time": 11.0}
+        )
     return rows
 
 
@@ -64,27 +72,27 @@ def results(tmp_path: Path) -> Path:
     context = {"num_cpus": 2, "mhz_per_cpu": 2000, "date": "2026-01-02T03:04:05", "commit": "abc"}
     benchmarks = {
         "bench_work_precision": [
-            _step("explicit_euler", 4e-3, 20.0, 0.0),
-            _step("explicit_euler", 2e-3, 20.0, 4e-5),
-            _step("implicit_table", 4e-3, 20.0, 8e-5),
-            _step("implicit_table", 2e-3, 20.0, 4e-5),
+            step_row("explicit_euler", 4e-3, 20.0, 0.0),
+            step_row("explicit_euler", 2e-3, 20.0, 4e-5),
+            step_row("implicit_table", 4e-3, 20.0, 8e-5),
+            step_row("implicit_table", 2e-3, 20.0, 4e-5),
         ],
         "bench_rendered_force": [
-            _force("direct_table", 8.0, 4e-3, 4e-4),
-            _force("massless_table", 20.0, 0.12, 0.12),
+            force_row("direct_table", 8.0, 4e-3, 4e-4),
+            force_row("massless_table", 20.0, 0.12, 0.12),
         ],
         "bench_controller": [{"name": "tick/direct", "cpu_time": 30.0, "p50_ns": 29.0, "p999_ns": 120.0}],
         "bench_model_error": [
-            _model("P1/wavelet network/0", 2, 1e-2),
-            _model("P1/wavelet network/1", 6, 3e-4),
-            _model("P1/lookup table/2", 0, 2e-2),
+            model_row("P1/wavelet network/0", 2, 1e-2),
+            model_row("P1/wavelet network/1", 6, 3e-4),
+            model_row("P1/lookup table/2", 0, 2e-2),
         ],
         "bench_evaluation": [
             row
             for method in ("ExpLoop", "Network", "Compiled", "Table", "CubicSpline")
-            for row in _sized(f"latency<{method}>")
+            for row in rows_of_both_sizes(f"latency<{method}>")
         ],
-        "bench_bounds": [row for name in BOUNDS for row in _sized(name, excess=0.004)],
+        "bench_bounds": [row for name in BOUNDS for row in rows_of_both_sizes(name, excess=0.004)],
     }
     for name, rows in benchmarks.items():
         (tmp_path / f"{name}.json").write_text(json.dumps({"context": context, "benchmarks": rows}))
@@ -131,7 +139,7 @@ def test_refuses_a_folder_without_results(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("change", "message"),
     [
         pytest.param({"error_occurred": True, "error_message": "0.7 N*m"}, "wrong result", id="wrong-result"),
         pytest.param(
@@ -139,12 +147,12 @@ def test_refuses_a_folder_without_results(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_refuses_a_wrong_benchmark(results: Path, change: dict[str, Any], says: str) -> None:
+def test_refuses_a_wrong_benchmark(results: Path, change: dict[str, Any], message: str) -> None:
     path = results / "bench_rendered_force.json"
     content = json.loads(path.read_text())
     content["benchmarks"][1] |= change
     path.write_text(json.dumps(content))
-    with pytest.raises(SystemExit, match=says) as refused:
+    with pytest.raises(SystemExit, match=message) as refused:
         main([str(results), "--to", str(results / "figures")])
     assert "massless_table" in str(refused.value)
 

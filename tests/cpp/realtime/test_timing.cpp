@@ -57,7 +57,7 @@ TEST(LoopTiming, MeasuresPeriodLatenessAndRate) {
 TEST(RateCheck, DetectsALowRateWithinOneSecond) {
     RateCheck check;
     bool window_ended = false;
-    for (Nanoseconds now = 1; now < 1'000'000'000 && !said; now += 2'000'000) {
+    for (Nanoseconds now = 1; now < 1'000'000'000 && !window_ended; now += 2'000'000) {
         window_ended = check.add(now);
     }
     EXPECT_TRUE(window_ended);

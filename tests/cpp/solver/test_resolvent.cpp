@@ -429,12 +429,12 @@ TEST(CertifiedSolver, IsExactAtTheKinksAtTheEdges) {
         for (int j = 0; j < 100; ++j) {
             const double edge = j % 2 == 0 ? 0.0 : 1.0;
             // The tangent of a step from a slightly larger distance may end on the wrong side of the edge.
-            const auto beside = [&](double from, double to) {
+            const auto near_kink = [&](double from, double to) {
                 return edge +
                        (uniform(random, -1.0, 1.0) < 0.0 ? -1.0 : 1.0) * std::exp(uniform(random, from, to));
             };
-            const double start = beside(-14.0, -5.0);
-            const double wanted = beside(-28.0, -12.0);
+            const double start = near_kink(-14.0, -5.0);
+            const double wanted = near_kink(-28.0, -12.0);
             const auto intercept = [&](double y) { return network.at(y, {}).force + p * y; };
             CertifiedSolver::Memory memory;
             ASSERT_NEAR(solver.solve(network, {}, {p, intercept(start)}, memory).position, start, 1e-12);

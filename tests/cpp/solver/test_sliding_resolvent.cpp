@@ -154,9 +154,9 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
                 state = pair.start(uniform(random, -0.3, 1.4));
             }
             const double turn = state.play + (j % 2 == 0 ? radius : -radius);
-            const double beside = (j % 5 < 2 ? 1.0 : -1.0) * std::exp(uniform(random, -25.0, -3.0));
+            const double offset = (j % 5 < 2 ? 1.0 : -1.0) * std::exp(uniform(random, -25.0, -3.0));
             const double x = j % 4 == 0   ? uniform(random, -0.3, 1.4)
-                             : j % 4 == 1 ? turn + radius * beside
+                             : j % 4 == 1 ? turn + radius * offset
                                           : state.play + radius * uniform(random, -1.5, 1.5);
             const double q = pair.at(x, state).force + p * x;
             for (const Solution& solution : {resolvent.solve(pair, state, {p, q}, memory),

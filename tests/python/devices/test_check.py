@@ -123,9 +123,9 @@ def test_a_device_whose_check_forbids_force_has_no_profile() -> None:
 
 
 def test_without_echoes_of_a_disabled_device_the_delay_is_unknown_until_a_push() -> None:
-    silent = summary_without_force()
-    del silent["round_trip"], silent["delay"]
-    found = judge(silent)
+    summary = summary_without_force()
+    del summary["round_trip"], summary["delay"]
+    found = judge(summary)
     assert found.suitable
     assert found.numbers["delay_s"] is None
     assert check.with_pushes(found, push_response(push_ticks())).numbers["delay_s"] == 0
@@ -151,13 +151,13 @@ def push_ticks(
     reported_sign: float = 1.0,
     moves: Callable[[np.ndarray], np.ndarray] | None = None,
     friction: float = 0.0,
-    smaller: float = 0.6,
+    smaller_share: float = 0.6,
 ) -> dict[str, np.ndarray]:
     """Returns ticks of alternating pushes on a free handle of 2e-4 kg m^2 and 0.06 N m s/rad."""
     sent, position, speed = np.zeros(2000), np.zeros(2000), 0.0
     sent[np.arange(2000) % 200 >= 170] = 0.025
     sent *= np.where(np.arange(2000) // 200 % 2, -1.0, 1.0)
-    sent *= np.where(np.arange(2000) // 600 % 2, smaller, 1.0)
+    sent *= np.where(np.arange(2000) // 600 % 2, smaller_share, 1.0)
     x = 0.0
     for k in range(1, 2000):
         for _ in range(20):

@@ -115,7 +115,7 @@ def test_every_field_of_a_model_is_saved_and_loaded(tmp_path: Path) -> None:
             damping=0.2,
             slope_bounds=(-1e6, 2e6),
             plan=PLAN,
-            notes={"who": "bench 3"},
+            notes={"operator": "bench 3"},
             fit=Fit("hysteresis", "fresh", 0.1, N, 20, [step]),  # type: ignore[list-item]
             data=Source(("a.csv", "b.csv"), "aa bb", 30, {"force": "force_N"}, held_out_every=5),
         )
@@ -134,7 +134,7 @@ def test_every_field_of_a_model_is_saved_and_loaded(tmp_path: Path) -> None:
         assert getattr(again, name) == getattr(model, name), name
     assert again.data == model.data
     assert list(again.path) == [step]
-    assert again.notes == {"who": "bench 3", "held_out_every": 5}
+    assert again.notes == {"operator": "bench 3", "held_out_every": 5}
     assert (again.play_radius, again.stop_reason, again.n_parameters) == (1e-4, "fresh", 20)
     assert again.created_by == f"palpate {_core.__version__}"
 
@@ -183,8 +183,8 @@ def test_a_model_of_two_inputs_predicts_and_is_saved(tmp_path: Path) -> None:
 
 def test_copies_and_pickles_are_equal() -> None:
     model = Model(**content(hysteresis=True))
-    for twin in (copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
-        assert twin.to_dict() == model.to_dict()
+    for duplicate in (copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
+        assert duplicate.to_dict() == model.to_dict()
 
 
 @pytest.mark.parametrize(
@@ -214,8 +214,8 @@ def test_a_failed_save_leaves_the_old_file(tmp_path: Path) -> None:
     model = Model(**content())
     path = model.save(tmp_path / "a.json")
     before = path.read_bytes()
-    model.notes["who"] = float("nan")
-    with pytest.raises(InputError, match=r"notes\.who is nan"):
+    model.notes["operator"] = float("nan")
+    with pytest.raises(InputError, match=r"notes\.operator is nan"):
         model.save(path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]

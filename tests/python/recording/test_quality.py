@@ -174,9 +174,9 @@ def test_a_file_appended_to_itself_is_reported_with_the_row() -> None:
 
 def test_positions_without_rows_are_reported_for_the_whole_recording_and_for_one_stroke() -> None:
     rows = rows_of("loop")
-    hole = (rows.x > 1e-3) & (rows.x < 1.5e-3)
-    assert "the recording has no rows from 0.00" in only_sentence(rows.take(~hole))
-    one = only_sentence(rows.take(~hole | (rows.d == -1)))
+    gap = (rows.x > 1e-3) & (rows.x < 1.5e-3)
+    assert "the recording has no rows from 0.00" in only_sentence(rows.take(~gap))
+    one = only_sentence(rows.take(~gap | (rows.d == -1)))
     assert "the press stroke has no rows from 0.00" in one
     assert "13% of the travel" in one or "12% of the travel" in one
 

@@ -145,8 +145,10 @@ def test_mcap_messages_are_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.diff(recording.time), 1e-3, rtol=1e-6)
     two = {"/pose": [{"depth_mm": 1.0, "n": 1}], "/wrench": [{"force_N": 1.0, "n": 1}]}
     assert "2 topics hold two values or more (/pose, /wrench)" in refusal(mcap(tmp_path / "b.mcap", two))
-    ros = mcap(tmp_path / "c.mcap", {"/pose": [{}]}, encoding="cdr")
-    assert refusal(ros).startswith("c.mcap holds only messages in cdr; it must hold JSON messages")
+    binary_messages = mcap(tmp_path / "c.mcap", {"/pose": [{}]}, encoding="cdr")
+    assert refusal(binary_messages).startswith(
+        "c.mcap holds only messages in cdr; it must hold JSON messages"
+    )
 
 
 WRITERS = {

@@ -16,7 +16,6 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import InputError
-from ...recording.comparison import amount
 from ..data.compression import Compressed
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
@@ -183,17 +182,16 @@ class ClassSelection:
         names, unit = " and ".join(dict.fromkeys(bound.name for bound in bounds)), self.data.force_unit
         note = (
             f"{in_words(free.model_class)}: {names} imposed over the whole domain, which changes the RMS "
-            f"error from {amount(free.rmse, unit)} to {amount(rmse, unit)}."
+            f"error from {unit.interval(free.rmse, rmse)}."
         )
         above = crossing(free.problem, free.solution) if self.options.hysteresis_nonnegative else None
         if above is None:
             return note
         lower, reach, position = float(self.data.lower[0]), float(self.data.reach[0]), self.data.position_unit
         return (
-            f"{note} Without this constraint release is up to {amount(above.height, unit)} above press "
-            f"between {amount(lower + reach * above.start, position)} and "
-            f"{amount(lower + reach * above.end, position)}; a passive object cannot do that. The force may "
-            "be recorded late: try --force-late-s."
+            f"{note} Without this constraint release is up to {unit.text(above.height)} above press at "
+            f"{position.interval(lower + reach * above.start, lower + reach * above.end)}; a passive "
+            "object cannot do that. The force may be recorded late: try --force-late-s."
         )
 
     def bounds(self, problem: SeparableProblem) -> list[Bound]:

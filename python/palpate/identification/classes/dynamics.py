@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
-from ...recording.comparison import amount
 from ...recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
 from ..data.limits import FORCE_RESOLUTION
 from ..data.rows import Rows, modulo
@@ -184,15 +183,13 @@ class Dynamics:
             names = tuple(other for other in names if other != name)
             reason = f"{measured}, must fall by more than {100 * error:.2g} %"
             if not found > 0.0:
-                reason = (
-                    f"its value is {amount(found, self._unit_of(name))}, a passive object needs more than 0"
-                )
+                reason = f"its value is {found:.4g} {self._unit_of(name)}, a passive object needs more than 0"
             decisions.append(decided(name, False, f"{reason}; {change}"))
         return regression.solved(use, names), decisions
 
     def _unit_of(self, name: str) -> str:
         """Unit of damping or mass; empty if the units of force and position are not known."""
-        force, position = self._data.force_unit, self._data.position_unit
+        force, position = self._data.force_unit.si, self._data.position_unit.si
         if not (force and position):
             return ""
         return f"{force}*s/{position}" if name == "damping" else f"{force}*s^2/{position}"

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...recording import Recording
-from ...recording.comparison import amount
 from ...recording.quality import findings_of
+from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, Verdict, no, usable
 from ..data.rows import period_notes
 from ..decision import latest
@@ -193,7 +193,7 @@ def explained_findings(
     residual: Float1D,
     side: Float1D | None,
     nrmse: float,
-    force_unit: str = "",
+    force_unit: Unit = UNSTATED_UNIT,
 ) -> list[Finding]:
     """A finding if most of a model's error is force that position cannot explain.
 
@@ -205,7 +205,7 @@ def explained_findings(
         Direction, where the model has hysteresis.
     nrmse : float
         Of the model.
-    force_unit : str
+    force_unit : Unit
         For the message.
     """
     rows = _thinned(force)
@@ -223,7 +223,7 @@ def explained_findings(
     return [
         judge(
             f"{inputs} at most {share:.0%} of the variance of the force: rows at neighbouring positions "
-            f"differ by {amount(apart, force_unit)} RMS. No model of these inputs has an NRMSE below "
+            f"differ by {force_unit.text(apart)} RMS. No model of these inputs has an NRMSE below "
             f"{np.sqrt(least):.2g}. Likely cause: {cause}. Cure: {cure}"
         )
     ]
@@ -258,7 +258,7 @@ UNFIT_EXCESS = 1.0
 """The same, from which the model is unfit [-]."""
 
 
-def extreme_force_findings(error: RowError, force_unit: str = "") -> list[Finding]:
+def extreme_force_findings(error: RowError, force_unit: Unit = UNSTATED_UNIT) -> list[Finding]:
     """A finding if few rows of extreme force hide a large error of all others."""
     rows = np.flatnonzero(error.weight > 0.0)
     if len(rows) < LEAST_ROWS or error.spread == 0.0 or _plainly_small(error, rows):
@@ -274,8 +274,8 @@ def extreme_force_findings(error: RowError, force_unit: str = "") -> list[Findin
         judge(
             f"the NRMSE is {error.nrmse:.3g} over all rows, but {inner.nrmse:.3g} without the "
             f"{EXTREME_SHARE:.0%} with the most extreme forces. These reach "
-            f"{amount(float(np.abs(error.force).max()), force_unit)}, the others have a range of "
-            f"{amount(float(np.ptp(error.force[kept])), force_unit)}, so that few rows hide the error of the "
+            f"{force_unit.text(float(np.abs(error.force).max()))}, the others have a range of "
+            f"{force_unit.text(float(np.ptp(error.force[kept])))}, so that few rows hide the error of the "
             "others. If they are wrong readings, remove these rows or give --loss huber"
         )
     ]
@@ -290,7 +290,12 @@ def _plainly_small(error: RowError, rows: NDArray[np.intp]) -> bool:
 
 
 def excess_findings(
-    network: FittedNetwork, force: Float1D, *, repeats: bool, position_unit: str = "", force_unit: str = ""
+    network: FittedNetwork,
+    force: Float1D,
+    *,
+    repeats: bool,
+    position_unit: Unit = UNSTATED_UNIT,
+    force_unit: Unit = UNSTATED_UNIT,
 ) -> list[Finding]:
     """A finding if a model of one input leaves the range of the recorded forces between the rows.
 
@@ -320,10 +325,10 @@ def excess_findings(
     judge = no if share > UNFIT_EXCESS else usable
     return [
         judge(
-            f"between the rows the force of the model is {amount(value, force_unit)} at position "
-            f"{amount(place, position_unit)}{stroke}, but the recorded forces lie between {force.min():.4g} "
-            f"and {amount(float(force.max()), force_unit)}. Likely cause: few rows of that stroke near this "
-            "position. Cure: record more strokes there, or give a smaller --max-wavelets"
+            f"between the rows the force of the model is {force_unit.text(value)} at position "
+            f"{position_unit.text(place)}{stroke}, but the recorded forces are "
+            f"{force_unit.interval(force.min(), force.max())}. Likely cause: few rows of that stroke near "
+            "this position. Cure: record more strokes there, or give a smaller --max-wavelets"
         )
     ]
 
@@ -334,17 +339,17 @@ def cell_findings(
     travel: float,
     cells: int,
     *,
-    position_unit: str = "",
-    force_unit: str = "",
+    position_unit: Unit = UNSTATED_UNIT,
+    force_unit: Unit = UNSTATED_UNIT,
 ) -> list[Finding]:
     """A finding if the error on rows is far above the error on the cells that were fitted."""
     if on_rows.nrmse <= REPORTED_NRMSE or on_rows.rmse <= CELL_ERROR_RATIO * on_cells:
         return []
     return [
         no(
-            f"the RMS error is {amount(on_rows.rmse, force_unit)} on the rows, but "
-            f"{amount(on_cells, force_unit)} on the fitted cells. The cells are too wide for this force: "
-            f"1/{cells} of the travel of {amount(travel, position_unit)}. Remove rows with wrong positions, "
+            f"the RMS error is {force_unit.text(on_rows.rmse)} on the rows, but "
+            f"{force_unit.text(on_cells)} on the fitted cells. The cells are too wide for this force: "
+            f"1/{cells} of the travel of {position_unit.text(travel)}. Remove rows with wrong positions, "
             "or increase max_positions"
         )
     ]
@@ -374,7 +379,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     decisions, replaced = latest([*report.decisions, *data.decisions])
     if data.period is not None:
         positions = data.lower[0] + data.reach[0] * data.path[:, 0]
-        note, of_period = period_notes(positions, data.period, data.position_unit)
+        note, of_period = period_notes(positions, data.period, data.position_unit.si)
         notes, findings = [*notes, note], findings + of_period
     findings += report.findings + limit_findings(best, options)
     if data.robust is not None:

@@ -25,7 +25,7 @@ from scipy.spatial import cKDTree
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...recording import Recording
-from ...recording.comparison import amount
+from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
 from .limits import FORCE_RESOLUTION
 
@@ -69,10 +69,9 @@ def without_isolated(recordings: Sequence[Recording]) -> tuple[list[Recording], 
         columns.append((name, np.concatenate([recording.inputs[:, index] for recording in recordings])))
     dropped = np.zeros(len(position), dtype=bool)
     findings: list[Finding] = []
-    units = recordings[0].units
     for name, values in columns:
-        dropped |= _judged(name, values, ~dropped, None, findings, units.get(name, ""))
-    dropped |= _judged("force", force, ~dropped, position, findings, units["force"])
+        dropped |= _judged(name, values, ~dropped, None, findings, recordings[0].file_unit(name))
+    dropped |= _judged("force", force, ~dropped, position, findings, recordings[0].file_unit("force"))
     if not dropped.any():
         return list(recordings), findings
     apart = np.split(dropped, np.cumsum(counts)[:-1])
@@ -139,7 +138,7 @@ def _judged(
     given: NDArray[np.bool_],
     position: Float1D | None,
     findings: list[Finding],
-    unit: str = "",
+    unit: Unit,
 ) -> NDArray[np.bool_]:
     """Rows (n,) to be dropped for their values, among the given ones; adds findings."""
     found = np.zeros(len(values), dtype=bool)
@@ -162,7 +161,7 @@ def _judged(
         count, ratio = len(here), _gap(values[here], others)
         drop = drop and _longest_run(apart) <= LONGEST_RUN
         found[here] = drop
-        named = ", ".join(f"row {row} at {values[row]:.4g}" for row in here[:MOST_NAMED_ROWS])
+        named = ", ".join(f"row {row} at {unit.text(values[row])}" for row in here[:MOST_NAMED_ROWS])
         more = ", ..." if count > MOST_NAMED_ROWS else ""
         result = (
             "They are likely wrong readings and were dropped"
@@ -172,7 +171,7 @@ def _judged(
         findings.append(
             usable(
                 f"{count} of {len(rows)} rows ({named}{more}) have a {name} outside the range of the others, "
-                f"{others.min():.4g} to {amount(float(others.max()), unit)}, by {ratio:.3g} times its width. "
+                f"{unit.interval(others.min(), others.max())}, by {ratio:.3g} times its width. "
                 f"{result}"
             )
         )
@@ -293,7 +292,7 @@ class Robust:
     """(n,) rows that were left out"""
     note: str
 
-    def findings(self, residual: Float1D, force_unit: str = "") -> list[Finding]:
+    def findings(self, residual: Float1D, force_unit: Unit = UNSTATED_UNIT) -> list[Finding]:
         """A finding on the dropped rows; residual (n,) is that of all rows."""
         count = int(np.count_nonzero(self.outliers))
         if not count:
@@ -305,8 +304,8 @@ class Robust:
             judge(
                 f"{count} rows ({100 * share:.2g} %) differ by more than {OUTLIER_STANDARD_DEVIATIONS:g} "
                 "standard deviations from the model and from their neighbours, at most by "
-                f"{amount(largest, force_unit)}. They are likely wrong readings and were dropped; the error "
-                "is that of the other rows"
+                f"{force_unit.text(largest)}. They are likely wrong readings and were dropped; the error is "
+                "that of the other rows"
             )
         ]
 

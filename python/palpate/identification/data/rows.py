@@ -14,9 +14,9 @@ from ..._core.dynamics import environment_filters, paper_sample_time_s
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...recording import Recording
-from ...recording.comparison import amount
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
 from ...recording.motion import Piece, pieces, velocity
+from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
 from ..decision import Decision
 from ..options import IdentifyOptions
@@ -79,10 +79,10 @@ class Rows:
     """Limits of the information in the rows"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) least and largest corner of the box; None: those of the positions"""
-    position_unit: str = ""
-    """For messages; empty if not known"""
-    force_unit: str = ""
-    """For messages; empty if not known, or if the forces are scaled"""
+    position_unit: Unit = UNSTATED_UNIT
+    """For messages"""
+    force_unit: Unit = UNSTATED_UNIT
+    """For messages; not stated if the forces are scaled"""
 
     @cached_property
     def lower(self) -> Float1D:
@@ -145,7 +145,7 @@ class Rows:
             force=scale.scaled(self.force),
             within=self.within * scale.factor**2,
             parts=[replace(part, force=scale.scaled(part.force)) for part in self.parts],
-            force_unit=self.force_unit if scale.factor == 1.0 else "",
+            force_unit=self.force_unit if scale.factor == 1.0 else UNSTATED_UNIT,
         )
 
     def limited(self) -> Rows:
@@ -266,8 +266,8 @@ def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
         decisions=decisions,
         notes=notes,
         findings=findings,
-        position_unit=recordings[0].units["position"],
-        force_unit=recordings[0].units["force"],
+        position_unit=recordings[0].file_unit("position"),
+        force_unit=recordings[0].file_unit("force"),
     )
 
 
@@ -372,7 +372,7 @@ def period_notes(position: Float1D, period: float, unit: str = "") -> tuple[str,
     if travel <= period:
         gap = period - travel
         note = (
-            f"The positions leave a gap of {amount(gap, unit)}, {100 * gap / period:.2g} % of the period of "
+            f"The positions leave a gap of {_exact(gap, unit)}, {100 * gap / period:.2g} % of the period of "
             f"{_exact(period, unit)}. The model closes it."
         )
     box = np.sort(modulo((position - lower) / period))

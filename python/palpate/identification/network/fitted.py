@@ -12,7 +12,7 @@ import numpy as np
 from ..._core.model import ForceModel
 from ..._typing import Float1D, Float2D
 from ...model import Fit, PathStep
-from ...recording.comparison import amount
+from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding
 from ..data.limits import ForceScale
 from ..decision import Decision
@@ -118,7 +118,7 @@ class FittedNetwork:
             path=path,
         )
 
-    def unscaled(self, scale: ForceScale, force_unit: str = "") -> FittedNetwork:
+    def unscaled(self, scale: ForceScale, force_unit: Unit = UNSTATED_UNIT) -> FittedNetwork:
         """Returns the network in the unit of the force, which is `force_unit` in messages."""
 
         factor = scale.factor
@@ -129,7 +129,7 @@ class FittedNetwork:
             )
             notes = (multiplied, *notes)
         if scale.offset:
-            offset = amount(scale.offset, force_unit)
+            offset = force_unit.text(scale.offset)
             notes = (f"An offset of {offset} was subtracted from the force for the fit.", *notes)
         scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
