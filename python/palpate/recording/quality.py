@@ -219,7 +219,8 @@ def saturation_findings(recording: Recording, travel: Travel) -> list[Finding]:
                     f"the {name} force, {recording.file_unit('force').text(value)}, occurs in {len(rows)} "
                     f"rows ({len(rows) / len(f):.2g} of all) while the position changes from "
                     f"{recording.file_unit('position').interval(x[rows].min(), x[rows].max())}: the force "
-                    "sensor or its converter is probably clipped there; record with a larger force range or press less far"
+                    "sensor or its converter is probably clipped there; record with a larger force range or "
+                    "press less far"
                 )
             )
     return [*found, *_constant_position_findings(recording, travel, force_range)]

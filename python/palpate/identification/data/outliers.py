@@ -304,8 +304,8 @@ class Robust:
             judge(
                 f"{count} rows ({100 * share:.2g} %) differ by more than {OUTLIER_STANDARD_DEVIATIONS:g} "
                 "standard deviations from the model and from their neighbours, at most by "
-                f"{force_unit.text(largest)}. They are likely wrong readings and were dropped; the error is "
-                "that of the other rows"
+                f"{force_unit.text(largest)}. They are likely wrong readings and were dropped; the error "
+                "is that of the other rows"
             )
         ]
 
