@@ -7,7 +7,7 @@ import typing
 __all__: list[str] = ['DeviceProfile', 'UsbRequest', 'decode_info', 'longest_watchdog_ms', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_to_device', 'usb_to_host', 'usb_vendor']
 class DeviceProfile:
     """
-    What is known of a haptic device of one degree of freedom; SI units, rotary or linear.
+    Properties of a haptic device of one degree of freedom; SI units, rotary or linear.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -21,12 +21,12 @@ class DeviceProfile:
         ...
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        Returns the fields that are written to a file, by name, without optional ones that are not set.
         """
     @property
     def coulomb_friction(self) -> float:
         """
-        f_c, physical [N or N*m]; at most the true one.
+        f_c, friction without control [N or N*m]; at most the true value.
         """
     @property
     def delay_s(self) -> float:
@@ -36,7 +36,7 @@ class DeviceProfile:
     @property
     def encoder_step(self) -> float:
         """
-        Delta [m or rad]; 0 = not quantised.
+        Delta, step of the encoder [m or rad]; 0 = not quantised.
         """
     @property
     def force_limit(self) -> float:
@@ -46,22 +46,22 @@ class DeviceProfile:
     @property
     def force_step(self) -> float:
         """
-        Delta_F, of the command [N or N*m]; 0 = not quantised.
+        Delta_F, step of the command [N or N*m]; 0 = not quantised.
         """
     @property
     def id(self) -> str:
         """
-        Its name; a certificate holds for the device of this name and these numbers.
+        Name; a certificate holds for the device with this name and these numbers.
         """
     @property
     def inertia(self) -> float:
         """
-        Of handle and motor [kg or kg*m^2].
+        Inertia of handle and motor [kg or kg*m^2].
         """
     @property
     def jitter_s(self) -> float:
         """
-        How much longer than T the time between two samples can get [s].
+        Largest excess of the time between two samples over T [s].
         """
     @property
     def late_samples(self) -> int:
@@ -71,7 +71,7 @@ class DeviceProfile:
     @property
     def longest_period_s(self) -> float:
         """
-        period_s + jitter_s: what a certificate has to hold for [s].
+        period_s + jitter_s, the longest time between two samples [s].
         """
     @property
     def period_s(self) -> float:
@@ -86,7 +86,7 @@ class DeviceProfile:
     @property
     def viscous_damping(self) -> float:
         """
-        b, physical [N*s/m or N*m*s/rad]; at most the true one.
+        b, damping without control [N*s/m or N*m*s/rad]; at most the true value.
         """
 class UsbRequest:
     """
@@ -146,14 +146,14 @@ class UsbRequest:
         ...
 def decode_info(data: bytes) -> dict:
     """
-    Identity of a USB device from its answer to GET_INFO. InputError names the wrong field.
+    Returns the properties in a USB device's answer to GET_INFO. InputError names the wrong field.
     
     firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms, transducer,
     measures_velocity, uid.
     """
 def usb_cause(code: typing.SupportsInt | typing.SupportsIndex) -> str:
     """
-    Cause and cure for an error code of libusb; empty for a code that states no cause.
+    Returns cause and cure for an error code of libusb; empty for a code without a known cause.
     """
 longest_watchdog_ms: int = 1000
 shortest_watchdog_ms: int = 2

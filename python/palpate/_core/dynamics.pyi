@@ -16,21 +16,21 @@ class TransferFunction:
         ...
     def at(self, z: complex | typing.SupportsComplex | typing.SupportsFloat | typing.SupportsIndex) -> complex:
         """
-        H(z), for instance at z = exp(1j * omega * T).
+        Returns H(z), for instance at z = exp(1j * omega * T).
         """
     def filter(self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        The response to a signal (n,) from this state; the state itself is left as it is.
+        Returns the response to a signal (n,) from this state, and does not change the state.
         """
     def poles(self) -> typing.Annotated[list[complex], "FixedSize(2)"]:
         ...
     def reset(self) -> None:
         """
-        Back to rest.
+        Sets the state to zero.
         """
     def step(self, input: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
-        The next output sample.
+        Returns the next output sample.
         """
     @property
     def denominator(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
@@ -56,6 +56,6 @@ class EnvironmentFilters:
         ...
 def environment_filters(pair: str, design: str = 'paper') -> EnvironmentFilters:
     """
-    The paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.
+    Returns the paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.
     """
 paper_sample_time_s: float = 0.001

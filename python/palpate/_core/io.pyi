@@ -11,13 +11,13 @@ import typing
 __all__: list[str] = ['check_model', 'checked_certificate', 'profile_of', 'read_json', 'scheme_of']
 def check_model(content: typing.Any) -> None:
     """
-    Checks the content of a model file; a certificate is computed again. ValueError: the path of the
-    first wrong field, its value, what would be right.
+    Checks the content of a model file and recomputes its certificate. ValueError names the path of the
+    first wrong field, its value and the correct ones.
     """
 def checked_certificate(model: palpate._core.model.ForceModel, plan: typing.Any, certificate: typing.Any) -> palpate._core.stability.Certificate:
     """
-    Certificate of a model file, computed again from the rendered model and found the same. ValueError:
-    the field that differs, its value, what would be right.
+    Returns the certificate of a model file after recomputing it from the rendered model. ValueError
+    names the field that differs, its value and the correct one.
     """
 def profile_of(content: typing.Any) -> palpate._core.device.DeviceProfile:
     """
@@ -26,9 +26,9 @@ def profile_of(content: typing.Any) -> palpate._core.device.DeviceProfile:
     """
 def read_json(path: str) -> typing.Any:
     """
-    Content of a JSON file. ValueError: one sentence that begins with the name of the file.
+    Returns the content of a JSON file. ValueError has one sentence that begins with the name of the file.
     """
 def scheme_of(plan: typing.Any) -> palpate._core.rendering.Scheme:
     """
-    Scheme of the plan of a model file.
+    Returns the scheme of the plan of a model file.
     """

@@ -8,7 +8,7 @@ import typing
 __all__: list[str] = ['Scheme', 'compensated_share', 'default_play_radius', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'solver_name', 'structure_names']
 class Scheme:
     """
-    How a model is rendered: the structure and its numbers, SI units.
+    Structure that renders a model, with its numbers in SI units.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -22,22 +22,22 @@ class Scheme:
         ...
     def steepest_slope(self, model: palpate._core.model.ForceModel) -> float:
         """
-        Largest slope of the model that the structure meets, never below 0; h / r is part of it while a
-        hysteresis model sticks.
+        Returns the largest slope of the model in the structure, at least 0. It includes h / r, the slope
+        that a hysteresis model adds while it sticks.
         """
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        Returns the fields that are written to a file, by name, without optional ones that are not set.
         """
     def validate(self, model: palpate._core.model.ForceModel, period_s: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
-        ValueError names the field, its value and what would be right for this model; with a period also
-        what is sure to diverge at it.
+        Raises ValueError with the field, its value and the bound for this model. With a period it also
+        refuses a scheme that diverges at this period.
         """
     @property
     def compensated(self) -> bool:
         """
-        The coupling's spring is taken out of the model beforehand.
+        True if the compliance of the coupling's spring is subtracted from the model.
         """
     @property
     def coupling_damping(self) -> float:
@@ -50,14 +50,9 @@ class Scheme:
         K_c, stiffness of the coupling [N/m or N*m/rad].
         """
     @property
-    def object_damping(self) -> float:
-        """
-        B_o, damping of the object [N*s/m or N*m*s/rad].
-        """
-    @property
     def has_coupling(self) -> bool:
         """
-        True if the object stands behind a virtual coupling.
+        True if the object is behind a virtual coupling.
         """
     @property
     def has_mass(self) -> bool:
@@ -70,9 +65,14 @@ class Scheme:
         m, mass of the object [kg or kg*m^2].
         """
     @property
+    def object_damping(self) -> float:
+        """
+        B_o, damping of the object [N*s/m or N*m*s/rad].
+        """
+    @property
     def play_radius(self) -> float:
         """
-        r of a hysteresis model [m or rad]; 0 = the model's own.
+        r of a hysteresis model [m or rad]; 0 = that of the model.
         """
     @property
     def predict(self) -> int:
@@ -82,21 +82,21 @@ class Scheme:
     @property
     def structure(self) -> str:
         """
-        How the model is connected to the device.
+        Connection of the model to the device.
         """
 def default_play_radius(model: palpate._core.model.ForceModel, encoder_step: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Play radius of a model that leaves it to the rendering, else 0.
+    Returns the default play radius of a model that does not define one; otherwise 0.
     """
 def explicit_slope_limit(scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex, *, coupled: bool = True) -> float:
     """
-    Slope of the model below which the explicit structure is stable at a held device, or (not coupled)
-    driven by a force.
+    Returns the slope of the model below which the explicit structure is stable at a held device, or,
+    with coupled=False, driven by a force.
     """
 def solver_name(model: palpate._core.model.ForceModel, scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex) -> str | None:
     """
-    How the load line is solved: 'table' where certified tables answer, at least in part, else 'newton';
-    None where a structure has no load line.
+    Returns the method that solves the load line: 'table' if certified tables are used at least in part,
+    otherwise 'newton'; None for a structure without a load line.
     """
 compensated_share: float = 0.9
 fewest_encoder_steps_in_play: float = 4.0

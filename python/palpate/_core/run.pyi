@@ -28,29 +28,38 @@ def measure(*, object: palpate._core.model.ForceModel | None = None, position_un
     """
     Measures a real object in real time; on the simulated device the model `object` is mounted.
     
-    A hand moves the handle; with `probe` the device moves it slowly between `lower` and `upper`; with
-    `push` it gives short pushes of that force to either side. Options by keyword, None for the
-    default: device (simulated or usb[:SERIAL]), wait_s, rate_hz, duration_s (inf: until Ctrl-C),
-    record, force, priority, cpu, lowest_rate_share, probe, lower, upper, speed, stiffness, force_limit,
-    push, keep, transducer, friction_share (Coulomb friction of the simulated device over its force
-    limit). Calls progress(ticks, position, force, lost) ten times a second.
+    A hand moves the handle. With `probe` the device moves it slowly between `lower` and `upper`. With
+    `push` the device gives short pushes of that force to either side. Options are keywords, None for
+    the default:
     
-    Returns the summary by name; with `keep` it holds the ticks. InputError where it is refused before
-    anything moves.
+    - device (simulated or usb[:SERIAL]), wait_s.
+    - rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.
+    - probe, lower, upper, speed, stiffness, force_limit, push.
+    - record, force, keep.
+    - transducer, friction_share (Coulomb friction of the simulated device / its force limit).
+    
+    Calls progress(ticks, position, force, lost) ten times a second.
+    
+    Returns the summary by name; with `keep` it contains the ticks. Raises InputError if it is refused
+    before anything moves.
     """
 def render(model: palpate._core.model.ForceModel, plan: palpate._core.rendering.Scheme | None = None, *, limited: palpate._core.model.ForceModel | None = None, certificate: palpate._core.stability.Certificate | None = None, position_unit: str = 'rad', force_unit: str = 'N*m', model_name: str = '', progress: collections.abc.Callable | None = None, **kwargs) -> dict:
     """
     Renders a model in real time on a device: the loop of palpate-control.
     
-    `plan`, `limited` and `certificate` are those of the model; without a plan the scheme is the default
-    one. Options by keyword, None for the default: device (simulated, usb[:SERIAL] or
-    inverse3[:AXIS[@PORT]]), uncertified, wait_s, rate_hz, duration_s (inf: until Ctrl-C), record,
-    force, telemetry_port, telemetry_hz, priority, cpu, lowest_rate_share, force_limit, faults, and the
-    fields of a scheme. `record` names the recording, which grows as record.part; an existing one is
-    refused, or replaced with `force`. Calls progress(ticks, position, force, lost) ten times a second.
+    `plan`, `limited` and `certificate` are those of the model. Without a plan the default scheme is
+    used. Options are keywords, None for the default:
     
-    Returns the summary by name, its lines for a person under `lines`. InputError where it is refused
-    before anything moves.
+    - device (simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]), wait_s, uncertified, faults.
+    - rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.
+    - force_limit and the fields of a scheme.
+    - record, force, telemetry_port, telemetry_hz.
+    
+    `record` names the recording, which grows as record.part. An existing one is refused, or replaced with
+    `force`. Calls progress(ticks, position, force, lost) ten times a second.
+    
+    Returns the summary by name, and its text under `lines`. Raises InputError if it is refused before
+    anything moves.
     """
 smallest_domain_share: float = 0.1
 tolerated_change: float = 0.01

@@ -13,7 +13,7 @@ import typing
 __all__: list[str] = ['Hand', 'TestRig', 'force_driven', 'force_error', 'motion_driven', 'rig_for', 'simulate']
 class Hand:
     """
-    A simulated hand: a spring to a point sweeping between lower and upper, a damper to ground.
+    Simulated hand: a spring to a target that moves between lower and upper, and a damper to ground.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -27,12 +27,12 @@ class Hand:
         ...
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        Returns the fields that are written to a file, by name, without optional ones that are not set.
         """
     @property
     def damping(self) -> float:
         """
-        [N*s/m or N*m*s/rad]
+        Damping to ground [N*s/m or N*m*s/rad].
         """
     @property
     def frequency_hz(self) -> float:
@@ -42,12 +42,12 @@ class Hand:
     @property
     def lower(self) -> float:
         """
-        Least target [m or rad].
+        Smallest target [m or rad].
         """
     @property
     def stiffness(self) -> float:
         """
-        [N/m or N*m/rad]
+        Stiffness of the spring [N/m or N*m/rad].
         """
     @property
     def upper(self) -> float:
@@ -70,11 +70,12 @@ class TestRig:
         ...
     def scheme(self, model: palpate._core.model.ForceModel, **kwargs) -> palpate._core.rendering.Scheme:
         """
-        Returns the scheme with the given fields of Scheme, in the model's units. None: the default at the model's scale.
+        Returns the scheme with the given fields of Scheme, in the model's units. None: the default at the
+        model's scale.
         """
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        Returns the fields that are written to a file, by name, without optional ones that are not set.
         """
     @property
     def device(self) -> palpate._core.device.DeviceProfile:
@@ -94,34 +95,38 @@ class TestRig:
         """
 def force_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
-    The motion that a recorded force (n,) gives the environment alone (paper figures 12 and 14).
+    Returns the motion of the environment alone under a recorded force (n,) (paper figures 12 and 14).
     Arrays (n,) by name: force, environment_position, evaluations, status.
     """
 def force_error(model: palpate._core.model.ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex, *, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], middle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], mean_applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
-    RMS errors [N or N*m] of a simulated rendering against a model: at the end of the tick, at its
-    sampling instant, of its mean over the tick, and of that below 50 Hz; and the work of the error [J].
-    Arrays (n,) from simulate; play_radius 0 is the model's own.
+    Returns errors of a simulated rendering against a model, by name. RMS [N or N*m]: at the end of the
+    tick, at its sampling instant, of the mean over the tick, and of the mean below 50 Hz. Also the work
+    of the error [J]. Takes arrays (n,) from simulate; play_radius 0 is that of the model.
     """
 def motion_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
-    The force that would have been rendered while a recorded motion (n,) moves the device.
+    Returns the force that is rendered while a recorded motion (n,) moves the device.
     Arrays (n,) by name: force, environment_position, evaluations, status.
     """
 def rig_for(model: palpate._core.model.ForceModel, is_angle: bool, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> TestRig:
     """
     Returns the test rig for a model of position, or of position and velocity. An angle is rendered on
-    the default knob; for any other unit its lengths and forces are scaled to the travel and the largest
+    the default knob. For any other unit its lengths and forces are scaled to the travel and the largest
     force of the model.
     """
 def simulate(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0, progress: collections.abc.Callable | None = None) -> dict:
     """
-    The model rendered on a simulated device held by a simulated hand, in virtual time.
-    The handle starts at rest at start_position. Calls progress(ticks) about ten times a second. Ctrl-C
-    ends it as in Python; ValueError for more than 3 600 000 ticks.
+    Renders a model on a simulated device with a simulated hand, in virtual time.
     
-    Arrays (n,) by name: time_s, position (measured), velocity, handle_start, handle_middle and
-    handle_end (the true handle when sampled, and in the middle and at the end of the tick that holds the
-    force), environment_position, force (commanded), applied (at the end of the tick), mean_applied (over
-    the tick), evaluations, status, extrapolated.
+    The handle starts at rest at start_position. Calls progress(ticks) about ten times a second.
+    Ctrl-C raises KeyboardInterrupt. Raises ValueError for more than 3 600 000 ticks.
+    
+    Returns arrays (n,) by name:
+    
+    - time_s, position (measured), velocity, environment_position.
+    - handle_start, handle_middle, handle_end: true positions of the handle when it is sampled, and in
+      the middle and at the end of the tick that holds the force.
+    - force (commanded), applied (at the end of the tick), mean_applied (over the tick).
+    - evaluations, status, extrapolated.
     """

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Certificates and the inequalities they consist of.
+Certificates and their inequalities.
 """
 from __future__ import annotations
 import collections.abc
@@ -8,12 +8,13 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'passive_shift', 'certify', 'certify_bounds', 'device_difference', 'explicit_scheme', 'slope_behind_coupling', 'force_bounds', 'narrowest_play', 'renderable_slopes', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share']
+__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'certify', 'certify_bounds', 'device_difference', 'explicit_scheme', 'force_bounds', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share']
 class ForceBounds:
     """
-    Proved bounds of a force over every position that can be reached, continuations included.
+    Proved bounds of a force over all positions, continuations included.
     
-    With hysteresis, f = g + s h with a play of radius r, a path's slope is g' + s h', and h / r more while it sticks.
+    With hysteresis, f = g + s h with a play of radius r, the slope of a path is g' + s h'. While it
+    sticks, h / r is added.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -27,12 +28,12 @@ class ForceBounds:
         ...
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        Returns the fields that are written to a file, by name, without optional ones that are not set.
         """
     @property
     def drag(self) -> float:
         """
-        B_v = max |f(x, v) - f(x, 0)| / |v|; 0 of a force of position alone.
+        B_v = max |f(x, v) - f(x, 0)| / |v|; 0 for a force of position alone.
         """
     @property
     def hysteresis(self) -> bool:
@@ -57,22 +58,22 @@ class ForceBounds:
     @property
     def mean_force(self) -> float:
         """
-        Mean of a limited force that repeats over its period, beyond its loss.
+        Mean of a limited periodic force in excess of its hysteresis.
         """
     @property
     def sliding(self) -> float:
         """
-        max |f'|, or max(|g'| + |h'|); of all velocities.
+        max |f'|, or max(|g'| + |h'|), over all velocities.
         """
     @property
     def slope_max(self) -> float:
         """
-        Of every path: max f', or max(g' + |h'| + h/r).
+        Largest slope of any path: max f', or max(g' + |h'| + h/r).
         """
     @property
     def slope_min(self) -> float:
         """
-        Of every path: min f', or min(g' - |h'|).
+        Smallest slope of any path: min f', or min(g' - |h'|).
         """
     @property
     def steepest(self) -> float:
@@ -81,7 +82,7 @@ class ForceBounds:
         """
 class Inequality:
     """
-    One line of a certificate: left >= right, or left > right where it is strict.
+    One line of a certificate: left >= right, or left > right if it is strict.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -95,12 +96,17 @@ class Inequality:
         ...
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        Returns the fields that are written to a file, by name, without optional ones that are not set.
+        """
+    @property
+    def basis(self) -> str:
+        """
+        proved, linear (the linearised system only) or none (no bound is known).
         """
     @property
     def formula(self) -> str:
         """
-        In the symbols of docs/certificate.md.
+        Formula in the symbols of docs/certificate.md.
         """
     @property
     def holds(self) -> bool:
@@ -113,7 +119,7 @@ class Inequality:
     @property
     def left(self) -> float:
         """
-        What there is.
+        Left side: the available value.
         """
     @property
     def margin(self) -> float:
@@ -126,19 +132,14 @@ class Inequality:
         Subject in words.
         """
     @property
-    def basis(self) -> str:
-        """
-        proved, linear (the linearised system only) or none (no bound is known beyond).
-        """
-    @property
     def right(self) -> float:
         """
-        What is needed.
+        Right side: the required value.
         """
     @property
     def source(self) -> str:
         """
-        Where the proof stands.
+        Source of the proof.
         """
     @property
     def strict(self) -> bool:
@@ -147,7 +148,7 @@ class Inequality:
         """
 class Certificate:
     """
-    What is proved of a model, rendered by a scheme, on a device.
+    Proved properties of a model that a scheme renders on a device.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -165,12 +166,12 @@ class Certificate:
         """
     def to_dict(self) -> dict:
         """
-        The fields that are written to a file, by name; without optional ones that are not given.
+        Returns the fields that are written to a file, by name, without optional ones that are not set.
         """
     @property
     def bounds(self) -> ForceBounds:
         """
-        Of the force that is rendered, compensation included.
+        Bounds of the rendered force, compensation included.
         """
     @property
     def certified(self) -> bool:
@@ -178,27 +179,32 @@ class Certificate:
     @property
     def device(self) -> palpate._core.device.DeviceProfile:
         """
-        The device it holds for.
+        Device for which it holds.
         """
     @property
     def fingerprint(self) -> str:
         """
-        16 hexadecimal digits over every stored number and name before it.
+        16 hexadecimal digits computed from all other stored fields.
         """
     @property
     def inequalities(self) -> list[Inequality]:
         """
-        Every line with both its sides.
+        All inequalities with both sides.
         """
     @property
     def longest_period_s(self) -> float:
         """
-        Time between two samples up to which every inequality holds [s]; 0 where one does not.
+        Longest time between two samples for which every inequality holds [s]; 0 if one does not hold.
         """
     @property
     def model(self) -> str:
         """
-        Fingerprint of the model; empty where only bounds were certified.
+        Fingerprint of the model; empty if only bounds were certified.
+        """
+    @property
+    def reason(self) -> str:
+        """
+        Reason for the verdict, one sentence.
         """
     @property
     def refused(self) -> bool:
@@ -206,45 +212,32 @@ class Certificate:
     @property
     def scheme(self) -> palpate._core.rendering.Scheme:
         """
-        How the model is rendered.
+        Structure that renders the model, with its numbers.
         """
     @property
     def verdict(self) -> str:
         """
         certified, stable-locally or refused.
         """
-    @property
-    def reason(self) -> str:
-        """
-        One sentence.
-        """
-def passive_shift(model: palpate._core.model.ForceModel, force_limit: typing.SupportsFloat | typing.SupportsIndex) -> float:
-    """
-    Shift of a force that repeats with which the limited force does not push on average; 0 for other
-    models. Add it to the bias of the network.
-    """
 def certify(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> Certificate:
     """
-    What is proved of a model rendered by a scheme on a device. A refusal is an answer, with its reason;
-    ValueError where scheme or device is impossible.
+    Certifies a model that a scheme renders on a device. A refusal is a result with a reason; an
+    impossible scheme or device raises ValueError.
     """
 def certify_bounds(bounds: ForceBounds, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> Certificate:
     """
-    The same for any force within bounds.
+    Certifies any force within bounds.
     """
 def device_difference(certified: palpate._core.device.DeviceProfile, device: palpate._core.device.DeviceProfile) -> str:
     """
-    The first field in which a device is not the certified one, as a sentence; empty where it is.
+    Returns a sentence about the first field in which a device differs from the certified one; empty
+    without a difference.
     """
 def explicit_scheme(bounds: ForceBounds, device: palpate._core.device.DeviceProfile, **kwargs) -> palpate._core.rendering.Scheme:
     """
-    Explicit structure with the stiffest coupling, then the least object damping, for which it is stable; the
-    last one tried if none is. mass, damping, coupling_stiffness, coupling_damping and play_radius by
-    keyword, None: chosen.
-    """
-def slope_behind_coupling(slope: typing.SupportsFloat | typing.SupportsIndex, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex) -> float:
-    """
-    K_c k / (K_c + k): the slope that is felt through a coupling where the object's is k > -K_c.
+    Returns the explicit structure with the stiffest coupling, then the least object damping, for which
+    it is stable; otherwise the last one tried. Keywords: mass, object_damping, coupling_stiffness,
+    coupling_damping and play_radius; None: chosen by the search.
     """
 def force_bounds(model: palpate._core.model.ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> ForceBounds:
     """
@@ -253,24 +246,36 @@ def force_bounds(model: palpate._core.model.ForceModel, play_radius: typing.Supp
     """
 def narrowest_play(sliding: ForceBounds, device: palpate._core.device.DeviceProfile, least: typing.SupportsFloat | typing.SupportsIndex, most: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Narrowest play radius between `least` and `most` for which hysteresis is certified; infinite if none
-    is. `sliding` bounds the model with a play so wide that sticking adds no slope.
+    Returns the narrowest play radius from `least` to `most` for which hysteresis is certified;
+    infinite without one. `sliding` are bounds of the model with a play so wide that sticking adds
+    no slope.
+    """
+def passive_shift(model: palpate._core.model.ForceModel, force_limit: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Returns the shift of a periodic force for which the mean of the limited force is not active; 0
+    for other models. Add it to the bias of the network.
     """
 def renderable_slopes(device: palpate._core.device.DeviceProfile, stick: typing.SupportsFloat | typing.SupportsIndex = 0.0, *, rising: typing.SupportsFloat | typing.SupportsIndex = ..., falling: typing.SupportsFloat | typing.SupportsIndex = ...) -> tuple[float, float]:
     """
-    (lowest, highest) slope that direct rendering is certified for; infinite where nothing limits it.
+    Returns the (lowest, highest) slope for which direct rendering is certified; infinite without a
+    limit.
     
-    First as steep a slope on both sides as is certified, but none steeper than `rising` and `falling`;
-    then as steep a fall, and after it a rise, as is still certified. With hysteresis these are slopes
-    while sliding, and a stick adds h / r = `stick`.
+    First finds the largest k for which slopes of -k and k are certified together, limited to `falling`
+    and `rising`. Then finds the largest falling slope, and after that the largest rising one. With
+    hysteresis these are slopes while sliding; sticking adds h / r = `stick`.
+    """
+def slope_behind_coupling(slope: typing.SupportsFloat | typing.SupportsIndex, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Returns K_c k / (K_c + k), the slope of an object of slope k > -K_c behind a coupling.
     """
 def steepest_stick(device: palpate._core.device.DeviceProfile) -> float:
     """
-    Slope h / r that leaves half of what the device holds to sliding.
+    Returns the slope h / r that leaves half of the device's largest slope for sliding.
     """
 def stiffest_coupling(*, coupling_damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: palpate._core.device.DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 0.95) -> float:
     """
-    Largest coupling stiffness K_c for which a share of the device's damping is enough; 0 if there is none.
-    `damping` is B_c; `falling` the steepest fall of the object's force.
+    Returns the largest coupling stiffness K_c for which a share of the device's damping is sufficient; 0
+    if no stiffness is certified. `coupling_damping` is B_c; `falling` is the steepest falling slope of
+    the object's force.
     """
 usual_coupling_share: float = 0.95

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Why a step ended as it did.
+Results of steps.
 """
 from __future__ import annotations
 import typing
 __all__: list[str] = ['Status', 'status_meanings']
 class Status:
     """
-    Why a step ended as it did; the same words in C++ and in records.
+    Result of a step; the same words in C++ and in records.
     
     Members:
     
@@ -15,32 +15,33 @@ class Status:
     
       MaxIterations : the solver used all its evaluations; the position is its best one
     
-      NotUnique : the load line meets the environment where it falls faster than the line rises
+      NotUnique : the force falls more steeply than the load line rises; another solution may exist
     
       NonFinite : an input or the environment was not a finite number; the force sent is zero
     
       Timeout : the device did not answer in time
     
-      Lost : a sample of the device was lost or came twice
+      Lost : a sample of the device was lost or repeated
     
-      Fault : the device reported a fault or is gone; the force sent is zero
+      Fault : the device reported a fault or was disconnected; the force sent is zero
     
       Limited : the force was clipped to the limit of the host or of the device
     
       Jump : the position moved farther in one sample than the device can; the force sent is zero
     
-      Frozen : the position stood still at once out of full motion; the force sent is zero
+      Frozen : the position stopped within one sample during fast motion; the force sent is zero
     
-      Ramp : the force is still on its way up from zero after the start
+      Ramp : the force is scaled up from zero after the start
     
-      EnergyLimited : the rendering had given all the energy it may; a force that gives more was scaled down
+      EnergyLimited : the rendering had given all energy that it may give; the force was scaled down
     
-      LimitCycleScaled : the handle buzzed; all forces are scaled down from then on
+      LimitCycleScaled : a limit cycle was detected; all forces are scaled down until the end of the run
     """
     EnergyLimited: typing.ClassVar[Status]
     Fault: typing.ClassVar[Status]
     Frozen: typing.ClassVar[Status]
     Jump: typing.ClassVar[Status]
+    LimitCycleScaled: typing.ClassVar[Status]
     Limited: typing.ClassVar[Status]
     Lost: typing.ClassVar[Status]
     MaxIterations: typing.ClassVar[Status]
@@ -48,7 +49,6 @@ class Status:
     NotUnique: typing.ClassVar[Status]
     Ok: typing.ClassVar[Status]
     Ramp: typing.ClassVar[Status]
-    LimitCycleScaled: typing.ClassVar[Status]
     Timeout: typing.ClassVar[Status]
     __members__: typing.ClassVar[dict[str, Status]]
     @typing.overload
@@ -85,4 +85,4 @@ class Status:
     @property
     def value(self) -> int:
         ...
-status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the load line meets the environment where it falls faster than the line rises', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or came twice', 'Fault': 'the device reported a fault or is gone; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stood still at once out of full motion; the force sent is zero', 'Ramp': 'the force is still on its way up from zero after the start', 'EnergyLimited': 'the rendering had given all the energy it may; a force that gives more was scaled down', 'LimitCycleScaled': 'the handle buzzed; all forces are scaled down from then on'}
+status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the force falls more steeply than the load line rises; another solution may exist', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or repeated', 'Fault': 'the device reported a fault or was disconnected; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stopped within one sample during fast motion; the force sent is zero', 'Ramp': 'the force is scaled up from zero after the start', 'EnergyLimited': 'the rendering had given all energy that it may give; the force was scaled down', 'LimitCycleScaled': 'a limit cycle was detected; all forces are scaled down until the end of the run'}

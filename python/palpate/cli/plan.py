@@ -189,7 +189,7 @@ _LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", 
 
 def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
     error = plan.force_error
-    felt, steepest = plan.slopes_behind_coupling
+    slope, steepest = plan.slopes_behind_coupling
     return {
         "structure": plan.structure,
         "verdict": str(plan.verdict),
@@ -203,7 +203,7 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
         "inequalities": [{name: getattr(line, name) for name in _LINE} for line in certificate.inequalities],
         "reason": certificate.reason,
         "steepest_slope": steepest,
-        "slope_behind_coupling": felt,
+        "slope_behind_coupling": slope,
         "seconds": seconds,
     }
 

@@ -33,21 +33,22 @@ _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping"
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.option(
     "--beside",
+    "other_file",
     metavar="OTHER.json",
     type=PATH,
     help="Another model: print how far it is from the first, in shares of the just noticeable difference.",
 )
 @plot_option("every network that was considered; with --beside both models and their difference")
 @json_option
-def show(model_file: Path, beside: Path | None, plot: Path | None, as_json: bool) -> None:
+def show(model_file: Path, other_file: Path | None, plot: Path | None, as_json: bool) -> None:
     """Print a model: its verdict, terms, domain and units, how it was identified, and its plan.
 
     Exit code 1: the verdict of the model is "no".
     """
-    require_writable(plot, inputs=(model_file, beside))
+    require_writable(plot, inputs=(model_file, other_file))
     model = load_model(model_file)
-    if beside is not None:
-        _compare(model, model_file, load_model(beside), beside, plot=plot, as_json=as_json)
+    if other_file is not None:
+        _compare(model, model_file, load_model(other_file), other_file, plot=plot, as_json=as_json)
         return
     with finishing():
         if plot is not None:

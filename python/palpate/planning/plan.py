@@ -187,8 +187,8 @@ class Plan:
         steepest = max(0.0, self.certificate.bounds.slope_max)
         if not self.scheme.has_coupling:
             return steepest, steepest
-        rendered_slope = slope_behind_coupling(steepest, self.scheme.coupling_stiffness)
-        return rendered_slope, rendered_slope if self.scheme.compensated else steepest
+        slope = slope_behind_coupling(steepest, self.scheme.coupling_stiffness)
+        return slope, slope if self.scheme.compensated else steepest
 
     def summary(self) -> dict[str, str]:
         """Returns the main properties of a certified plan for display, by name."""
@@ -196,9 +196,9 @@ class Plan:
         error, certificate = self.force_error, self.certificate
         rows = {"structure": self.description}
         unit = self.model.units["force"] or "in the model's unit"
-        rendered_slope, steepest = self.slopes_behind_coupling
-        if rendered_slope < steepest:
-            rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {rendered_slope:.4g}"
+        slope, steepest = self.slopes_behind_coupling
+        if slope < steepest:
+            rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {slope:.4g}"
         rows["force error"] = (
             f"up to {error.largest:.4g} {unit}, "
             f"{100.0 * error.share:.3g} % of the range; RMS {100.0 * error.rms_share:.3g} % of the spread"
@@ -248,7 +248,7 @@ class Plan:
         if self.certificate is None:
             return (usable("the plan has no certificate: make a plan for a device with palpate plan"),)
         if self.certificate.refused:
-            cure = f"; the object {self.needs}" if self.needs else ""
+            cure = f". The object {self.needs}" if self.needs else ""
             reason = "" if self.needs else f": {self.certificate.reason}"
             return (no(f"no structure can render the model on this device{cure}{reason}"),)
         if not self.certificate.certified:
@@ -263,23 +263,23 @@ class Plan:
 
     def _force_findings(self) -> tuple[Finding, ...]:
         error = self.force_error
-        if error.share <= FORCE_FLOOR:
+        refused = self.certificate is not None and self.certificate.refused
+        if refused or error.share <= FORCE_FLOOR:
             return ()
         unit = self.model.units["force"] or "in the model's unit"
         difference = (
-            f"the felt force differs from the identified force by up to {error.largest:.3g} {unit}, "
-            f"{_percent(error.share)} of its range"
+            f"the force error is up to {error.largest:.3g} {unit}, {_percent(error.share)} of the force range"
         )
         if error.share <= ACCEPTED_FORCE_ERROR:
             return (usable(difference),)
         if error.share <= self.accept_force_error:
-            return (usable(f"{difference}; at most {_percent(self.accept_force_error)} are accepted"),)
-        cause = f"; the object {self.needs}" if self.needs else ""
+            return (usable(f"{difference}; at most {_percent(self.accept_force_error)} is accepted"),)
+        cause = f". The object {self.needs}" if self.needs else ""
         share = math.ceil(100.0 * error.share) / 100.0
         return (
             no(
-                f"{difference}; at most {_percent(self.accept_force_error)} are accepted{cause}; "
-                f"to accept this error, give --accept-force-error {share:g} (in Python accept_force_error)"
+                f"{difference}: at most {_percent(self.accept_force_error)} is accepted{cause}. To accept "
+                f"this error, give --accept-force-error {share:g} (in Python accept_force_error)"
             ),
         )
 

@@ -85,6 +85,9 @@ LEAST_GAP_SHARE = 0.02
 LEAST_GAP_RATIO = 8.0
 """Least width of a gap over the 90th percentile of the distances between adjacent positions."""
 
+MOST_NAMED_GAPS = 2
+"""Largest number of gaps whose ends a finding gives."""
+
 LARGEST_END_GAP = 0.05
 """Largest share of the travel that one stroke may omit at an end."""
 
@@ -356,7 +359,8 @@ def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
         return []
     side = sides(recording, travel)
     strokes = [(1, "press stroke"), (-1, "release stroke")] if recording.direction is not None else []
-    found, reported = [], set()
+    found: list[Finding] = []
+    reported: set[tuple[float, float]] = set()
     for of, name in [(0, "recording"), *strokes]:
         rows = travel.inside if of == 0 else travel.inside & (side == of)
         at = np.unique(recording.position[rows])
@@ -364,22 +368,28 @@ def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
             continue
         distances = np.diff(at)
         bound = max(LEAST_GAP_SHARE * travel.length, LEAST_GAP_RATIO * float(np.percentile(distances, 90.0)))
-        for k in np.flatnonzero(distances > bound).tolist():
-            if (at[k], at[k + 1]) not in reported:
-                reported.add((at[k], at[k + 1]))
-                found.append(_gap(recording, travel, name, float(at[k]), float(at[k + 1])))
+        gaps = [(float(at[k]), float(at[k + 1])) for k in np.flatnonzero(distances > bound)]
+        gaps = [gap for gap in gaps if gap not in reported]
+        reported.update(gaps)
         if of and at[0] - travel.lower > LARGEST_END_GAP * travel.length:
-            found.append(_gap(recording, travel, name, travel.lower, float(at[0])))
+            gaps.append((travel.lower, float(at[0])))
         if of and travel.upper - at[-1] > LARGEST_END_GAP * travel.length:
-            found.append(_gap(recording, travel, name, float(at[-1]), travel.upper))
+            gaps.append((float(at[-1]), travel.upper))
+        if gaps:
+            found.append(_gaps(recording, travel, name, gaps))
     return found
 
 
-def _gap(recording: Recording, travel: Travel, name: str, start: float, stop: float) -> Finding:
-    unit, share = recording.file_unit("position"), (stop - start) / travel.length
+def _gaps(recording: Recording, travel: Travel, name: str, gaps: list[tuple[float, float]]) -> Finding:
+    """Returns one finding on all intervals of position without rows, the longest ones named."""
+    unit = recording.file_unit("position")
+    share = sum(stop - start for start, stop in gaps) / travel.length
+    longest = sorted(gaps, key=lambda gap: gap[0] - gap[1])[:MOST_NAMED_GAPS]
+    named = " and ".join(unit.interval(*gap) for gap in sorted(longest))
+    more = f" and in {len(gaps) - len(longest)} shorter intervals" if len(gaps) > len(longest) else ""
     return usable(
-        f"the {name} has no rows from {unit.interval(start, stop)}, {share:.0%} of the travel: the "
-        "model is interpolated there; record this interval too"
+        f"the {name} has no rows from {named}{more}, {share:.0%} of the travel: the model is interpolated "
+        "there; record these positions too"
     )
 
 

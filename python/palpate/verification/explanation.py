@@ -143,8 +143,8 @@ def _of_position(
     yield Explanation(
         left(position + best, side),
         f"the model fits if {recording.file_unit('position').text(abs(best))} is "
-        f"{'added to' if best > 0.0 else 'subtracted from'} the recorded position: its zero may have moved. "
-        "Correct it in the file",
+        f"{'added to' if best > 0.0 else 'subtracted from'} the recorded position: its zero may have "
+        "moved. Correct it in the file",
         order=5,
     )
 

@@ -137,7 +137,7 @@ def test_requested_prediction_is_used_or_refused() -> None:
     assert weak.verdict.level == "no"
     assert weak.scheme.predict == 1
     assert "b >= T B(M, s_, m) needs 0.04" in weak.refused[0]
-    assert weak.needs.startswith("needs b >= 0.04")
+    assert weak.needs.startswith("needs device damping b >= 0.04")
     for wrong in ("on", -1, 17, 2.0, True):
         with pytest.raises(InputError, match="predict is"):
             plan(model, KNOB, predict=wrong)  # type: ignore[arg-type]
@@ -370,7 +370,7 @@ def test_unsuitable_device_is_refused_and_no_file_is_written(
     assert main(["plan", "m.json", "--device", "ice.toml", "-o", "planned.json"]) == 1
     refusal = " ".join(capsys.readouterr().out.split())
     assert refusal.startswith(
-        "verdict: no no structure can render the model on this device: the object needs "
+        "verdict: no no structure can render the model on this device; the object needs b >= "
     )
     assert "short by" in refusal
     assert not Path("planned.json").exists()
@@ -383,7 +383,7 @@ def test_unsuitable_device_is_refused_and_no_file_is_written(
         (["--device", "touch"], "position_unit of the device touch is m: must be rad"),
         (["--device", "m.json"], "m.json is not TOML"),
         ([], "Missing option '--device'"),
-        (["--device", "knob.toml", "-o", "knob.toml"], "is an input as well"),
+        (["--device", "knob.toml", "-o", "knob.toml"], "is also an input"),
         (["--device", "knob.toml", "--plot", "locus.txt"], "locus.txt is not a figure file"),
         (["--device", "knob.toml", "--coupling-stiffness", "-1"], "coupling_stiffness is -1"),
     ],

@@ -151,7 +151,7 @@ def test_friction_and_encoder_are_named_where_they_are_the_limit() -> None:
     coarse = DeviceProfile(id="coarse", coulomb_friction=1e-4, encoder_step=1e-3)
     chosen = plan(model_by_hand(), coarse)
     assert chosen.verdict.level == "no"
-    assert "needs f_c >= 0.00" in chosen.needs
+    assert "needs device friction f_c >= 0.00" in chosen.needs
     assert " b >= " not in chosen.needs
     step = re.search(r"an encoder step of (\S+) rad", chosen.needs)
     assert step
