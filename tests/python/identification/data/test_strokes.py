@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate import InputError, Model, Recording, identify, read_recording, verify
+from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate.cli.main import main
 from palpate.identification.data.strokes import strokes_of
 from palpate.recording.comparison import scale_findings
