@@ -212,7 +212,7 @@ def test_an_error_of_a_few_percent_is_usable_and_below_the_noticeable_good() -> 
 def test_plan_with_large_force_error_is_stored_only_if_accepted() -> None:
     chosen = plan(keyswitch_by_hand(), "touch")
     assert chosen.verdict.level == "no"
-    with pytest.raises(InputError, match=r"a plan with verdict no is not stored: no: the felt force"):
+    with pytest.raises(InputError, match=r"a plan with verdict no is not stored: no: the force error"):
         chosen.stored()
     accepted = re.search(r"--accept-force-error (\S+)", str(chosen.verdict))
     assert accepted
@@ -231,9 +231,7 @@ def test_a_plan_that_is_stable_only_is_usable() -> None:
 def test_plan_that_is_stable_only_reports_the_needed_friction() -> None:
     chosen = plan(model_by_hand(), DeviceProfile(id="smooth bearing"))
     assert chosen.structure == "explicit"
-    friction = re.search(
-        r"for a certificate the object needs f_c >= (\S+) N\*m \(has 0\)", str(chosen.verdict)
-    )
+    friction = re.search(r"needs device friction f_c >= (\S+) N\*m \(has 0\)", str(chosen.verdict))
     assert friction
     again = plan(model_by_hand(), DeviceProfile(id="bearing", coulomb_friction=float(friction[1])))
     assert (again.structure, str(again.verdict)) == ("direct", "good")
