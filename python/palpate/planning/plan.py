@@ -25,7 +25,7 @@ from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
 
 _CERTIFICATE = {
     "certified": "certified",
-    "stable-locally": "stable (local), passivity not certified",
+    "stable-locally": "stable (local) only",
     "refused": "refused",
 }
 """Verdict of a certificate to its text."""
@@ -201,7 +201,7 @@ class Plan:
             rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {slope:.4g}"
         rows["force error"] = (
             f"up to {error.largest:.4g} {unit}, "
-            f"{100.0 * error.share:.3g} % of the range; RMS {100.0 * error.rms_share:.3g} % of the spread"
+            f"{100.0 * error.share:.3g} % of range; RMS {100.0 * error.rms_share:.3g} % of spread"
             if error.largest
             else "none"
         )

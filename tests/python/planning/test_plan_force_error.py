@@ -231,9 +231,7 @@ def test_a_plan_that_is_stable_only_is_usable() -> None:
 def test_plan_that_is_stable_only_reports_the_needed_friction() -> None:
     chosen = plan(model_by_hand(), DeviceProfile(id="smooth bearing"))
     assert chosen.structure == "explicit"
-    friction = re.search(
-        r"for a certificate the object needs f_c >= (\S+) N\*m \(has 0\)", str(chosen.verdict)
-    )
+    friction = re.search(r"needs device friction f_c >= (\S+) N\*m \(has 0\)", str(chosen.verdict))
     assert friction
     again = plan(model_by_hand(), DeviceProfile(id="bearing", coulomb_friction=float(friction[1])))
     assert (again.structure, str(again.verdict)) == ("direct", "good")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate import InputError, Model, Recording, identify, read_recording, verify
+from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate.cli.main import main
 from palpate.identification.data.strokes import strokes_of
 from palpate.recording.comparison import scale_findings
@@ -63,14 +63,14 @@ def test_one_file_for_each_stroke_is_not_taken_for_two_objects(stated: bool) -> 
         assert str(identify(recordings).verdict) == "good"
     for other in (recorded(RELEASE, 3.0), recorded(RELEASE, 1 / 3), recorded(PRESS, 1.5)):
         assert "two objects" in str(identify([press, other]).verdict)
-        assert "probably of two objects" in str(identify([both, other]).verdict)
+        assert "probably belong to two objects" in str(identify([both, other]).verdict)
 
 
 def test_two_files_parted_by_their_force_are_not_taken_for_two_objects() -> None:
     recordings = [bare(PRESS, loop(h=1.0)), bare(RELEASE[::-1], loop(h=1.0))]
     assert "recording 1 is taken as press and recording 2 as release" in str(identify(recordings).verdict)
-    assert "probably of two objects" not in str(identify(recordings).verdict)
-    assert "probably of two objects" in str(identify(recordings, inputs="position").verdict)
+    assert "probably belong to two objects" not in str(identify(recordings).verdict)
+    assert "probably belong to two objects" in str(identify(recordings, inputs="position").verdict)
 
 
 def test_a_release_above_the_press_is_taken_for_another_object() -> None:
@@ -186,7 +186,8 @@ def test_the_command_identifies_and_verifies_two_columns(
     assert result["verdict"] == "good"
     # The average of the strokes has 0.16. One held-out row is at the reversal, where the force jumps.
     assert result["nrmse"] < 0.04
-    assert "direction is taken from the order of rows: 1 turn" in captured.err
+    note = "The direction is taken from the order of rows: 1 turn."
+    assert note in load_model(model).notes["identification"]
     assert main(["verify", model, files[1], "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["nrmse"] < 0.03
 
