@@ -207,6 +207,8 @@ def identify(
     if by_parts:
         chosen_columns = ", ".join(f"{role} is {column}" for role, column in model.data.columns.items())
         talk(f"read {model.data.rows} rows; {chosen_columns}")
+        for note in model.notes["identification"]:
+            talk(f"  {note}")
     seconds = time.perf_counter() - start
     verified = [(recording, verify(model, recording)) for recording in judged_on]
     nrmse = model.fit.nrmse if hold_out_every is None else _pooled_nrmse(verified)

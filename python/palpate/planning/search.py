@@ -265,15 +265,15 @@ def _properties(
         _Property(
             lambda on, factor: _changed(on, viscous_damping=_rounded(math.ceil, factor * b)),
             lambda on: (
-                f"device damping b >= {on.viscous_damping:.3g} {force}*s/{position} (has "
-                f"{device.viscous_damping:.3g})"
+                f"device damping b >= {on.viscous_damping:.3g} {force}*s/{position} "
+                f"(has {device.viscous_damping:.3g})"
             ),
         ),
         _Property(
             lambda on, factor: _changed(on, coulomb_friction=_rounded(math.ceil, factor * f_c)),
             lambda on: (
-                f"device friction f_c >= {on.coulomb_friction:.3g} {force} (has "
-                f"{device.coulomb_friction:.3g})"
+                f"device friction f_c >= {on.coulomb_friction:.3g} {force} "
+                f"(has {device.coulomb_friction:.3g})"
             ),
         ),
         _Property(faster, lambda on: f"a rate of {1.0 / on.period_s:.3g} Hz{in_proportion}"),

@@ -408,8 +408,8 @@ TEST(ExplicitScheme, IsStableWithTheStiffestCouplingAndThenTheLeastDamping) {
         EXPECT_EQ(again.inertia.mass, chosen.inertia.mass);
         EXPECT_TRUE(holds(bounds, again, again.coupling, device));
         EXPECT_LE(again.inertia.damping, chosen.inertia.damping * (1.0 + 1e-12));
-        given.damping = 0.9 * again.inertia.damping;
-        EXPECT_EQ(explicit_scheme(bounds, device, given).inertia.damping, *given.damping);
+        given.object_damping = 0.9 * again.inertia.damping;
+        EXPECT_EQ(explicit_scheme(bounds, device, given).inertia.damping, *given.object_damping);
     }
     EXPECT_GT(stable, 5);
 }

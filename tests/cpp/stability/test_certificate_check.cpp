@@ -173,7 +173,7 @@ TEST(CertificateCheck, NamesTheFirstFieldInWhichADeviceDiffers) {
     const auto names = [](const std::string& sentence, const char* field) {
         return sentence.find(field) != std::string::npos;
     };
-    EXPECT_TRUE(names(difference([](auto& d) { d.id = "other"; }), "this is other"));
+    EXPECT_TRUE(names(difference([](auto& d) { d.id = "other"; }), "not for other"));
     EXPECT_TRUE(names(difference([](auto& d) { d.period_s *= 1.001; }), "period_s"));
     EXPECT_TRUE(names(difference([](auto& d) { d.viscous_damping *= 1.001; }), "viscous_damping"));
     EXPECT_TRUE(names(difference([](auto& d) { d.delay_s = d.period_s; }), "delay_s"));
