@@ -138,5 +138,5 @@ def test_correlated_residuals_lead_to_finer_wavelets() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_noise_has_no_neighbour_correlation(seed: int) -> None:
     problem = kinked(0.03, seed)
-    assert problem.likeness(grown(problem).solution) < 3.0
-    assert problem.likeness(problem.solve(Basis.empty(1))) > 10.0
+    assert problem.neighbour_correlation(grown(problem).solution) < 3.0
+    assert problem.neighbour_correlation(problem.solve(Basis.empty(1))) > 10.0
