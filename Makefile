@@ -40,7 +40,7 @@ core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree contain absolute paths: they are created again after the folder was moved.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python bench figures lint lint-python lint-cpp lint-stubs format stubs output \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python bench figures lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved
 
 help:
@@ -109,7 +109,7 @@ figures: setup
 
 # ------------------------------------------------------------------------------------------------------------ lint
 
-lint: lint-python lint-cpp lint-stubs
+lint: lint-python lint-cpp lint-stubs lint-language
 
 lint-python: setup
 	$(python) -m ruff check .
@@ -122,6 +122,9 @@ lint-cpp: setup
 
 lint-stubs: setup
 	$(python) tools/stubs.py --check
+
+lint-language: setup
+	$(python) tools/plain_english.py
 
 format: setup
 	$(python) -m ruff check --fix .

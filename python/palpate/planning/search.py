@@ -188,7 +188,7 @@ class _Property:
 
 
 def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
-    """Returns the device property that a model needs, for instance "needs device damping b >= 6.07 N*s/m (has 0.005)".
+    """Returns the device property that a model needs: "needs device damping b >= 6.07 N*s/m (has 0.005)".
 
     The text is empty if no property helps.
 
@@ -265,13 +265,15 @@ def _properties(
         _Property(
             lambda on, factor: _changed(on, viscous_damping=_rounded(math.ceil, factor * b)),
             lambda on: (
-                f"device damping b >= {on.viscous_damping:.3g} {force}*s/{position} (has {device.viscous_damping:.3g})"
+                f"device damping b >= {on.viscous_damping:.3g} {force}*s/{position} "
+                f"(has {device.viscous_damping:.3g})"
             ),
         ),
         _Property(
             lambda on, factor: _changed(on, coulomb_friction=_rounded(math.ceil, factor * f_c)),
             lambda on: (
-                f"device friction f_c >= {on.coulomb_friction:.3g} {force} (has {device.coulomb_friction:.3g})"
+                f"device friction f_c >= {on.coulomb_friction:.3g} {force} "
+                f"(has {device.coulomb_friction:.3g})"
             ),
         ),
         _Property(faster, lambda on: f"a rate of {1.0 / on.period_s:.3g} Hz{in_proportion}"),

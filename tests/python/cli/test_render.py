@@ -13,9 +13,11 @@ from typing import Any
 import pytest
 
 from control_program import ANY_RATE, MODEL, every_row, wait_for_rows
-from palpate import _core, load_model, read_recording
+from palpate import InputError, _core, load_model, read_recording
 from palpate._core.rendering import Scheme
 from palpate._core.simulation import motion_driven
+from palpate.cli.main import main
+from usb_emulation import emulated, frames, needs_emulation
 
 COMMAND = [sys.executable, "-m", "palpate", "render", str(MODEL)]
 
@@ -199,13 +201,48 @@ def test_render_accepts_the_simulated_device_by_name(tmp_path: Path) -> None:
     assert summary["recorded"] == len(every_row(out))
 
 
-@pytest.mark.parametrize("device", ["toaster", "usb:", "inverse3:w"])
-def test_an_unknown_device_is_refused_before_anything_is_written(device: str, tmp_path: Path) -> None:
+def test_options_of_the_device_reach_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    received: dict[str, Any] = {}
+
+    def refuse(*_: Any, **options: Any) -> None:
+        received.update(options)
+        raise InputError("refused")
+
+    monkeypatch.setattr("palpate.cli.render.render_live", refuse)
+    arguments = ["--device", "usb:EMU-1", "--wait-ms", "20", "--uncertified"]
+    assert main(["render", str(MODEL), *arguments]) == 2
+    assert (received["device"], received["wait_s"], received["uncertified"]) == ("usb:EMU-1", 0.02, True)
+
+
+@needs_emulation
+def test_a_usb_device_receives_the_force_and_zero_at_the_end(tmp_path: Path) -> None:
+    trace = tmp_path / "trace.csv"
+    command = [*COMMAND, "--device", "usb", "--uncertified", "--wait-ms", "10000", "--duration-s", "0.6"]
+    completed = emulated(*command, "--json", *ANY_RATE, device=["--lock-step", "--trace", str(trace)])
+    assert completed.returncode in (0, 1), completed.stderr  # the verdict depends on the load of the machine
+    assert json.loads(completed.stdout)["ticks"] > 500
+    sent_frames = frames(trace)
+    assert max(abs(frame.torque) for frame in sent_frames) > 0.01
+    assert sent_frames[-1].torque == 0.0
+    assert not sent_frames[-1].enabled
+
+
+@pytest.mark.parametrize(
+    ("device", "sentence"),
+    [
+        ("toaster", "device is 'toaster', must be simulated, usb[:SERIAL] or inverse3"),
+        ("usb:", "device is 'usb:', must be simulated, usb[:SERIAL] or inverse3"),
+        ("inverse3:w", "Inverse3"),
+    ],
+)
+def test_an_unknown_device_is_refused_before_anything_is_written(
+    device: str, sentence: str, tmp_path: Path
+) -> None:
     out = tmp_path / "rendered.csv"
     command = [*COMMAND, "--device", device, "--record", str(out)]
     completed = subprocess.run(command, capture_output=True, text=True, check=False)
     assert completed.returncode == 2
-    sentence = completed.stderr.splitlines()[-1]
-    assert sentence.startswith("error: ")
-    assert device in sentence or "Inverse3" in sentence
+    last_line = completed.stderr.splitlines()[-1]
+    assert last_line.startswith("error: ")
+    assert sentence in last_line
     assert list(tmp_path.iterdir()) == []

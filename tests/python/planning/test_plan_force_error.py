@@ -66,7 +66,7 @@ def test_plan_with_large_force_error_is_refused_and_the_model_file_is_unchanged(
     before = Path("k.json").read_bytes()
     assert main(["plan", "k.json", "--device", "phantom-premium-1.0", "-o", "k.json", "--json"]) == 1
     printed = json.loads(capsys.readouterr().out)
-    assert printed["verdict"].startswith("no: the felt force differs from the identified force by up to 1.2")
+    assert printed["verdict"].startswith("no: the force error is up to 1.2")
     assert printed["force_error_share"] > 0.9
     assert printed["written"] is None
     assert Path("k.json").read_bytes() == before
@@ -81,7 +81,7 @@ def test_accepted_plan_does_not_change_the_identified_network(
     assert main(["plan", "k.json", *words, "-o", "k.json"]) == 0
     first = json.loads(capsys.readouterr().out)
     assert first["verdict"].startswith("usable: ")
-    assert first["verdict"].endswith(" % are accepted")
+    assert first["verdict"].endswith(" % is accepted")
     assert network("k.json") == identified
     again = load_model("k.json")
     assert verify(again, press).nrmse == verify(switch, press).nrmse
@@ -92,7 +92,7 @@ def test_accepted_plan_does_not_change_the_identified_network(
     assert main(["show", "k.json"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "26 wavelets" in shown
-    for words in ("direct, with a limited network", "phantom-premium-1.0", "are accepted"):
+    for words in ("direct, with a limited network", "phantom-premium-1.0", "is accepted"):
         assert words in shown
 
 
@@ -212,7 +212,7 @@ def test_an_error_of_a_few_percent_is_usable_and_below_the_noticeable_good() -> 
 def test_plan_with_large_force_error_is_stored_only_if_accepted() -> None:
     chosen = plan(keyswitch_by_hand(), "touch")
     assert chosen.verdict.level == "no"
-    with pytest.raises(InputError, match=r"a plan with verdict no is not stored: no: the felt force"):
+    with pytest.raises(InputError, match=r"a plan with verdict no is not stored: no: the force error"):
         chosen.stored()
     accepted = re.search(r"--accept-force-error (\S+)", str(chosen.verdict))
     assert accepted

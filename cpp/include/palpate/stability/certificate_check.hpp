@@ -110,7 +110,7 @@ namespace detail {
         validate(stored.scheme, model);
         bounds = rendered_bounds(model, stored.scheme, stored.device);
     } catch (const std::invalid_argument& error) {
-        require(std::string("certificate belongs to an invalid plan: ") + error.what());
+        require(std::string("certificate has an invalid plan: ") + error.what());
     }
     require(detail::narrower_bound(stored.bounds, bounds));
     Certificate now = certify_rendered(stored.bounds, stored.scheme, stored.device);
