@@ -15,9 +15,9 @@ namespace palpate {
 namespace {
 
 using test::patient;
+using test::send_order;
 using test::settled;
 using test::state;
-using test::send_order;
 
 TEST(UsbTwoDevices, AreDistinguishedBySerialNumber) {
     const std::string both = patient().open().reason;
