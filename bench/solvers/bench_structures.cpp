@@ -78,7 +78,8 @@ void step(benchmark::State& state, const WaveletNetwork& object, const S& initia
         squares += std::pow(rendered.force - object.at(x, {}).force, 2);
         evaluations += rendered.evaluations;
         largest_difference =
-            std::max(largest_difference, std::abs(rendered.environment_position - expected.environment_position) / 0.6);
+            std::max(largest_difference,
+                     std::abs(rendered.environment_position - expected.environment_position) / 0.6);
     }
     state.counters["force_error_rms"] = std::sqrt(squares / static_cast<double>(motion.size()));
     state.counters["evaluations"] = evaluations / static_cast<double>(motion.size());

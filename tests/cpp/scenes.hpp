@@ -95,7 +95,7 @@ inline double energy_at(const ForceModel& model, const Scheme& scheme, double x)
 /// Returns the device with the damping and friction that the certificate requires, times `factor`; nothing if the scene
 /// cannot be certified.
 inline std::optional<DeviceProfile> device_at_its_bound(const ForceModel& model, const Scheme& scheme,
-                                                DeviceProfile device, double factor) {
+                                                        DeviceProfile device, double factor) {
     constexpr double placeholder_damping = 12345.0;
     constexpr double any_friction = 54321.0;
     device.viscous_damping = placeholder_damping;

@@ -21,7 +21,7 @@ struct Identity {
     std::uint16_t watchdog_ms = 20;
     std::uint32_t capabilities = 3;  ///< Bit 0 force transducer, bit 1 measured velocity.
     std::uint64_t uid = 0x5041'4C50'0001ULL;
-    std::size_t info_size = 32;              ///< Another value makes it a device of another protocol.
+    std::size_t info_size = 32;            ///< Another value makes it a device of another protocol.
     bool reports_current_watchdog = true;  ///< Otherwise it reports the initial one.
 
     // Descriptors
@@ -47,9 +47,9 @@ struct Identity {
     std::uint16_t first_out_age_us = 0xFFFF;  ///< Echoed before the first OUT packet.
 
     // Choices of the firmware
-    bool reversed = false;           ///< The torque has the wrong sign.
-    bool applies_out_first = false;  ///< OUT packets act before the encoder of their frame is latched.
-    bool ends_in_transfer_first = false;     ///< A frame ends its IN transfer before its OUT transfer.
+    bool reversed = false;                ///< The torque has the wrong sign.
+    bool applies_out_first = false;       ///< OUT packets act before the encoder of their frame is latched.
+    bool ends_in_transfer_first = false;  ///< A frame ends its IN transfer before its OUT transfer.
     std::size_t held_packets =
         0;  ///< Number of packets that wait unread. With 0 the newest replaces an unread one.
     bool accepts_while_disabled = true;  ///< Otherwise OUT packets are accepted only while it is enabled.

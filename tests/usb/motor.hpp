@@ -98,7 +98,8 @@ class Motor {
     }
     /// Runs the watchdog.
     void look(std::uint32_t clock_us) {
-        if (has_command_ && clock_us - command_us_ >= 1000U * std::min<std::uint32_t>(watchdog_ms_, life_ms_)) {
+        if (has_command_ &&
+            clock_us - command_us_ >= 1000U * std::min<std::uint32_t>(watchdog_ms_, life_ms_)) {
             tripped_ = true;
             torque_uNm_ = 0;
         }

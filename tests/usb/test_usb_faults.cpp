@@ -15,9 +15,9 @@ namespace {
 using std::chrono::milliseconds;
 using test::open_files;
 using test::patient;
+using test::send_order;
 using test::settled;
 using test::state;
-using test::send_order;
 
 TEST(UsbDevice, CountsAndIgnoresPacketsOfAnotherProtocol) {
     UsbDevice device = patient();

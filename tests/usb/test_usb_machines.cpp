@@ -15,9 +15,9 @@ namespace palpate {
 namespace {
 
 using test::patient;
+using test::send_order;
 using test::settled;
 using test::state;
-using test::send_order;
 
 TEST(UsbTwoDevices, AreDistinguishedBySerialNumber) {
     const std::string both = patient().open().reason;
@@ -107,7 +107,7 @@ TEST(UsbOtherFirmware, IsFoundAgainByItsSerialNumber) {
     ASSERT_FALSE(serial.empty());
     first.close();
     EXPECT_EQ(patient(serial).open().reason, "");
-    EXPECT_NE(patient("another").open().reason.find("there is " + serial), std::string::npos);
+    EXPECT_NE(patient("another").open().reason.find("connected: " + serial), std::string::npos);
 }
 
 TEST(UsbOtherFirmware, StateOfAnEarlierProgramIsNotAFault) {

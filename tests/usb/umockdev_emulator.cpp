@@ -194,7 +194,8 @@ int main(int count, char** words) {
     }
     try {
         const bool help_only = count == 2 && std::string(words[1]) == "--help";
-        emulator::Settings settings = help_only ? emulator::Settings{} : emulator::read_settings(count, words);
+        emulator::Settings settings =
+            help_only ? emulator::Settings{} : emulator::read_settings(count, words);
         if (settings.command.empty()) {
             std::cerr << "Usage: umockdev_emulator [OPTIONS] -- COMMAND...\n\n" << emulator::options_text;
             return help_only ? 0 : 2;

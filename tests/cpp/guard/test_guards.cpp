@@ -551,20 +551,20 @@ TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
         Motions motion{random, scene};
         GuidedHandle handle{scene.device, scene.start};
         const Guards guards = certified_guards(scene.model, scene.scheme, scene.device);
-        with_structure(scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit,
-                       [&](auto structure) {
-                           Controller controller{handle, std::move(structure), guards};
-                           ASSERT_EQ(controller.start(), Status::Ok);
-                           std::size_t energy_limited = 0;
-                           for (int tick = 0; tick < 3000; ++tick) {
-                               handle.move_to(tick < 5 ? scene.start : motion.next(random, tick));
-                               energy_limited += controller.tick().status == Status::EnergyLimited ? 1 : 0;
-                           }
-                           const EnergyTank& tank = controller.guards().tank;
-                           EXPECT_EQ(energy_limited, 0U) << "scene " << k << ": " << scene << "; given "
-                                                  << tank.most_given() << " of " << tank.stored().most();
-                           most = std::max(most, tank.most_given() / tank.stored().most());
-                       });
+        with_structure(
+            scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit, [&](auto structure) {
+                Controller controller{handle, std::move(structure), guards};
+                ASSERT_EQ(controller.start(), Status::Ok);
+                std::size_t energy_limited = 0;
+                for (int tick = 0; tick < 3000; ++tick) {
+                    handle.move_to(tick < 5 ? scene.start : motion.next(random, tick));
+                    energy_limited += controller.tick().status == Status::EnergyLimited ? 1 : 0;
+                }
+                const EnergyTank& tank = controller.guards().tank;
+                EXPECT_EQ(energy_limited, 0U) << "scene " << k << ": " << scene << "; given "
+                                              << tank.most_given() << " of " << tank.stored().most();
+                most = std::max(most, tank.most_given() / tank.stored().most());
+            });
     }
     EXPECT_GT(most, 0.3);  // the bound of the stored energy is close to the energy given
     EXPECT_GE(scenes.size(), 2U);

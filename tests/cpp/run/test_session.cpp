@@ -182,8 +182,8 @@ ForceModel velocity_model() {
 /// Runs the real loop at 10 kHz with its real recorder. `before` runs in the loop's thread before it starts, `after` in
 /// that thread after its end.
 template <class ForbiddenAction, class Before, class After>
-Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenAction action, Before before, After after,
-                   int predict = 0) {
+Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenAction action, Before before,
+                   After after, int predict = 0) {
     Scheme scheme;
     scheme.structure = kind;
     scheme.predict = predict;

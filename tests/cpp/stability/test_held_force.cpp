@@ -176,7 +176,7 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
     const auto count = static_cast<int>(cycle.late.size());
     struct Event {
         double time;
-        int sample;    ///< taken here, or -1
+        int sample;   ///< taken here, or -1
         int command;  ///< command that starts here, or -1
     };
     std::vector<Event> events;
