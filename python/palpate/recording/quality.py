@@ -386,7 +386,7 @@ def _gaps(recording: Recording, travel: Travel, name: str, gaps: list[tuple[floa
     share = sum(stop - start for start, stop in gaps) / travel.length
     longest = sorted(gaps, key=lambda gap: gap[0] - gap[1])[:MOST_NAMED_GAPS]
     named = " and ".join(unit.interval(*gap) for gap in sorted(longest))
-    more = f" and in {len(gaps) - len(longest)} shorter intervals" if len(gaps) > len(longest) else ""
+    more = f" ({len(gaps) - len(longest)} shorter gaps are not listed)" if len(gaps) > len(longest) else ""
     return usable(
         f"the {name} has no rows from {named}{more}, {share:.0%} of the travel: the model is interpolated "
         "there; record these positions too"
