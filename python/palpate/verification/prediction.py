@@ -205,10 +205,12 @@ def _gaps(time: Float1D | None) -> NDArray[np.intp]:
 def require_same_units(model: Model, units: Mapping[str, str]) -> None:
     """Refuses a recording whose units differ from those of the model. Unstated units always fit."""
     for role in ("position", "force"):
-        ours, theirs = model.units[role], units[role]
-        if ours != theirs and _UNSTATED not in (ours, theirs):
-            hint = "; give --torque-constant-Nm-per-A for the current" if "A" in (ours, theirs) else ""
-            raise InputError(f"the {role} of the model is in {ours}, that of the recording in {theirs}{hint}")
+        model_unit, unit = model.units[role], units[role]
+        if model_unit != unit and _UNSTATED not in (model_unit, unit):
+            hint = "; give --torque-constant-Nm-per-A for the current" if "A" in (model_unit, unit) else ""
+            raise InputError(
+                f"the {role} of the model is in {model_unit}, that of the recording in {unit}{hint}"
+            )
 
 
 @dataclass(frozen=True)

@@ -291,13 +291,13 @@ def test_planned_rendering_is_stable_with_hands_on_its_device() -> None:
     weak = DeviceProfile(id="weak", viscous_damping=0.01, coulomb_friction=0.02)
     hand = Hand(stiffness=15.0, damping=0.0, lower=0.02, upper=0.1)
     chosen = plan(model, weak)
-    calm = simulate(chosen, weak, hand, 2.0)
+    undisturbed = simulate(chosen, weak, hand, 2.0)
     shaking = simulate(Plan(model, Scheme(structure="direct")), weak, hand, 2.0)
-    jerks = [float(np.abs(np.diff(each.position, 2))[-1000:].max()) for each in (calm, shaking)]
+    jerks = [float(np.abs(np.diff(each.position, 2))[-1000:].max()) for each in (undisturbed, shaking)]
     assert jerks[0] < 3.0 * weak.encoder_step
     assert jerks[1] > 100.0 * weak.encoder_step
     as_limited = replace(chosen, model=chosen.rendered, limited=None)
-    assert force_error(as_limited, calm).end < 0.01
+    assert force_error(as_limited, undisturbed).end < 0.01
 
 
 def test_the_verb_writes_the_plan_into_the_model(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -71,11 +71,11 @@ def test_the_temporary_name_differs_every_time_and_is_readable_by_its_owner_alon
 
 
 def test_a_symbolic_link_at_a_predictable_temporary_name_is_not_followed(tmp_path: Path) -> None:
-    victim = tmp_path / "victim"
-    victim.write_text("precious", encoding="utf-8")
-    (tmp_path / f".m.json.{os.getpid()}.tmp").symlink_to(victim)
+    target = tmp_path / "target"
+    target.write_text("precious", encoding="utf-8")
+    (tmp_path / f".m.json.{os.getpid()}.tmp").symlink_to(target)
     write(tmp_path / "m.json", "new")
-    assert victim.read_text(encoding="utf-8") == "precious"
+    assert target.read_text(encoding="utf-8") == "precious"
     assert not (tmp_path / "m.json").is_symlink()
 
 

@@ -149,7 +149,7 @@ class ClassSelection:
         return candidate
 
     def constrained(self, candidate: Candidate) -> Candidate:
-        """The candidate with its constraints, their price in the notes.
+        """The candidate with its constraints, and their cost in the notes.
 
         If they cost more than a little, the network is grown further on forces that keep them; the result is
         taken if the criterion prefers it once the constraints are imposed on the true forces again.

@@ -136,7 +136,7 @@ class Solution:
     rss: float
     """Residual sum of squares about the rows' mean forces"""
     objective: float
-    """rss plus the price of the weights' prior; refinement lowers it"""
+    """rss plus the penalty of the weights' prior; refinement lowers it"""
     designs: tuple[Float2D, ...]
     grams: tuple[Float2D, ...]
     """design' design of every block, plus the prior on the weights"""
@@ -232,9 +232,9 @@ class SeparableProblem:
         return rows.errors(self.readout @ solution.coefficients, solution.basis.alpha, solution.basis.beta)
 
     def with_prior(self, rss: float) -> SeparableProblem:
-        """The problem with a price on large weights: each is expected within the force range.
+        """The problem with a penalty on large weights: each is expected within the force range.
 
-        The price is as firm as one sample at this noise level, from the residual sum of squares.
+        The penalty is as firm as one sample at this noise level, from the residual sum of squares.
 
         Without it, a stroke without data at positions of the other one could give a wavelet there any weight.
         """
@@ -277,8 +277,8 @@ class SeparableProblem:
             for block, design, table in zip(self.blocks, designs, self._tables(coefficients), strict=True)
         )
         rss = float(sum(residual @ residual for residual in residuals))
-        price = self.prior * float((coefficients[:, 1 + self.dimension :] ** 2).sum())
-        return Solution(basis, coefficients, rss, rss + price, designs, grams, residuals)
+        penalty = self.prior * float((coefficients[:, 1 + self.dimension :] ** 2).sum())
+        return Solution(basis, coefficients, rss, rss + penalty, designs, grams, residuals)
 
     def _tables(self, coefficients: Float2D) -> list[Float2D]:
         """The coefficients of each block."""

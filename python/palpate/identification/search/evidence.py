@@ -2,11 +2,11 @@
 """Candidate models, the criteria that they are compared by, and the judge that accepts them.
 
 The criteria weigh the error against the number of fitted numbers. All are written as a deviance, n ln(RSS/n)
-plus a price for the p fitted parameters, so that their differences compare: BIC (Schwarz 1978), AICc (Hurvich
+plus a penalty for the p fitted parameters, so that their differences compare: BIC (Schwarz 1978), AICc (Hurvich
 & Tsai 1989), GCV (Craven & Wahba 1979, as n ln of the score), FPE (Akaike 1970, as n ln of the score). The
 smallest value wins.
 
-Two rules judge on held-out rows instead, and need no price. "fresh" takes the smallest network
+Two rules judge on held-out rows instead, and need no penalty. "fresh" takes the smallest network
 whose error there is within one standard error of the least (Breiman et al. 1984); "perceptual" the smallest
 whose error there is not felt: RMS of the error over 7 % of the local force, or 1 % of the largest, below 1.
 """
@@ -66,7 +66,7 @@ CRITERIA: dict[str, Callable[[float, int], float]] = {
     "fresh": lambda n, p: 0.0,
     "perceptual": lambda n, p: 0.0,
 }
-"""Name of the criterion to its price of p parameters on n samples."""
+"""Name of the criterion to its penalty of p parameters on n samples."""
 
 CRITERION_NAMES = {
     "bic": "BIC",
@@ -83,7 +83,7 @@ ON_HELD_OUT_ROWS = ("fresh", "perceptual")
 
 
 def deviance(criterion: str, rss: float, n: float, p: int) -> float:
-    """Value of a criterion: n ln(rss/n) + price(n, p); rss in force squared, over all n samples.
+    """Value of a criterion: n ln(rss/n) + penalty(n, p); rss in force squared, over all n samples.
 
     For "perceptual" rss is in just noticeable differences squared, so that 0 is the limit of perception.
     """

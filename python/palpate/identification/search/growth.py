@@ -53,7 +53,7 @@ CANDIDATE_STEPS = 4
 """Refinement steps of each of these candidates: enough to compare them."""
 
 GROWING_TOLERANCE = 0.4
-"""Fall of the deviance by one step below which refinement ends during growth [-]: far below the price of a
+"""Fall of the deviance by one step below which refinement ends during growth [-]: far below the penalty of a
 wavelet."""
 
 FINAL_TOLERANCE = 0.04
@@ -244,8 +244,8 @@ class Growth:
 
     def _price(self, problem: SeparableProblem, solution: Solution) -> float:
         """Price of one of the solution's wavelets by the criterion."""
-        price, n = CRITERIA[self._criterion], len(solution.basis)
-        return price(problem.independent, problem.n_parameters(n)) - price(
+        penalty, n = CRITERIA[self._criterion], len(solution.basis)
+        return penalty(problem.independent, problem.n_parameters(n)) - penalty(
             problem.independent, problem.n_parameters(n - 1)
         )
 

@@ -107,8 +107,8 @@ def test_every_selection_finds_a_wall(selection: str, refine: bool) -> None:
 def test_outliers_do_not_move_the_force_under_hubers_loss() -> None:
     x, truth, y = wall(3000, 2)
     random = np.random.default_rng(3)
-    wild = random.choice(3000, 150, replace=False)
-    y[wild] += random.uniform(-20.0, 20.0, 150)
+    outliers = random.choice(3000, 150, replace=False)
+    y[outliers] += random.uniform(-20.0, 20.0, 150)
     order = np.argsort(x)
 
     def error(loss: str) -> float:

@@ -92,8 +92,10 @@ def test_smooth_force_over_two_inputs_has_wide_wavelets(monkeypatch: pytest.Monk
     assert np.all(found.solution.basis.alpha <= np.maximum(widest, LEAST_DILATION) * (1.0 + 1e-9))
     monkeypatch.setattr(Growth, "_smooth", lambda *_: None)
     narrow = grown(over_two_inputs(smooth, 200))
-    ours, theirs = (np.linalg.norm(errors_between_rows(each, smooth)) for each in (found, narrow))
-    assert ours < 0.5 * theirs
+    error_of_found, error_of_narrow = (
+        np.linalg.norm(errors_between_rows(each, smooth)) for each in (found, narrow)
+    )
+    assert error_of_found < 0.5 * error_of_narrow
 
 
 def test_force_with_a_kink_is_grown_as_without_wide_wavelets(
