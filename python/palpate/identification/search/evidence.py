@@ -2,9 +2,9 @@
 """Candidate models, the criteria that they are compared by, and the judge that accepts them.
 
 The criteria weigh the error against the number of fitted numbers. All are written as a deviance, n ln(RSS/n)
-plus a penalty for the p fitted parameters, so that their differences compare: BIC (Schwarz 1978), AICc (Hurvich
-& Tsai 1989), GCV (Craven & Wahba 1979, as n ln of the score), FPE (Akaike 1970, as n ln of the score). The
-smallest value wins.
+plus a penalty for the p fitted parameters, so that their differences compare: BIC (Schwarz 1978), AICc
+(Hurvich & Tsai 1989), GCV (Craven & Wahba 1979, as n ln of the score), FPE (Akaike 1970, as n ln of the
+score). The smallest value wins.
 
 Two rules judge on held-out rows instead, and need no penalty. "fresh" takes the smallest network
 whose error there is within one standard error of the least (Breiman et al. 1984); "perceptual" the smallest
