@@ -35,7 +35,7 @@ struct Inequality {
     std::string source;
     bool strict = false;
 
-    /// Returns the left side minus the right side; the inequality holds if this margin is positive.
+    /// Returns the left side minus the right side. If it is negative, the inequality does not hold.
     [[nodiscard]] double margin() const noexcept { return left - right; }
 
     /// Returns the share of the left side that is not needed: (left - right) / |left|.
