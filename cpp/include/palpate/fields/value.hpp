@@ -10,11 +10,11 @@
 namespace palpate {
 
 struct NamedValue;
-/// Named values of a report (for example of `palpate ... --json`), in the order in which the report contains them.
+/// Named values of a report, in the order in which the report contains them.
 using NamedValues = std::vector<NamedValue>;
 
 /// One value of a report, which is converted to JSON or to a Python object. An empty value and a number that is not
-/// finite become null in JSON.
+/// finite become null.
 using Value = std::variant<std::monostate, bool, std::uint64_t, double, std::string, std::vector<double>,
                            std::vector<std::string>, NamedValues, std::vector<NamedValues>>;
 

@@ -20,7 +20,7 @@ namespace palpate {
 
 /// Required accuracy and largest size of the table of polynomials that replaces a wavelet network.
 struct CompileOptions {
-    double relative_error = 1e-12;  ///< largest force error / max|f| over the domain; includes rounding
+    double relative_error = 1e-12;     ///< largest force error / max|f| over the domain; includes rounding
     std::size_t largest_table = 8192;  ///< largest number of table cells of 80 bytes
     std::size_t fewest_wavelets = 2;   ///< with fewer wavelets the sum of eq. 4 is as fast as a table
 };

@@ -34,8 +34,8 @@ inline constexpr auto words_of<Continuation> = std::array<std::string_view, 2>{"
 /// force at the distance `reach` from the edge. The force is continuous at the start and at the end of the line; the
 /// slope is not.
 struct EdgeLine {
-    double edge = 0.0;                                       ///< position of the edge [m]
-    Curve at_edge;                                           ///< force at the edge, and slope of the straight line
+    double edge = 0.0;  ///< position of the edge [m]
+    Curve at_edge;      ///< force at the edge, and slope of the straight line
     double reach = std::numeric_limits<double>::infinity();  ///< distance from the edge to zero force [m]
 
     /// Returns force, slope and antiderivatives at a position x outside the domain, on the side of this edge.

@@ -13,7 +13,8 @@ namespace palpate {
 
 /// Smallest and largest energy that a virtual object can store.
 struct EnergyRange {
-    double least = 0.0;  ///< minimum over all positions, continuation included; -infinity for an active model [J]
+    double least =
+        0.0;  ///< minimum over all positions, continuation included; -infinity for an active model [J]
     double largest = 0.0;  ///< maximum over the domain, hysteresis included [J]
     double missed = 0.0;   ///< upper bound of the error of both, from positions between the samples [J]
 
@@ -72,11 +73,11 @@ struct LimitedEnergy {
 };
 
 /// Computes the stored energy of a limited force over a domain: the energy of the force f minus the energy that the
-/// force limit removes. f is sampled at the borders of cells of width w; L is the largest |f'|. If |f| is below the
-/// force limit at both ends of a cell, or above it with the same sign, f can cross the force limit between the samples
-/// only if f at one end differs from the force limit by at most L w / 2. Such a crossing changes the energy by at most
-/// L w^2 / 4. Between the ends of a cell and the position of zero force, the energy lies outside its sampled values by
-/// less than L w^2 / 4.
+/// force limit removes. f is sampled at the borders of cells of width w; L is the largest |f'|. Let |f| be below the
+/// force limit at both ends of a cell, or above it with the same sign. Then f can cross the force limit between the
+/// samples only if f at one end differs from it by at most L w / 2. Such a crossing changes the energy by at most L w^2
+/// / 4. Between the ends of a cell and the position of zero force, the energy lies outside its sampled values by less
+/// than L w^2 / 4.
 template <class At>
 [[nodiscard]] LimitedEnergy limited_energy(const At& at, double lower, double upper, std::size_t cells,
                                            double steepest, double limit) noexcept {

@@ -31,9 +31,9 @@ namespace palpate {
 /// Taylor's formula about the middle of each cell proves condition (C), and F is stored at the borders of the cells. As
 /// the cells cover all positions, F rises everywhere. `solve` finds the cell with F = q by the values at the borders,
 /// interpolates linearly between them and applies Newton's method inside the cell:
-/// - The error of the linear interpolation is at most w^2 max|F''| / 8 in F and w/32 in the position. A first guess that
-///   differs from the interpolated position by at most w/32, such as the tangent of the last solution, differs from the
-///   solution by at most w/16.
+/// - The error of the linear interpolation is at most w^2 max|F''| / 8 in F and w/32 in the position. A first guess
+///   that differs from the interpolated position by at most w/32, such as the tangent of the last solution, differs
+///   from the solution by at most w/16.
 /// - A Newton step reduces a position error e to at most c e^2 with c = max|F''| / (2 min F') <= 1/(8w). The errors are
 ///   w/16, w/2^11, w/2^25, w/2^53. Limiting the position to the cell does not increase the error, because the cell
 ///   contains the solution.
@@ -60,8 +60,8 @@ class CertifiedSolver {
         double position = 0.0;    ///< solution of the last call [m]
         double at_zero = 0.0;     ///< position that the last tangent predicts for q = 0 [m]
         double compliance = 0.0;  ///< 1 / F' at the last solution [m/N]
-        double low =
-            std::numeric_limits<double>::infinity();  ///< lower end of the smooth interval; low > high: no prediction [m]
+        double low = std::numeric_limits<
+            double>::infinity();  ///< lower end of the smooth interval; low > high: no prediction [m]
         double high = -std::numeric_limits<double>::infinity();
         double curvature = 0.0;  ///< c = max|F''| / (2 min F') of the cell of the last solution
         double play = 0.0;       ///< position of the play operator at the last solution [m]
@@ -544,9 +544,10 @@ class CertifiedSolver {
     double radius_;     ///< play radius r; 0 without hysteresis [m]
     double by_radius_;  ///< 1 / r; 0 without hysteresis [1/m]
     double travel_;
-    double period_;                  ///< period of the force; 0 if the force is not periodic [m]
-    double tolerance_;               ///< largest error of the solution's position [m]
-    double least_slope_ = infinity;  ///< smallest load-line slope p for which (C) is proved in every cell [N/m]
+    double period_;     ///< period of the force; 0 if the force is not periodic [m]
+    double tolerance_;  ///< largest error of the solution's position [m]
+    double least_slope_ =
+        infinity;  ///< smallest load-line slope p for which (C) is proved in every cell [N/m]
     std::vector<Border> borders_;
 };
 

@@ -41,7 +41,7 @@ struct InverseTable {
     Interval values{std::numeric_limits<double>::infinity(),
                     -std::numeric_limits<double>::infinity()};  ///< smallest and largest value q of the table
     Interval positions;                                         ///< positions y for both values
-    double error = 0.0;                                         ///< proved bound of the position error |y - F^-1(q)|
+    double error = 0.0;  ///< proved bound of the position error |y - F^-1(q)|
     PiecewiseSeptic table;
 
     [[nodiscard]] bool empty() const noexcept { return table.empty(); }

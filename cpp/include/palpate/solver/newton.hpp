@@ -25,8 +25,8 @@ struct LoadLine {
 struct Solution {
     double position = 0.0;          ///< solution y [m]
     EnvironmentSample environment;  ///< force, slope and energy at the solution
-    double residual = 0.0;  ///< f(y) + p y - q [N or N*m]; 0 if a proof replaces the evaluation
-    int evaluations = 0;    ///< number of evaluations of the force
+    double residual = 0.0;          ///< f(y) + p y - q [N or N*m]; 0 if a proof replaces the evaluation
+    int evaluations = 0;            ///< number of evaluations of the force
     Status status = Status::Ok;
 };
 
@@ -41,7 +41,8 @@ struct WarmStart {
 /// Interval of positions that contains the solution of a load line.
 struct Bracket {
     double low = -std::numeric_limits<double>::infinity();  ///< residual < 0 at `low`: the solution is > low
-    double high = std::numeric_limits<double>::infinity();  ///< residual > 0 at `high`: the solution is < high
+    double high =
+        std::numeric_limits<double>::infinity();  ///< residual > 0 at `high`: the solution is < high
 };
 
 /// Solves a load line f(y) + p y = q that is not proved to have exactly one solution, by Newton's method inside a
@@ -54,7 +55,8 @@ struct Bracket {
 struct LoadLineSolver {
     int max_evaluations = 64;  ///< number of evaluations of the force after which the search stops
     double tolerance = 1e-13;  ///< largest accepted |residual / slope| / (1 + |y|)
-    double longest_step = std::numeric_limits<double>::infinity();  ///< largest change of y without a bracket [m]
+    double longest_step =
+        std::numeric_limits<double>::infinity();  ///< largest change of y without a bracket [m]
 
     using Memory = WarmStart;
 

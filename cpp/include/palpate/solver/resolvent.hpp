@@ -28,8 +28,8 @@ struct Branch {
     Interval values{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     Interval positions{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     InverseTable table;
-    double line_slope = 0.0;     ///< slope p + f' if F is a straight line; otherwise 0 [N/m]
-    double curvature_low = 0.0;  ///< |f''| at the lower end if F falls below it; else 0
+    double line_slope = 0.0;      ///< slope p + f' if F is a straight line; otherwise 0 [N/m]
+    double curvature_low = 0.0;   ///< |f''| at the lower end if F falls below it; else 0
     double curvature_high = 0.0;  ///< |f''| at the upper end if F falls above it; else 0
 
     /// Returns the position y with F(y) = q if F is a straight line over this interval, computed from a finite end of

@@ -123,8 +123,8 @@ void hash_value(NumberHash& hash, const T& value) {
     std::vector<Inequality> lines = with_kind(
         scheme.structure, [&](auto structure) { return inequalities(structure, bounds, scheme, device); });
     if (bounds.drag > 0.0 && !traits_of(scheme.structure).velocity) {
-        lines.push_back({"velocity-coupling", "force that depends on velocity, without direct rendering", "proved only for B_v = 0", 0.0,
-                         bounds.drag, Basis::None, "use direct rendering"});
+        lines.push_back({"velocity-coupling", "force that depends on velocity, without direct rendering",
+                         "proved only for B_v = 0", 0.0, bounds.drag, Basis::None, "use direct rendering"});
     }
     return lines;
 }

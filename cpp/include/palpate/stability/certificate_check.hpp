@@ -107,7 +107,8 @@ namespace detail {
     };
     if (const std::string now = fingerprint(model); stored.model != now) {
         require("certificate.model is \"" + stored.model + "\": must be \"" + now +
-                "\", the fingerprint of this network; the model was changed after it was certified, plan the model again");
+                "\", the fingerprint of this network; the model was changed after it was certified, plan the "
+                "model again");
     }
     ForceBounds bounds;
     try {

@@ -57,9 +57,8 @@ inline void add_hysteresis(std::vector<Inequality>& lines, const ForceBounds& bo
 /// be 0, and Coulomb friction must exceed the effect of force steps.
 inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                 const DeviceProfile& device, const char* name, const char* cure) {
-    lines.push_back(unknown("encoder-step-coupling", name,
-                            "proved only for an encoder step Delta = 0", 0.0, device.encoder_step,
-                            cure));
+    lines.push_back(unknown("encoder-step-coupling", name, "proved only for an encoder step Delta = 0", 0.0,
+                            device.encoder_step, cure));
     DeviceProfile smooth = device;
     smooth.encoder_step = 0.0;
     Inequality friction = friction_inequality(smooth, 0.0, bounds.mean_force, "0");
@@ -153,12 +152,14 @@ inline constexpr double usual_coupling_share = 0.95;
     }
     lines.push_back(detail::coupling_inequality(coupling, bounds.falling(), device));
     if (bounds.hysteresis) {
-        detail::add_no_quantisation(lines, bounds, device, "encoder steps with hysteresis behind a virtual coupling",
+        detail::add_no_quantisation(lines, bounds, device,
+                                    "encoder steps with hysteresis behind a virtual coupling",
                                     "use direct rendering");
     } else if (bounds.falling() >= coupling.stiffness) {
-        detail::add_no_quantisation(lines, bounds, device,
-                                    "encoder steps with a force that falls at least as steeply as the coupling stiffness K_c",
-                                    "use direct rendering");
+        detail::add_no_quantisation(
+            lines, bounds, device,
+            "encoder steps with a force that falls at least as steeply as the coupling stiffness K_c",
+            "use direct rendering");
     } else {
         lines.push_back(detail::friction_inequality(device, massless_gain(bounds, coupling, device.period_s),
                                                     bounds.mean_force, "gamma Delta / 2"));
@@ -179,9 +180,10 @@ inline constexpr double usual_coupling_share = 0.95;
     detail::add_hysteresis(lines, bounds);
     if (detail::limit_acts(device)) {
         lines.push_back(detail::coupling_inequality(coupling, 0.0, device));
-        lines.push_back(detail::unknown(
-            "falling-slope-limit", "falling force on a virtual object with mass, with a force limit",
-            "proved only for s_ <= 2 B_o / T", damped, bounds.falling(), "use the energy-consistent structure"));
+        lines.push_back(detail::unknown("falling-slope-limit",
+                                        "falling force on a virtual object with mass, with a force limit",
+                                        "proved only for s_ <= 2 B_o / T", damped, bounds.falling(),
+                                        "use the energy-consistent structure"));
         lines.push_back(detail::uniqueness(uncoupled, bounds.falling(), "m / T^2 + B_o / T > s_"));
         detail::add_no_quantisation_of_a_mass(lines, bounds, device);
         return lines;

@@ -110,9 +110,9 @@ template <class Need>
     return gain;
 }
 
-/// Returns gamma, the largest error of the rendered force divided by the position error of the encoder [N/m], for a
-/// virtual spring of stiffness K with mass behind a virtual coupling, by backward Euler without a force limit. gamma is
-/// the sum of |g|, where g is the impulse response from position to force, C A / (C + A),
+/// Returns gamma, the largest error of the rendered force divided by the position error of the encoder [N/m]. The
+/// virtual object is a spring of stiffness K with mass behind a virtual coupling, integrated by backward Euler without
+/// a force limit. The result is the sum of |g|, where g is the impulse response from position to force, C A / (C + A),
 ///
 ///     C = K_c + beta (1 - z^-1),   A = (m/T^2) (1 - z^-1)^2 + (B_o/T) (1 - z^-1) + K.
 ///

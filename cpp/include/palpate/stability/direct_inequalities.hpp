@@ -48,11 +48,12 @@ namespace detail {
                                                 const std::string& formula) {
     const double T = device.longest_period_s();
     const bool late = device.late_samples() > 0;
-    return {"damping-hold", "viscous damping against hold and delay", formula, device.viscous_damping,
-            // The velocity is computed with the nominal period; with jitter the true time between two samples can be
-            // longer.
-            T * device_need(device, slopes) + T / device.period_s * drag, Basis::Proved,
-            late ? "docs/certificate.md" : "Colgate and Schenkel 1997; docs/certificate.md"};
+    return {
+        "damping-hold", "viscous damping against hold and delay", formula, device.viscous_damping,
+        // The velocity is computed with the nominal period; with jitter the true time between two samples can be
+        // longer.
+        T * device_need(device, slopes) + T / device.period_s * drag, Basis::Proved,
+        late ? "docs/certificate.md" : "Colgate and Schenkel 1997; docs/certificate.md"};
 }
 
 /// Returns the inequality for the device damping of direct rendering with prediction; `need` is the damping divided by
@@ -142,8 +143,9 @@ namespace detail {
     if (bounds.drag > 0.0) {
         std::vector<Inequality> lines = velocity_inequalities(bounds, device);
         if (scheme.predict > 0) {
-            lines.push_back({"velocity-prediction", "prediction of a force that depends on velocity", "proved only for B_v = 0", 0.0,
-                             bounds.drag, Basis::None, "docs/certificate.md"});
+            lines.push_back({"velocity-prediction", "prediction of a force that depends on velocity",
+                             "proved only for B_v = 0", 0.0, bounds.drag, Basis::None,
+                             "docs/certificate.md"});
         }
         return lines;
     }

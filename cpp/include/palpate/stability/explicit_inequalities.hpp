@@ -97,13 +97,13 @@ namespace palpate {
     const char* const poles = "poles of the linearised step; docs/certificate.md";
     const Interval slopes{bounds.slope.lower, bounds.slope.upper};
     return {
-        {"explicit-slope", "slope small enough for the explicit integration", "(4 m - 2 (B_o + B_c) T) / T^2 > K + K_c",
-         explicit_slope_limit(inertia, {0.0, coupling.damping}, T), slopes.upper + coupling.stiffness,
-         Basis::Linear, poles, true},
-        {"explicit-damping", "damping small enough for the explicit integration", "2 m > (B_o + B_c) T", 2.0 * inertia.mass,
-         damping * T, Basis::Linear, poles, true},
-        {"explicit-damping-positive", "positive damping of object and coupling", "B_o + B_c > 0", damping, 0.0,
-         Basis::Linear, poles, true},
+        {"explicit-slope", "slope small enough for the explicit integration",
+         "(4 m - 2 (B_o + B_c) T) / T^2 > K + K_c", explicit_slope_limit(inertia, {0.0, coupling.damping}, T),
+         slopes.upper + coupling.stiffness, Basis::Linear, poles, true},
+        {"explicit-damping", "damping small enough for the explicit integration", "2 m > (B_o + B_c) T",
+         2.0 * inertia.mass, damping * T, Basis::Linear, poles, true},
+        {"explicit-damping-positive", "positive damping of object and coupling", "B_o + B_c > 0", damping,
+         0.0, Basis::Linear, poles, true},
         {"explicit-falling-slope", "falling force behind the coupling", "K_c > s_", coupling.stiffness,
          bounds.falling(), Basis::Linear, poles, true},
         {"explicit-port-damping", "viscous damping for the linearised rendering",

@@ -43,17 +43,20 @@ struct ForceBounds {
 
 template <>
 inline constexpr auto fields_of<ForceBounds> = std::tuple{
-    Field<&ForceBounds::slope, &Interval::lower>{"slope_min",
-                                                 "Smallest slope of any path: min f', or min(g' - |h'|)."},
+    Field<&ForceBounds::slope, &Interval::lower>{
+        "slope_min", "Smallest slope of the force [N/m]: min f', or min(g' - |h'|)."},
     Field<&ForceBounds::slope, &Interval::upper>{
-        "slope_max", "Largest slope of any path: max f', or max(g' + |h'| + h/r)."},
+        "slope_max", "Largest slope of the force [N/m]: max f', or max(g' + |h'| + h/r)."},
     Field<&ForceBounds::steepest>{"steepest", "L = max |f'|, or max(|g'| + |h'| + h/r)."},
     Field<&ForceBounds::sliding>{"sliding", "max |f'|, or max(|g'| + |h'|), over all velocities."},
-    Field<&ForceBounds::hysteresis_force, &Interval::lower>{"loss_min", "Smallest h; 0 without hysteresis."},
-    Field<&ForceBounds::hysteresis_force, &Interval::upper>{"loss_max", "Largest h; 0 without hysteresis."},
-    Field<&ForceBounds::hysteresis_per_play>{"loss_per_play", "max h/r"},
+    Field<&ForceBounds::hysteresis_force, &Interval::lower>{"loss_min",
+                                                            "Smallest hysteresis h [N]; 0 without."},
+    Field<&ForceBounds::hysteresis_force, &Interval::upper>{"loss_max",
+                                                            "Largest hysteresis h [N]; 0 without."},
+    Field<&ForceBounds::hysteresis_per_play>{"loss_per_play",
+                                             "Largest slope h/r that the play operator adds, max h/r [N/m]."},
     Field<&ForceBounds::mean_force>{"mean_force",
-                                    "Mean of a limited periodic force in excess of its hysteresis."},
+                                    "Mean of a limited periodic force above its hysteresis [N]; 0: passive."},
     Field<&ForceBounds::drag>{"drag", "B_v = max |f(x, v) - f(x, 0)| / |v|; 0 for a force of position alone.",
                               Rule::NotNegative},
     Field<&ForceBounds::hysteresis>{"hysteresis", "True if the model has hysteresis.", Rule::Any, false}};

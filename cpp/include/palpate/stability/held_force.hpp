@@ -25,9 +25,9 @@ struct SlopeRange {
     [[nodiscard]] double steepest() const noexcept { return std::max(rising, falling); }
 };
 
-/// Returns R(Lambda): device damping divided by the period, b / T [N/m], that a force needs if it is held for a sample
-/// and computed at a position x_k - q_k instead of the position x_k of the handle. The position error q_k satisfies sum
-/// of q^2 <= Lambda^2 sum of d^2 for the steps d_k = x_{k+1} - x_k; Lambda is `lag`. The formula is proved in
+/// Returns R(Lambda): device damping divided by the period, b / T [N/m], that a held force needs if it is computed at a
+/// position x_k - q_k instead of the position x_k of the handle. The position error q_k satisfies sum of q^2 <=
+/// Lambda^2 sum of d^2 for the steps d_k = x_{k+1} - x_k; Lambda is `lag`. The formula is proved in
 /// docs/certificate.md.
 [[nodiscard]] inline double held_need(double lag, SlopeRange slopes) noexcept {
     const double M = slopes.rising;
@@ -43,9 +43,10 @@ struct SlopeRange {
 
 namespace detail {
 
-/// Returns a = max over rho of h(rho) - l rho - gamma rho^2, gamma > 0: a bound of the energy that a force gives in one
-/// sample, divided by the square of the handle's step. rho is the position error divided by this step. h(rho) is M (1/2
-/// + rho) for rho > 0, M (1 + rho)^2 / 2 + s rho^2 / 2 for -1 <= rho <= 0, and s (-rho - 1/2) for rho < -1.
+/// Returns a = max over rho of h(rho) - l rho - gamma rho^2, gamma > 0: a bound of the energy that a held force gives
+/// in one sample, divided by the square of the handle's step. The ratio rho is the position error divided by the
+/// handle's step, and l and gamma are weights. The function h(rho) is M (1/2 + rho) for rho > 0, M (1 + rho)^2 / 2 + s
+/// rho^2 / 2 for -1 <= rho <= 0, and s (-rho - 1/2) for rho < -1.
 [[nodiscard]] inline double step_energy(SlopeRange slopes, double l, double gamma) noexcept {
     const double M = slopes.rising;
     const double s = slopes.falling;
@@ -76,7 +77,7 @@ namespace detail {
     return sum;
 }
 
-/// Returns the sum of |taps|.
+/// Returns the sum of the absolute filter coefficients |taps|.
 [[nodiscard]] inline double size_of(std::span<const double> taps) noexcept {
     double size = 0.0;
     for (const double tap : taps) {

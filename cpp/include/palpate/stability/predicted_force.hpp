@@ -29,6 +29,10 @@ namespace palpate {
 /// predicted position. The force may have hysteresis if its play operator follows the measured position. The prediction
 /// changes the force by at most L |sum of w_j d_{k-j}| (steepest slope L, prediction weights w, handle's steps d),
 /// which adds L / 2 to the result.
+/// Returns the device damping divided by the longest period, b / T [N/m], for a held force that is computed at a
+/// predicted position. The force may have hysteresis if its play operator follows the measured position. The prediction
+/// changes the force by at most L |sum of w_j d_{k-j}| (steepest slope L, prediction weights w, handle's steps d),
+/// which adds L / 2 to the result.
 [[nodiscard]] inline double predicted_path_need(const DeviceProfile& device, SlopeRange slopes) {
     return device_need(device, slopes) + 0.5 * slopes.steepest();
 }
@@ -65,7 +69,8 @@ namespace palpate {
         const std::vector<double> taps = prediction_taps(whole, predict);
         const double split = filtered_need(taps, (fraction * P + uncertain_s) / T, slopes,
                                            ((1.0 - fraction) * P + jitter) / T);
-        return std::min(simple, std::max(filtered_need(taps, slopes), split));  // the true delay may be shorter
+        return std::min(simple,
+                        std::max(filtered_need(taps, slopes), split));  // the true delay may be shorter
     }
     if (jitter >= P) {
         return simple;

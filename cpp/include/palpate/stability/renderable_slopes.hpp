@@ -140,9 +140,10 @@ template <class Holds>
 /// play radius.
 [[nodiscard]] inline Scheme explicit_scheme(const ForceBounds& bounds, const DeviceProfile& device,
                                             const SchemeChoices& chosen) {
-    constexpr std::array shares{0.9, 0.75, 0.6, 0.45, 0.3, 0.15};  // coupling stiffness / stiffest certified one
-    constexpr std::array ratios{0.1, 0.25, 0.5, 1.0};              // B_o T / m; the paper's choice is 0.5
-    constexpr std::array reserves{1.1, 1.5, 2.5, 5.0};             // slope limit / steepest slope
+    constexpr std::array shares{0.9,  0.75, 0.6,
+                                0.45, 0.3,  0.15};      // coupling stiffness / stiffest certified one
+    constexpr std::array ratios{0.1, 0.25, 0.5, 1.0};   // B_o T / m; the paper's choice is 0.5
+    constexpr std::array reserves{1.1, 1.5, 2.5, 5.0};  // slope limit / steepest slope
     const double T = device.period_s;
     const double stiffest = stiffest_coupling(0.0, 0.0, device);
     Scheme scheme;
