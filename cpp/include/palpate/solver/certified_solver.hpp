@@ -60,9 +60,9 @@ class CertifiedSolver {
         double position = 0.0;    ///< solution of the last call [m]
         double at_zero = 0.0;     ///< position that the last tangent predicts for q = 0 [m]
         double compliance = 0.0;  ///< 1 / F' at the last solution [m/N]
-        double low = std::numeric_limits<
-            double>::infinity();  ///< lower end of the smooth interval; low > high: no prediction [m]
-        double high = -std::numeric_limits<double>::infinity();
+        /// Lower end of the interval around the last solution in which F is smooth; low > high: no prediction [m]
+        double low = std::numeric_limits<double>::infinity();
+        double high = -std::numeric_limits<double>::infinity();  ///< upper end of this interval [m]
         double curvature = 0.0;  ///< c = max|F''| / (2 min F') of the cell of the last solution
         double play = 0.0;       ///< position of the play operator at the last solution [m]
 
