@@ -43,12 +43,12 @@ class ForceBounds:
     @property
     def loss_max(self) -> float:
         """
-        Largest hysteresis h [N]; 0 without.
+        Largest hysteresis h [N]; 0 for a force without hysteresis.
         """
     @property
     def loss_min(self) -> float:
         """
-        Smallest hysteresis h [N]; 0 without.
+        Smallest hysteresis h [N]; 0 for a force without hysteresis.
         """
     @property
     def loss_per_play(self) -> float:
@@ -78,7 +78,7 @@ class ForceBounds:
     @property
     def steepest(self) -> float:
         """
-        L = max |f'|, or max(|g'| + |h'| + h/r).
+        Steepest slope [N/m]: L = max |f'|, or max(|g'| + |h'| + h/r).
         """
 class Inequality:
     """
@@ -114,7 +114,7 @@ class Inequality:
     @property
     def id(self) -> str:
         """
-        Stable name, compared when a certificate is checked; texts are not.
+        Name that never changes. A check of a certificate compares it, not the texts.
         """
     @property
     def left(self) -> float:

@@ -47,12 +47,13 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
         "slope_min", "Smallest slope of the force [N/m]: min f', or min(g' - |h'|)."},
     Field<&ForceBounds::slope, &Interval::upper>{
         "slope_max", "Largest slope of the force [N/m]: max f', or max(g' + |h'| + h/r)."},
-    Field<&ForceBounds::steepest>{"steepest", "L = max |f'|, or max(|g'| + |h'| + h/r)."},
+    Field<&ForceBounds::steepest>{"steepest",
+                                  "Steepest slope [N/m]: L = max |f'|, or max(|g'| + |h'| + h/r)."},
     Field<&ForceBounds::sliding>{"sliding", "max |f'|, or max(|g'| + |h'|), over all velocities."},
-    Field<&ForceBounds::hysteresis_force, &Interval::lower>{"loss_min",
-                                                            "Smallest hysteresis h [N]; 0 without."},
-    Field<&ForceBounds::hysteresis_force, &Interval::upper>{"loss_max",
-                                                            "Largest hysteresis h [N]; 0 without."},
+    Field<&ForceBounds::hysteresis_force, &Interval::lower>{
+        "loss_min", "Smallest hysteresis h [N]; 0 for a force without hysteresis."},
+    Field<&ForceBounds::hysteresis_force, &Interval::upper>{
+        "loss_max", "Largest hysteresis h [N]; 0 for a force without hysteresis."},
     Field<&ForceBounds::hysteresis_per_play>{"loss_per_play",
                                              "Largest slope h/r that the play operator adds, max h/r [N/m]."},
     Field<&ForceBounds::mean_force>{"mean_force",

@@ -48,19 +48,20 @@ struct Inequality {
 };
 
 template <>
-inline constexpr auto fields_of<Inequality> = std::tuple{
-    Field<&Inequality::id>{"id", "Stable name, compared when a certificate is checked; texts are not."},
-    Field<&Inequality::left>{"left", "Left side of the inequality: the available value."},
-    Field<&Inequality::right>{"right", "Right side of the inequality: the required value."},
-    Field<&Inequality::name>{"name", "Subject of the inequality in words.", Rule::Any, false},
-    Field<&Inequality::formula>{"formula", "Formula in the symbols of docs/certificate.md.", Rule::Any,
-                                false},
-    Field<&Inequality::basis>{"basis",
-                              "proved, linear (the linearised system only) or none (no bound is known).",
-                              Rule::Any, false},
-    Field<&Inequality::source>{"source", "Source of the proof.", Rule::Any, false},
-    Field<&Inequality::strict>{"strict", "True if the left side must be larger than the right side.",
-                               Rule::Any, false}};
+inline constexpr auto fields_of<Inequality> =
+    std::tuple{Field<&Inequality::id>{
+                   "id", "Name that never changes. A check of a certificate compares it, not the texts."},
+               Field<&Inequality::left>{"left", "Left side of the inequality: the available value."},
+               Field<&Inequality::right>{"right", "Right side of the inequality: the required value."},
+               Field<&Inequality::name>{"name", "Subject of the inequality in words.", Rule::Any, false},
+               Field<&Inequality::formula>{"formula", "Formula in the symbols of docs/certificate.md.",
+                                           Rule::Any, false},
+               Field<&Inequality::basis>{
+                   "basis", "proved, linear (the linearised system only) or none (no bound is known).",
+                   Rule::Any, false},
+               Field<&Inequality::source>{"source", "Source of the proof.", Rule::Any, false},
+               Field<&Inequality::strict>{
+                   "strict", "True if the left side must be larger than the right side.", Rule::Any, false}};
 
 /// Returns true if all inequalities hold.
 [[nodiscard]] inline bool all_hold(const std::vector<Inequality>& lines) noexcept {
