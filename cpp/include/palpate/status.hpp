@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// Result of one step of the control loop or of a solver. Solvers, devices, guards and records use this one list; Python,
-/// CSV files and the documentation use the same words.
+/// Result of one step of the control loop or of a solver. Solvers, devices, guards and records use this one list;
+/// Python, CSV files and the documentation use the same words.
 enum class Status : std::uint8_t {
     Ok,
     MaxIterations,

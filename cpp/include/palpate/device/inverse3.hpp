@@ -86,8 +86,8 @@ class Inverse3Device {
         return {};
     }
 
-    /// Sends the force command and waits for the device's state that answers the command. If an answer is late, the next
-    /// exchange reads it together with its own answer.
+    /// Sends the force command and waits for the device's state that answers the command. If an answer is late, the
+    /// next exchange reads it together with the answer to its command.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         if (!link_ || link_->disconnected) {
             last_.status = Status::Fault;
@@ -129,8 +129,8 @@ class Inverse3Device {
     using Json = nlohmann::json;
     using Error = boost::system::error_code;
 
-    /// A connection to the service and its unfinished operations. The address of a Link must not change, because handlers
-    /// store the address.
+    /// A connection to the service and its unfinished operations. The address of a Link must not change, because
+    /// handlers store the address.
     struct Link {
         boost::asio::io_context context;
         boost::beast::websocket::stream<boost::beast::tcp_stream> stream{context};
@@ -149,8 +149,8 @@ class Inverse3Device {
         int states_without_effect = 0;  ///< consecutive states with zero force after a force command
         std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 
-        /// Runs the handlers of network operations, until `done` returns true or the time `within` has passed. Returns the
-        /// last result of `done`.
+        /// Runs the handlers of network operations, until `done` returns true or the time `within` has passed. Returns
+        /// the last result of `done`.
         template <class Done>
         bool run(std::chrono::milliseconds within, Done done) {
             const auto until = std::chrono::steady_clock::now() + within;
@@ -161,8 +161,7 @@ class Inverse3Device {
         }
     };
 
-    static constexpr double least_visible_force =
-        0.05;  ///< least commanded force that the state must show [N]
+    static constexpr double least_visible_force = 0.05;  ///< least force that a state must show [N]
     static constexpr int most_states_without_effect = 200;
 
     /// Connects to the service. Throws an error with the likely cure if no service answers.
@@ -216,8 +215,8 @@ class Inverse3Device {
         return text;
     }
 
-    /// Reads the properties of the first device in the service's first message. Throws if the message contains no device, or
-    /// the device is not calibrated.
+    /// Reads the properties of the first device in the service's first message. Throws if the message contains no
+    /// device, or the device is not calibrated.
     void read_inventory(const Json& inventory, const std::string& service) {
         const Json none = Json::array();
         const Json& devices = inventory.contains("inverse3") ? inventory.at("inverse3") : none;
@@ -322,8 +321,8 @@ class Inverse3Device {
         });
     }
 
-    /// Reads position, velocity and force from a message of the service. Throws if the message differs from the service's
-    /// documentation, or does not contain this device.
+    /// Reads position, velocity and force from a message of the service. Throws if the message differs from the
+    /// service's documentation, or does not contain this device.
     void take_state(const std::string& text) {
         const Json message = Json::parse(text);
         for (const Json& device : message.at("inverse3")) {

@@ -30,8 +30,8 @@ struct StreamHealth {
 };
 
 /// Converts the packets of one device to readings. Counters no longer restart at 0, encoder counts become SI units, and
-/// status bits become a Status. Each packet contains the number of the last accepted command (its echo), which gives the
-/// delay of commands.
+/// status bits become a Status. Each packet contains the number of the last accepted command (its echo), which gives
+/// the delay of commands.
 ///
 /// The delay is computed from the device's clock only. A command is computed from the sample of time t_k. A packet of
 /// time t_m states that the command was accepted `out_age` before t_m. The delay is then t_m - out_age - t_k.
@@ -41,7 +41,8 @@ class PacketStream {
     explicit PacketStream(const wire::Info& info, Nanoseconds longest_delay) noexcept
         : info_{info}, longest_delay_{longest_delay} {}
 
-    /// Reads a packet that arrived at the time `now` of the host's clock. Returns false if it is not a packet of this protocol.
+    /// Reads a packet that arrived at the time `now` of the host's clock. Returns false if it is not a packet of this
+    /// protocol.
     [[nodiscard]] bool take(std::span<const std::uint8_t> bytes, Nanoseconds now) noexcept {
         wire::InPacket packet;
         if (!wire::decode(bytes, packet)) {
@@ -67,8 +68,8 @@ class PacketStream {
         return true;
     }
 
-    /// Marks that packets were discarded. The step to the next packet then does not count lost samples, and commands sent
-    /// before the next packet have no delay.
+    /// Marks that packets were discarded. The step to the next packet then does not count lost samples, and commands
+    /// sent before the next packet have no delay.
     void pause() noexcept { follows_ = false; }
     /// Returns true if no packet was discarded after the last packet that was read.
     [[nodiscard]] bool follows() const noexcept { return follows_; }
@@ -97,8 +98,8 @@ class PacketStream {
     struct SentCommand {
         std::uint16_t sequence = 0;
         Nanoseconds sent = 0;
-        std::int64_t sample_us = std::numeric_limits<
-            std::int64_t>::min();  ///< time of the sample, device clock; least value: no sample
+        /// Time of the sample by the device's clock [us]; the least value if the command has no sample.
+        std::int64_t sample_us = std::numeric_limits<std::int64_t>::min();
     };
 
     /// Finds the command that a packet confirms, and measures its delay. The numbers of commands start after the first
@@ -156,9 +157,9 @@ class PacketStream {
         return follows ? (now.position - reading_.position) / elapsed : first ? 0.0 : reading_.velocity;
     }
 
-    /// Returns the status of a packet. A report of the watchdog counts only after a command of this session has reached the
-    /// device, because earlier reports belong to earlier sessions. If the torque is disabled after it was enabled, the
-    /// device has restarted.
+    /// Returns the status of a packet. A report of the watchdog counts only after a command of this session has reached
+    /// the device, because earlier reports belong to earlier sessions. If the torque is disabled after it was enabled,
+    /// the device has restarted.
     [[nodiscard]] Status status_of(std::uint16_t bits) noexcept {
         const bool tripped = (bits & wire::watchdog_tripped) != 0 && is_acknowledged_;
         const bool refused = (bits & wire::bad_packet) != 0 && is_acknowledged_;

@@ -41,11 +41,11 @@ struct UsbHealth {
 
 /// A haptic device of one degree of freedom over USB; device/wire.hpp defines packets and signs.
 ///
-/// The packets of the device set the rate of the control loop. An exchange sends its command at once, then waits for the
-/// next packet, at most `UsbOptions::wait`. If the host is late by one or two packets, it processes all of them, and
-/// sends only the command for the last packet. If more than 4 packets wait, the host discards them. After opening and
-/// after discarded packets, the first exchange only reads, so that every command is sent directly after a packet. An
-/// exchange neither allocates nor throws; libusb uses its own locks, and the wait uses a futex.
+/// The packets of the device set the rate of the control loop. An exchange sends its command at once, then waits for
+/// the next packet, at most `UsbOptions::wait`. If the host is late by one or two packets, it processes all of them,
+/// and sends only the command for the last packet. If more than 4 packets wait, the host discards them. After opening
+/// and after discarded packets, the first exchange only reads, so that every command is sent directly after a packet.
+/// An exchange neither allocates nor throws; libusb uses its own locks, and the wait uses a futex.
 ///
 /// Reading::status:
 /// - Timeout: no packet arrived, the device's watchdog ended the torque, or a command took longer than
@@ -64,8 +64,8 @@ class UsbDevice {
     UsbDevice& operator=(UsbDevice&&) = delete;
     ~UsbDevice() { close(); }
 
-    /// Finds the device and starts its packets. Enables the device's torque if `UsbOptions::makes_force` is set. The torque
-    /// is zero until the first exchange.
+    /// Finds the device and starts its packets. Enables the device's torque if `UsbOptions::makes_force` is set. The
+    /// torque is zero until the first exchange.
     Opened open() {
         close();
         open_ = std::make_unique<OpenDevice>();
@@ -109,8 +109,8 @@ class UsbDevice {
         return failed(Status::Timeout);
     }
 
-    /// Sends zero torque, disables the device, ends all USB transfers and releases the device, in this order. Steps to which
-    /// the device does not respond are skipped.
+    /// Sends zero torque, disables the device, ends all USB transfers and releases the device, in this order. Steps to
+    /// which the device does not respond are skipped.
     void close() noexcept {
         if (open_ == nullptr) {
             return;
@@ -155,8 +155,8 @@ class UsbDevice {
         return open_ == nullptr || open_->transfers == nullptr ? 0 : open_->transfers->in_flight();
     }
 
-    /// Returns a device profile from the properties that the device reports. Its inertia has the default value, and damping
-    /// and friction are 0, because a device does not report them.
+    /// Returns a device profile from the properties that the device reports. Its inertia has the default value, and
+    /// damping and friction are 0, because a device does not report them.
     [[nodiscard]] DeviceProfile profile() const {
         DeviceProfile profile = unmeasured({});
         profile.id = name().serial.empty() ? name().product : name().serial;
@@ -268,7 +268,8 @@ class UsbDevice {
         return true;
     }
 
-    /// Discards all waiting packets and returns true, if there are too many of them or if packets were discarded before.
+    /// Discards all waiting packets and returns true, if there are too many of them or if packets were discarded
+    /// before.
     [[nodiscard]] bool restarted() noexcept {
         if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting_packets) {
             return false;
@@ -282,9 +283,9 @@ class UsbDevice {
         return true;
     }
 
-    /// Sends the command for the last packet. If a newer packet has already arrived, the command is skipped, and the command
-    /// for the newer packet is sent instead. Two consecutive commands are never both skipped, and the command after an
-    /// invalid reading is never skipped for a newer packet.
+    /// Sends the command for the last packet. If a newer packet has already arrived, the command is skipped, and the
+    /// command for the newer packet is sent instead. Two consecutive commands are never both skipped, and the command
+    /// after an invalid reading is never skipped for a newer packet.
     void send_or_skip(double force, Nanoseconds deadline) noexcept {
         const bool ended = wait_for_last_write(deadline);
         const bool behind = !ended || (open_->reading_is_valid && open_->transfers->arrived() > 0);
@@ -297,10 +298,10 @@ class UsbDevice {
         }
     }
 
-    /// Waits until the last command has been sent. Returns true if it has. The end of a command and the packet that wakes
-    /// the host come in the same USB frame (1 ms), in any order. A command that ends much later was sent in the next frame,
-    /// close to a newer packet. Waiting for the newer packet prevents this command and all later commands from being one
-    /// frame late.
+    /// Waits until the last command has been sent. Returns true if it has. The end of a command and the packet that
+    /// wakes the host come in the same USB frame (1 ms), in any order. A command that ends much later was sent in the
+    /// next frame, close to a newer packet. Waiting for the newer packet prevents this command and all later commands
+    /// from being one frame late.
     [[nodiscard]] bool wait_for_last_write(Nanoseconds deadline) noexcept {
         detail::UsbTransfers& transfers = *open_->transfers;
         if (!transfers.writes()) {

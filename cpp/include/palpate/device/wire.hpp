@@ -260,8 +260,8 @@ class ByteWriter {
     return static_cast<std::int32_t>(std::lround(std::clamp(-1e6 * force, -largest, largest)));
 }
 
-/// Extends a counter that restarts at 0 after its largest value to a 64-bit counter that does not restart. A step of more
-/// than half the counter's range counts as a negative step.
+/// Extends a counter that restarts at 0 after its largest value to a 64-bit counter that does not restart. A step of
+/// more than half the counter's range counts as a negative step.
 template <std::integral Counter>
 class Unwrapped {
   public:

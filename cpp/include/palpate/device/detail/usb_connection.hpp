@@ -159,7 +159,8 @@ class UsbConnection {
                "that the system detects";
     }
 
-    /// Returns true if the USB descriptors of a device are those of the protocol. Reading descriptors does not open the device.
+    /// Returns true if the USB descriptors of a device are those of the protocol. Reading descriptors does not open the
+    /// device.
     [[nodiscard]] static bool is_ours(libusb_device* device) noexcept {
         libusb_device_descriptor descriptor{};
         if (libusb_get_device_descriptor(device, &descriptor) != 0 ||

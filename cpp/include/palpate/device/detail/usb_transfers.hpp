@@ -111,8 +111,8 @@ class UsbTransfers {
         return code;
     }
 
-    /// Sends a control request without data and waits for its end. Returns 0 or an error code of libusb. Only the control
-    /// loop's thread may call this function, one request at a time.
+    /// Sends a control request without data and waits for its end. Returns 0 or an error code of libusb. Only the
+    /// control loop's thread may call this function, one request at a time.
     [[nodiscard]] int request(wire::Request request, std::uint16_t value) noexcept {
         if (requests_in_flight_.load(std::memory_order_acquire) != 0) {
             return LIBUSB_ERROR_BUSY;
@@ -145,8 +145,8 @@ class UsbTransfers {
     [[nodiscard]] bool wait_for_write(Nanoseconds deadline) noexcept {
         return wait_until([&] { return !writes(); }, deadline);
     }
-    /// Waits until the command in flight has ended or a packet has arrived. Returns false if neither happened before the
-    /// deadline.
+    /// Waits until the command in flight has ended or a packet has arrived. Returns false if neither happened before
+    /// the deadline.
     [[nodiscard]] bool wait_for_write_or_arrival(Nanoseconds deadline) noexcept {
         return wait_until([&] { return !writes() || arrived() > 0 || has_failed(); }, deadline);
     }
@@ -197,7 +197,8 @@ class UsbTransfers {
 
     /// Processes libusb's events until stop() is called.
     void handle_events() noexcept {
-        // The event thread has a higher priority than the control loop, because an unprocessed packet makes the loop late.
+        // The event thread has a higher priority than the control loop, because an unprocessed packet makes the loop
+        // late.
         const sched_param priority{90};
         (void)pthread_setschedparam(
             pthread_self(), SCHED_FIFO,
@@ -361,7 +362,8 @@ class UsbTransfers {
 
     // ------------------------------------------------------------------------------------------- both threads
 
-    /// Waits until `condition` is true, and checks it after every event of a transfer. Returns false after the deadline.
+    /// Waits until `condition` is true, and checks it after every event of a transfer. Returns false after the
+    /// deadline.
     template <class Condition>
     [[nodiscard]] bool wait_until(Condition condition, Nanoseconds deadline) noexcept {
         while (!condition()) {
