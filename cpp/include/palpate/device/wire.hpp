@@ -38,7 +38,7 @@ inline constexpr std::uint8_t request_to_device = 0x41;
 /// Numbers of the control requests to the device (the field bRequest of a control transfer).
 enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
 
-/// Returns cause and cure for an error code of libusb; empty for a code without a known cause.
+/// Returns cause and cure for an error code of libusb; empty for a code without a text.
 [[nodiscard]] constexpr std::string_view usb_cause(int code) noexcept {
     switch (code) {
         case -1:  // LIBUSB_ERROR_IO
