@@ -34,9 +34,8 @@ void bind_dynamics(py::module_& module) {
                 return output;
             },
             "input"_a,
-            "Returns the filtered signal for an input signal (n,). The filter starts from its present state "
-            "and "
-            "keeps\nthis state.");
+            "Returns the filtered signal for an input signal (n,). The filter starts from its present\n"
+            "state and keeps this state.");
 
     py::class_<EnvironmentFilters>(
         module, "EnvironmentFilters",

@@ -103,14 +103,12 @@ Json to_json(const py::handle& value, int depth = 0) {
 void bind_io(py::module_& module) {
     module.def(
         "read_json", [](const std::string& path) { return to_python(read_json(path)); }, "path"_a,
-        "Returns the content of a JSON file. Raises ValueError with one sentence that begins with the name "
-        "of "
-        "the\nfile.");
+        "Returns the content of a JSON file. Raises ValueError with one sentence that begins with the\n"
+        "name of the file.");
     module.def(
         "check_model", [](const py::object& content) { (void)parse_model(to_json(content)); }, "content"_a,
-        "Checks the content of a model file and computes its certificate again. Raises ValueError with the "
-        "path\n"
-        "of the first wrong field, its value and the correct values.");
+        "Checks the content of a model file and computes its certificate again. Raises ValueError with\n"
+        "the path of the first wrong field, its value and the correct values.");
     module.def(
         "profile_of",
         [](const py::object& content) {
@@ -120,9 +118,8 @@ void bind_io(py::module_& module) {
             return read;
         },
         "content"_a,
-        "Returns the device profile in the content of a file. Raises ValueError with the first wrong field, "
-        "its\n"
-        "value and the correct values.");
+        "Returns the device profile in the content of a file. Raises ValueError with the first wrong\n"
+        "field, its value and the correct values.");
     module.def(
         "scheme_of", [](const py::object& plan) { return *detail::read_plan({to_json(plan), "plan"}); },
         "plan"_a, "Returns the scheme (structure and its numbers) in the plan of a model file.");

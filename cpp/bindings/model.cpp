@@ -290,32 +290,27 @@ py::array_t<double> cell_derivative_bounds(const Array& alpha, const Array& beta
 void bind_model(py::module_& module) {
     py::class_<ForceModel> type(
         module, "ForceModel",
-        "A force law of d inputs x, with its domain and the continuation of the force outside the domain.\n\n"
-        "f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4). With hysteresis the force is\n"
-        "f(x, s) = g(x) + s h(x), with the mean force g of press and release, the direction state s from -1 "
-        "to 1,\n"
-        "and the hysteresis h, which has separate weights for the same wavelets.");
+        "A force law of d inputs x, with its domain and the continuation of the force outside the\n"
+        "domain.\n\n"
+        "f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4). With hysteresis the force\n"
+        "is f(x, s) = g(x) + s h(x), with the mean force g of press and release, the direction state s\n"
+        "from -1 to 1, and the hysteresis h, which has separate weights for the same wavelets.");
     type.def(
         py::init(&make_model), py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a,
         "weight_hysteresis"_a = py::none(), "linear_hysteresis"_a = py::none(),
         "bias_hysteresis"_a = py::none(), "lower"_a, "upper"_a, "below"_a = "linear", "above"_a = "linear",
         "period"_a = py::none(), "play_radius"_a = py::none(), "of_velocity"_a = false,
-        "Makes the model of N wavelets and d inputs: alpha, beta (N, d); weight (N,); linear, lower, upper "
-        "(d,).\n"
-        "of_velocity is true if the second of two inputs is the velocity. Raises ValueError with the "
-        "wrong field.");
+        "Makes the model of N wavelets and d inputs: alpha, beta (N, d); weight (N,); linear, lower,\n"
+        "upper (d,). of_velocity is true if the second of two inputs is the velocity. Raises ValueError\n"
+        "with the wrong field.");
 
     bind_quantity<&EnvironmentSample::force>(
         type, "force",
-        "Returns the force of the object against the tool [N or N*m]: a number for one position, an array "
-        "for\n"
-        "an array of positions.\n\n"
-        "A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius, "
-        "`play`,\n"
-        "the state of the play operator. Arguments that the model does not use are ignored. Raises "
-        "ValueError\n"
-        "with the name of a missing argument.\n"
-        "A position that is not finite gives NaN.");
+        "Returns the force of the object against the tool [N or N*m]: a number for one position, an\n"
+        "array for an array of positions.\n\n"
+        "A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius,\n"
+        "`play`, the state of the play operator. Arguments that the model does not use are ignored.\n"
+        "Raises ValueError with the name of a missing argument. A position that is not finite gives NaN.");
     bind_quantity<&EnvironmentSample::slope>(
         type, "slope",
         "Returns the slope df/dx of the force [N/m or N*m/rad]; the arguments are "
@@ -323,11 +318,9 @@ void bind_model(py::module_& module) {
     bind_quantity<&EnvironmentSample::energy>(
         type, "energy",
         "Returns the stored energy, up to a constant [J]; the arguments are those of force().");
-    type.def(
-        "predict", &predict, "X"_a,
-        "Returns the force (n,) for the n rows of inputs X (n, d). A hysteresis model takes the direction "
-        "as one\n"
-        "more column. A row with a value that is not finite gives NaN.");
+    type.def("predict", &predict, "X"_a,
+             "Returns the force (n,) for the n rows of inputs X (n, d). A hysteresis model takes the\n"
+             "direction as one more column. A row with a value that is not finite gives NaN.");
     type.def("extrapolated", &extrapolated, "position"_a,
              "Returns True for a position outside the domain of the model.");
     type.def(
@@ -342,11 +335,10 @@ void bind_model(py::module_& module) {
             return pair_of(model.slope_bounds(radius));
         },
         "play_radius"_a = py::none(),
-        "Returns proved bounds (smallest, largest) of the slope of the force inside the domain, in press "
-        "and\n"
-        "in release. They are wider than the true range by at most 1 % of the steepest slope. With a play\n"
-        "radius r they include the slope h / r (hysteresis h), with which the force of a hysteresis model\n"
-        "changes after a reversal.");
+        "Returns proved bounds (smallest, largest) of the slope of the force inside the domain, in press\n"
+        "and in release. They are wider than the true range by at most 1 % of the steepest slope. With a\n"
+        "play radius r they include the slope h / r (hysteresis h), with which the force of a hysteresis\n"
+        "model changes after a reversal.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
     type.def_property_readonly("n_wavelets",
@@ -392,18 +384,15 @@ void bind_model(py::module_& module) {
     module.def(
         "slope_bounds", &network_slope_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a,
         "bias"_a, "lower"_a, "upper"_a, "relative"_a = 0.01,
-        "Returns proved bounds (smallest, largest) of the slope f' of a network of one input from lower to "
-        "upper.\n"
-        "They are wider than the true range by at most `relative` times the largest |f'|.");
+        "Returns proved bounds (smallest, largest) of the slope f' of a network of one input from lower\n"
+        "to upper. They are wider than the true range by at most `relative` times the largest |f'|.");
     module.def("derivative_bounds", &cell_derivative_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a,
                "linear"_a, "bias"_a, "lower"_a, "upper"_a, "order"_a,
-               "Returns proved upper bounds (k,) of the absolute derivative of a network of one input, for "
-               "orders up\n"
-               "to 9, in k intervals of positions from lower (k,) to upper (k,).");
+               "Returns proved upper bounds (k,) of the absolute derivative of a network of one input,\n"
+               "for orders up to 9, in k intervals of positions from lower (k,) to upper (k,).");
     module.def("fingerprint", &fingerprint, "model"_a,
                "Returns a fingerprint of a model: 16 hexadecimal digits, computed from all numbers that "
-               "determine the "
-               "force.");
+               "determine the force.");
 }
 
 }  // namespace palpate::bindings

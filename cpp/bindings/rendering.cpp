@@ -37,16 +37,15 @@ void bind_rendering(py::module_& module) {
                 period_s ? validate(s, model, *period_s) : validate(s, model);
             },
             "model"_a, "period_s"_a = py::none(),
-            "Checks that the scheme can render a model. Raises ValueError with the wrong field, its value "
-            "and "
-            "its\n"
-            "bound. With period_s also raises ValueError if the scheme diverges at this period.")
+            "Checks that the scheme can render a model. Raises ValueError with the wrong field, its\n"
+            "value and its bound. With period_s also raises ValueError if the scheme diverges at this\n"
+            "period.")
         .def(
             "steepest_slope",
             [](const Scheme& s, const ForceModel& model) { return steepest_slope(s, model); }, "model"_a,
-            "Returns the largest slope of the rendered force, at least 0 [N/m or N*m/rad]. For a hysteresis "
-            "model it\n"
-            "includes h / r (hysteresis by play radius), the slope that is added after a reversal.");
+            "Returns the largest slope of the rendered force, at least 0 [N/m or N*m/rad]. For a\n"
+            "hysteresis model it includes h / r (hysteresis by play radius), the slope that is added\n"
+            "after a reversal.");
 
     module.def(
         "explicit_slope_limit",
@@ -56,9 +55,8 @@ void bind_rendering(py::module_& module) {
                                         period_s);
         },
         "scheme"_a, "period_s"_a, py::kw_only(), "coupled"_a = true,
-        "Returns the slope limit of a model: below it the explicit structure is stable while the device is "
-        "held\n"
-        "still, or, with coupled=False, while a force drives the object without coupling.");
+        "Returns the slope limit of a model: below it the explicit structure is stable while the device\n"
+        "is held still, or, with coupled=False, while a force drives the object without coupling.");
 
     module.def(
         "default_play_radius", &default_play_radius, "model"_a, "encoder_step"_a,
@@ -73,9 +71,9 @@ void bind_rendering(py::module_& module) {
             return name ? std::optional<std::string>{*name} : std::nullopt;
         },
         "model"_a, "scheme"_a, "period_s"_a,
-        "Returns the method that solves the load line of a scheme: 'table' if a table of solutions is used "
-        "for\n"
-        "at least a part of the positions, otherwise 'newton'; None for a structure without a load line.");
+        "Returns the method that solves the load line of a scheme: 'table' if a table of solutions is\n"
+        "used for at least a part of the positions, otherwise 'newton'; None for a structure without a\n"
+        "load line.");
 }
 
 }  // namespace palpate::bindings

@@ -88,9 +88,8 @@ py::dict rendered_along(const Array& samples, const char* name, double period_s,
 
 void bind_simulation(py::module_& module) {
     py::class_<Hand> hand(module, "Hand",
-                          "Simulated hand: a spring to a target that moves between lower and upper, and a "
-                          "damper between handle\n"
-                          "and ground.");
+                          "Simulated hand: a spring to a target that moves between lower and upper, and\n"
+                          "a damper between handle and ground.");
     bind_fields(hand);
 
     py::class_<TestRig> rig(module, "TestRig", "Simulated device and hand, scaled to a model.");
@@ -103,16 +102,13 @@ void bind_simulation(py::module_& module) {
             return self.scheme(model, chosen);
         },
         "model"_a,
-        "Returns a scheme with the given fields of Scheme, in the model's units. Other fields and fields "
-        "that\n"
-        "are None have the default, multiplied by the scale of the model.");
+        "Returns a scheme with the given fields of Scheme, in the model's units. Other fields, and fields\n"
+        "with the value None, have the default, multiplied by the scale of the model.");
     module.def(
         "rig_for", &rig_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
-        "Returns the test rig for a model of position, or of position and velocity. With is_angle (positions "
-        "in\n"
-        "rad) it is the default knob. For any other unit, lengths and forces of the knob and its hand are "
-        "scaled\n"
-        "to the travel and the largest force of the model.");
+        "Returns the test rig for a model of position, or of position and velocity. With is_angle\n"
+        "(positions in rad) it is the default knob. For any other unit, lengths and forces of the knob\n"
+        "and its hand are scaled to the travel and the largest force of the model.");
 
     module.def(
         "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
@@ -148,12 +144,10 @@ void bind_simulation(py::module_& module) {
         },
         "model"_a, "play_radius"_a, py::kw_only(), "start"_a, "middle"_a, "end"_a, "applied"_a,
         "mean_applied"_a, "period_s"_a,
-        "Returns errors of the force of a simulated rendering, compared with a model, by name. RMS errors\n"
-        "[N or N*m]: `end`, at the end of each tick; `instant`, at the time of the sample; `mean`, mean "
-        "error\n"
-        "over a tick; `band`, mean error below 50 Hz. `work` is the work of the error [J]. The arrays (n,) "
-        "are\n"
-        "those of simulate(); play_radius 0 means the play radius of the model.");
+        "Returns errors of the force of a simulated rendering, compared with a model, by name. RMS\n"
+        "errors [N or N*m]: `end`, at the end of each tick; `instant`, at the time of the sample;\n"
+        "`mean`, mean error over a tick; `band`, mean error below 50 Hz. `work` is the work of the error\n"
+        "[J]. The arrays (n,) are those of simulate(); play_radius 0 means the play radius of the model.");
     module.def(
         "motion_driven",
         [](const ForceModel& model, const Scheme& s, const Array& position, double period_s) {
@@ -173,10 +167,9 @@ void bind_simulation(py::module_& module) {
             });
         },
         "model"_a, "scheme"_a, "force"_a, "period_s"_a, "start_position"_a = 0.0,
-        "Returns the motion of the virtual object, without device and coupling, when a recorded force (n,) "
-        "drives\n"
-        "the object (paper figures 12 and 14).\n"
-        "Arrays (n,) by name: force, environment_position, evaluations, status.");
+        "Returns the motion of the virtual object, without device and coupling, when a recorded force\n"
+        "(n,) drives the object (paper figures 12 and 14). Arrays (n,) by name: force,\n"
+        "environment_position, evaluations, status.");
 }
 
 }  // namespace palpate::bindings

@@ -25,11 +25,9 @@ void bind_bounds(py::module_& module) {
     py::class_<ForceBounds> type(
         module, "ForceBounds",
         "Proved bounds of a model's force and slope at all positions, inside and outside the domain.\n\n"
-        "With hysteresis the force is f = g + s h: the mean force g of press and release, the hysteresis h "
-        "and\n"
-        "the direction state s. During a stroke the slope is g' + s h'; after a reversal h / r is added, "
-        "with\n"
-        "the play radius r.");
+        "With hysteresis the force is f = g + s h: the mean force g of press and release, the hysteresis\n"
+        "h and the direction state s. During a stroke the slope is g' + s h'; after a reversal h / r is\n"
+        "added, with the play radius r.");
     bind_fields<ForceBounds, 4>(type);
     constexpr double none = std::numeric_limits<double>::infinity();
     module.def(
@@ -38,9 +36,8 @@ void bind_bounds(py::module_& module) {
         "force_limit. A play_radius above 0 replaces the play radius of the model.");
     module.def("passive_shift", py::overload_cast<const ForceModel&, double>(&passive_shift), "model"_a,
                "force_limit"_a,
-               "Returns the force to add to the bias of a periodic model, so that its force, limited to "
-               "force_limit,\n"
-               "gives no energy over a period [N or N*m]; 0 for other models.");
+               "Returns the force to add to the bias of a periodic model, so that its force, limited to\n"
+               "force_limit, gives no energy over a period [N or N*m]; 0 for other models.");
     module.def(
         "renderable_slopes",
         [](const DeviceProfile& device, double stick, double rising, double falling) {
@@ -48,24 +45,19 @@ void bind_bounds(py::module_& module) {
             return std::pair{slopes.lower, slopes.upper};
         },
         "device"_a, "stick"_a = 0.0, py::kw_only(), "rising"_a = none, "falling"_a = none,
-        "Returns the (lowest, highest) slope of a model for which direct rendering on a device is "
-        "certified;\n"
-        "infinite if every slope is certified.\n\n"
-        "First finds the largest k for which slopes from -k to k are certified, with at most `falling` and\n"
-        "`rising`. Then finds the steepest falling slope, and after that the steepest rising slope. With\n"
-        "hysteresis these are slopes during a stroke; after a reversal h / r = `stick` is added (hysteresis "
-        "by\n"
-        "play radius).");
+        "Returns the (lowest, highest) slope of a model for which direct rendering on a device is\n"
+        "certified; infinite if every slope is certified.\n\n"
+        "First finds the largest k for which slopes from -k to k are certified, with at most `falling`\n"
+        "and `rising`. Then finds the steepest falling slope, and after that the steepest rising slope.\n"
+        "With hysteresis these are slopes during a stroke; after a reversal h / r = `stick` is added\n"
+        "(hysteresis by play radius).");
     module.def("steepest_stick", &steepest_stick, "device"_a,
-               "Returns the largest slope h / r (hysteresis by play radius) for which half of the largest "
-               "slope that\n"
-               "the device can render remains for the model's strokes.");
-    module.def(
-        "narrowest_play", &narrowest_play, "sliding"_a, "device"_a, "least"_a, "most"_a,
-        "Returns the smallest play radius from `least` to `most` for which a hysteresis model is certified;\n"
-        "infinity if there is none. `sliding` are bounds of the model's force with a play radius so large "
-        "that\n"
-        "a reversal adds no slope.");
+               "Returns the largest slope h / r (hysteresis by play radius) for which half of the\n"
+               "largest slope that the device can render remains for the model's strokes.");
+    module.def("narrowest_play", &narrowest_play, "sliding"_a, "device"_a, "least"_a, "most"_a,
+               "Returns the smallest play radius from `least` to `most` for which a hysteresis model is\n"
+               "certified; infinity if there is none. `sliding` are bounds of the model's force with a play\n"
+               "radius so large that a reversal adds no slope.");
 }
 
 void bind_inequality(py::module_& module) {
@@ -107,9 +99,8 @@ void bind_stability(py::module_& module) {
             return certify(model, scheme, device);
         },
         "model"_a, "scheme"_a, "device"_a,
-        "Returns the certificate of a model that a scheme renders on a device. If stability is not proved, "
-        "the\n"
-        "certificate states the reason. Raises ValueError for an invalid scheme or device.");
+        "Returns the certificate of a model that a scheme renders on a device. If stability is not\n"
+        "proved, the certificate states the reason. Raises ValueError for an invalid scheme or device.");
     module.def(
         "certify_bounds",
         [](const ForceBounds& bounds, const Scheme& scheme, const DeviceProfile& device) {
@@ -121,11 +112,9 @@ void bind_stability(py::module_& module) {
     module.def(
         "stiffest_coupling", &stiffest_coupling, py::kw_only(), "coupling_damping"_a, "falling"_a, "device"_a,
         "share"_a = usual_coupling_share,
-        "Returns the largest coupling stiffness K_c that is certified with only the given share of the "
-        "device's\n"
-        "damping; 0 if no stiffness is certified. `coupling_damping` is B_c; `falling` is the steepest "
-        "falling\n"
-        "slope of the object's force.");
+        "Returns the largest coupling stiffness K_c that is certified with only the given share of the\n"
+        "device's damping; 0 if no stiffness is certified. `coupling_damping` is B_c; `falling` is the\n"
+        "steepest falling slope of the object's force.");
     module.attr("usual_coupling_share") = usual_coupling_share;
     module.def(
         "explicit_scheme",
@@ -135,13 +124,10 @@ void bind_stability(py::module_& module) {
             return explicit_scheme(bounds, device, chosen);
         },
         "bounds"_a, "device"_a,
-        "Searches the explicit structure with the stiffest coupling, then the least object damping, for "
-        "which\n"
-        "the structure is stable, and returns its scheme. If none is stable, returns the last scheme that "
-        "was\n"
-        "tried. Keywords: mass, object_damping, coupling_stiffness, coupling_damping and play_radius; None: "
-        "the\n"
-        "search chooses the value.");
+        "Searches the explicit structure with the stiffest coupling, then the least object damping, for\n"
+        "which the structure is stable, and returns its scheme. If none is stable, returns the last\n"
+        "scheme that was tried. Keywords: mass, object_damping, coupling_stiffness, coupling_damping and\n"
+        "play_radius; None: the search chooses the value.");
     module.def("device_difference", &device_difference, "certified"_a, "device"_a,
                "Returns a sentence about the first field in which a device profile differs from the "
                "certified profile;\n"

@@ -260,9 +260,9 @@ void bind_wavelet(py::module_& module) {
         "translations beta, each as a list of d arrays (n, N): (value, by_alpha, by_beta).");
     module.def(
         "wavelet_steps", &wavelet_steps, "x"_a, "alpha"_a, "beta"_a,
-        "Returns the derivatives of the wavelets' values by changes without a unit, d log(alpha) of the "
-        "dilations\n"
-        "and alpha d(beta) of the translations: (n, 2 d N), columns ordered by quantity, input, wavelet.");
+        "Returns the derivatives of the wavelets' values by changes without a unit, d log(alpha) of the\n"
+        "dilations and alpha d(beta) of the translations: (n, 2 d N), columns ordered by quantity,\n"
+        "input, wavelet.");
     module.def(
         "wavelet_curvature_columns", &wavelet_curvature_columns, "x"_a, "alpha"_a, "beta"_a,
         "Returns the second derivatives of the wavelets' values by each input: a list of d arrays (n, N).");
