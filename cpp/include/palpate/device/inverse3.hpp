@@ -221,8 +221,9 @@ class Inverse3Device {
         const Json none = Json::array();
         const Json& devices = inventory.contains("inverse3") ? inventory.at("inverse3") : none;
         if (devices.empty()) {
-            throw std::runtime_error("the Haply Inverse Service at " + service +
-                                     " detects no Inverse3: plug it in, and check that Haply Hub shows it");
+            throw std::runtime_error(
+                "the Haply Inverse Service at " + service +
+                " detects no Inverse3: plug the Inverse3 in, and check that Haply Hub shows it");
         }
         const Json& device = devices.at(0);
         info_.id = device.at("device_id").get<std::string>();

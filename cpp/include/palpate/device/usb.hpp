@@ -208,18 +208,18 @@ class UsbDevice {
         if (!discard_packets(most_kept_packets, deadline) || !next_packet(deadline)) {
             return open_->transfers->has_failed()
                        ? "does not stream: " + detail::usb_reason(open_->transfers->error())
-                       : "sends no packets; unplug it and plug it in again";
+                       : "sends no packets; unplug the device and plug it in again";
         }
         if ((open_->stream.status_bits() & wire::fault_bits) != 0) {
-            return "reports " + fault_text(open_->stream.status_bits()) + "; remove the cause, then " +
-                   clear_cure;
+            return "reports " + fault_text(open_->stream.status_bits()) +
+                   "; remove the cause of the fault, then " + clear_cure;
         }
         if (!options_.makes_force) {
             return "";
         }
         if (const int code = open_->transfers->request(wire::Request::Enable, 1); code != 0) {
             return "cannot be enabled: " + (code == LIBUSB_ERROR_PIPE
-                                                ? std::string("it refuses the request; ") + clear_cure
+                                                ? std::string("the device refuses the request; ") + clear_cure
                                                 : detail::usb_reason(code));
         }
         while ((open_->stream.status_bits() & wire::enabled) == 0) {

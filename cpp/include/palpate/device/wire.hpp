@@ -44,17 +44,17 @@ enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog 
         case -1:  // LIBUSB_ERROR_IO
             return "the transfer failed on the bus; try another cable or port";
         case -3:  // LIBUSB_ERROR_ACCESS
-            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in "
-                   "again";
+            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug the "
+                   "device in again";
         case -4:  // LIBUSB_ERROR_NO_DEVICE
         case -5:  // LIBUSB_ERROR_NOT_FOUND
-            return "it was unplugged; plug it in and try again";
+            return "the device was unplugged; plug it in and try again";
         case -6:  // LIBUSB_ERROR_BUSY
-            return "another program uses it; end that program, then try again";
+            return "another program uses the device; end that program, then try again";
         case -7:  // LIBUSB_ERROR_TIMEOUT
-            return "it does not answer; unplug it and plug it in again";
+            return "the device does not answer; unplug it and plug it in again";
         case -9:  // LIBUSB_ERROR_PIPE
-            return "it refused a request; the version of its firmware may differ";
+            return "the device refused a request; the version of its firmware may differ";
         case -11:  // LIBUSB_ERROR_NO_MEM
             return "the system has no memory left for USB; see "
                    "/sys/module/usbcore/parameters/usbfs_memory_mb";
