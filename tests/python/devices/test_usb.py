@@ -90,7 +90,9 @@ def test_a_halted_endpoint_stalls_until_it_is_cleared(reported: dict[str, Any]) 
 def test_an_unplugged_device_is_not_found_until_it_is_plugged_in_again(
     reported: dict[str, Any],
 ) -> None:
-    assert reported["unplugged"].endswith("reading its identity: the device was unplugged; plug it in and try again")
+    assert reported["unplugged"].endswith(
+        "reading its identity: the device was unplugged; plug it in and try again"
+    )
     assert reported["found without it"] == 0
     assert reported["opened without it"].startswith("no haptic USB device is plugged in")
     assert reported["found again"] == "EMU-1"
