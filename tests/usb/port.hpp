@@ -91,7 +91,7 @@ class Port {
     void clear_halt(std::uint8_t endpoint) {
         device_.clear_halt(endpoint);
         (endpoint == 0x81 ? in_held_ : out_held_) = false;
-        // The packet that answers the host was lost, even if the host does not know this.
+        // The OUT packet with which the host answered was lost, even if the host does not know this.
         host_must_answer_ = host_must_answer_ && endpoint == 0x81;
     }
 
