@@ -133,7 +133,7 @@ def map_table(failure_map: Map) -> str:
 
 
 def spread(line: Map, largest_tried: float) -> str:
-    """Returns least and largest ratio of measured to theoretical limit, or the largest value without failure."""
+    """Returns least and largest ratio of measured to theoretical limit, or the largest tried value."""
     measured, theory = values(line, "measured"), values(line, "theory")
     comparable = np.isfinite(measured) & np.isfinite(theory) & (theory != 0.0)
     ratio, without_failure = (

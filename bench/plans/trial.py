@@ -92,7 +92,7 @@ def objects(switches: int) -> Iterator[tuple[str, Model, tuple[DeviceProfile, ..
 
 
 def measured_switches(n_files: int) -> list[Path]:
-    """Returns files at equal distances in the list of measured switches; an empty list without measured data."""
+    """Returns every n-th file of the measured switches, n_files in total; empty without measured data."""
     data_folder = os.environ.get("PALPATE_DATA")
     files = sorted((Path(data_folder) / "keyswitches").glob("*.csv")) if data_folder else []
     return files[:: max(1, len(files) // max(1, n_files))][:n_files]
