@@ -18,7 +18,7 @@ from palpate.recording.files import replacing
 ROOT = Path(__file__).parents[1]
 
 SCALE = float(os.environ.get("PALPATE_BENCH_SCALE", "1"))
-"""1 for published numbers, 0.01 for a quick test"""
+"""Scale of the sizes of all studies: 1 for published numbers, 0.01 for a quick test"""
 
 
 def count(full: int) -> int:
@@ -57,7 +57,7 @@ def where() -> dict[str, Any]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Replaces a file in one step, so an error leaves the old file."""
+    """Replaces a file in one step; if an error occurs, the old file remains unchanged."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -29,7 +29,7 @@ from bench.studies import SCALE, count, write_results
 PALPATE = METHODS[0].name
 
 SLOW_TIME_RATIO = 5.0
-"""Time relative to palpate above which a method runs in the first DRAWS_OF_SLOW_METHODS draws only"""
+"""Computing time of a method over that of palpate; slower methods run only DRAWS_OF_SLOW_METHODS draws"""
 
 DRAWS_OF_SLOW_METHODS = 3
 
@@ -72,7 +72,7 @@ def measure(name: str, n_draws: int, methods: Sequence[Method]) -> list[dict[str
 def is_skipped_as_slow(
     results: Sequence[tuple[float, Fitted]], palpate_results: Sequence[tuple[float, Fitted]] | None
 ) -> bool:
-    """Returns true if a method is so slow that it runs in the first draws only."""
+    """Returns true if a method is so slow that only the first draws use the method."""
     return (
         len(results) >= DRAWS_OF_SLOW_METHODS
         and palpate_results is not None
@@ -117,7 +117,7 @@ def line(row: dict[str, Any]) -> str:
 
 
 def _with_range(row: dict[str, Any], key: str) -> str:
-    """Returns median and range of a count."""
+    """Returns median and range of a count over the draws as text."""
     if row[key] is None:
         return ""
     low, high = row[f"{key}_range"]

@@ -32,13 +32,13 @@ from palpate import WaveletNetworkRegressor
 Array = NDArray[np.float64]
 
 PUBLISHED = ("LTI SS", "polynomial NARX", "best known (SOTA row)")
-"""Printed rows of the table: a linear model, a black box, and the best."""
+"""Published models in the printed table: a linear model, a black box, and the model with the least error."""
 
 DRIVE_MASS = 90.0
 """Start of the search for the mass of the drive [kg]."""
 
 SUBSTEPS = 10
-"""Steps of a sample period in the simulation of the drive."""
+"""Integration steps in each sample period of the simulated drive."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,11 @@ class Set:
     name: str
     unit: str
     factor: float = 1.0
-    """Factor from the unit of the file"""
+    """Factor from the unit of the file to the printed unit"""
     skip: int = 0
-    """First rows of a test that are not scored"""
+    """Number of first test rows that are not included in the error"""
     comparable: bool = True
-    """True if the published errors are of the same rows"""
+    """True if the published errors were measured on the same test rows"""
 
 
 @dataclass(frozen=True)
@@ -202,14 +202,14 @@ def includes_pulses(estimation_rows: pd.DataFrame, table: pd.DataFrame, period: 
 
 
 def smooth(signal: Array, period: float, derivative: int) -> Array:
-    """Returns the signal or its derivative, smoothed by cubics over 0.1 s."""
+    """Returns a signal or its time derivative, smoothed by cubic polynomials over windows of 0.1 s."""
     return np.asarray(savgol_filter(signal, 25, 3, deriv=derivative, delta=period))
 
 
 def simulate(
     force: Array, start: float, mass: float, friction: Callable[[float], float], period: float
 ) -> Array:
-    """Solves m dv/dt = F - f(v) by semi-implicit Euler steps."""
+    """Solves m dv/dt = F - f(v) for the velocity v by semi-implicit Euler steps."""
     position, velocity, result, step = start, 0.0, np.empty(len(force)), period / SUBSTEPS
     for k, force_of_sample in enumerate(force):
         result[k] = position
@@ -234,7 +234,7 @@ SETS: dict[str, Callable[[Path], list[Row]]] = {
 
 
 def with_published(folder: Path, row: Row) -> Row:
-    """Returns the row with the published errors of its test set, if there are any."""
+    """Returns a row of the table with the published errors of the same test set, if there are any."""
     table = pd.read_csv(folder / "sysid_benchmarks" / "published_results.csv")
     rows = table[(table.benchmark == row.benchmark) & (table.test_set == row.test_set)]
     errors = rows[(rows.metric == "RMSE") & (rows.unit == row.unit)].set_index("method").value

@@ -31,10 +31,10 @@ from bench.studies import fill_tables, markdown_table
 from palpate.plotting.look import grid
 
 ANY_SIGN, EARLIER = "_h_of_any_sign", "_force_25_ms_earlier"
-"""Suffixes of sets that repeat another set with other options."""
+"""Suffixes in the names of sets that contain the files of another set, fitted with other options."""
 
 WORST_SPLINE_RATIO = 1.3
-"""Ratio of the error to that of the splines above which a file is counted."""
+"""Error of a model over the error of the splines; files with a larger ratio are counted."""
 
 METHOD_STYLES = (
     ("o", "black"),
@@ -101,7 +101,7 @@ def problems(rows: Sequence[Row]) -> str:
 
 
 def with_range(row: Row, key: str, form: str) -> str:
-    """Returns median and range of a value; empty for a method without it."""
+    """Returns median and range of a value as text; empty for a method without this value."""
     if row[key] is None:
         return ""
     low, high = row[f"{key}_range"]
@@ -176,7 +176,7 @@ def row_of_crossing(row: Row, any_sign: Row, earlier: Row) -> tuple[str, ...]:
 
 
 def worst_ratio(files: Sequence[Row], splines: str) -> str:
-    """Returns the largest ratio of a model's error to that of its splines, and the number above the limit."""
+    """Returns the largest ratio of a model's error to the splines' error, and the number of large ratios."""
     errors = [(row["nrmse"], row[splines]["nrmse"]) for row in files if row[splines]]
     ratios = [
         error / splines_error
@@ -236,7 +236,7 @@ TABLES: Mapping[str, Callable[[Any], str]] = {
     "dynamic": dynamic,
     "filters": speeds,
 }
-"""Tables of studies that may not have run; crossing is the second table of real_data."""
+"""Names of the tables whose studies may not have run; `crossing` is the second table of real_data."""
 
 
 def draw_error_over(path: Path, rows: Sequence[Row], label: str, cost: Callable[[Row], float]) -> None:
@@ -323,7 +323,7 @@ def draw_over_speed(path: Path, rows: Sequence[Row]) -> None:
 
 
 def decades(values: Iterable[float]) -> tuple[float, float]:
-    """Returns whole decades that contain all values, at least one."""
+    """Returns the least range of whole powers of ten that contains all values."""
     exponents = [math.log10(value) for value in values]
     low, high = math.floor(min(exponents)), math.ceil(max(exponents))
     return 10.0**low, 10.0 ** max(high, low + 1)

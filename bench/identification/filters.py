@@ -29,7 +29,7 @@ from palpate.recording.sample import LOWER, UPPER
 
 MASS, DAMPING = 1e-3, 0.06
 FASTEST_HZ = (0.5, 1.0, 2.0, 4.0, 8.0)
-"""Highest frequency of the hand; the lowest is a tenth of it."""
+"""Highest frequency of the hand motion; the lowest frequency is a tenth of the highest."""
 
 CASES: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
     "matched, mass": ({"mass": MASS}, {}),
@@ -61,7 +61,7 @@ def error(
 
 
 def mean_force(model: Model, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns f, or the mean of press and release of a model with (wrongly identified) hysteresis."""
+    """Returns the force f, or the mean of press and release force if the model has (wrong) hysteresis."""
     if not model.hysteretic:
         return np.asarray(model.force(x))
     strokes = [np.asarray(model.force(x, direction=np.full(len(x), direction))) for direction in (1.0, -1.0)]

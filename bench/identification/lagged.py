@@ -15,7 +15,7 @@ N_FITS = 8
 """Number of alternating fits of the linear part and of the network"""
 
 DIVERGENCE_LIMIT = 3.0
-"""Distance from zero at which a free run counts as diverged [ranges of its data]"""
+"""Absolute output at which a free run counts as diverged [multiples of the range of the fitted outputs]"""
 
 
 class Lagged:
@@ -32,7 +32,7 @@ class Lagged:
 
     @property
     def start(self) -> int:
-        """Number of measured outputs at the start of a free run."""
+        """Number of measured outputs that start a free run; all later outputs are predicted."""
         return max(self._p, self._q)
 
     @property
@@ -49,10 +49,10 @@ class Lagged:
             return self
         wavelets = np.zeros((len(target), 0))
         for _ in range(N_FITS):
-            # lags and wavelets are nearly collinear: alternating fits would converge slowly
+            # past outputs and wavelets are nearly collinear columns: alternating fits would converge slowly
             columns = np.concatenate([X, np.ones((len(X), 1)), wavelets], axis=1)
             self._linear = np.linalg.lstsq(columns, target, rcond=1e-10)[0][: X.shape[1]]
-            # with the sign of a force, whose continuation outside the data rises with position
+            # f has the sign of a force, because a force outside the domain is continued to rise with position
             self._network.fit(X[:, list(self._state)], X @ self._linear - target)
             network = self._network.network_
             wavelets = wavelet_columns(
@@ -61,13 +61,13 @@ class Lagged:
         return self
 
     def one_step(self, u: Array, y: Array) -> Array:
-        """Predicts all rows past the start from measured outputs."""
+        """Predicts every row after the start from the measured outputs before this row."""
         lags = self._lags(u, y)
         inputs = lags if self._state is None else lags[:, list(self._state)]
         return np.asarray(lags @ self._linear + self._sign * self._network.predict(inputs))
 
     def free_run(self, u: Array, y: Array) -> Array:
-        """Predicts all rows past the start from the first measured outputs and the input; NaN: diverged."""
+        """Predicts all rows after the start from the first measured outputs and the input; NaN: diverged."""
         limit = DIVERGENCE_LIMIT * float(np.ptp(y))
         simulated = y.copy()
         simulated[self.start :] = np.nan

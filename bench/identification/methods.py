@@ -30,7 +30,7 @@ Predict = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Fitted:
-    """A method fitted to all rows with its chosen setting."""
+    """Model that a method has fitted to all rows with the setting that the method has chosen."""
 
     predict: Predict
     n_parameters: int
@@ -168,7 +168,7 @@ def frame_pursuit(X: Array, y: Array) -> Fitted:
     for n_tried in (8, 16, 24, 32, 48, 64, 96, 128):
         pursuit = OrthogonalMatchingPursuit(n_nonzero_coefs=min(n_tried, len(y) // 3))
         with warnings.catch_warnings():
-            # warns at the end of the dictionary
+            # the solver warns when no further wavelet of the frame can be selected
             warnings.simplefilter("ignore", RuntimeWarning)
             pursuit.fit(columns_at_rows[~held_out], y[~held_out])
         scores.append(
@@ -178,7 +178,7 @@ def frame_pursuit(X: Array, y: Array) -> Fitted:
     n_atoms = min(min(scores)[1], len(y) // 3)
     pursuit = OrthogonalMatchingPursuit(n_nonzero_coefs=n_atoms).fit(columns_at_rows, y)
     fitted_at_s = time.perf_counter()
-    # each atom counts its dilation, its translations and its weight
+    # each wavelet has one dilation, one translation for each input, and one weight
     count = n_atoms * (X.shape[1] + 2) + 1
     fit_seconds = (built_at_s - start) + (fitted_at_s - tuned_at_s)
     return Fitted(

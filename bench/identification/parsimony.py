@@ -43,7 +43,7 @@ def has_velocity(model: Model) -> bool:
 
 
 def has_true_mass_and_damping(model: Model) -> bool:
-    """Returns true if mass and damping are those of the object."""
+    """Returns true if the identified mass and damping are close to the true values of the object."""
     return (
         model.mass is not None
         and model.damping is not None
@@ -76,7 +76,7 @@ CLAIMS: dict[str, tuple[int, Callable[[int], Recording], Callable[[Model], bool]
         has_true_mass_and_damping,
     ),
 }
-"""Number of draws, recording of a draw, and test of its model."""
+"""Number of draws, function that makes the recording of a draw, and function that checks the model."""
 
 
 def is_correct_draw(claim: str, draw: int) -> bool:

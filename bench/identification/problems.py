@@ -26,7 +26,7 @@ TITLES = {
 
 @dataclass(frozen=True)
 class Problem:
-    """Rows for the fit and rows for the test."""
+    """Noisy rows that fit a model and exact rows that test the model."""
 
     name: str
     X: Array
@@ -38,7 +38,7 @@ class Problem:
     """Without noise"""
 
     def nrmse(self, predicted: Array) -> float:
-        """Returns the RMSE over the standard deviation of the truth."""
+        """Returns the RMS error divided by the standard deviation of the true force."""
         return float(np.sqrt(np.mean((predicted - self.truth) ** 2)) / np.std(self.truth))
 
 
@@ -105,7 +105,7 @@ _SWITCH = CubicHermiteSpline(
 
 
 def tactile_switch(x: Array) -> Array:
-    """Returns N over mm: a bump with kinks in the slope, and a stop of 20 N/mm at 3.8 mm."""
+    """Returns a force [N] over position [mm]: a bump with kinks, and a stop of 20 N/mm at 3.8 mm."""
     return _SWITCH(x) + 20.0 * 0.01 * np.logaddexp(0.0, (x - 3.8) / 0.01)
 
 

@@ -41,7 +41,7 @@ MOST_FILES = 16
 
 
 AT_TURN = 0.01
-"""Share of the travel before the turn"""
+"""Share of the travel before the reversal from press to release"""
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,9 @@ class Set:
     reading: Mapping[str, Any] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     folder: str = ""
-    """Folder, if its name is not that of the set"""
+    """Name of the folder, if it differs from the name of the set of recordings"""
     with_baselines: bool = True
-    """False if the baselines are those of another set"""
+    """False if another set of the same files already includes the results of the baselines"""
 
 
 SETS = {
@@ -123,7 +123,7 @@ def _stroke(recording: palpate.Recording, side: int) -> tuple[Array, Array]:
 def fit_palpate(
     recording: palpate.Recording, train: palpate.Recording, options: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Identifies the kept rows and tests the held-out rows of the baselines.
+    """Identifies a model from the rows that are not held out, and tests the rows held out for the baselines.
 
     The test uses the whole motion, because velocity and play need the rows between. Only the force of the
     held-out rows is unknown to the model.

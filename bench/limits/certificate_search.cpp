@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Searches motions that take out energy, for each line of the certificate. Prints the largest damping or friction with
-// such a motion over the certified value, one row for each line and delay.
+// Searches motions that take energy out, for each inequality of the certificate. Prints the largest damping or
+// friction at which such a motion exists, divided by the certified value; one row for each inequality and delay.
 //
-//   certificate_search [scenes of each line] [part of a line's name]
+//     certificate_search [scenes of each inequality] [part of an inequality's name]
 
 #include <algorithm>
 #include <chrono>

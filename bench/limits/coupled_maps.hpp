@@ -21,7 +21,8 @@
 
 namespace palpate::bench {
 
-/// Stiffness of a spring in the explicit structure driven by a force, (4m - 2 B_o T) / T^2, over the mass.
+/// Map: stiffness of a spring in the explicit structure, driven by a force, over the object mass. Theory: (4m - 2 B_o
+/// T) / T^2.
 [[nodiscard]] inline FailureMap explicit_map(int points) {
     constexpr double period = 1e-3;
     constexpr std::size_t ticks = 40'000;
@@ -39,8 +40,9 @@ namespace palpate::bench {
     return map;
 }
 
-/// Returns true if one of several objects behind a coupling gives energy in the steady state. Each object responds like
-/// a spring with a share of the coupling stiffness, or for a negative share like a mass.
+/// Returns true if a hand can take energy out of one of several objects behind a coupling in the steady state. Each
+/// object responds like a spring whose stiffness is a share of the coupling stiffness, or for a negative share like a
+/// mass.
 [[nodiscard]] inline bool coupling_generates_energy(VirtualCoupling coupling, const DeviceProfile& device) {
     constexpr double reach = 0.01;  // [rad]
     const double period = device.period_s;
@@ -63,18 +65,18 @@ namespace palpate::bench {
     return false;
 }
 
-/// Coupling damping over coupling stiffness in the maps [s].
+/// Ratio of coupling damping to coupling stiffness in the maps [s].
 inline constexpr double coupling_time = 0.2e-3;
 
-/// Stiffness of the stiffest coupling that is certified for every passive object behind it: b > K_c T / 2 + B_c,
-/// and its form with delay.
+/// Map: stiffness of the stiffest coupling that is certified for every passive object behind the coupling. Theory:
+/// device damping b > K_c T / 2 + B_c, and the same inequality with delay.
 [[nodiscard]] inline double coupling_limit(const DeviceProfile& device) noexcept {
     const double need = coupling_need({1.0, coupling_time}, device.period_s, device.whole_delay_samples(),
                                       device.delay_fraction());
     return device.viscous_damping / (device.period_s * need);
 }
 
-/// Coupling stiffness over the damping of the device.
+/// Map: coupling stiffness over the damping of the device.
 [[nodiscard]] inline FailureMap coupling_map(int points) {
     return {
         "coupling", "device damping b [N*m*s/rad]", "coupling stiffness K_c [N*m/rad]",
@@ -83,9 +85,9 @@ inline constexpr double coupling_time = 0.2e-3;
         })};
 }
 
-/// Steepest falling slope of an object behind a coupling over the coupling stiffness. The device has exactly the
-/// damping that the coupling needs, and its force limit is never reached. The bounds are sufficient: K_c + B_c/T
-/// without mass, K_c + (B_c + 2 B_o)/T with mass and backward Euler.
+/// Map: steepest falling slope of an object behind a coupling over the coupling stiffness. The device has exactly the
+/// damping that the coupling needs, and the force limit of the device is never reached. The theoretical slopes are
+/// sufficient: K_c + B_c/T without mass, K_c + (B_c + 2 B_o)/T with mass and backward Euler.
 [[nodiscard]] inline FailureMap falling_map(int points) {
     constexpr double width = 0.1;  // of the snap [rad]
     const double period = smooth_knob().period_s;
@@ -130,8 +132,9 @@ inline constexpr double coupling_time = 0.2e-3;
     return map;
 }
 
-/// Work of a hand on a free mass [J]. The hand deflects the coupling, waits until the mass has passed the handle, then
-/// slows it down with a force just below the device's limit. The device clips the structure's force.
+/// Work of a hand on a free mass [J]. The hand stretches the coupling, waits until the mass has passed the handle,
+/// then slows the mass down with a coupling force just below the force limit of the device. The device clips the force
+/// of the structure.
 template <Structure S>
 [[nodiscard]] double work_of_a_throw(S structure, VirtualCoupling coupling, const DeviceProfile& device,
                                      double deflection) {
@@ -163,8 +166,9 @@ template <Structure S>
     return work;
 }
 
-/// Work of a hand that accelerates a mass behind a coupling, over the deflection of the coupling. The force limit acts
-/// inside the step, on device and object, or outside, on the device only. Below 0 the hand takes out energy.
+/// Map: work of a hand that accelerates a mass behind a coupling, over the deflection of the coupling. The force limit
+/// is applied inside the step to device and object, or outside the step to the device only. Negative work means that
+/// the hand takes energy out.
 [[nodiscard]] inline FailureMap limit_map(int points) {
     constexpr double infinite = std::numeric_limits<double>::infinity();
     const Inertia mass{0.05, 0.0};
@@ -193,7 +197,7 @@ template <Structure S>
     return map;
 }
 
-/// Limit of each structure over the sample time, at the damping of the default knob.
+/// Map: stiffness limit of each structure over the sample time, at the damping of the default knob.
 [[nodiscard]] inline FailureMap period_map(int points) {
     constexpr Inertia inertia{0.001, 0.1};
     constexpr std::size_t ticks = 40'000;

@@ -11,11 +11,11 @@
 
 namespace palpate::bench {
 
-/// Limit of one method over one quantity, measured in simulation and computed by theory.
+/// Limit of one method as a function of one quantity, measured in simulation and computed by theory.
 struct FailureLine {
     std::string name;
     std::vector<double> at;        ///< the quantity
-    std::vector<double> measured;  ///< the largest value without failure; NaN: no value failed
+    std::vector<double> measured;  ///< largest tried value that did not fail; NaN: no value failed
     std::vector<double> theory;    ///< NaN: unlimited or unknown
 };
 
@@ -25,8 +25,9 @@ struct FailureMap {
     std::string along;  ///< the quantity on the horizontal axis, with its unit
     std::string limit;  ///< the quantity that is limited, with its unit
     std::vector<FailureLine> lines;
-    double searched = 0.0;  ///< largest tested value over the theory, if no value failed
-    bool linear = false;    ///< linear axis of the limit, which may be negative
+    /// Largest tested value divided by the theoretical limit, for points at which no value failed.
+    double searched = 0.0;
+    bool linear = false;  ///< true if the axis of the limit is linear, because the limit may be negative
 };
 
 /// Values from `first` to `last`, evenly spaced on a logarithmic axis.

@@ -41,14 +41,14 @@ PAGE = "where-each-method-fails.md"
 MARKERS = "os^Dv"
 DASHES = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (5, 2, 1, 2)), (0, (8, 3)))
 LONGEST_NAME_IN_TWO_COLUMNS = 30
-"""Longest name in a legend of two columns [characters]"""
+"""Largest length of a line name for a legend of two columns [characters]"""
 
 Map = Mapping[str, Any]
 """A map as the program prints it; null means NaN."""
 
 
 def values(line: Map, key: str) -> NDArray[np.float64]:
-    """Returns at, measured or theory of a line, (points,)."""
+    """Returns the array (points,) `at`, `measured` or `theory` of a line in a map."""
     return np.array(line[key], dtype=np.float64)
 
 
@@ -133,7 +133,7 @@ def map_table(failure_map: Map) -> str:
 
 
 def spread(line: Map, largest_tried: float) -> str:
-    """Returns smallest and largest ratio of measured over theory, or the largest value without failure."""
+    """Returns least and largest ratio of measured to theoretical limit, or the largest tried value."""
     measured, theory = values(line, "measured"), values(line, "theory")
     comparable = np.isfinite(measured) & np.isfinite(theory) & (theory != 0.0)
     ratio, without_failure = (

@@ -21,8 +21,9 @@
 
 namespace palpate::bench {
 
-/// Speed of the handle in the last of three seconds over the stiffness of a wall relative to its bound. A hand without
-/// damping presses; the guards are none, the energy tank, the limit-cycle detector, and both.
+/// Map: speed of the handle in the last of three seconds, over the ratio of a wall's stiffness to its bound. A hand
+/// without damping presses the wall. One line each: without a guard, with the energy tank, with the limit-cycle
+/// detector, and with both.
 [[nodiscard]] inline FailureMap guard_map(int points) {
     constexpr std::size_t second = 1000;
     FailureMap map{"guard", "stiffness K / (2 b / T)", "RMS speed [rad/s]", {}};

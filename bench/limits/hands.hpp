@@ -10,7 +10,8 @@
 
 namespace palpate {
 
-/// Passive hand: a mass on the handle, a spring and a damper to a fixed point. Without a hand all values are zero.
+/// Passive hand: a mass on the handle, a spring and a damper between handle and a fixed point. All values are zero if
+/// there is no hand.
 struct PassiveHand {
     double stiffness = 0.0;  ///< [N/m or N*m/rad]
     double damping = 0.0;    ///< [N*s/m or N*m*s/rad]
@@ -22,7 +23,8 @@ struct PassiveHand {
     }
 };
 
-/// Hand that oscillates at a share of the Nyquist frequency. At this frequency a sampled wall is half a cycle late.
+/// Hand that oscillates at a share of the Nyquist frequency. At the Nyquist frequency the force of a sampled wall lags
+/// by half a cycle.
 struct ShakingHand {
     double stiffness = 0.0;  ///< of the grip [N/m or N*m/rad]
     double centre = 0.0;     ///< [m or rad]
@@ -37,8 +39,8 @@ struct ShakingHand {
     }
 };
 
-/// Hand that extracts energy: it crosses the object's steepest part at constant speed in both directions. There the
-/// held force lags the object's force during each tick.
+/// Hand that extracts energy: it moves the handle through the steepest part of the object at constant speed in both
+/// directions. In this part the held force lags the object's force most during each tick.
 struct GreedyHand {
     double grip_damping = 1.0;  ///< force for each error of the speed [N*s/m or N*m*s/rad]
     double centre = 0.0;        ///< of the steepest part [m or rad]
@@ -65,8 +67,9 @@ struct PacingHand {
     int ticks = 1;              ///< Number of ticks of `turns` turns, at least 1.
     double grip_damping = 1e6;  ///< Far above every damping of device and object [N*s/m or N*m*s/rad].
     double period_s = 1e-3;     ///< Of the tick [s].
-    int rests = 1;              ///< Ticks before the first motion, while the object is placed at the handle.
-    int turns = 1;              ///< From 1 to ticks.
+    /// Ticks before the first motion of the hand, in which the object is placed at the handle.
+    int rests = 1;
+    int turns = 1;  ///< From 1 to ticks.
 
     [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
         const double tick = std::round(time / period_s) - rests;

@@ -25,8 +25,9 @@ namespace palpate::bench {
     return device;
 }
 
-/// Returns true if a directly rendered spring oscillates with growing amplitude with a heavy hand. The phase advances
-/// by 0.03 rad during the mean delay of the force, (1/2 + n_d) T. The spring fails just above the bound.
+/// Returns true if a directly rendered spring oscillates with growing amplitude against a heavy hand. The phase
+/// advances by 0.03 rad during the mean delay of the force, (1/2 + n_d) T. The spring fails at a stiffness just above
+/// the theoretical bound.
 [[nodiscard]] inline bool spring_oscillates(const DeviceProfile& device, double stiffness) {
     constexpr double late_phase = 0.03;  // [rad]
     constexpr double radians = 1000.0;   // of the simulated oscillation
@@ -37,14 +38,14 @@ namespace palpate::bench {
     return oscillates_with(Direct{LinearObject{stiffness}}, device, heavy, stiffness, ticks);
 }
 
-/// Stiffness of the stiffest spring that is certified for a device without steps. The required damping is proportional
-/// to the slope.
+/// Stiffness of the stiffest spring that is certified for a device without encoder steps. The required damping is
+/// proportional to the stiffness.
 [[nodiscard]] inline double direct_limit(const DeviceProfile& device) {
     return device.viscous_damping / (device.longest_period_s() * device_need(device, {1.0, 0.0}));
 }
 
-/// Measures a limit over the damping of the device, one line for each delay. `limit(device)` is the theory;
-/// `fails(device, stiffness)` is searched up to `reach` times the theory.
+/// Measures a stiffness limit over the damping of the device, one line for each delay. `limit(device)` is the
+/// theoretical limit; the boundary of `fails(device, stiffness)` is searched up to `reach` times this limit.
 template <class Limit, class Fails>
 [[nodiscard]] std::vector<FailureLine> lines_over_damping(int points, double reach, Limit limit,
                                                           Fails fails) {
@@ -64,14 +65,14 @@ template <class Limit, class Fails>
     return lines;
 }
 
-/// Stiffness of a directly rendered spring over the damping of the device.
+/// Map: stiffness of a directly rendered spring over the damping of the device.
 [[nodiscard]] inline FailureMap damping_map(int points) {
     return {"damping", "device damping b [N*m*s/rad]", "stiffness K [N*m/rad]",
             lines_over_damping(points, 10.0, direct_limit, spring_oscillates)};
 }
 
-/// Returns lengths of a motion over the edge between two encoder counts. Friction, damping or the encoder dominates.
-/// Most are far below a count.
+/// Returns amplitudes of a motion over the border between two encoder counts, so that friction, damping or the encoder
+/// dominates. Most amplitudes are far below one encoder step.
 [[nodiscard]] inline std::vector<double> motions_over_an_edge(const DeviceProfile& device) {
     const double balance = device.coulomb_friction * device.period_s / device.viscous_damping;
     const double step = device.encoder_step;
@@ -107,8 +108,9 @@ template <class Limit, class Fails>
     return map;
 }
 
-/// Hysteresis h of a spring over the play radius. While the play operator sticks the slope is g' + h/r, and
-/// b >= T (g' + h/r) (1/2 + n_d). Without the term h/r the hysteresis would be unlimited.
+/// Map: hysteresis h of a spring over the play radius r. While the play operator does not move, the slope is g' + h/r,
+/// and the required damping is b >= T (g' + h/r) (1/2 + n_d). Without the term h/r the theory would not limit the
+/// hysteresis.
 [[nodiscard]] inline FailureMap play_map(int points) {
     constexpr double spring = 10.0;  // g' [N*m/rad]
     FailureMap map{"play", "play radius r [rad]", "hysteresis h [N*m]", {}};
@@ -131,7 +133,8 @@ template <class Limit, class Fails>
     return device.viscous_damping / (device.longest_period_s() * predicted_need(device, predict, {1.0, 0.0}));
 }
 
-/// Returns true if a firm hand takes out energy in the steady state at one of 60 frequencies up to the Nyquist one.
+/// Returns true if a firm hand takes energy out in the steady state at one of 60 frequencies up to the Nyquist
+/// frequency.
 [[nodiscard]] inline bool predicted_spring_generates(const DeviceProfile& device, int predict,
                                                      double stiffness) {
     constexpr int frequencies = 60;
@@ -149,7 +152,7 @@ template <class Limit, class Fails>
     return false;
 }
 
-/// Stiffness of a spring rendered at a predicted position over the number of samples of the prediction.
+/// Map: stiffness of a spring rendered at a predicted position over the number of samples of the prediction.
 [[nodiscard]] inline FailureMap prediction_map(int points) {
     FailureMap map{"prediction", "samples m of the prediction", "stiffness K [N*m/rad]", {}};
     std::vector<double> taps;
@@ -171,8 +174,8 @@ template <class Limit, class Fails>
     return map;
 }
 
-/// Stiffness of a spring without growing oscillation over the mass of a passive hand. The theory is the bound for every
-/// hand, so the map shows the margin of a given hand.
+/// Map: stiffness of a spring without growing oscillation over the mass of a passive hand. The theory is the bound for
+/// every hand, so the map shows the margin for a hand of this mass.
 [[nodiscard]] inline FailureMap hand_map(int points) {
     FailureMap map{"hand", "mass of the hand [kg*m^2]", "stiffness K [N*m/rad]", {}};
     map.searched = 40.0;

@@ -54,11 +54,11 @@ class PredictionGain:
     damping: tuple[float, float]
     """Certified b / (T M): slopes from 0 to M, and from -M to M"""
     friction: float
-    """Certified f_c over that without prediction"""
+    """Certified Coulomb friction f_c divided by the value without prediction"""
     knob: dict[str, float]
     """Force errors of the sample's knob at 2 Hz in 4 s [N*m], and the work of the error [J]"""
     ratio: dict[str, NDArray[np.float64]]
-    """(cases,) force error without prediction over that with it, for each error"""
+    """Force error without prediction divided by the error with prediction (cases,), for each kind of error"""
 
     def spread(self, error: str) -> tuple[float, float, float]:
         """Returns the median, 10 % and 90 % quantile of a ratio."""
@@ -140,7 +140,7 @@ def hands(model: Model) -> Iterator[Hand]:
 
 
 def certificate(samples: int, steepest_fall: float, device: DeviceProfile) -> dict[str, float]:
-    """Returns the right side of each inequality for slopes from -steepest_fall to 1."""
+    """Returns the right side of each certificate inequality, for force slopes from -steepest_fall to 1."""
     bounds = ForceBounds(slope_min=-steepest_fall, slope_max=1.0, steepest=1.0, sliding=1.0)
     scheme = Scheme(structure="direct", predict=samples)
     return {line.id: line.right for line in certify_bounds(bounds, scheme, device).inequalities}
@@ -158,7 +158,7 @@ def friction(samples: int) -> float:
 
 
 def draw_prediction(axes: Axes, gains: Sequence[PredictionGain]) -> None:
-    """Draws force errors over that without prediction, with their 10 to 90 % range, over the damping."""
+    """Draws the force errors relative to no prediction, with 10 % and 90 % quantiles, over the damping."""
     x = np.array([gain.damping[1] for gain in gains])
     for name, error, marker, filled, sign in (
         ("mean of a tick", "mean", "o", "white", -1),

@@ -13,7 +13,7 @@
 
 namespace palpate::bench {
 
-/// Returns true if the branch of the solution depends on the start of the search.
+/// Returns true if the solver finds different solutions from different start positions.
 [[nodiscard]] inline bool jumps_branches(double p, double falling) noexcept {
     constexpr int lines = 400;
     const SnappingObject object{falling, 0.1};
@@ -42,8 +42,8 @@ namespace palpate::bench {
     return true;
 }
 
-/// Slope limit of the solvers over the sample time: a unique solution while p + min f' > 0, a convergent fixed-point
-/// iteration while max |f'| < p. p is that of the default coupling and inertia.
+/// Map: slope limit of the solvers over the sample time. The solution is unique if p + min f' > 0, and the fixed-point
+/// iteration converges if max |f'| < p. The slope p of the load line is that of the default coupling and inertia.
 [[nodiscard]] inline FailureMap solver_map(int points) {
     FailureMap map{"solver", "sample time T [s]", "steepest slope [N*m/rad]", {}};
     const auto massless = [](double period) {

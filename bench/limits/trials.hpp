@@ -44,7 +44,7 @@ struct SnappingObject {
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
 
-/// A straight line as one of the two curves of a hysteresis.
+/// A straight line as the mean force or the hysteresis of a model.
 struct StraightCurve {
     double slope = 0.0;
     double offset = 0.0;
@@ -56,14 +56,15 @@ struct StraightCurve {
     [[nodiscard]] bool extrapolated(double /*x*/) const noexcept { return false; }
 };
 
-/// f = g x + s h: a spring with constant hysteresis.
+/// f = g x + s h: a spring of stiffness g with constant hysteresis h and direction state s.
 using ConstantHysteresis = HysteresisPair<StraightCurve>;
 
 static_assert(Environment<LinearObject> && Environment<ConstantHysteresis> && Environment<SnappingObject>);
 
 inline constexpr double not_finite = std::numeric_limits<double>::infinity();
 
-/// Detects a growing oscillation: the largest value in the last quarter of a motion exceeds that in the second quarter.
+/// Detects a growing oscillation: the largest amplitude in the last quarter of a motion exceeds the largest in the
+/// second quarter.
 class Growth {
   public:
     explicit Growth(std::size_t ticks) noexcept : ticks_{ticks} {}
@@ -90,7 +91,7 @@ class Growth {
     bool diverged_ = false;
 };
 
-/// Returns true if a structure that is driven by a force oscillates with growing amplitude after a push.
+/// Returns true if a virtual object that is driven by a force oscillates with growing amplitude after a push.
 template <Structure S>
 [[nodiscard]] bool oscillates_force_driven(S structure, std::size_t ticks) noexcept {
     structure.reset(0.0);
@@ -107,11 +108,12 @@ template <Structure S>
 
 inline constexpr Guards unguarded{.limit = {1e9}};
 
-/// Returns true if a passive hand and the object, a spring around 0, oscillate with growing amplitude.
+/// Returns true if a passive hand and a rendered spring with rest position 0 oscillate together with growing
+/// amplitude.
 template <Structure S>
 [[nodiscard]] bool oscillates_with(S structure, DeviceProfile device, const PassiveHand& hand,
                                    double stiffness, std::size_t ticks) {
-    constexpr double endless = 1e150;  // a force limit would stop the growth [N*m]
+    constexpr double endless = 1e150;  // without force limit, which would stop the growth [N*m]
     device.force_limit = endless;
     const double inertia = device.inertia + hand.mass;
     Growth growth{ticks};
@@ -123,13 +125,13 @@ template <Structure S>
     return growth.grows();
 }
 
-/// Work that a pacing hand has put in, after all turns and after half of them.
+/// Work that a hand with prescribed motion has put in, after all reversals and after half of the reversals.
 struct PacedWork {
     double half = 0.0;      ///< [J]
     double whole = 0.0;     ///< [J]
-    double rounding = 0.0;  ///< bound of its rounding error [J]
+    double rounding = 0.0;  ///< bound of the rounding error of the work [J]
 
-    /// Returns true if the hand takes out energy in the steady state.
+    /// Returns true if the hand takes energy out in the steady state.
     [[nodiscard]] bool negative() const noexcept { return whole - half < -rounding; }
 };
 
@@ -154,10 +156,10 @@ template <Structure S>
     return work;
 }
 
-/// Ticks of half a period of the pacing hands, from the Nyquist frequency down.
+/// Half periods of the prescribed motions [ticks], starting at the Nyquist frequency.
 inline constexpr std::array<int, 9> paces{1, 2, 3, 4, 6, 10, 20, 60, 500};
 
-/// Returns true if a hand takes out energy in the steady state at one of the paces.
+/// Returns true if a hand takes energy out in the steady state at one of the frequencies.
 template <class Build>
 [[nodiscard]] bool generates_energy(Build build, const DeviceProfile& device, double reach) {
     return std::any_of(paces.begin(), paces.end(), [&](int pace) {

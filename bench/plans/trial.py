@@ -41,7 +41,7 @@ LINEAR_DEVICES = (
 
 @dataclass(frozen=True)
 class Row:
-    """Result of one object on one device; forces in the unit of the model."""
+    """Plan and trial of one object on one device; force errors in the unit of the model."""
 
     object: str
     device: str
@@ -92,7 +92,7 @@ def objects(switches: int) -> Iterator[tuple[str, Model, tuple[DeviceProfile, ..
 
 
 def measured_switches(n_files: int) -> list[Path]:
-    """Returns evenly spaced files of the measured switches; an empty list without measured data."""
+    """Returns every n-th file of the measured switches, n_files in total; empty without measured data."""
     data_folder = os.environ.get("PALPATE_DATA")
     files = sorted((Path(data_folder) / "keyswitches").glob("*.csv")) if data_folder else []
     return files[:: max(1, len(files) // max(1, n_files))][:n_files]
@@ -201,7 +201,7 @@ def unchanged_part(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[f
     for force in forces:
         nearest = slope_limited(x, force, lowest_slope, highest_slope)
         unchanged &= np.abs(nearest - force) <= 1e-6 * np.ptp(force)
-    # Kinks are rounded over 0.5 % of the travel, so six times this length does not count as unchanged.
+    # Limiting rounds kinks over 0.5 % of the travel; 3 % around a kink does not count as unlimited.
     margin = round(0.03 * SAMPLES)
     unchanged = np.convolve(~unchanged, np.ones(2 * margin + 1), mode="same") < 0.5
     force_error = np.abs(strokes(chosen.rendered, x) - forces).max(axis=0)

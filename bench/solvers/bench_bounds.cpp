@@ -37,7 +37,8 @@ NetworkParameters random_network(std::size_t size, std::size_t dimension, double
     return network;
 }
 
-/// Fails if the bound is violated or its excess over the largest slope is above `allowed`.
+/// Measures one network; fails if the proved bound is smaller than the searched slope, or exceeds it by more than
+/// `allowed` times the largest slope.
 void assert_tight(benchmark::State& state, Interval proved, Interval sampled, double allowed) {
     const double excess =
         std::max(proved.upper - sampled.upper, sampled.lower - proved.lower) / sampled.largest();

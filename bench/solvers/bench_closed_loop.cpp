@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures simulated ticks for each second, with object, guards, device, hand and energy account, 20 substeps a tick.
-// A run fails if its energy account does not close up to rounding.
+// Measures the number of simulated ticks per second of computing time, with object, guards, device, hand and energy
+// account, 20 integration substeps for each tick. A run fails if the sum of its energy account differs from zero by
+// more than rounding.
 
 #include <cmath>
 #include <utility>

@@ -109,7 +109,8 @@ struct CubicSpline : Nodes {
     }
 };
 
-/// Checks the largest deviation from the exp loop; the benchmark fails above the error that the method promises.
+/// Checks the largest deviation of a method from the loop over std::exp; the benchmark fails if the deviation exceeds
+/// the error that the method promises.
 template <class Method>
 void assert_answer(benchmark::State& state, const palpate::WaveletNetwork& network, const Method& method) {
     const ExpLoop exact{network};
@@ -154,7 +155,7 @@ void throughput(benchmark::State& state) {
     assert_answer(state, network, method);
 }
 
-/// Batch evaluation, which Python uses for arrays.
+/// Evaluates many positions in one call, as Python does for arrays.
 void throughput_batch(benchmark::State& state) {
     const auto network = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
     const std::vector<double> motion = palpate::bench::hand_motion(4000);
@@ -238,7 +239,7 @@ void latency_of_inputs(benchmark::State& state) {
     }
 }
 
-/// Time of loading a model: the table and its certificate.
+/// Time of loading a model: building the table of the force and proving its error.
 void compile(benchmark::State& state) {
     const auto network = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
     for (auto _ : state) {

@@ -34,7 +34,8 @@ using palpate::WaveletNetwork;
 
 constexpr double period = 1e-3;
 
-/// Object with a coupling and an inertia. In the scene of the clicks only the explicit step has one solution.
+/// Object with a coupling and an inertia. In the scene with two clicks only the step of the explicit structure has
+/// exactly one solution.
 struct SpringWall {
     static constexpr VirtualCoupling coupling{100.0, 0.02};
     static constexpr Inertia inertia{0.001, 0.5};
@@ -50,7 +51,7 @@ std::size_t size_of(const benchmark::State& state) {
     return static_cast<std::size_t>(state.range(0));
 }
 
-/// Times the steps of `initial` and compares them with those of `reference`.
+/// Measures the time of the steps of `initial` and compares their results with those of `reference`.
 template <class S, class R>
 void step(benchmark::State& state, const WaveletNetwork& object, const S& initial, R reference,
           double allowed_error) {
@@ -89,7 +90,7 @@ void step(benchmark::State& state, const WaveletNetwork& object, const S& initia
     }
 }
 
-/// Search over the sum of wavelets; the steps are short enough to find every root.
+/// Searches the solution over the sum of wavelets; the search steps are short enough to find every solution.
 LoadLineSolver reference_solver() {
     LoadLineSolver solver;
     solver.longest_step = 0.002;
@@ -122,7 +123,7 @@ void massless(benchmark::State& state, const WaveletNetwork& object, const Solve
          palpate::Massless{object, Scene::coupling, period, reference_solver()}, exactly);
 }
 
-/// The reference: an explicit step, with the same table of f.
+/// The reference is a step of the explicit structure with the same table of the force f.
 template <class Scene>
 void explicit_step(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));
@@ -140,7 +141,8 @@ void implicit_table(benchmark::State& state) {
                     Resolvent{object.curve(), implicit_slope<Scene>()});
 }
 
-/// Newton's method in certified cells, with predictor; at a snap-through in the brackets of the branches.
+/// Newton's method in cells with a proved convergence, started by a predictor; if the object snaps through, in the
+/// interval of each solution branch.
 template <class Scene>
 void implicit_newton(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));
@@ -153,14 +155,14 @@ void implicit_newton(benchmark::State& state) {
     }
 }
 
-/// The same, over the sum of wavelets.
+/// Newton's method as above, but with the sum of wavelets instead of the cells.
 void implicit_newton_network(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
     implicit<SpringWall>(state, object, object,
                          CertifiedSolver{palpate::piecewise(object.curve()), implicit_slope<SpringWall>()});
 }
 
-/// Plain Newton's method, from the last position until the step is small.
+/// Newton's method without cells, from the last position until the Newton step is small.
 void implicit_textbook(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
     implicit<SpringWall>(state, object, CompiledNetwork{object}, LoadLineSolver{});
@@ -183,7 +185,7 @@ void direct(benchmark::State& state) {
     step(state, object, palpate::Direct{CompiledNetwork{object}}, palpate::Direct{object}, exactly);
 }
 
-/// Exact for a line only: its deviation is the residual of one step of Newton's method.
+/// One step of Newton's method is exact only if the force is a straight line; otherwise its residual is the deviation.
 void linearly_implicit(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
     step(state, object,
@@ -221,7 +223,7 @@ void substepped(benchmark::State& state) {
     step(state, object, over(CompiledNetwork{object}), over(object), exactly);
 }
 
-/// Time of loading: the tables and their certificates.
+/// Time of loading a model: building the tables and proving their error.
 template <class Scene>
 void build(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));

@@ -29,7 +29,7 @@ using palpate::CompiledNetwork;
 constexpr palpate::VirtualCoupling coupling{100.0, 0.02};
 constexpr palpate::Inertia inertia{0.001, 0.5};
 constexpr double duration_s = 2.0;
-constexpr double settled_s = 0.2;  // the transient of the start has decayed
+constexpr double settled_s = 0.2;  // start time of the comparison, after the initial transient has decayed
 constexpr std::int64_t longest_ns = 4'000'000;
 constexpr std::int64_t shortest_ns = 62'500;
 constexpr int truth_steps = 64;  // of the exact motion, in each shortest period

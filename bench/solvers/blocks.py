@@ -21,7 +21,7 @@ REPETITIONS = 9
 
 
 def scaled(seconds: float) -> float:
-    """Returns a duration at the current scale."""
+    """Returns a duration, multiplied by the scale of the current run."""
     return seconds * SCALE
 
 

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from bench.solvers.results import BenchmarkResults, Row, nanoseconds
 
 Runs = Mapping[str, Row]
-"""Benchmarks of all files by their names."""
+"""Results of the benchmarks of all files; the keys are the benchmark names."""
 
 
 class Claim(NamedTuple):
@@ -40,7 +40,7 @@ def slowest_over_fastest(names: list[str]) -> Callable[[Runs], float]:
 
 
 def largest_counter(prefix: str, key: str) -> Callable[[Runs], float]:
-    """Returns the largest value of a counter over all runs with this prefix."""
+    """Returns the largest value of a counter over all benchmarks whose names begin with this prefix."""
     return lambda runs: max(row[key] for name, row in runs.items() if name.startswith(prefix) and key in row)
 
 

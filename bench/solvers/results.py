@@ -47,7 +47,7 @@ class BenchmarkResults:
         self.rows: list[Row] = [
             {**rows[0], **_medians(rows), "name": name} for name, rows in repetitions.items()
         ]
-        # Interleaved repetitions come in any order.
+        # The file contains the interleaved repetitions of all benchmarks in any order.
         self.rows.sort(key=lambda row: (row.get("family_index", 0), row.get("per_family_instance_index", 0)))
 
     def number(self, row: Row, key: str) -> float:

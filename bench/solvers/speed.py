@@ -30,7 +30,7 @@ from palpate.plotting.look import grid
 from palpate.verdict import FORCE_JND
 
 PERIOD_S = 1e-3
-"""Motion for which the computing times of different periods are compared [s]"""
+"""Duration of the simulated motion for which computing times are compared [s]"""
 
 MARKERS = "os^Dv<>pP*Xhd"
 THIN_LINE: dict[str, Any] = {

@@ -17,35 +17,35 @@
 
 namespace palpate::test {
 
-/// A hand that grips a resting handle after some time, so that the first forces of a delayed device meet an object at
-/// rest.
+/// A hand that takes hold of a resting handle some time after the start, so that the first forces of a device with
+/// delay find the object at rest.
 template <SimulatedHand H>
 struct Later {
     H hand;
-    double from = 0.0;  ///< time of the grip [s]
+    double from = 0.0;  ///< time at which the hand takes hold of the handle [s]
 
     [[nodiscard]] Grip grip(double time, const Motion& handle) noexcept {
         return time < from ? Grip{1e9, 1e6, handle.position, 0.0, 0.0} : hand.grip(time, handle);
     }
 };
 
-/// A certified rendering: model, scheme, device and start.
+/// A certified rendering: model, scheme, device profile and start position.
 struct Scene {
     ForceModel model;
     Scheme scheme;
     DeviceProfile device;
     double start = 0.0;
-    double steepest = 0.0;  ///< position of the largest f' [m or rad]
+    double steepest = 0.0;  ///< position at which the slope f' of the force is largest [m or rad]
 
-    /// Stored energy at the start above its least, and the largest |V| [J].
+    /// Stored energy at the start minus the least stored energy, and the largest absolute stored energy |V| [J].
     double held = 0.0;
     double largest = 0.0;
 };
 
-/// Returns a random model of position, with or without hysteresis.
+/// Returns a random force model of position, with or without hysteresis.
 inline ForceModel random_model(Random& random, bool hysteresis) {
     NetworkParameters network = random_network(random, random() % 7);
-    if (random() % 2 == 0) {  // a force that rises everywhere
+    if (random() % 2 == 0) {  // a force that rises at every position
         network.linear[0] -= slope_bounds(network, 0.0, 1.0).lower;
     }
     const auto side = [&] { return random() % 2 == 0 ? Continuation::Linear : Continuation::Free; };
@@ -65,7 +65,7 @@ inline ForceModel random_model(Random& random, bool hysteresis) {
     return {network, hysteresis_part, domain, uniform(random, 0.005, 0.05)};
 }
 
-/// Returns the position of the largest slope.
+/// Returns the position at which the slope of the force is largest.
 inline double steepest_place(const ForceModel& model) {
     double place = 0.0;
     double most = -1e300;
@@ -83,7 +83,7 @@ inline double steepest_place(const ForceModel& model) {
     return place;
 }
 
-/// Returns V of the object that a structure sees, at rest [J].
+/// Returns the energy V that the virtual object of a structure stores at rest [J].
 inline double energy_at(const ForceModel& model, const Scheme& scheme, double x) {
     if (scheme.compensated) {
         return Compensated{*model.network(), scheme.coupling.stiffness}.at(x, {}).energy;
@@ -92,8 +92,8 @@ inline double energy_at(const ForceModel& model, const Scheme& scheme, double x)
                                          : model.network()->at(x, {}).energy;
 }
 
-/// Returns the device with the damping and friction that the certificate requires, times `factor`; nothing if the scene
-/// cannot be certified.
+/// Returns the device with the damping and friction that the certificate requires, times `factor`; nothing if the
+/// scene cannot be certified.
 inline std::optional<DeviceProfile> device_at_its_bound(const ForceModel& model, const Scheme& scheme,
                                                         DeviceProfile device, double factor) {
     constexpr double placeholder_damping = 12345.0;
@@ -115,7 +115,7 @@ inline std::optional<DeviceProfile> device_at_its_bound(const ForceModel& model,
     return device;
 }
 
-/// Returns a random certified scene, with a margin of `factor` - 1 in damping and friction.
+/// Returns a random certified scene, whose device has `factor` times the required damping and friction.
 inline Scene random_certified_scene(Random& random, double factor) {
     for (;;) {
         constexpr std::array kinds{StructureKind::Direct, StructureKind::Massless, StructureKind::Implicit,
@@ -162,7 +162,7 @@ inline Scene random_certified_scene(Random& random, double factor) {
     }
 }
 
-/// Runs a scene in a closed loop with an energy account.
+/// Runs a scene in a closed control loop and computes the energy account of hand, device and object.
 template <SimulatedHand H, class Watch>
 ClosedLoopEnd run(const Scene& scene, H hand, std::size_t ticks, int substeps, Watch watch) {
     const double from = (scene.device.late_samples() + 2) * scene.device.period_s;

@@ -18,7 +18,8 @@
 
 namespace palpate::test {
 
-/// Returns the number of random cases: `quick` in the usual tier, PALPATE_TEST_SCALE times that in the full tier.
+/// Returns the number of random test cases: `quick` in the normal test run, PALPATE_TEST_SCALE times `quick` in the
+/// full test run.
 inline int cases(int quick) {
     const char* scale = std::getenv("PALPATE_TEST_SCALE");
     return quick * std::max(1, scale == nullptr ? 1 : std::atoi(scale));
@@ -55,7 +56,8 @@ inline Domain unit_domain(Continuation below = Continuation::Linear,
     return {{0.0}, {1.0}, below, above, std::nullopt};
 }
 
-/// Returns the largest falling slope of f, edge lines included, within 1e-9 of max|f'|; negative if f rises everywhere.
+/// Returns the steepest falling slope of the force f, including its straight continuations, within 1e-9 of max|f'|;
+/// negative if f rises at every position.
 inline double steepest_fall(const PiecewiseForce& force) {
     double least = slope_bounds(force.network, force.lower, force.upper, 1e-9).lower;
     for (const auto* side : {&force.below, &force.above}) {
@@ -66,7 +68,7 @@ inline double steepest_fall(const PiecewiseForce& force) {
     return -least;
 }
 
-/// A spring, f = stiffness * x, for which every limit is known.
+/// A spring, f = stiffness * x, for which every stability limit has a formula.
 struct Spring {
     using State = Stateless;
     double stiffness;

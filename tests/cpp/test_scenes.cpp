@@ -24,8 +24,8 @@ constexpr int substeps = 8;
 constexpr auto to_the_end = [](const Tick& /*tick*/, const Motion& /*handle*/,
                                const EnergyAccount& /*account*/) { return true; };
 
-/// Returns the energy that the hand took out in excess of the stored energy, divided by the rounding error. A value
-/// above 1 is a violation.
+/// Returns the energy that the hand took out in excess of the stored energy, divided by the rounding error of the
+/// account. A value above 1 violates the certificate.
 double generated(const Scene& scene, const ClosedLoopEnd& end) {
     const double rounding = 1e-13 * scene.largest + 1e-15;
     return -(end.energy.least + scene.held) / rounding;
@@ -111,7 +111,8 @@ TEST(CertifiedScenes, DoNotOscillateWithPassiveHands) {
     }
 }
 
-/// Returns a scene of a random network of position and velocity, on a device with exactly the need of its certificate.
+/// Returns a scene with a random network of position and velocity, on a device with exactly the damping and friction
+/// that its certificate requires.
 Scene random_scene_of_velocity(test::Random& random) {
     NetworkParameters network = test::random_network(random, random() % 7, 2);
     const double fastest = test::uniform(random, 0.2, 5.0);
@@ -119,7 +120,7 @@ Scene random_scene_of_velocity(test::Random& random) {
         network.alpha[2 * i + 1] = std::exp(test::uniform(random, -1.0, 2.0)) / fastest;
         network.beta[2 * i + 1] = test::uniform(random, -1.0, 1.0) * fastest;
     }
-    network.linear[1] = test::uniform(random, -0.2, 0.2);  // also an object that pushes
+    network.linear[1] = test::uniform(random, -0.2, 0.2);  // also an object that pushes the handle away
     const double slowest = random() % 4 == 0 ? test::uniform(random, 0.0, 0.1) : -fastest;
     Scene scene{
         ForceModel::of_velocity(network, {{0.0, slowest}, {1.0, fastest}, {}, {}, std::nullopt}), {}, {}};
@@ -127,9 +128,9 @@ Scene random_scene_of_velocity(test::Random& random) {
     return scene;
 }
 
-/// Returns the energy of the object at rest at x above that at its lower edge [J].
+/// Returns the energy of the object at rest at position x minus its energy at the lower edge of the domain [J].
 double resting_energy(const VelocityNetwork& force, double x) {
-    constexpr int cells = 200;  // over a quarter of the travel at most
+    constexpr int cells = 200;  // play radius of at most a quarter of the travel
     const double step = (x - force.lower()) / cells;
     double sum = 0.0;
     for (int k = 0; k < cells; ++k) {
@@ -142,7 +143,7 @@ double resting_energy(const VelocityNetwork& force, double x) {
 
 // spec section 7, velocity models: b >= T M/2 + t_d L + B_v, f_c >= L_x Delta/2 + B_v Delta/T
 TEST(CertifiedScenes, NeverGiveEnergyWithForcesOfVelocity) {
-    constexpr double quadrature = 1e-6;  // [J]; the objects hold tenths
+    constexpr double quadrature = 1e-6;  // tolerance [J]; the objects store tenths of a joule
     test::Random random{22};
     for (int k = 0; k < test::cases(200); ++k) {
         Scene scene = random_scene_of_velocity(random);

@@ -25,8 +25,8 @@
 
 namespace emulator {
 
-/// Receives the orders of a test as datagrams and answers each one, independent of the tested library. The environment
-/// variable PALPATE_EMULATOR names the socket.
+/// Receives the orders of a test to the emulator as datagrams and answers each order. The code is independent of the
+/// tested library. The environment variable PALPATE_EMULATOR names the socket.
 class Orders {
   public:
     explicit Orders(std::function<std::string(const std::string&)> execute_order)
@@ -81,7 +81,8 @@ class Orders {
     std::thread executor_;
 };
 
-/// Runs the command as a child process. The child receives the signals that end a program and ends with this process.
+/// Runs a command of the operating system as a child process. The child receives the signals that end this program,
+/// and ends when this process ends.
 class Command {
   public:
     /// Starts the command; `prepare` runs in the child.
@@ -104,7 +105,7 @@ class Command {
         }
     }
 
-    /// Waits for the end and returns the exit code like a shell.
+    /// Waits for the end of the child process and returns its exit code in the form that a shell uses.
     int wait() {
         int status = 0;
         while (::waitpid(child(), &status, 0) < 0 && errno == EINTR) {

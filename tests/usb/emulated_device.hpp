@@ -60,7 +60,7 @@ class EmulatedDevice {
         return answer;
     }
 
-    /// Ends the torque, as bus reset, suspend and SET_CONFIGURATION do.
+    /// Sets the torque to zero, as bus reset, suspend and SET_CONFIGURATION do.
     void disarm() {
         motor_.disarm();
         halts_ = {};
@@ -69,7 +69,8 @@ class EmulatedDevice {
 
     // ------------------------------------------------------------------------------------------------- frames
 
-    /// Advances by a millisecond: moves the mechanics, runs the watchdog, latches the encoder.
+    /// Advances the device by one millisecond: moves the mechanics, runs the watchdog, stores the encoder count of
+    /// this frame.
     void frame() {
         faults_.frame(out_seen_);
         unplugged_ = unplugged_ || faults_.used_last(FaultKind::Unplug);
@@ -97,7 +98,7 @@ class EmulatedDevice {
         latch();
     }
 
-    /// Returns true if an IN packet belongs to this protocol.
+    /// Returns true if an IN packet belongs to this version of the protocol.
     [[nodiscard]] static bool is_whole(const Bytes& packet) {
         return packet.size() == 32 && packet[0] == 'H' && packet[1] == 1;
     }
@@ -150,8 +151,9 @@ class EmulatedDevice {
 
     void inject(FaultKind kind, std::uint32_t count) { faults_.inject(kind, count); }
     [[nodiscard]] bool is_unplugged() const { return unplugged_; }
-    /// Returns true while transfers are refused. Such frames last a real millisecond, because the timeouts of the host
-    /// are in real time. A halted endpoint is different: the host receives the halt and clears it.
+    /// Returns true while the device refuses transfers. Frames in this state last a real millisecond, because the
+    /// timeouts of the host are in real time. A halted endpoint does not count: the host receives the halt and clears
+    /// it.
     [[nodiscard]] bool withholds_packets() const { return naks_ || mute_; }
     [[nodiscard]] bool is_slow() const { return slow_; }
 
@@ -269,9 +271,9 @@ class EmulatedDevice {
     std::uint64_t frames_ = 0;
     std::uint16_t sequence_ = 0;
     std::uint32_t clock_us_ = 0;
-    bool out_seen_ = false;  ///< the frames of the script are counted
+    bool out_seen_ = false;  ///< an OUT packet has arrived, so the frames of the fault script are counted
 
-    std::deque<Bytes> packets_;  ///< not yet read
+    std::deque<Bytes> packets_;  ///< IN packets that the host has not yet read
     Bytes last_sent_;
     std::int32_t last_count_ = 0;
     bool naks_ = false;

@@ -24,7 +24,7 @@ inline std::string send_order(const std::string& order) {
     sockaddr_un own{};
     own.sun_family = AF_UNIX;
     ::bind(connection, reinterpret_cast<const sockaddr*>(&own),
-           sizeof own.sun_family);  // the kernel chooses a name
+           sizeof own.sun_family);  // the kernel chooses a name for the socket
     sockaddr_un emulator{};
     emulator.sun_family = AF_UNIX;
     std::string{std::getenv("PALPATE_EMULATOR")}.copy(emulator.sun_path, sizeof emulator.sun_path - 1);
@@ -44,7 +44,7 @@ inline double state(const std::string& field) {
     return value.rfind("true", 0) == 0 ? 1.0 : value.rfind("false", 0) == 0 ? 0.0 : std::stod(value);
 }
 
-/// Returns a device with a long timeout, because the machine of the test may be busy.
+/// Returns a device with a long timeout, because the computer that runs the test may be slow.
 inline UsbDevice patient(const std::string& serial = "") {
     UsbOptions options;
     options.serial = serial;
@@ -52,8 +52,8 @@ inline UsbDevice patient(const std::string& serial = "") {
     return UsbDevice{options};
 }
 
-/// Exchanges until every command is sent, the last one has reached the motor, the reading is the newest one and only
-/// two reads are in flight. From then on, one exchange is one frame.
+/// Exchanges packets until every command is sent, the last command has reached the motor, the reading is the newest
+/// one, and only two reads are queued. Then each further exchange takes exactly one frame.
 inline Reading settled(UsbDevice& device, double force = 0.0) {
     Reading reading;
     for (int k = 0; k < 4; ++k) {
@@ -65,8 +65,8 @@ inline Reading settled(UsbDevice& device, double force = 0.0) {
         return reading.status != Status::Lost && device.in_flight() <= 2 && newest;
     };
     for (int k = 0; k < 1000 && reading.status != Status::Fault && !is_settled(); ++k) {
-        std::this_thread::sleep_for(
-            std::chrono::milliseconds{2});  // a packet in flight then waits for the exchange
+        // A packet on its way to the host then waits for the next exchange.
+        std::this_thread::sleep_for(std::chrono::milliseconds{2});
         if (!is_settled()) {
             reading = device.exchange({force});
         }

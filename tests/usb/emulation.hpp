@@ -21,10 +21,10 @@ struct Settings {
     std::vector<Fault> script;
     bool lock_step = false;
     double rate_hz = 1000.0;
-    std::chrono::milliseconds lock_step_timeout{3000};  ///< longest wait of lock-step for the host
+    std::chrono::milliseconds lock_step_timeout{3000};  ///< lock-step: longest wait of a frame for the host
     std::string trace;                                  ///< CSV, one row for each frame
-    std::string preload_first;                          ///< a sanitizer's library
-    bool denied = false;                                ///< the node cannot be opened
+    std::string preload_first;                          ///< library of a sanitizer, loaded first
+    bool denied = false;                                ///< true: opening the device file fails
     std::vector<std::string> command;
 };
 
@@ -130,7 +130,7 @@ inline constexpr const char* options_text =
     return settings;
 }
 
-/// Executes an order of a test (fault KIND COUNT, state) and returns the answer.
+/// Executes an order of a test ("fault KIND COUNT" or "state") and returns the answer of the emulator.
 [[nodiscard]] inline std::string execute_order(Port& port, const std::string& order) {
     const std::size_t space = order.find(' ');
     const std::string verb = order.substr(0, space);

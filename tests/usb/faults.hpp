@@ -13,7 +13,8 @@
 
 namespace emulator {
 
-/// Kind of a fault. The first six have numbers on the wire (request 0x7F, wValue 1 to 6).
+/// Kind of a fault of the emulated device. The first six have numbers in the USB protocol (request 0x7F, wValue 1 to
+/// 6).
 enum class FaultKind : std::uint8_t {
     StallIn,          ///< The IN endpoint halts, once for each count.
     StallOut,         ///< The OUT endpoint halts, once for each count.
@@ -36,7 +37,7 @@ enum class FaultKind : std::uint8_t {
     Jump,             ///< The count has an error of a quarter turn.
     FrozenEncoder,    ///< The count repeats.
     Slow,             ///< Frames last three times longer.
-    Busy,             ///< OUT packets are refused with NAK and are a frame late; IN packets continue.
+    Busy,             ///< OUT packets are refused with NAK and arrive one frame late; IN packets continue.
 };
 
 inline constexpr std::array<std::string_view, 22> fault_names{
@@ -46,7 +47,7 @@ inline constexpr std::array<std::string_view, 22> fault_names{
     "emergency-stop", "reset",     "saturate", "jump",    "frozen-encoder",
     "slow",           "busy"};
 
-/// Fault with its duration in packets or frames and its first frame.
+/// Fault with its duration (in packets or frames) and its first frame.
 struct Fault {
     FaultKind kind = FaultKind::StallIn;
     std::uint32_t count = 1;
@@ -76,14 +77,14 @@ struct Fault {
     return fault;
 }
 
-/// Active faults, and the faults of the script.
+/// Faults that are active now, and the faults of the script with their first frames.
 class Faults {
   public:
     explicit Faults(std::vector<Fault> script) : script_{std::move(script)} {}
 
     void inject(FaultKind kind, std::uint32_t count) { remaining(kind) = std::max(count, 1U); }
 
-    /// Begins a frame; it belongs to the script if `counts`.
+    /// Begins a frame; the frame number of the script increases if `counts`.
     void frame(bool counts) {
         started_ += counts ? 1 : 0;
         for (const Fault& fault : script_) {
@@ -92,10 +93,10 @@ class Faults {
             }
         }
     }
-    /// Returns the number of frames of the script.
+    /// Returns the number of frames that the fault script has counted.
     [[nodiscard]] std::uint64_t started() const { return started_; }
 
-    /// Returns true if a fault is active, and uses it once.
+    /// Returns true if a fault is active, and reduces the remaining count of this fault by one.
     bool used(FaultKind kind) {
         if (remaining(kind) == 0) {
             return false;
@@ -105,7 +106,7 @@ class Faults {
     }
     /// Returns the remaining count of a fault and sets it to zero.
     std::uint32_t used_up(FaultKind kind) { return std::exchange(remaining(kind), 0); }
-    /// Returns true if a fault was used for the last time.
+    /// Reduces the remaining count of an active fault by one; returns true if the count becomes zero.
     bool used_last(FaultKind kind) { return used(kind) && remaining(kind) == 0; }
 
   private:

@@ -30,13 +30,13 @@ NEEDED = {
     "ldd": "libc-bin",
 }
 LONGEST_RUN_S = 1800
-"""Longest run of the guest [s]"""
+"""Longest allowed run of the guest Linux in QEMU [s]"""
 UNPRIVILEGED = "nobody"
 """User without rights"""
 
 
 def missing() -> str:
-    """Returns the missing packages as the reason of a skipped test; empty if the guest can run."""
+    """Returns the names of missing packages, for the reason of a skipped test; empty if none is missing."""
     if platform.machine() != "x86_64":
         return f"needs a machine that is x86_64, not {platform.machine()}"
     missing_packages = [package for tool, package in NEEDED.items() if shutil.which(tool) is None]
@@ -75,7 +75,7 @@ def libraries(program: Path) -> list[Path]:
 
 
 def install_module(driver: Path, folder: Path) -> None:
-    """Copies a driver, which is compressed in newer kernels."""
+    """Copies a kernel driver; newer kernels store drivers compressed."""
     packed = Path(f"{driver}.xz")
     content = driver.read_bytes() if driver.exists() else lzma.decompress(packed.read_bytes())
     (folder / driver.name).write_bytes(content)

@@ -10,7 +10,7 @@
 
 namespace emulator {
 
-/// Properties of a device, and its choices for everything that the protocol leaves open.
+/// Properties of an emulated device, and its choices for everything that the protocol leaves open.
 struct Identity {
     // GET_INFO
     std::uint8_t magic = 'I';  ///< Another value makes it a foreign device.
@@ -39,7 +39,7 @@ struct Identity {
     bool has_second_interface = false;
     Bytes class_descriptor;  ///< between interface and endpoints
 
-    // Counters begin close to their ends, so that they wrap in every run.
+    // The counters begin close to their largest values, so that they overflow to zero in every run.
     std::uint16_t first_sequence = 65'500;
     std::uint32_t first_us = 4'294'867'296U;
     std::int32_t first_count = 0;
@@ -47,17 +47,20 @@ struct Identity {
     std::uint16_t first_out_age_us = 0xFFFF;  ///< Echoed before the first OUT packet.
 
     // Choices of the firmware
-    bool reversed = false;                ///< The torque has the wrong sign.
-    bool applies_out_first = false;       ///< OUT packets act before the encoder of their frame is latched.
-    bool ends_in_transfer_first = false;  ///< A frame ends its IN transfer before its OUT transfer.
-    std::size_t held_packets =
-        0;  ///< Number of packets that wait unread. With 0 the newest replaces an unread one.
-    bool accepts_while_disabled = true;  ///< Otherwise OUT packets are accepted only while it is enabled.
+    bool reversed = false;  ///< The torque has the wrong sign.
+    /// The torque of an OUT packet acts before the encoder count of its frame is stored.
+    bool applies_out_first = false;
+    /// The device completes the IN transfer of a frame before the OUT transfer.
+    bool ends_in_transfer_first = false;
+    /// Number of IN packets that wait until the host reads them. With 0 the newest packet replaces an unread one.
+    std::size_t held_packets = 0;
+    /// Otherwise OUT packets are accepted only while the device is enabled.
+    bool accepts_while_disabled = true;
     bool refuses_by_stall = true;    ///< Otherwise ENABLE after an emergency stop is accepted without effect.
-    bool stop_disables = true;       ///< An emergency stop also clears the enabled bit.
+    bool stop_disables = true;       ///< An emergency stop also clears the enabled bit of the status.
     std::uint16_t spare_status = 0;  ///< Bits without a meaning.
     std::uint16_t temperature_dC = 253;
-    std::int32_t torque_step_uNm = 1;  ///< Resolution of the current control.
+    std::int32_t torque_step_uNm = 1;  ///< Smallest change of the torque that the current control makes.
     std::uint32_t latch_jitter_us = 0;
 
     [[nodiscard]] Bytes device_descriptor() const {
@@ -77,7 +80,8 @@ struct Identity {
             rest.insert(rest.end(), part.begin(), part.end());
         }
         if (has_second_interface) {
-            const Bytes second{9, 4, 1, 0, 0, 0xFE, 0x01, 0x01, 0};  // for another firmware
+            // Interface for another purpose, firmware update.
+            const Bytes second{9, 4, 1, 0, 0, 0xFE, 0x01, 0x01, 0};
             rest.insert(rest.end(), second.begin(), second.end());
         }
         Bytes bytes{9, 2};

@@ -20,13 +20,13 @@ inline constexpr std::uint16_t encoder_fault = 16;
 inline constexpr std::uint16_t over_temperature = 32;
 inline constexpr std::uint16_t emergency_stop = 64;
 
-/// Motor of a device, with everything that ends a torque. Times are those of the device's clock.
+/// Motor of a device, with every event that sets the torque to zero. Times are those of the device's clock.
 class Motor {
   public:
     explicit Motor(Identity identity)
         : identity_{std::move(identity)}, out_sequence_{identity_.first_out_sequence} {}
 
-    /// Restarts like after power-up; only the first values of the counters differ.
+    /// Restarts with the state after power-up, except for the first values of the counters.
     void restart() {
         const Identity identity = identity_;
         const std::uint64_t outs = outs_;
@@ -36,7 +36,7 @@ class Motor {
         outs_ = outs;
         bad_outs_ = bad_outs;
     }
-    /// Ends the torque, as bus reset, suspend and SET_CONFIGURATION do.
+    /// Sets the torque to zero, as bus reset, suspend and SET_CONFIGURATION do.
     void disarm() {
         enabled_ = false;
         torque_uNm_ = 0;
@@ -65,13 +65,13 @@ class Motor {
         return {};
     }
 
-    /// Sets a fault of the status until CLEAR.
+    /// Sets a fault bit of the status; the bit stays set until the request CLEAR.
     void fail(std::uint16_t bit) {
         faults_ |= bit;
         torque_uNm_ = 0;
         enabled_ = enabled_ && !(bit == emergency_stop && identity_.stop_disables);
     }
-    /// Halves the torque and sets the status bit.
+    /// Halves the torque and sets the status bit for saturation.
     void saturate(bool now) { saturates_ = now; }
 
     void take(const Bytes& packet, std::uint32_t clock_us) {
@@ -96,7 +96,7 @@ class Motor {
             torque_uNm_ = 0;
         }
     }
-    /// Runs the watchdog.
+    /// Runs the watchdog, which sets the torque to zero if no command arrives in time.
     void look(std::uint32_t clock_us) {
         if (has_command_ &&
             clock_us - command_us_ >= 1000U * std::min<std::uint32_t>(watchdog_ms_, life_ms_)) {
@@ -141,7 +141,7 @@ class Motor {
     std::int32_t torque_uNm_ = 0;
     std::uint16_t out_sequence_ = 0;
     std::uint32_t command_us_ = 0;
-    bool has_command_ = false;  ///< since the start
+    bool has_command_ = false;  ///< a command has arrived since the start of the device
     std::uint64_t outs_ = 0;
     std::uint64_t bad_outs_ = 0;
 };

@@ -22,7 +22,7 @@ struct Plant {
     double hand_damping = 0.05;    ///< B_h [N*m*s/rad]
     double hand_lower = 0.02;      ///< smallest target [rad]
     double hand_upper = 0.47;      ///< largest target [rad]
-    double hand_hz = 0.5;          ///< sweeps a second
+    double hand_hz = 0.5;          ///< strokes of the hand back and forth in a second
 
     double position = 0.0;  ///< [rad]
     double velocity = 0.0;  ///< [rad/s]

@@ -12,9 +12,9 @@
 
 namespace emulator {
 
-/// Transfer of the host, with the terms of the kernel.
+/// Transfer that the host has submitted, with the terms of the Linux kernel.
 struct Transfer {
-    std::uint64_t id = 0;  ///< id of the transport
+    std::uint64_t id = 0;  ///< identifier that the transport uses
     const void* owner = nullptr;
     bool is_control = false;
     std::uint8_t endpoint = 0;
@@ -25,7 +25,8 @@ struct Transfer {
     int status = 0;          ///< 0 or a negative errno
 };
 
-/// Port of the device: transfers wait here until a frame serves them. It is independent of the transport.
+/// USB port of the emulated device: transfers wait here until a frame executes them. The port is independent of the
+/// transport.
 class Port {
   public:
     explicit Port(EmulatedDevice device) : device_{std::move(device)} {}
@@ -33,7 +34,7 @@ class Port {
     [[nodiscard]] EmulatedDevice& device() { return device_; }
     [[nodiscard]] const EmulatedDevice& device() const { return device_; }
 
-    /// Returns 0 or a negative errno. Control transfers end at once.
+    /// Submits a transfer; returns 0 or a negative errno. Control transfers complete immediately.
     int submit(Transfer transfer) {
         if (device_.is_unplugged()) {
             return -ENODEV;
@@ -58,7 +59,7 @@ class Port {
         return 0;
     }
 
-    /// Cancels a waiting transfer, which ends with `status`. Returns false if it is not waiting.
+    /// Cancels a waiting transfer, which completes with `status`. Returns false if the transfer is not waiting.
     bool cancel(std::uint64_t id, const void* owner, int status) {
         for (std::deque<Transfer>* queue : {&in_, &out_}) {
             const auto found = std::find_if(queue->begin(), queue->end(), [&](const Transfer& transfer) {
@@ -80,7 +81,7 @@ class Port {
         host_must_answer_ = true;
     }
 
-    /// Removes the transfers of a client that has ended.
+    /// Removes the transfers of a client process that has ended.
     void remove_client(const void* owner) {
         for (std::deque<Transfer>* queue : {&in_, &out_, &done_}) {
             std::erase_if(*queue, [&](const Transfer& transfer) { return transfer.owner == owner; });
@@ -90,8 +91,8 @@ class Port {
     void clear_halt(std::uint8_t endpoint) {
         device_.clear_halt(endpoint);
         (endpoint == 0x81 ? in_held_ : out_held_) = false;
-        host_must_answer_ =
-            host_must_answer_ && endpoint == 0x81;  // the answer was lost, even if the host does not know it
+        // The OUT packet with which the host answered was lost, even if the host does not know this.
+        host_must_answer_ = host_must_answer_ && endpoint == 0x81;
     }
 
     /// Runs one frame of the bus.
@@ -126,15 +127,16 @@ class Port {
         }
     }
 
-    /// Returns true if the host has done its part of a frame: it reads, and has answered every packet that it could.
+    /// Returns true if the host has done everything it can do in this frame: a read is queued, and each received
+    /// packet that needs a command is answered.
     [[nodiscard]] bool host_is_ready() const {
         return !in_.empty() && (!out_.empty() || !host_must_answer_) && !in_held_ && !out_held_;
     }
-    /// Returns true if the host keeps reads queued; false if it reads and writes one after the other.
+    /// Returns true if the host keeps several reads queued; false if the host reads and writes alternately.
     [[nodiscard]] bool host_reads_ahead() const { return reads_ahead_; }
-    /// Returns true if such a host has not queued the next read.
+    /// Returns true if a host that keeps several reads queued has no read queued now.
     [[nodiscard]] bool has_no_read() const { return reads_ahead_ && in_.empty(); }
-    /// Returns true if an OUT packet has missed its frame.
+    /// Returns true if an OUT packet has arrived too late for its frame.
     [[nodiscard]] bool is_behind() const { return out_refused_ && !out_.empty(); }
     [[nodiscard]] std::deque<Transfer>& done() { return done_; }
     [[nodiscard]] std::size_t waiting() const { return in_.size() + out_.size(); }
@@ -191,10 +193,12 @@ class Port {
 
 /// Decides when a frame begins.
 ///
-/// Paced: every millisecond; up to three late frames follow at once. Lock-step: when the host has done its part, so
-/// that the result does not depend on the speed of the machine. Before the host's first command, and while the device
-/// refuses transfers, frames follow the clock in lock-step too, while the host reads. Otherwise a frame waits for the
-/// host; after `lock_step_timeout` the host misses one frame. For a host without two queued reads it waits a few milliseconds.
+/// Paced mode: a frame begins every millisecond; up to three late frames follow immediately.
+///
+/// Lock-step mode: a frame begins when the host has read and answered, so that the result does not depend on the speed
+/// of the computer. Before the first command of the host, and while the device refuses transfers, frames follow the
+/// clock while the host reads. Otherwise a frame waits for the host; after `lock_step_timeout` the host misses one
+/// frame. For a host without two queued reads the frame waits a few milliseconds.
 class FrameClock {
   public:
     using Clock = std::chrono::steady_clock;
@@ -211,7 +215,8 @@ class FrameClock {
     }
     void host_left() { host_is_connected_ = false; }
 
-    /// Returns true if a frame begins now; otherwise sets `until` to the latest time of the next call.
+    /// Returns true if a frame begins now; otherwise sets `until` to the latest time at which this function must be
+    /// called again.
     [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {
         const EmulatedDevice& device = port.device();
         const bool in_step =
@@ -234,14 +239,15 @@ class FrameClock {
     }
 
   private:
-    /// Time for earlier packets to arrive before lock-step begins; otherwise the host stays a packet behind.
+    /// Time in which earlier packets arrive before lock-step begins; without it the host stays one packet behind the
+    /// device.
     static constexpr std::chrono::milliseconds settling{20};
 
     bool lock_step_;
     Clock::duration period_;
     Clock::duration lock_step_timeout_;
     Clock::time_point last_ = Clock::now();
-    Clock::time_point first_ = last_;  ///< first frame in lock-step
+    Clock::time_point first_ = last_;  ///< time of the first frame in lock-step
     bool host_is_connected_ = false;
 };
 

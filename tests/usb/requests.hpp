@@ -35,7 +35,7 @@ struct Setup {
           length{get<std::uint16_t>(bytes, 6)} {}
 };
 
-/// Endpoints that refuse every transfer until they are cleared.
+/// Halted endpoints, which refuse every transfer until the host clears the halt.
 struct Halts {
     bool in = false;
     bool out = false;
@@ -43,7 +43,8 @@ struct Halts {
     void clear(std::uint8_t endpoint) { (endpoint == 0x81 ? in : out) = false; }
 };
 
-/// Answers the standard requests (chapter 9 of the USB specification), except those that end a torque.
+/// Answers the standard requests (chapter 9 of the USB specification), except the requests that set the torque to
+/// zero.
 [[nodiscard]] inline Answer standard_answer(const Setup& setup, const Identity& identity, Halts& halts) {
     switch (setup.request) {
         case 0: {  // GET_STATUS

@@ -24,7 +24,7 @@ SOURCES = ROOT / "tests" / "usb"
 
 
 def emulator() -> Path | str:
-    """Returns the program, built if necessary, or the reason why it cannot be built."""
+    """Returns the path of the emulator, built if necessary, or the reason why it cannot be built."""
     given = os.environ.get("PALPATE_USB_EMULATOR")
     if given:
         return Path(given)

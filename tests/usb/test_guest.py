@@ -172,7 +172,7 @@ def test_force_error_is_at_most_twice_that_of_the_simulated_device(
 
 
 def force_error(plan: Plan, force: np.ndarray, ends: np.ndarray) -> float:
-    """Returns the RMS of applied force minus model at the end of the tick; `ends` starts one tick earlier."""
+    """Returns the RMS of applied force minus model force at tick ends; `ends` starts one tick earlier."""
     return float(np.sqrt(np.mean(np.square(force - force_at(plan, ends)[1:]))))
 
 

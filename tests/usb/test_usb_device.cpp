@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests UsbDevice with the real libusb on an emulated device, in lock-step, without assertions on wall-clock time.
+// Tests UsbDevice with the real libusb on an emulated device. Frames wait for the host (lock-step), and no test
+// compares real time.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -83,7 +84,7 @@ TEST(UsbDevice, StreamsEverySampleOnceAndInOrder) {
     EXPECT_EQ(health.stalls, 0U);
     EXPECT_EQ(health.bus_errors, 0U);
     EXPECT_GE(health.stream.round_trip.count(), static_cast<std::uint64_t>(samples));
-    // A busy machine sometimes misses a frame, so that a command is late or skipped.
+    // A slow computer sometimes misses a frame, so that a command arrives late or is skipped.
     EXPECT_LE(health.skipped_commands - before.skipped_commands, static_cast<std::uint64_t>(samples / 2));
     EXPECT_NEAR(health.stream.delay.quantile(0.5), 1e6, 1e6 / 256);  // one sample; histogram resolution
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests UsbDevice with faults on the wire and in the device.
+// Tests UsbDevice with faults of the USB transfers and faults of the device.
 #include <chrono>
 #include <cstdint>
 #include <string>
@@ -86,7 +86,8 @@ TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
     ASSERT_EQ(device.open().reason, "");
     int late = 0;
     int in_time_again = 0;
-    for (int round = 0; round < rounds; ++round) {  // the first includes the first command of the stream
+    // The first round includes the first command of the stream.
+    for (int round = 0; round < rounds; ++round) {
         send_order("fault busy 1");
         int in_a_row = 0;
         for (int k = 0; k < commands; ++k) {
@@ -97,7 +98,7 @@ TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
         in_time_again += in_a_row >= commands / 2 ? 1 : 0;
     }
     EXPECT_GE(late, rounds);
-    EXPECT_GE(in_time_again, rounds / 2);  // all rounds, if this machine is fast enough
+    EXPECT_GE(in_time_again, rounds / 2);  // every round, if this computer is fast enough
 }
 
 TEST(UsbDevice, CountsSkippedSamplesInTheSequence) {
@@ -129,7 +130,7 @@ TEST(UsbDevice, WatchdogEndsTheTorqueUntilTheNextCommand) {
     ASSERT_TRUE(device.open());
     settled(device, 0.2);
     EXPECT_EQ(state("torque_uNm"), -200'000.0);
-    send_order("fault freeze 15");  // longer than the lifetime of a command
+    send_order("fault freeze 15");  // the fault lasts longer than the device applies a command
     const Reading tripped = device.exchange({0.2});
     EXPECT_EQ(tripped.status, Status::Timeout);
     EXPECT_EQ(tripped.applied, 0.0);
@@ -186,7 +187,8 @@ TEST(UsbDevice, ReportsAFaultAfterUnpluggingAndOpensAgainAfterPluggingIn) {
         device.close();
         EXPECT_EQ(device.in_flight(), 0);
         EXPECT_EQ(open_files(), files);
-        const std::string reason = device.open().reason;  // the system may not have noticed yet
+        // The operating system may not have removed the device yet.
+        const std::string reason = device.open().reason;
         EXPECT_TRUE(reason.find("is connected") != std::string::npos ||
                     reason.find("was unplugged") != std::string::npos)
             << reason;

@@ -87,11 +87,12 @@ TEST(UsbOtherFirmware, BehavesLikeTheUsualDevice) {
         last = reading;
     }
     const double step = wire::position_of(1, device.info().counts_per_rev);
-    EXPECT_NEAR(last.position - state("position_rad"), began, 4.0 * step + 2e-3);  // one or two samples late
+    // The reading is one or two samples late.
+    EXPECT_NEAR(last.position - state("position_rad"), began, 4.0 * step + 2e-3);
     EXPECT_EQ(device.health().stream.lost, before.stream.lost);
     EXPECT_EQ(device.health().stream.late_echoes, 0U);
     EXPECT_EQ(device.health().stream.watchdog_trips, 0U);
-    EXPECT_GE(device.health().stream.delay.count(), 195U);         // the last ones may wait in the device
+    EXPECT_GE(device.health().stream.delay.count(), 195U);         // the last commands may wait in the device
     EXPECT_LE(device.health().stream.delay.quantile(0.5), 2.1e6);  // two samples at most
     EXPECT_NEAR(settled(device, 0.25).applied, 0.25, 1e-3);
     EXPECT_NEAR(state("torque_uNm"), -0.25e6, 1e3);
@@ -116,7 +117,7 @@ TEST(UsbOtherFirmware, StateOfAnEarlierProgramIsNotAFault) {
     settled(rendering, 0.2);
     send_order("fault emergency-stop 1");
     Status status = Status::Ok;
-    for (int k = 0; k < 3 && status == Status::Ok; ++k) {  // a packet or two may wait in the device
+    for (int k = 0; k < 3 && status == Status::Ok; ++k) {  // one or two packets may wait in the device
         status = rendering.exchange({0.2}).status;
     }
     ASSERT_EQ(status, Status::Fault);
@@ -129,7 +130,7 @@ TEST(UsbOtherFirmware, StateOfAnEarlierProgramIsNotAFault) {
     ASSERT_EQ(connection.open("").reason, "");
     ASSERT_EQ(connection.request(wire::Request::Clear, 0), 0);
     ASSERT_EQ(connection.request(wire::Request::Enable, 1),
-              0);  // stays enabled, like after a killed program
+              0);  // the device stays enabled, like after a killed program
     connection.close();
     UsbOptions options;
     options.makes_force = false;

@@ -1,10 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a command with the emulated device at the USB of the machine, by umockdev:
-//
-//   umockdev_emulator [OPTIONS] -- COMMAND...
-//
-// PALPATE_EMULATOR names a socket that receives orders as datagrams: fault KIND COUNT, plug, state.
-// The exit code is that of the command.
+// Runs a command on a simulated USB port with the emulated device (library umockdev):
 #include <sys/prctl.h>
 #include <unistd.h>
 
@@ -91,7 +86,7 @@ class Emulation {
         places_.push_back(std::move(place));
     }
 
-    /// Gives all permissions on every file except the node, which cannot be opened.
+    /// Gives all permissions on every file except the file of the device, which then cannot be opened.
     void deny(const std::string& node) {
         namespace fs = std::filesystem;
         gchar* root = umockdev_testbed_get_root_dir(testbed_);
@@ -105,7 +100,7 @@ class Emulation {
         fs::permissions(node, fs::perms::none);
     }
 
-    /// Sets the preloaded libraries and the user of the command, in the child.
+    /// Sets the preloaded libraries and the user of the command, in the child process.
     void prepare() {
         const std::string first = settings_.preload_first;
         ::setenv("LD_PRELOAD", (first + (first.empty() ? "" : ":") + preload).c_str(), 1);
@@ -117,7 +112,7 @@ class Emulation {
         }
     }
 
-    /// Runs every due frame and returns the time of the next call. The caller holds the mutex.
+    /// Runs every frame whose time has come and returns the time of the next frame. The caller holds the mutex.
     FrameClock::Clock::time_point begin_frames() {
         auto next = FrameClock::Clock::now() + std::chrono::milliseconds{50};
         for (const std::unique_ptr<Place>& place : places_) {
@@ -177,7 +172,7 @@ class Emulation {
     std::mutex mutex_;
     std::condition_variable changed_;
     std::vector<std::unique_ptr<Place>> places_;
-    FrameClock::Clock::time_point wakes_at_{};  ///< wake-up time of the thread of the frames
+    FrameClock::Clock::time_point wakes_at_{};  ///< time at which the frame thread wakes up
     int next_address_ = 2;
     bool over_ = false;
 };
@@ -186,7 +181,7 @@ class Emulation {
 }  // namespace emulator
 
 int main(int count, char** words) {
-    // The emulator uses the testbed through the same library as the command.
+    // The emulator and the command both use the umockdev testbed, through the same preloaded library.
     const char* preloaded = std::getenv("LD_PRELOAD");
     if (preloaded == nullptr || std::string(preloaded).find(emulator::preload) == std::string::npos) {
         ::setenv("LD_PRELOAD", emulator::preload, 1);

@@ -45,7 +45,7 @@ class UsbfsFiles {
     /// Returns the real path of the node.
     [[nodiscard]] const std::string& node_file() const { return node_file_; }
 
-    /// Makes the node writable if a transfer can be reaped.
+    /// Makes the device file writable if a completed transfer can be collected.
     void show(bool ready) {
         if (ready == shown_ready_) {
             return;
@@ -77,7 +77,7 @@ class UsbfsFiles {
         return text;
     }
 
-    /// Replaces other characters by '?', because names are not read from /sys.
+    /// Replaces characters outside printable ASCII by '?', because the library does not read names from /sys.
     static std::string ascii(const std::u16string& text) {
         std::string letters;
         for (const char16_t unit : text) {

@@ -21,7 +21,7 @@
 
 namespace emulator {
 
-/// Device in a umockdev testbed: its files, and the usbfs ioctls of its node.
+/// Device in a umockdev testbed: its files, and the usbfs ioctls of its device file.
 class UsbfsNode {
   public:
     UsbfsNode(UMockdevTestbed* testbed, EmulatedDevice device, int address, std::mutex& mutex,
@@ -60,7 +60,7 @@ class UsbfsNode {
         }
     }
 
-    /// Must be called without the mutex, because the testbed may be in an ioctl that waits for it.
+    /// Must be called without the mutex, because the testbed may be in an ioctl that waits for the mutex.
     void announce_removal() { files_->announce_removal(); }
     void announce_arrival() { files_->announce_arrival(); }
 
@@ -92,7 +92,7 @@ class UsbfsNode {
         if (claimed_by_ == client) {
             reset_host();
         }
-        // The data of these transfers ended with the client.
+        // The memory of these transfers was freed when the client process ended.
         std::erase_if(urbs_, [&](const auto& urb) { return urb.first.first == client; });
         show_readiness();
     }
@@ -279,7 +279,7 @@ class UsbfsNode {
     std::unique_ptr<UsbfsFiles> files_;
     std::mutex& mutex_;
     std::function<void()> woken_;
-    std::map<UMockdevIoctlClient*, bool> clients_;  ///< true while the client exists
+    std::map<UMockdevIoctlClient*, bool> clients_;  ///< true while the client process exists
     const UMockdevIoctlClient* claimed_by_ = nullptr;
     std::map<std::pair<const UMockdevIoctlClient*, std::uint64_t>, UMockdevIoctlData*>
         urbs_;  ///< by client, address

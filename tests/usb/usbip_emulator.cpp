@@ -74,7 +74,7 @@ class UsbIp {
         };
         const std::uint32_t number = word(4);
         if (word(0) == unlink_command) {
-            // Zero means that it had ended and its answer is already sent.
+            // The status zero means that the transfer had completed and its answer is already sent.
             const bool waited = port_.cancel(word(20), this, 0);
             if (waited) {
                 port_.done().pop_back();
@@ -108,7 +108,7 @@ class UsbIp {
         return true;
     }
 
-    /// Answers all ended transfers.
+    /// Sends the answers of all completed transfers to the kernel.
     void answer_all() {
         while (!port_.done().empty()) {
             const Transfer transfer = std::move(port_.done().front());
@@ -124,7 +124,7 @@ class UsbIp {
     static constexpr std::uint32_t unlink_command = 2;
     static constexpr std::uint32_t submit_answer = 3;
     static constexpr std::uint32_t unlink_answer = 4;
-    static constexpr std::uint32_t device_id = 1U << 16U | 2U;  // bus and address on the other side
+    static constexpr std::uint32_t device_id = 1U << 16U | 2U;  // bus and device number that the kernel uses
 
     bool read_all(std::uint8_t* bytes, std::size_t size) {
         while (size > 0) {

@@ -60,7 +60,7 @@ def test_draws_figures_and_fills_tables_of_the_page(results_folder: Path) -> Non
     names = ("compare_methods", "filters", "parsimony", "real_data", "dynamic")
     page = results_folder / "identification.md"
     tables = "".join(f"<!-- {name} -->\nold {name}\n<!-- end -->\n" for name in names)
-    # a new table is empty
+    # a table that is new on the page is empty before the first run
     page.write_text(tables.replace("old filters\n", ""))
     main([str(results_folder), "--to", str(results_folder)])
     for name in ("parameters", "time", "filters"):

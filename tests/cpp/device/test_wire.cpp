@@ -18,7 +18,8 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// An IN packet written byte by byte, as the page of the protocol defines it.
+/// An IN packet of the USB protocol, written byte by byte as the protocol page of the documentation defines the
+/// packet.
 struct Packet {
     std::uint16_t sequence = 0;
     std::uint32_t clock_us = 0;
@@ -201,18 +202,21 @@ TEST(PacketStream, CountsLostRepeatedAndMalformedPackets) {
     EXPECT_EQ(stream.health().packets, 7U);
     EXPECT_EQ(stream.health().repeated, 2U);
     EXPECT_EQ(stream.health().malformed, 1U);
-    EXPECT_EQ(stream.health().lost, 2U + 1U + 3U);  // after 2, after the repeated one, after 6
+    // Lost packets after number 2, after the repeated packet, and after number 6.
+    EXPECT_EQ(stream.health().lost, 2U + 1U + 3U);
 }
 
 TEST(PacketStream, MeasuresRoundTripAndDelayFromTheEcho) {
     PacketStream stream = stream_of();
-    // Another session left its echo, close to the wrap of the counter.
+    // The device still echoes a packet of an earlier session, whose sequence number is close to the overflow of the
+    // 16-bit counter.
     ASSERT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, 1, 65'535, 100, 0}.bytes(), 0));
     for (int k = 0; k < 100; ++k) {
         const wire::OutPacket command = stream.next_command(0.1, 10, k * ms);
         EXPECT_EQ(command.sequence, static_cast<std::uint16_t>(k));
         stream.sent(command, k * ms);
-        // Accepted 300 us before the latch of the next sample, reported 1.25 ms after it was sent.
+        // The device accepts the command 300 us before it latches the encoder of the next sample; the sample arrives
+        // 1.25 ms after the command was sent.
         ASSERT_TRUE(
             stream.take(Packet{static_cast<std::uint16_t>(k + 1), static_cast<std::uint32_t>(k + 1) * 1000, 0,
                                0, 0, 1, command.sequence, 300, 0}

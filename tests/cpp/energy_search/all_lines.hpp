@@ -14,7 +14,8 @@
 
 namespace palpate::energy_search {
 
-/// Returns every line of the certificate that requires damping or friction, with the scenes that test it.
+/// Returns every inequality of the certificate that requires damping or friction, with the scenes that test this
+/// inequality.
 [[nodiscard]] inline std::vector<Line> all_lines() {
     std::vector<Line> lines;
     for (const double n : {0.0, 1.0, 2.0, 0.25, 0.5, 1.3}) {
@@ -89,7 +90,7 @@ namespace palpate::energy_search {
     return lines;
 }
 
-/// Returns scene number `index` of a line. The same number gives the same scene.
+/// Returns scene number `index` for an inequality of the certificate. The same number gives the same scene.
 [[nodiscard]] inline Trial scene_of(const Line& line, std::size_t index) {
     test::Random random{1000003 * (index + 1) + static_cast<std::size_t>(100.0 * line.delay)};
     for (;;) {

@@ -15,7 +15,7 @@
 
 namespace palpate::energy_search {
 
-/// Minimum of V = integral of `force` over [low, high], and its position.
+/// Least value of the energy V = integral of `force` over [low, high], and the position of this least value.
 struct Least {
     double place = 0.0;
     double energy = 0.0;
@@ -48,7 +48,7 @@ template <class Force>
     return least;
 }
 
-/// An object behind a coupling, with its scheme and its device.
+/// A virtual object behind a virtual coupling, with its scheme and the profile of the device.
 struct CoupledScene {
     Scheme scheme;
     DeviceProfile device;
@@ -70,7 +70,7 @@ struct CoupledScene {
 /// above a force limit.
 enum class Regime { Usual, Firm, Limited };
 
-/// Returns a coupling and an inertia of about the size of the object's slopes. A firm object moves little: it is much
+/// Returns a coupling and an inertia of about the size of the object's slopes. An object that moves little is much
 /// stiffer than the coupling, or heavy.
 [[nodiscard]] inline Scheme random_coupling(test::Random& random, StructureKind structure, double slope,
                                             double period, Regime regime) {
@@ -93,7 +93,8 @@ enum class Regime { Usual, Firm, Limited };
     return scheme;
 }
 
-/// Returns a trial that optimises the motion once and compares the damping below which energy is taken out.
+/// Returns a trial that optimises one motion. The trial then compares the device damping with the least damping at
+/// which the motion takes no energy out.
 template <class Structure>
 [[nodiscard]] Trial motion_trial(test::Random& random, Structure structure, const CoupledScene& scene,
                                  const Need& need, int starts, int steps) {
@@ -127,7 +128,8 @@ template <class Structure>
             need, text_of(scene)};
 }
 
-/// Returns the same trial for friction.
+/// Returns a trial that optimises one motion and compares the friction of the device with the least friction at which
+/// the motion takes no energy out.
 template <class Structure>
 [[nodiscard]] Trial friction_trial(test::Random& random, Structure structure, const CoupledScene& scene,
                                    const Need& need, int starts, int steps) {
@@ -154,7 +156,7 @@ template <class Structure>
             need, text_of(scene)};
 }
 
-/// Returns an object of straight pieces that stores finite energy.
+/// Returns an object whose force consists of straight pieces and whose stored energy is finite.
 [[nodiscard]] inline Pieces closed_pieces(test::Random& random, int count, double step, Slopes slopes) {
     std::vector<double> forces = random_forces(random, count, step, slopes);
     const double steepest = std::max(slopes.M, slopes.s);
@@ -184,7 +186,7 @@ template <class Structure>
         });
     };
     const auto placed = [&](double low, double high, double step, double slope, const auto& force) {
-        // Without mass the limit is part of the object.
+        // Without mass the force limit of the device also limits the force of the object.
         const double limit = has_mass(kind) ? 1e300 : scene.device.force_limit;
         const Least least = least_energy(low - 5.0 * (high - low), high + 5.0 * (high - low),
                                          [&](double x) { return std::clamp(force(x), -limit, limit); });
@@ -262,7 +264,8 @@ template <class Structure>
     return build(PieceObject{g}, bounds_of(g));
 }
 
-/// Makes a scene of an encoder with steps before a coupling, with objects without mass or springs with mass.
+/// Makes a scene of an encoder with steps and a virtual coupling; the virtual objects are massless, or springs with
+/// mass.
 [[nodiscard]] inline std::optional<Trial> draw_coupled_encoder(test::Random& random, double delay,
                                                                bool mass) {
     CoupledScene scene;
@@ -315,7 +318,8 @@ template <class Structure>
                           starts, steps);
 }
 
-/// Makes a force with hysteresis at a predicted position. The play follows the measured position.
+/// Makes a force with hysteresis that is computed at a predicted position. The play operator follows the measured
+/// position.
 [[nodiscard]] inline std::optional<Trial> draw_predicted_hysteresis(test::Random& random, double delay) {
     CoupledScene scene;
     scene.scheme.structure = StructureKind::Direct;

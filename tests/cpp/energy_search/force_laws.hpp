@@ -16,8 +16,9 @@
 
 namespace palpate::energy_search {
 
-/// Straight pieces between points of equal distance; constant beyond the ends, or periodic. The worst cases of the
-/// proofs have this shape: slopes M and -s only.
+/// Force law of straight pieces between points of equal distance; outside the points the force is constant or
+/// periodic. The worst cases of the proofs have this shape, with only two slopes: the steepest rise M and the steepest
+/// fall -s.
 class Pieces {
   public:
     Pieces(double from, double step, std::vector<double> force, bool repeats = false)
@@ -36,7 +37,7 @@ class Pieces {
     [[nodiscard]] std::size_t cells() const noexcept { return force_.size() - 1; }
     [[nodiscard]] const std::vector<double>& points() const noexcept { return force_; }
 
-    /// Returns value, slope and antiderivative.
+    /// Returns force, slope and energy of the straight pieces.
     [[nodiscard]] Curve at(double x) const noexcept {
         double u = (x - from_) / step_;
         const auto last = static_cast<double>(cells());
@@ -76,7 +77,7 @@ class Pieces {
     bool repeats_;
 };
 
-/// A static force of straight pieces as an object.
+/// An object whose force consists of straight pieces, without hysteresis and velocity.
 struct PieceObject {
     using State = Stateless;
     Pieces pieces;
@@ -89,7 +90,7 @@ struct PieceObject {
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
 
-/// Returns the exact bounds of straight pieces.
+/// Returns the exact bounds of force and slope of straight pieces.
 [[nodiscard]] inline ForceBounds bounds_of(const Pieces& pieces) {
     ForceBounds bounds;
     bounds.slope = pieces.slopes();
@@ -97,7 +98,8 @@ struct PieceObject {
     return bounds;
 }
 
-/// Returns the exact bounds of g + s h with a play, both of straight pieces between the same points.
+/// Returns the exact bounds of a force g + s h with mean force g, hysteresis h and direction state s. Both g and h are
+/// straight pieces between the same points.
 [[nodiscard]] inline ForceBounds bounds_of(const HysteresisPair<Pieces>& pair) {
     const Pieces& g = pair.force();
     const Pieces& h = pair.hysteresis_force();
@@ -122,17 +124,17 @@ struct PieceObject {
     return bounds;
 }
 
-/// Largest slopes of a random force.
+/// Steepest rising and falling slope of a random force.
 struct Slopes {
     double M = 1.0;
     double s = 0.0;
 };
 
-/// Any force, or one of the shapes for which the bounds are closest: long runs of the extreme slopes, falling at most
-/// as steeply as rising, or never rising.
+/// Shape of a random force: any shape, or one of the shapes for which the bounds are closest: long runs of the extreme
+/// slopes, falling slopes limited to the steepest rising slope, or a force that never rises.
 enum class Shapes { Any, Steep };
 
-/// Returns slopes that only rise, only fall, or both.
+/// Returns slopes that only rise, only fall, or rise and fall.
 [[nodiscard]] inline Slopes random_slopes(test::Random& random, Shapes shapes = Shapes::Any) {
     const double M = std::exp(test::uniform(random, 0.0, 4.0));
     switch (random() % (shapes == Shapes::Any ? 4 : 3)) {
@@ -180,7 +182,7 @@ enum class Shapes { Any, Steep };
     return force;
 }
 
-/// Returns one turn of a wheel: random forces at `count` points with mean `mean`.
+/// Returns the force of a wheel over one revolution: random values at `count` points with mean `mean`.
 [[nodiscard]] inline std::vector<double> random_wheel(test::Random& random, int count, double size,
                                                       double mean) {
     std::vector<double> force;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes of wheels, of the ramp at the start, and of the limit-cycle detector.
+// Scenes with wheels (periodic forces), with the start ramp of the force, and with the limit-cycle detector.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace palpate::energy_search {
 
-/// Returns the mean of a force over one turn from 0.
+/// Returns the mean of a force over one revolution that begins at position 0.
 template <class Force>
 [[nodiscard]] double mean_over(double turn, const Force& force) {
     constexpr int parts = 20000;
@@ -26,7 +26,7 @@ template <class Force>
     return sum / parts;
 }
 
-/// Adds a constant to `force` so that `mean_of` the result is 0.
+/// Adds a constant to `force`, so that `mean_of` returns 0 for the result.
 template <class MeanOf>
 [[nodiscard]] std::vector<double> balanced(std::vector<double> force, const MeanOf& mean_of) {
     double low = -2.0 * largest_of(force);
@@ -45,7 +45,7 @@ template <class MeanOf>
     return shifted(0.5 * (low + high));
 }
 
-/// Returns the nodes of a turn: many for slow turning, few for jumps.
+/// Returns the grid positions of one revolution of a wheel: many for slow rotation, few for jumps.
 [[nodiscard]] inline int wheel_nodes(double delay, bool slowly) {
     constexpr int slow[] = {3000, 1200, 600};
     constexpr int fast[] = {48, 24, 12};
@@ -53,7 +53,8 @@ template <class MeanOf>
     return slowly ? slow[samples] : fast[samples];
 }
 
-/// Makes a wheel of straight pieces. Slow turning in many short moves tests the mean force, jumps test the damping.
+/// Makes a wheel whose force consists of straight pieces. Slow rotation in many short moves tests the mean force,
+/// jumps test the damping.
 [[nodiscard]] inline std::optional<Trial> draw_wheel(test::Random& random, double delay, bool slowly) {
     const int cells = 8 + static_cast<int>(random() % 9);
     const double turn = 1.0;
@@ -96,7 +97,7 @@ template <class MeanOf>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// Makes a wheel of a few wavelets, with the core's certificate.
+/// Makes a wheel whose force is a network of a few wavelets, with the certificate that the C++ library computes.
 [[nodiscard]] inline std::optional<Trial> draw_network_wheel(test::Random& random, double delay,
                                                              bool slowly) {
     const NetworkParameters network = small_network(random);
@@ -125,7 +126,7 @@ template <class MeanOf>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// Makes a wheel with hysteresis that turns slowly. Its hysteresis may exceed its mean force.
+/// Makes a wheel with hysteresis that rotates slowly. The hysteresis may exceed the mean of press and release force.
 [[nodiscard]] inline std::optional<Trial> draw_hysteresis_wheel(test::Random& random, double delay) {
     const int nodes = 300;
     const int cells = 10;
@@ -148,7 +149,7 @@ template <class MeanOf>
     ForceBounds bounds = bounds_of(pair);
     bounds.mean_force = std::max({0.0, mean(-1.0), -mean(1.0)}) * (1.0 + 1e-6);
     if (bounds.mean_force <= 0.02 * size) {
-        return std::nullopt;  // too small for this grid
+        return std::nullopt;  // play radius too small for this grid of positions
     }
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
@@ -165,7 +166,7 @@ template <class MeanOf>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// Returns the limit-cycle detector after `limit_cycles` limit cycles.
+/// Returns a limit-cycle detector that has detected `limit_cycles` limit cycles.
 [[nodiscard]] inline LimitCycleDetector scaled_after_limit_cycles(int limit_cycles) {
     LimitCycleDetector detector{{1e-9, 1000, 0.0}};
     double side = 1.0;
@@ -176,7 +177,8 @@ template <class MeanOf>
     return detector;
 }
 
-/// Makes a force that is scaled_after_limit_cycles at any time, more than once, and never hardened. It is a wheel or straight pieces.
+/// Makes a force that the limit-cycle detector scales down at any time, more than once, and never increases again. The
+/// force is that of a wheel or consists of straight pieces.
 [[nodiscard]] inline std::optional<Trial> draw_softening(test::Random& random, double delay) {
     const bool wheel = random() % 2 == 0;
     const int nodes = wheel ? wheel_nodes(delay, true) / 2 : 40;

@@ -20,13 +20,13 @@
 
 namespace palpate::energy_search {
 
-/// Resolution of a search: jumps between all of a few positions, or short moves over many.
+/// Grid of a search: a few positions with jumps between all of them, or many positions with short moves.
 struct Fineness {
     int nodes = 24;
     int reach = 23;
 };
 
-/// Returns the number of stored positions for a delay in samples.
+/// Returns the number of earlier positions that a search must store for a delay in samples.
 [[nodiscard]] inline int samples_of(double delay) {
     return static_cast<int>(std::ceil(delay));
 }
@@ -40,7 +40,8 @@ struct Fineness {
     return {coarse[std::min(memory, 3)], 23};
 }
 
-/// Returns a device without limits or steps. `delay` is in samples; without delay it may have jitter.
+/// Returns a device without force limit, encoder steps or command steps. `delay` is in samples. A device without delay
+/// may have jitter of its sample times.
 [[nodiscard]] inline DeviceProfile random_device(test::Random& random, double delay) {
     DeviceProfile device;
     device.period_s = test::uniform(random, 3e-4, 2e-3);
@@ -53,7 +54,7 @@ struct Fineness {
     return device;
 }
 
-/// Sets a force limit in half of the scenes.
+/// Sets a force limit of the device in half of the scenes.
 inline void limit_by(test::Random& random, DeviceProfile& device, double largest) {
     if (random() % 2 == 0 && largest > 0.0) {
         device.force_limit = largest * test::uniform(random, 0.2, 1.0);
@@ -79,7 +80,7 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
     return std::clamp(force, -device.force_limit, device.force_limit);
 }
 
-/// Returns a trial that searches a held force on a grid.
+/// Returns a trial that searches a force, held constant in each sample, on a grid of positions.
 [[nodiscard]] inline Trial trial_of(HeldScene scene, const Need& need, const DeviceProfile& device) {
     scene.need = {need.damping / device.longest_period_s(), need.friction, device.whole_delay_samples(),
                   device.delay_fraction()};
@@ -115,7 +116,7 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
     return test::random_network(random, 1 + random() % 3);
 }
 
-/// Returns the position of the largest absolute slope.
+/// Returns the position at which the absolute slope of the force is largest.
 template <class Force>
 [[nodiscard]] double steepest_place(const Force& force) {
     double place = 0.0;
@@ -131,7 +132,7 @@ template <class Force>
     return place;
 }
 
-/// Makes a network of position with a structure whose force depends only on the current position.
+/// Makes a scene of a wavelet network in position and a structure whose force depends only on the current position.
 [[nodiscard]] inline std::optional<Trial> draw_static_network(test::Random& random, double delay,
                                                               bool coupled) {
     const Fineness fine = random_fineness(random, samples_of(delay));
@@ -161,7 +162,8 @@ template <class Force>
     scene.table = with_structure(
         model, scheme, device.period_s, device.force_limit,
         [&](const auto& structure) { return table_of(structure, scene.read, 0, sent_on(device)); });
-    // Behind a coupling the force at x is that of the object at y, so the rendered force is again static.
+    // Behind a virtual coupling the force at handle position x is the force of the virtual object at its position y,
+    // so the rendered force is again static.
     scene.held = coupled ? with_structure(model, scheme, device.period_s, device.force_limit,
                                           [&](auto structure) {
                                               return held_energy(scene.read.grid, [&](double x) {
@@ -190,7 +192,7 @@ template <class Force>
     return draw_static_network(random, delay, true);
 }
 
-/// Makes g and h of straight pieces; the play is a whole number of nodes.
+/// Makes a mean force g and a hysteresis h of straight pieces; the play radius is a whole number of grid steps.
 [[nodiscard]] inline std::optional<Trial> draw_hysteresis_pieces(test::Random& random, double delay) {
     const bool far = random() % 2 == 0;
     const int nodes = far ? (samples_of(delay) == 0   ? 60
@@ -279,7 +281,7 @@ template <class Force>
     return random() % 3 != 0 ? draw_hysteresis_pieces(random, delay) : draw_hysteresis_network(random, delay);
 }
 
-/// Makes a force of position and velocity: a straight line in both, or a few wavelets.
+/// Makes a force of position and velocity: a straight line in both quantities, or a few wavelets.
 [[nodiscard]] inline std::optional<Trial> draw_velocity(test::Random& random, double delay) {
     const bool far = random() % 2 == 0;
     const int nodes = far ? 60 : (samples_of(delay) == 0 ? 16 : samples_of(delay) == 1 ? 9 : 6);
@@ -293,8 +295,8 @@ template <class Force>
         network.alpha[2 * i + 1] = std::exp(test::uniform(random, -1.0, 1.0)) / fastest;
         network.beta[2 * i + 1] = test::uniform(random, -1.0, 1.0) * fastest;
     }
-    network.linear[1] =
-        test::uniform(random, -1.0, 0.3) * 4.0 * device.period_s;  // comparable with b of a spring
+    // Velocity term comparable with the damping b that a spring requires.
+    network.linear[1] = test::uniform(random, -1.0, 0.3) * 4.0 * device.period_s;
     const ForceModel model =
         ForceModel::of_velocity(network, {{0.0, -fastest}, {1.0, fastest}, {}, {}, std::nullopt});
     const VelocityNetwork& force = *model.velocity();
@@ -315,7 +317,7 @@ template <class Force>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// Makes a scene of an encoder with steps: the handle is anywhere within the count.
+/// Makes a scene of an encoder with steps: the handle may be anywhere within the current encoder step.
 [[nodiscard]] inline std::optional<Trial> draw_encoder(test::Random& random, double delay, bool hysteresis) {
     const int counts = hysteresis               ? (samples_of(delay) == 0   ? 14
                                                    : samples_of(delay) == 1 ? 8
@@ -351,7 +353,8 @@ template <class Force>
         if (need && random() % 2 == 0) {
             need = need_at_less_friction(device, *need, certified).value_or(*need);
         }
-        // The read play rests at the count, the handle is up to half a count away.
+        // The play operator follows the reading of the encoder and rests at the reported position; the handle is up to
+        // half an encoder step away from this position.
         at_start = bounds_of(pair).hysteresis_per_play * step * step / 8.0;
         scene.table = play_table_of(Direct{pair}, scene.read, radius, sent_on(device));
     } else {
@@ -370,7 +373,8 @@ template <class Force>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// Makes a scene of a command with steps, with short moves around a position at which its rounding changes.
+/// Makes a scene of a device whose command has steps, with short moves around a position at which the rounded command
+/// changes.
 [[nodiscard]] inline std::optional<Trial> draw_force_step(test::Random& random, double delay) {
     const Fineness fine = random_fineness(random, samples_of(delay));
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
@@ -396,7 +400,7 @@ template <class Force>
     return trial_of(std::move(scene), *need, device);
 }
 
-/// Makes a static force on a device with jitter and a delay in seconds.
+/// Makes a static force on a device with jitter of the sample times and a delay in seconds.
 [[nodiscard]] inline std::optional<Trial> draw_jitter(test::Random& random, double delay, Shapes shapes) {
     DeviceProfile device = random_device(random, delay);
     device.jitter_s = device.period_s * test::uniform(random, 0.02, 0.6);
@@ -439,7 +443,8 @@ template <class Force>
         *need};
 }
 
-/// Makes a force at a position predicted from 1 to 3 samples; with an encoder, from 1 or 2.
+/// Makes a force at a position that is predicted from 1 to 3 samples; on a device with encoder steps, from 1 or 2
+/// samples.
 [[nodiscard]] inline std::optional<Trial> draw_prediction(test::Random& random, double delay, bool encoder,
                                                           Shapes shapes = Shapes::Any) {
     Scheme scheme;

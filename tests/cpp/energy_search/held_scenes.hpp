@@ -31,16 +31,16 @@ struct ScriptedDevice {
     void close() noexcept {}
 };
 
-/// Path of a force from structure to handle.
+/// Limits and rounding that a force passes between the structure and the handle.
 struct Sent {
     Guards guards;
-    double force_step = 0.0;  ///< of the command, rounded to the nearest [N or N*m]
+    double force_step = 0.0;  ///< step of the command; the force is rounded to the nearest step [N or N*m]
 
     /// Returns the force after a start at rest at `first[0]` and ticks at the positions first[0] to first[count - 1].
     template <class Structure>
     [[nodiscard]] double force(const Structure& structure, const double* first, int count) const {
         std::vector<double> read(first, first + count);
-        read.push_back(read.back());  // the last tick reads once more
+        read.push_back(read.back());  // the last tick reads one more position
         ScriptedDevice device{read.data()};
         Controller controller{device, structure, guards};
         (void)controller.start();
@@ -52,7 +52,7 @@ struct Sent {
     }
 };
 
-/// A grid of positions with the reading of the encoder at each node.
+/// A grid of handle positions with the reading of the encoder at each grid position.
 struct ReadGrid {
     Grid grid;
     std::vector<double> reading;
@@ -60,8 +60,8 @@ struct ReadGrid {
     std::vector<double> of_count;
 };
 
-/// Returns a grid of equal steps that are read exactly. The nodes of a turn must be a multiple of 2 reach + 1, unless
-/// all are in reach.
+/// Returns a grid of equal steps whose positions are read exactly. For a wheel the number of grid positions must be a
+/// multiple of 2 reach + 1, unless one move can reach all positions.
 [[nodiscard]] inline ReadGrid even_grid(double from, double step, int nodes, int reach,
                                         bool repeats = false) {
     ReadGrid result;
@@ -75,8 +75,8 @@ struct ReadGrid {
     return result;
 }
 
-/// Returns positions within the encoder's counts: both borders, at which either count may be read, and `within`
-/// between.
+/// Returns positions within the encoder steps: both borders of each step, where either reading is possible, and
+/// `within` positions between the borders.
 [[nodiscard]] inline ReadGrid encoder_grid(double from, double count_step, int counts, int within) {
     ReadGrid result;
     for (int c = 0; c < counts; ++c) {
@@ -92,7 +92,8 @@ struct ReadGrid {
     return result;
 }
 
-/// Returns the table of a structure without a play, by stepping it from rest through every window of positions.
+/// Returns the forces of a structure without play operator for every possible sequence of stored positions. Each
+/// sequence starts at rest.
 template <class Structure>
 [[nodiscard]] ForceTable table_of(const Structure& structure, const ReadGrid& read, int memory,
                                   const Sent& sent) {
@@ -106,7 +107,7 @@ template <class Structure>
         if (!windows.exists(w)) {
             continue;
         }
-        double turned = 0.0;  // consecutive positions are within reach
+        double turned = 0.0;  // consecutive positions of the window are at most `reach` grid steps apart
         for (int k = 0; k <= memory; ++k) {
             const int moved = k == 0 ? 0 : w.node[k] - w.node[k - 1];
             if (read.grid.repeats()) {
@@ -122,7 +123,8 @@ template <class Structure>
     return table;
 }
 
-/// Returns the table of a structure with a play of `radius` counts. The play rests on counts.
+/// Returns the forces of a structure whose play operator has a radius of `radius` encoder steps. The play operator
+/// rests only at reported positions.
 template <class Structure>
 [[nodiscard]] ForceTable play_table_of(const Structure& structure, const ReadGrid& read, int radius,
                                        const Sent& sent) {
@@ -156,7 +158,8 @@ template <class Structure>
     return table;
 }
 
-/// Returns S - S_min at the nodes: the integral of a static force over the positions from the first node to the last.
+/// Returns the stored energy S minus its least value S_min at the grid positions. S is the integral of a static force
+/// from the first grid position to the last.
 template <class Force>
 [[nodiscard]] std::vector<double> held_energy(const Grid& grid, const Force& at) {
     constexpr int parts = 64;
@@ -181,7 +184,7 @@ template <class Force>
     return energy;
 }
 
-/// A held force on a grid, with the cost of a device that has exactly the need.
+/// A held force on a grid of positions, and the damping and friction of a device that has exactly the certified need.
 struct HeldScene {
     ReadGrid read;
     ForceTable table;
@@ -196,7 +199,8 @@ struct HeldScene {
     }
 };
 
-/// Returns the largest factor within [low, high] at which energy is taken out; 0 if there is none.
+/// Returns the largest factor of the need within [low, high] at which a motion takes energy out; 0 if there is no such
+/// factor.
 template <class Violated>
 [[nodiscard]] double largest_violating(const Violated& violated, double low, double high, double resolution) {
     if (!violated(low)) {

@@ -18,7 +18,7 @@ struct Need {
     double friction = 0.0;  ///< f_c [N or N*m]
 };
 
-/// Returns the least damping and friction that `certify` accepts; nothing if it always refuses.
+/// Returns the least damping and friction that `certify` accepts; nothing if `certify` refuses every value.
 template <class Certify>
 [[nodiscard]] std::optional<Need> certified_need(DeviceProfile device, const Certify& certify) {
     constexpr double placeholder_damping = 1.2345e6;
@@ -40,7 +40,8 @@ template <class Certify>
     return need;
 }
 
-/// Returns the need with slightly less friction, if `certify` then has another line that needs more damping.
+/// Returns the need with slightly less friction, if another inequality of `certify` then requires more damping
+/// instead.
 template <class Certify>
 [[nodiscard]] std::optional<Need> need_at_less_friction(DeviceProfile device, const Need& need,
                                                         const Certify& certify) {
@@ -62,7 +63,8 @@ template <class Certify>
     return other;
 }
 
-/// A certified scene. `finds_energy` searches it on a device with the given multiples of the need.
+/// A certified scene. `finds_energy` searches a motion that takes energy out, on a device with the given multiples of
+/// the required damping and friction.
 struct Trial {
     std::function<bool(double damping, double friction)> finds_energy;
     Need need;
@@ -71,16 +73,18 @@ struct Trial {
 
 enum class Part { Damping, Friction };
 
-/// A line of the certificate and the scenes that test it.
+/// An inequality of the certificate and the scenes that test it.
 struct Line {
     std::string id;      ///< of the inequality
     std::string name;    ///< of the scenes
     double delay = 0.0;  ///< [samples]
     Part part = Part::Damping;
-    bool tight = false;  ///< some motion is close to the bound in at least half of the scenes
+    /// In at least half of the scenes some motion is close to the bound of the inequality.
+    bool tight = false;
     std::function<std::optional<Trial>(test::Random&)> draw;
 
-    /// Returns true if energy is taken out with `factor` of the line's need and all of the other needs.
+    /// Returns true if a motion takes energy out on a device with `factor` times the need of this inequality and all
+    /// of the other needs.
     [[nodiscard]] bool fails(const Trial& trial, double factor) const {
         constexpr double rounding = 1.0 + 1e-9;
         return part == Part::Damping ? trial.finds_energy(factor, rounding)

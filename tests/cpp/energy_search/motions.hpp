@@ -13,15 +13,16 @@
 
 namespace palpate::energy_search {
 
-/// A motion of the handle: from rest at `start` to `centre`, then a repeated wave, sample by sample or as a sum of
-/// sines.
+/// A motion of the handle: from rest at `start` to `centre`, then a repeated wave. The wave is a list of positions,
+/// one for each sample, or a sum of sines.
 struct Motion {
     double centre = 0.0;
     double size = 1.0;
     double period = 2.0;  ///< of the sines [samples]
     bool sines = false;
-    std::vector<double> shape;   ///< samples of one period, or cosine and sine of each harmonic
-    std::vector<double> within;  ///< position within the encoder's count, from -1/2 to 1/2
+    std::vector<double> shape;  ///< positions of one period, or cosine and sine amplitude of each harmonic
+    /// Position of the handle within the encoder step, from -1/2 to 1/2 of the step.
+    std::vector<double> within;
 
     [[nodiscard]] double wave(std::size_t k) const noexcept {
         if (!sines) {
@@ -36,16 +37,17 @@ struct Motion {
     }
 };
 
-/// Energy that a motion costs the hand, without the damping and friction of the device.
+/// Energy that the hand pays for a motion, without the damping and friction of the device.
 struct Account {
-    double work = 0.0;    ///< sum of the mean force of a sample times d [J]
+    double work = 0.0;    ///< sum over the samples of the mean force times the displacement d [J]
     double square = 0.0;  ///< sum d^2
     double length = 0.0;  ///< sum |d|
     /// Sum tau (1 - tau) (change of the force within a sample)^2. An uneven path within the samples gains this / (4
     /// b / T).
     double spread = 0.0;
 
-    /// Returns b / T below which the motion takes energy out of an object that stored `held`.
+    /// Returns the value of damping over period, b / T, below which the motion takes energy out of an object that
+    /// stored `held`.
     [[nodiscard]] double damping(double held, double friction) const noexcept {
         if (!(square > 0.0)) {
             return 0.0;
@@ -54,36 +56,38 @@ struct Account {
         return 0.5 * (-paid + std::sqrt(paid * paid + square * spread)) / square;
     }
 
-    /// Returns the energy taken out at a damping, divided by the length of the path.
+    /// Returns the energy that the motion takes out at a device damping, divided by the total length of the motion.
     [[nodiscard]] double gain(double damping, double held, double friction) const noexcept {
         const double uneven = damping > 0.0 ? 0.25 * spread / damping : 0.0;
         return length > 0.0 ? (uneven - work - held - damping * square) / length - friction : 0.0;
     }
 };
 
-/// Range of the positions and sizes of the motions.
+/// Positions and sizes of the motions that are tried.
 struct Places {
-    double start = 0.0;  ///< at rest, at the least energy of the object
-    double held = 0.0;   ///< S_0 - S_min at the start [J]
-    double low = 0.0;    ///< of the centres
+    /// Start position of the motion, at rest, where the stored energy of the object is least.
+    double start = 0.0;
+    double held = 0.0;  ///< stored energy at the start minus the least stored energy, S_0 - S_min [J]
+    double low = 0.0;   ///< of the centres
     double high = 0.0;
     double finest = 0.0;  ///< of the sizes
     double widest = 0.0;
     double encoder_step = 0.0;
     int delay = 0;      ///< whole samples
-    double late = 0.0;  ///< rest of the delay [samples]
+    double late = 0.0;  ///< fractional part of the delay [samples]
 };
 
-/// Optimises motions of a structure. `Structure` must have `reset` and `step`; `limit` clips the force sent.
+/// Optimises motions of a structure so that they take out energy. `Structure` must have `reset` and `step`; `limit` is
+/// the force limit of the device.
 template <class Structure>
 class MotionSearch {
   public:
     MotionSearch(Structure& structure, const Places& places, double limit)
         : structure_{structure}, places_{places}, limit_{limit} {}
 
-    /// Returns the largest `rate(account)` over motions and their lengths, for example the damping below which energy
-    /// is taken out. Half of the motions are optimised for it, which favours fast ones; the others are optimised for
-    /// `gain`.
+    /// Returns the largest `rate(account)` over motions and their lengths, for example the damping below which a
+    /// motion takes energy out. Half of the motions are optimised for `rate`, which favours fast motions; the others
+    /// are optimised for `gain`.
     template <class Rate, class Gain>
     [[nodiscard]] double most(test::Random& random, int starts, int steps, const Rate& rate,
                               const Gain& gain) {
@@ -112,7 +116,7 @@ class MotionSearch {
         return best;
     }
 
-    /// Largest values over all lengths of one motion.
+    /// Largest values of rate and gain over all lengths of one motion.
     struct Found {
         double rate = 0.0;
         double gain = -std::numeric_limits<double>::infinity();
@@ -133,7 +137,7 @@ class MotionSearch {
         for (std::size_t k = 0; k < ticks + late; ++k) {
             sent_.push_back(std::clamp(structure_.step(read).force, -limit_, limit_));
             if (k < late) {
-                continue;  // at rest until the first force acts
+                continue;  // handle at rest until the first force acts
             }
             const std::size_t now = k - late;
             read = now < approach ? places_.start + (motion.wave(0) - places_.start) *

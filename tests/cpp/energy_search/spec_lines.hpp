@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A second implementation of the damping that a held force needs, from the proofs. The tests compare the core's
-// certificates with it.
+// A second implementation, from the proofs, of the device damping that a held force needs. The tests compare the
+// certificates of the library with this implementation.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,8 @@
 
 namespace palpate::energy_search {
 
-/// Returns the need, divided by T, of a force with slopes in [-s, M] computed at x_k - q_k with |q| <= lambda |d|.
+/// Returns the needed damping divided by the period T, for a force with slopes in [-s, M]. The force is computed at
+/// x_k - q_k, the position x_k with an error q_k of at most lambda times the displacement d.
 [[nodiscard]] inline double held_need(double M, double s, double lambda) {
     if (lambda * s <= (1.0 + lambda) * M) {
         return M * (0.5 + lambda);
@@ -23,7 +24,8 @@ namespace palpate::energy_search {
     return 0.5 * (M + M * M / (s - M) + lambda * lambda * (s - M));
 }
 
-/// Returns the least a with h(rho) - l rho - g rho^2 <= a for all rho.
+/// Returns the least number a with h(rho) - l rho - g rho^2 <= a for all rho. h(rho) is the cost of one step as a
+/// function of rho.
 [[nodiscard]] inline double step_cost(double M, double s, double l, double g) {
     // Maximum of the quadratic c0 + c1 rho + c2 rho^2 on [low, high]; either end may be infinite.
     const auto most = [](double c0, double c1, double c2, double low, double high) {
@@ -47,7 +49,8 @@ namespace palpate::energy_search {
                      most(-0.5 * s, -s - l, -g, -infinite, -1.0)});
 }
 
-/// Returns (W): least over l and g of step_cost + max over theta of l Re Q + g |Q|^2. `taps[j]` multiplies z^-(j+1).
+/// Returns the bound (W) of the proof: least over l and g of step_cost + max over theta of l Re Q + g |Q|^2. Q is the
+/// filter of the steps at frequency theta; `taps[j]` multiplies z^-(j+1).
 [[nodiscard]] inline double filtered_need(double M, double s, const std::vector<double>& taps) {
     if (std::max(M, s) <= 0.0) {
         return 0.0;
@@ -111,7 +114,7 @@ namespace palpate::energy_search {
     return best * (1.0 + 1e-4);  // for the angles between
 }
 
-/// Returns the need at a delay of n + late samples.
+/// Returns the needed damping at a delay of n + late samples, with n whole samples and a fraction `late`.
 [[nodiscard]] inline double late_need(double M, double s, int n, double late) {
     if (std::max(M, s) <= 0.0) {
         return 0.0;
@@ -161,7 +164,8 @@ namespace palpate::energy_search {
     return std::min(best, least);
 }
 
-/// Returns q of n whole samples of delay and of a prediction from m taps (0: no prediction).
+/// Returns the position error q as a filter of the displacements, for n whole samples of delay and a prediction from m
+/// samples (0: no prediction).
 [[nodiscard]] inline std::vector<double> taps_of(int n, int m) {
     std::vector<double> taps(static_cast<std::size_t>(n + m), 0.0);
     for (int j = 1; j <= n; ++j) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Searches motions that take energy out of certified scenes. Its account, its motions and the stored energy are
-// independent of the core: sum F d + (b/T) d^2 + f_c |d| >= -(S_0 - S_min) for every motion of every length.
+// Searches motions that take energy out of certified scenes. The energy account, the motions and the stored energy are
+// computed independently of the library. Condition for every motion of every length: sum F d + (b/T) d^2 + f_c |d| >=
+// -(S_0 - S_min), with force F, displacement d and stored energy S.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -45,7 +46,7 @@ TEST(EnergySearch, FindsFailuresAt95PercentOfTightBounds) {
     }
 }
 
-/// Returns the need of a spring of stiffness 1 on a line of nodes of distance 1, from the value iteration.
+/// Returns the damping that a spring of stiffness 1 needs, found by value iteration on grid positions of distance 1.
 double spring_need(int nodes, int reach, int delay, double late) {
     HeldScene scene;
     scene.read = even_grid(0.0, 1.0, nodes, reach);
@@ -74,12 +75,13 @@ TEST(EnergySearch, FindsTheKnownNeedOfASpringAtAFractionalDelay) {
     }
 }
 
-// b >= T M / 2 + t_d L does not hold between whole samples.
+// The inequality b >= T M / 2 + t_d L does not hold if the delay t_d is not a whole number of samples.
 TEST(EnergySearch, FindsEnergyIfAFractionalDelayIsCountedAsItsShareOfASample) {
     EXPECT_GT(spring_need(200, 4, 0, 0.25), 0.5 + 0.25 + 0.03);
 }
 
-/// Returns true if turning a wheel without friction takes energy out; `command` is the force that is sent for f(x).
+/// Returns true if a full revolution of a wheel without friction takes energy out; `command(f(x))` is the force sent
+/// for the model force f(x).
 template <class Command>
 bool wheel_gives_energy(const std::vector<double>& forces, const Command& command) {
     const Pieces wheel{0.0, 1.0 / static_cast<double>(forces.size()), forces, true};
@@ -94,7 +96,8 @@ bool wheel_gives_energy(const std::vector<double>& forces, const Command& comman
     return scene.search(1.0 + 1e-9, 1.0).violated();
 }
 
-// A peak of 8 N m on a device that makes 5: its mean is 0, the mean of the clipped force is not 0.
+// The force has a peak of 8 N m, the device makes at most 5 N m: the mean of the model force is 0, the mean of the
+// clipped force is not 0.
 TEST(EnergySearch, FindsTheActiveModelThatAForceLimitMakes) {
     std::vector<double> forces(10, -8.0 / 9.0);
     forces[3] = 8.0;
@@ -112,7 +115,8 @@ TEST(EnergySearch, FindsTheActiveModelThatAForceLimitMakes) {
         << "scaling before the limit";
 }
 
-/// Returns the damping below which energy is taken out of a mass of 0.05 kg behind 90 N/m on a device that makes 5 N.
+/// Returns the device damping below which a motion takes energy out of a mass of 0.05 kg behind a coupling of 90 N/m;
+/// the force limit of the device is 5 N.
 double thrown_mass_need(double limit_inside) {
     constexpr double period = 1e-3;
     Implicit structure{test::Spring{0.0}, {0.05, 0.0}, {90.0, 0.0}, period, LoadLineSolver{}, limit_inside};

@@ -10,20 +10,24 @@
 
 namespace palpate::energy_search {
 
-/// Positions between which the handle moves. From node i it reaches the nodes i - reach to i + reach.
+/// Grid of positions between which the handle moves. From position number i one move reaches the positions i - reach
+/// to i + reach.
 struct Grid {
     std::vector<double> position;  ///< never decreasing [m or rad]
     int reach = 0;                 ///< longest move [nodes]
-    double turn = 0.0;             ///< length of one turn; 0 without repetition [m or rad]
+    /// Length of one revolution of a wheel; 0 for positions that do not repeat [m or rad].
+    double turn = 0.0;
 
     [[nodiscard]] int nodes() const noexcept { return static_cast<int>(position.size()); }
     [[nodiscard]] bool repeats() const noexcept { return turn > 0.0; }
-    /// Returns the number of values of one stored position: its index, or its index modulo 2 reach + 1.
+    /// Returns the number of values that a stored earlier position can have. It is stored as its grid index, or as its
+    /// index modulo 2 reach + 1.
     [[nodiscard]] int residues() const noexcept { return std::min(nodes(), 2 * reach + 1); }
 };
 
-/// Windows of `older` + 1 positions, newest first, numbered 0, 1, ... The newest is stored as its node, each older one
-/// as its residue, which is unique given the next position.
+/// Windows: lists of `older` + 1 consecutive positions, newest first, numbered 0, 1, ... The newest position is stored
+/// as its grid index, each older one as its index modulo 2 reach + 1. The next newer position makes this residue
+/// unique.
 class Windows {
   public:
     struct Nodes {
@@ -60,12 +64,12 @@ class Windows {
         return result;
     }
 
-    /// Returns false for a window that leaves the grid.
+    /// Returns false for a window with a position outside the grid.
     [[nodiscard]] bool exists(const Nodes& w) const noexcept {
         return std::all_of(w.node, w.node + older_ + 1, [&](int node) { return node >= 0 && node < nodes_; });
     }
 
-    /// Returns the number of the window that starts at place `first` of another one.
+    /// Returns the number of the window that begins at position number `first` of another window.
     [[nodiscard]] std::size_t number(const Nodes& w, int first) const noexcept {
         auto window = static_cast<std::size_t>(w.node[first]);
         for (int k = 1; k <= older_; ++k) {
@@ -92,7 +96,7 @@ class Windows {
     }
 
   private:
-    /// Returns the node within reach of `near` that has this residue.
+    /// Returns the grid index with this residue that one move from `near` can reach.
     [[nodiscard]] int resolved(int residue, int near) const noexcept {
         int offset = (residue - near) % residues_;
         offset = offset < 0 ? offset + residues_ : offset;
@@ -109,30 +113,31 @@ class Windows {
     std::size_t stride_ = 1;
 };
 
-/// Force that a structure computes from the last readings, as a table over the nodes. `of` has one value for each play
-/// state and each window (i_0, r_1, ..., r_memory), with i_0 the newest.
+/// Force that a structure computes from the last readings, as a table over the grid positions. `of` has one value for
+/// each play state and each window (i_0, r_1, ..., r_memory); i_0 is the newest position, r_j the residue of an older
+/// one.
 struct ForceTable {
-    int memory = 0;              ///< number of older positions in the force
+    int memory = 0;              ///< number of older positions on which the force depends
     int plays = 1;               ///< number of play states
     std::vector<double> of;      ///< [N or N*m]
-    std::vector<int> next_play;  ///< play state after reading node i: [play * nodes + i]
-    std::vector<int> rest_play;  ///< play state of a start at rest at node i
+    std::vector<int> next_play;  ///< play state after the reading at grid position i: [play * nodes + i]
+    std::vector<int> rest_play;  ///< play state at grid position i after a start at rest
 
     [[nodiscard]] int play_after(int play, int node, int nodes) const noexcept {
         return plays == 1 ? 0 : next_play[static_cast<std::size_t>(play * nodes + node)];
     }
 };
 
-/// Costs of the hand in addition to the force.
+/// Costs of a motion for the hand in addition to the work against the force.
 struct Cost {
     double damping = 0.0;   ///< b / T [N/m or N*m/rad]
     double friction = 0.0;  ///< f_c [N or N*m]
     int delay = 0;          ///< n, whole samples
-    double late = 0.0;      ///< tau, part of a sample in which the last command still acts
+    double late = 0.0;      ///< tau, fraction of a sample in which the previous command still acts
 
-    /// Returns the least energy that the hand pays for a move d while the force changes from `old` to `now` after tau
-    /// T. Within each part the path is straight, because an uneven one costs more. The first part stays within [down,
-    /// up].
+    /// Returns the least energy that the hand pays for a displacement d while the force changes from `old` to `now`
+    /// after the time tau T. The handle moves uniformly in each of the two parts, because uneven motion costs more.
+    /// The displacement of the first part stays within [down, up].
     [[nodiscard]] double of_move(double d, double old, double now, double down, double up) const noexcept {
         if (late == 0.0) {
             return now * d + damping * d * d + friction * std::abs(d);
@@ -153,8 +158,8 @@ struct Cost {
     }
 };
 
-/// A device with samples at k period + u_k, u_k either 0 or jitter, and commands that act `delay` after their samples.
-/// Each position of its grid has two consecutive nodes, one for each u.
+/// A device with sample times k period + u_k, where u_k is either 0 or the jitter, and commands that act `delay` after
+/// their samples. Each position of the grid has two consecutive entries, one for each u_k.
 struct Clock {
     double period = 1.0;   ///< [s]
     double jitter = 0.0;   ///< below the period [s]
@@ -169,17 +174,18 @@ struct Clock {
 
 /// Largest energy that a motion takes out, found by value iteration.
 struct Finding {
-    double taken = 0.0;      ///< largest -E - (S_0 - S_min) over starts at rest [J]
-    bool cycle = false;      ///< some motion takes out energy repeatedly
-    bool converged = false;  ///< no motion on the grid takes more
+    double taken = 0.0;      ///< largest energy taken out, -E - (S_0 - S_min), over starts at rest [J]
+    bool cycle = false;      ///< some motion takes energy out at each repetition
+    bool converged = false;  ///< no motion on the grid takes more energy out
     double scale = 0.0;      ///< largest force times the range of the grid [J]
 
     [[nodiscard]] bool violated() const noexcept { return cycle || taken > 1e-6 * scale; }
 };
 
-/// Finds the best motions between the nodes as shortest paths. The state is the window of positions on which the force
-/// still depends. J(state) is the least energy that the hand pays from there, for any number of samples. It decreases
-/// without end if a motion can be repeated and takes energy out each time.
+/// Finds the motion over the grid that takes the most energy out, as a shortest path. The state is the window of
+/// positions on which the force still depends. J(state) is the least energy that the hand pays from this state on, for
+/// any number of samples. J decreases without limit if a motion can be repeated and takes energy out at each
+/// repetition.
 class ValueIteration {
   public:
     ValueIteration(const Grid& grid, const ForceTable& table, const Cost& cost)
@@ -195,7 +201,7 @@ class ValueIteration {
         fill();
     }
 
-    /// Makes the search with a clock; the table is that of a static force.
+    /// Makes a search with jitter of the sample times; the force table is that of a static force.
     ValueIteration(const Grid& grid, const ForceTable& table, const Clock& clock)
         : grid_{grid},
           table_{&table},
@@ -209,7 +215,8 @@ class ValueIteration {
         fill(clock);
     }
 
-    /// Searches until the first motion takes energy out. `held[i]` is S_0 - S_min at node i, at rest.
+    /// Searches until the first motion takes energy out. `held[i]` is the stored energy S_0 - S_min at grid position
+    /// i, at rest.
     [[nodiscard]] Finding run(const std::vector<double>& held, int sweeps = 2000) {
         Finding finding;
         finding.scale =
@@ -229,16 +236,16 @@ class ValueIteration {
         return finding;
     }
 
-    /// Continues with another force, which acts from the first sample until the motion changes to the one searched
-    /// before.
+    /// Puts a motion with another force before the motions already searched. The other force acts from the first
+    /// sample until the force table of the earlier search replaces it.
     void precede(const ForceTable& table) {
         table_ = before_ = &table;
         std::fill(policy_.begin(), policy_.end(), none);
         fill();
     }
 
-    /// Adds one sample before all that was searched before. Its command is from `table`, a command that still acts from
-    /// the sample before is from `before`.
+    /// Puts one sample before the motions already searched. The command of this sample is from `table`; a command of
+    /// the sample before, if it still acts, is from `before`.
     void precede_once(const ForceTable& table, const ForceTable& before) {
         table_ = &table;
         before_ = &before;
@@ -268,8 +275,8 @@ class ValueIteration {
 
     void fill() {
         const bool late = cost_.late > 0.0;
-        const int newest =
-            cost_.delay + (late ? 1 : 0);  // index of the position to which the play state belongs
+        // Place in the window of the position to which the play state belongs.
+        const int newest = cost_.delay + (late ? 1 : 0);
         const Windows read{grid_, table_->memory};
         now_.assign(value_.size(), 0.0);
         old_.assign(late ? value_.size() : 0, 0.0);
@@ -285,7 +292,7 @@ class ValueIteration {
                 const std::size_t state = window * plays_ + play;
                 const double force = table_->of[play * read.count() + read.number(w, newest)];
                 if (!std::isfinite(force)) {
-                    continue;  // a play state that is impossible at the position
+                    continue;  // a play state that cannot occur at this position
                 }
                 const int before = static_cast<int>(play);
                 const int later =
@@ -311,11 +318,11 @@ class ValueIteration {
         }
     }
 
-    /// Cost of a sample from each state to each of both u.
+    /// Cost of one sample from each state, for each of the two sample-time shifts u_k of the next sample.
     struct Sample {
         double force = 0.0;    ///< mean over the sample
         double damping = 0.0;  ///< b over its length
-        double uneven = 0.0;   ///< gain of an uneven path while the force changes [J]
+        double uneven = 0.0;   ///< energy gained by uneven motion while the force changes [J]
     };
 
     void fill(const Clock& clock) {
@@ -339,7 +346,7 @@ class ValueIteration {
                 double work = 0.0;
                 double square = 0.0;
                 for (int k = older; k >= 0;
-                     --k) {  // the command of sample k acts until that of the next one does
+                     --k) {  // the command of sample k acts until the command of sample k + 1 acts
                     const double from = k == older ? taken(0) : std::max(taken(0), taken(k) + clock.delay);
                     const double to = k == 0 ? end : std::min(end, taken(k - 1) + clock.delay);
                     if (to > from) {
@@ -408,7 +415,7 @@ class ValueIteration {
                              up(place(state)));
     }
 
-    /// Improves every state once; returns the largest improvement.
+    /// Improves the value of every state once; returns the largest improvement.
     [[nodiscard]] double sweep_once(bool upward, double least_gain) {
         double most = 0.0;
         const std::size_t states = value_.size();
@@ -446,7 +453,7 @@ class ValueIteration {
         return most;
     }
 
-    /// Returns true if the best moves from some state lead around a cycle that takes energy out.
+    /// Returns true if the best moves from some state lead around a closed motion that takes energy out.
     [[nodiscard]] bool has_gaining_cycle(double least) const {
         std::vector<std::uint32_t> seen(value_.size(), 0);
         std::uint32_t walk = 0;

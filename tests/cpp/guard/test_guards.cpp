@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that each guard acts on a fault, and does not act without one.
+// Tests that each guard acts on the fault for which it is made, and does not act without this fault.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -78,7 +78,8 @@ Scheme direct() {
     return scheme;
 }
 
-// The scene of spec section 6, quantised and without friction: the guards do not change the force.
+// In the click-and-wall scene of spec section 6, with encoder steps and without friction, the guards do not change the
+// force.
 TEST(Guards, DoNotChangeForcesOfTheComparisonScene) {
     const test::ClickAndWall object;
     double held = 0.0;
@@ -146,7 +147,8 @@ TEST(EnergyTank, GivesAtMostTheEnergyOfTheObject) {
             settings.energy_tank = tank;
             const Guarded run = render(model, device, guards_of(settings, model, direct(), period),
                                        PassiveHand{15.0, 0.0, 0.0, 0.1}, 5000, 0.02);
-            // Energy that the motor gave, minus nine tenths of the losses of the device.
+            // Energy that the motor gave to the handle, minus nine tenths of the energy that damping and friction of
+            // the device dissipated.
             return -(run.energy.motor + 0.9 * run.energy.dissipated);
         };
         EXPECT_LT(lost(true), 1.3 * held) << stiffness << " delay " << device.late_samples();
@@ -157,7 +159,7 @@ TEST(EnergyTank, GivesAtMostTheEnergyOfTheObject) {
 TEST(EnergyTank, ScalesForcesDownWithinItsReserve) {
     EnergyTank tank{TankSettings{{.within = 1.0}, 0.0, 0.0, 0.0, period}};
     double force = -2.0;
-    tank.book(-1.0, 1.0);  // the energy of the object; the reserve of 0.25 remains
+    tank.book(-1.0, 1.0);  // stored energy of the object; the tank keeps its reserve of 0.25
     EXPECT_EQ(tank.apply(force), Status::Ok);
     tank.book(-0.15, 1.0);
     EXPECT_EQ(tank.apply(force), Status::EnergyLimited);
@@ -192,7 +194,7 @@ TEST(StoredEnergy, GrowsWithTheVisitedPositions) {
     stored.visit(-0.3, -0.2);
     EXPECT_NEAR(stored.most(), 1.0 + 5.0 * 0.3 + 0.5 * 0.02 * 660.0 * 660.0, 1e-6);
     stored = StoredEnergy{{.within = 1.0, .force_limit = 5.0, .stiffness = 50.0}};
-    stored.visit(0.0, 0.4);  // stretched by 0.3 more than at the limit
+    stored.visit(0.0, 0.4);  // coupling stretched by 0.3 more than at the force limit of the device
     EXPECT_NEAR(stored.most(), 1.0 + 5.0 * 0.3, 1e-12);
 }
 
@@ -244,7 +246,7 @@ TEST(EnergyTank, IsSizedByTheModelAndItsCoupling) {
     EXPECT_TRUE(std::isinf(largest_stored_energy(motor, direct(), 5.0)));
 }
 
-// The account of the observer equals that of the simulation if the encoder is without steps.
+// Without encoder steps, the energy account of the passivity observer equals the account of the simulation.
 TEST(PassivityObserver, MeasuresTheEnergyOfTheMotor) {
     DeviceProfile device;
     device.encoder_step = 0.0;
@@ -292,7 +294,7 @@ TEST(LimitCycleDetector, IgnoresOtherMotions) {
     Watched faint;
     faint.shake(100.0, 1e-4, 0.0, 4000);
     EXPECT_EQ(faint.detector.limit_cycles(), 0U);
-    Watched turning;  // detents pass fast, but the knob never reverses
+    Watched turning;  // the detents pass quickly, but the knob never reverses
     turning.shake(100.0, 2e-3, 0.0, 4000, 2e-3);
     EXPECT_EQ(turning.detector.limit_cycles(), 0U);
 }
@@ -326,8 +328,8 @@ TEST(GuardSettings, RefusesInvalidValues) {
     }
 }
 
-// The energy account with all guards. A handle with a prescribed motion computes an independent account from the acting
-// force, its true motion, and the losses by damping and friction.
+// Tests the energy with all guards active. A handle with a prescribed motion keeps an independent energy account from
+// the acting force, the true motion, and the losses by damping and friction.
 
 /// A device whose handle follows positions given by the test, at constant speed within each tick.
 class GuidedHandle {
@@ -360,7 +362,7 @@ class GuidedHandle {
                 Status::Ok};
     }
 
-    /// Return the energy that the hand put in, and its least value so far [J].
+    /// Returns the energy that the hand has put in, and the least value of this energy so far [J].
     [[nodiscard]] double energy() const noexcept { return motor_ + dissipated_; }
     [[nodiscard]] double least() const noexcept { return least_; }
     [[nodiscard]] double motor() const noexcept { return motor_; }
@@ -382,7 +384,7 @@ class GuidedHandle {
     std::array<double, longest_delay_samples + 2> pending_{};
 };
 
-/// Returns the bench knob of the package.
+/// Returns the `bench-knob` device profile of the package.
 DeviceProfile bench_knob() {
     DeviceProfile device;
     device.id = "bench-knob";
@@ -391,7 +393,7 @@ DeviceProfile bench_knob() {
     return device;
 }
 
-/// Returns the knob of the README, as `palpate demo` and `palpate identify` make it.
+/// Returns the identified model of the README example, as `palpate demo` and `palpate identify` make it.
 ForceModel readme_knob() {
     NetworkParameters network;
     network.alpha = {14.065144146110542, 4.162057332442819, 5.888611543700749, 36.06654311080214,
@@ -424,12 +426,12 @@ Guards certified_guards(const ForceModel& model, const Scheme& scheme, const Dev
 struct Pressed {
     std::size_t energy_limited = 0;
     std::size_t limit_cycle_scaled = 0;
-    double least = 0.0;  ///< of the true account after the ramp [J]
+    double least = 0.0;  ///< least energy of the independent account after the start ramp [J]
     std::uint64_t ticks = 0;
 };
 
-/// Presses the knob of the README from below its click into its wall and back. One press in 50 is ten times slower, one
-/// in 1000 is a hundred times slower.
+/// Presses the README example from below its click into its wall and moves back. One press in 50 is ten times slower,
+/// one in 1000 is a hundred times slower.
 Pressed press_readme_knob(int presses) {
     const DeviceProfile device = bench_knob();
     const ForceModel model = readme_knob();
@@ -477,7 +479,8 @@ TEST(GuardedAccount, SlowPressesOfTheReadmeKnobNeverEmptyTheTankNorGiveEnergy) {
     EXPECT_GE(run.least, -held);
 }
 
-// A reading that flickers between two counts adds L Delta^2 for a cycle of the read motion, and the tank does not act.
+// An encoder reading that alternates between two counts adds at most the energy L Delta^2 for each cycle (slope bound
+// L, encoder step Delta), and the energy tank does not act.
 TEST(GuardedAccount, AFlickeringCountDoesNotEmptyTheTank) {
     const DeviceProfile device = bench_knob();
     const ForceModel model = readme_knob();
@@ -497,7 +500,7 @@ TEST(GuardedAccount, AFlickeringCountDoesNotEmptyTheTank) {
     EXPECT_NEAR(controller.guards().observer.energy(), handle.motor(), 1e-4);
 }
 
-/// Motions from sample to sample that try to drain the tank.
+/// Motions, one displacement for each sample, that try to empty the energy tank.
 class Motions {
   public:
     Motions(test::Random& random, const test::Scene& scene)
@@ -521,7 +524,7 @@ class Motions {
                 return centre_ + reach_ * std::cos(angle_ * tick);
             case 3:
                 return centre_ + reach_ * test::uniform(random, -1.0, 1.0);
-            case 4:  // back and forth at constant speed
+            case 4:  // handle moved back and forth at constant speed
                 return centre_ + reach_ * (2.0 * std::abs(std::remainder(angle_ * tick, 2.0)) - 1.0);
             default:
                 offset_ = std::clamp(offset_ + 0.3 * reach_ * test::uniform(random, -1.0, 1.0), -1.0, 1.0);
@@ -536,7 +539,7 @@ class Motions {
     double offset_ = 0.0;
 };
 
-// Tests any motion on devices with exactly the damping and friction that a certificate requires.
+// Tests random motions on devices with exactly the damping and friction that a certificate requires.
 TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
     test::Random random{31};
     double most = 0.0;
@@ -545,7 +548,7 @@ TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
         test::Scene scene = test::random_certified_scene(random, 1.0 + 1e-9);
         scene.device.force_limit = std::exp(test::uniform(random, -2.0, 3.0));
         if (!certify(scene.model, scene.scheme, scene.device).certified()) {
-            continue;  // the proof does not include the limit here
+            continue;  // the proof does not cover a force limit for this structure
         }
         ++scenes[std::string(name_of(scene.scheme.structure))];
         Motions motion{random, scene};
@@ -566,15 +569,16 @@ TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
                 most = std::max(most, tank.most_given() / tank.stored().most());
             });
     }
-    EXPECT_GT(most, 0.3);  // the bound of the stored energy is close to the energy given
+    // The bound of the stored energy is close to the largest energy that the object gave.
+    EXPECT_GT(most, 0.3);
     EXPECT_GE(scenes.size(), 2U);
     for (const auto& [structure, count] : scenes) {
         RecordProperty(structure, count);
     }
 }
 
-// A spring of exactly 2 b / T, moved back and forth at every sample, gives exactly the energy that the damping
-// dissipates.
+// A spring of stiffness 2 b / T, moved back and forth at every sample, generates exactly the energy that the device
+// damping b dissipates.
 TEST(GuardedAccount, SlowMotionOnASpringAtItsBoundNeedsFullCredit) {
     DeviceProfile device;
     device.encoder_step = 0.0;
@@ -599,7 +603,8 @@ TEST(GuardedAccount, SlowMotionOnASpringAtItsBoundNeedsFullCredit) {
     EXPECT_GT(energy_limited(false), 1000U);
 }
 
-// A hand may press an object further than it was measured; the energy stored there is returned.
+// A hand may press an object further than the recording covers; the energy stored outside the domain is returned on
+// release.
 TEST(GuardedAccount, PressesBeyondTheDomainDoNotEmptyTheTank) {
     const DeviceProfile device = bench_knob();
     const ForceModel model = readme_knob();
@@ -617,7 +622,8 @@ TEST(GuardedAccount, PressesBeyondTheDomainDoNotEmptyTheTank) {
     EXPECT_NEAR(stored.most() - stored.within(), 5.0 * (0.8 - model.domain().upper[0]), 0.01);
 }
 
-/// A wheel with one peak of 8 N*m and a constant that balances the peak clipped at 5 N*m.
+/// A wheel whose force has one peak of 8 N*m, and a constant chosen so that the mean force is 0 when the peak is
+/// clipped at 5 N*m.
 struct Wheel {
     using State = Stateless;
     double pull = 0.0;
@@ -648,8 +654,8 @@ Wheel balanced_wheel(double limit) {
     return {low};
 }
 
-// The detector scales a force that is balanced with its limit. If the force were scaled before the limit, it would drive the
-// wheel.
+// The mean of the limited force is 0. The limit-cycle detector scales the limited force, so the mean stays 0. If it
+// scaled the force before the force limit, the mean would not be 0 and the force would drive the wheel.
 TEST(GuardedAccount, ScaledWheelWithAForceLimitIsPassive) {
     DeviceProfile device;
     device.encoder_step = device.viscous_damping = 0.0;
@@ -690,8 +696,8 @@ TEST(GuardedAccount, ALimitedForceIsScaledAfterItsLimit) {
     }
 }
 
-// While the forces increase, a handle can be moved in against a small force and pushed out with a larger one. The
-// account of the given energy starts after that, and the energy given before is stated separately.
+// While the start ramp increases the force, a handle can be moved in against a small force and pushed out by a larger
+// one. The account of the energy given begins after the ramp; energy given during the ramp is stated separately.
 TEST(GuardedAccount, EnergyOfTheRampIsAccountedSeparately) {
     constexpr double stiffness = 20.0;
     constexpr double reach = 0.1;
@@ -717,7 +723,9 @@ TEST(GuardedAccount, EnergyOfTheRampIsAccountedSeparately) {
         const double in_ramp = -controller.guards().ramp_observer.least();
         const double after = -controller.guards().observer.least();
         EXPECT_LT(in_ramp, stored);
-        EXPECT_LT(after, 1.2 * stored);  // without damping each sample on the way out adds K d^2 / 2
+        // Without device damping each sample of the outward motion adds K d^2 / 2, with stiffness K and displacement
+        // d.
+        EXPECT_LT(after, 1.2 * stored);
         EXPECT_NEAR(-controller.guards().observer.energy(), after_ramp - handle.energy(), 1e-12);
         if (during) {
             EXPECT_GT(in_ramp, 0.5 * stored);
@@ -730,7 +738,8 @@ TEST(GuardedAccount, EnergyOfTheRampIsAccountedSeparately) {
     }
 }
 
-/// Returns int c(f) over the domain from its least to its largest, by a fine sum, and the energy stored by bending.
+/// Returns the difference between the largest and the least energy of the limited force c(f) over the domain, by a
+/// fine sum, and the energy that the play operator can store.
 double stored_span(const ForceModel& model, double limit) {
     constexpr int cells = 200'000;
     const double lower = model.domain().lower[0];
@@ -744,7 +753,8 @@ double stored_span(const ForceModel& model, double limit) {
         const double x = lower + travel * (k + 0.5) / cells;
         energy += std::clamp(force.inside(x).value, -limit, limit) * travel / cells;
         least = std::min(least, energy);
-        double bent = 0.0;  // S - C with the play at its end, at some positions
+        // Energy that the hysteresis adds while the play operator is at its end, at some positions.
+        double bent = 0.0;
         if (both != nullptr && k % 1000 == 0) {
             const double r = both->play_radius();
             for (int j = 0; j < 100; ++j) {
@@ -779,13 +789,13 @@ TEST(LargestStoredEnergy, BoundsTheEnergyOfTheClippedForce) {
     RecordProperty("largest over the sum", std::to_string(worst));
 }
 
-// The energy of a clipped force can have a larger range than that of the force, because the energy of a peak is cut
-// off.
+// The stored energy of a clipped force can vary more over the domain than that of the force itself, because clipping
+// removes the energy of a peak.
 TEST(LargestStoredEnergy, CanExceedThatOfTheForce) {
     NetworkParameters network;
     network.alpha = {6.0};
     network.beta = {1.5};
-    network.weight = {-8.0};  // a peak of 8 between two valleys
+    network.weight = {-8.0};  // a force peak of 8 between two valleys
     network.linear = {0.0};
     network.bias = -0.5;
     const ForceModel model{network, {{0.0}, {3.0}, Continuation::Linear, Continuation::Linear, {}}};

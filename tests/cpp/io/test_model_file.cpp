@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests with the corpus of tests/models.
+// Tests the model-file reader with the valid and invalid files in tests/models.
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -33,7 +33,7 @@ std::string bytes(const std::string& text) {
     return result;
 }
 
-/// Returns the bad file of an entry.
+/// Returns the content of the invalid model file that an entry of the list describes.
 std::string text_of(const Json& entry) {
     if (entry.contains("text")) {
         return entry["text"];

@@ -23,7 +23,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// Makes pairs of almost equal wavelets with large weights that cancel.
+/// Makes pairs of almost equal wavelets with large weights of opposite sign.
 void cancel(NetworkParameters& network, Random& random) {
     const std::size_t d = network.dimension;
     for (std::size_t i = 0; i + 1 < network.weight.size(); i += 2) {
@@ -36,7 +36,7 @@ void cancel(NetworkParameters& network, Random& random) {
     }
 }
 
-/// Returns random networks, every third of them with weights that cancel.
+/// Returns random networks; in every third network large weights cancel.
 NetworkParameters difficult_network(Random& random, int kind) {
     NetworkParameters network = test::random_network(random, static_cast<std::size_t>(2 * (1 + kind % 32)));
     if (kind % 3 == 0) {
@@ -64,7 +64,7 @@ TEST(Bounds, HoldAtEveryPointOfRandomNetworks) {
     }
 }
 
-// spec section 7: "mean-value form ... for 1 % of L"
+// spec section 7: slope bound by the mean-value form, at most 1 % above the largest slope L
 TEST(Bounds, AreWithinOnePercentOfADenseSearch) {
     Random random{32};
     for (int k = 0; k < cases(20); ++k) {
@@ -100,7 +100,8 @@ TEST(Bounds, IncludeANarrowWaveletBetweenTheFirstCells) {
     EXPECT_GE(slope_bounds(spike, 0.0, 1.0).upper, 1.38e5);
 }
 
-// Two wavelets with a distance of a millionth of their width and weights of a million: the sum has the size of one.
+// Two wavelets at a distance of a millionth of their width with weights of a million: the weights cancel and the sum
+// has a size of about one.
 TEST(Bounds, AreTightForLargeWeightsThatCancel) {
     Random random{33};
     for (int k = 0; k < cases(20); ++k) {
@@ -129,7 +130,8 @@ Domain unit_box(std::size_t dimension) {
             Continuation::Linear, std::nullopt};
 }
 
-// Along a direction psi is a sum of two Hermite functions. All angles to it are tested at every distance.
+// Along a straight line, the mother wavelet psi of several inputs is a sum of two Hermite functions. The test uses all
+// angles of the line at every distance from the centre.
 TEST(RadialBounds, HigherDerivativesAreWithinTheirBounds) {
     for (std::size_t d = 1; d <= 5; ++d) {
         const double others = static_cast<double>(d) - 1.0;
@@ -156,7 +158,7 @@ TEST(RadialBounds, HigherDerivativesAreWithinTheirBounds) {
     }
 }
 
-/// Returns D^4 psi(t, t, t, t) of a wavelet at u, divided by |t|^4.
+/// Returns the fourth derivative of a wavelet at u in the direction t, D^4 psi(t, t, t, t), divided by |t|^4.
 double fourth_derivative(std::span<const double> u, std::span<const double> t) {
     double square = 0.0;
     double along = 0.0;
@@ -236,8 +238,8 @@ TEST(RadialBounds, AreTightForLargeWeightsThatCancel) {
     }
 }
 
-// Every instruction set of this machine. In small boxes the remainder is small, so errors of each derivative are
-// visible.
+// Repeats the test with every instruction set of this machine. In small boxes the remainder of Taylor's formula is
+// small, so an error of any derivative is visible.
 TEST(RadialBounds, RemainderBoundsTheErrorOfTaylorsFormula) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{36};
@@ -290,7 +292,7 @@ TEST(RadialBounds, RemainderBoundsTheErrorOfTaylorsFormula) {
     }
 }
 
-// Boxes in which every term of Taylor's formula can have its full size.
+// Boxes of positions in which every term of Taylor's formula can reach its largest size.
 TEST(RadialBounds, HoldAtTheCornersOfAnyBox) {
     Random random{37};
     for (int k = 0; k < cases(500); ++k) {

@@ -16,7 +16,8 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// Returns f^(n) in extended precision: psi^(n) = (-1)^n He_{n+2} E.
+/// Returns the n-th derivative of the network's force in extended precision, from psi^(n) = (-1)^n He_{n+2} E with the
+/// Hermite polynomials He and E = exp(-u^2/2).
 long double exact(const NetworkParameters& network, double x, int order) {
     const long double c = network.linear[0];
     long double sum = order == 0 ? c * x + network.bias : order == 1 ? c : 0.0L;
@@ -67,7 +68,7 @@ TEST(DerivativeBounds, AreReachedAtTheCentreOfAWavelet) {
 }
 
 TEST(PiecewiseSeptic, IsExactForPolynomialsOfDegreeSeven) {
-    // x^7 + x^4 - x on cells of width 1/2, in which the highest powers matter.
+    // Polynomial x^7 + x^4 - x on cells of width 1/2, in which the highest powers contribute most.
     const auto jet = [](double x) noexcept {
         return Jet{std::pow(x, 7) + std::pow(x, 4) - x, 7.0 * std::pow(x, 6) + 4.0 * std::pow(x, 3) - 1.0,
                    42.0 * std::pow(x, 5) + 12.0 * x * x, 210.0 * std::pow(x, 4) + 24.0 * x};
@@ -128,7 +129,8 @@ TEST(CompiledCurve, UsesMoreCellsForASmallerError) {
     EXPECT_GT(before, CompiledCurve(network.curve(), {1e-4}).cells());
 }
 
-// A curve that cannot be certified is not compiled; it returns the values of the network exactly.
+// If the error of a table of the force cannot be proved, the network is not compiled and its values are returned
+// exactly.
 TEST(CompiledCurve, IsNotCompiledIfTheErrorCannotBeCertified) {
     Random random{44};
     NetworkParameters cancelling = test::random_network(random, 8);
@@ -197,7 +199,8 @@ TEST(CompiledCurve, RepeatsLikeTheNetwork) {
         EXPECT_NEAR(curve.at(x).value, network.curve().at(x).value, 2e-12 * (1.0 + std::abs(x))) << x;
         EXPECT_NEAR(curve.at(x).integral, network.curve().at(x).integral, 1e-11) << x;
     }
-    // At distant positions the place in the period is lost to rounding; the force is still a value of f.
+    // At distant positions rounding loses the place within the period; the result is still a force that the model has
+    // at some position.
     const Interval bounds = network.curve().value_bounds();
     for (int k = 0; k < cases(2000); ++k) {
         const double x = uniform(random, -1.0, 1.0) * std::pow(10.0, uniform(random, 10.0, 300.0));

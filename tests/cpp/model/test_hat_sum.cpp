@@ -17,7 +17,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// The sums term by term with the library's exponential, and the sums of the absolute terms.
+/// Sums of the wavelets, added term by term with the standard library's exponential, and sums of the absolute terms.
 struct Plain {
     Curve sum;
     Curve absolute;
@@ -37,7 +37,7 @@ Plain plain(const NetworkParameters& network, double x) {
         add(&Curve::slope, weight * alpha * psi.slope);
         add(&Curve::integral, weight / alpha * psi.integral);
         add(&Curve::double_integral, weight / alpha / alpha * psi.double_integral);
-        // Rounding of u changes a term even if it is zero.
+        // Rounding error of the argument u = alpha (x - beta) changes a term even if the term is zero.
         result.absolute.value += std::abs(weight) * std::abs(psi.integral);
         result.absolute.slope += std::abs(weight) * alpha * psi.double_integral;
         result.absolute.integral += 1e-290;
@@ -46,7 +46,7 @@ Plain plain(const NetworkParameters& network, double x) {
     return result;
 }
 
-/// Returns positions of all kinds: inside, at the centres, distant, tiny, huge.
+/// Returns positions of all kinds: inside the domain, at the centres of wavelets, distant, tiny and huge.
 double position(Random& random, int k) {
     switch (k % 6) {
         case 0:
@@ -58,7 +58,7 @@ double position(Random& random, int k) {
     }
 }
 
-// Every instruction set of this machine.
+// Repeats the test with every instruction set of this machine.
 TEST(HatSum, IsAccurateToThirteenDigitsOnEveryInstructionSet) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{71};
@@ -69,7 +69,8 @@ TEST(HatSum, IsAccurateToThirteenDigitsOnEveryInstructionSet) {
             const Plain expected = plain(network, x);
             Curve sum;
             hats.add(x, sum);
-            // The terms of the slope are sums of products that may cancel: an error in u^2 is multiplied by u^2.
+            // Each term of the slope is a sum of products that may cancel: an error of the exponential is multiplied
+            // by u^2, with u the argument of the wavelet.
             for (const auto member :
                  {&Curve::value, &Curve::slope, &Curve::integral, &Curve::double_integral}) {
                 ASSERT_NEAR(sum.*member, expected.sum.*member, 1e-13 * (expected.absolute.*member) + 1e-280)
@@ -90,7 +91,8 @@ TEST(HatSum, BatchesAgreeWithSinglePositions) {
                 x[j] = position(random, static_cast<int>(j));
             }
             for (const auto quantity : {HatQuantity::Value, HatQuantity::Slope, HatQuantity::Integral}) {
-                std::vector<double> sums(x.size() + 1, 1.0);  // one more element detects writes past the end
+                // Array has one extra element that detects writes past its end.
+                std::vector<double> sums(x.size() + 1, 1.0);
                 hats.add(quantity, x, std::span{sums}.first(x.size()));
                 EXPECT_EQ(sums.back(), 1.0);
                 for (std::size_t j = 0; j < x.size(); ++j) {

@@ -15,8 +15,8 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// Returns a random g with an h >= 0. Mexican hats alone are not positive, so h includes a constant that is larger than
-/// the negative parts of its wavelets.
+/// Returns a random mean force g with a hysteresis h >= 0. Wavelets (Mexican hats) also have negative values, so h
+/// includes a constant that is larger than the negative parts of its wavelets.
 HysteresisNetwork random_hysteresis(Random& random) {
     const std::size_t size = 1 + static_cast<std::size_t>(uniform(random, 0.0, 6.0));
     const NetworkParameters network = test::random_network(random, size);
@@ -126,7 +126,8 @@ TEST(Hysteresis, SlopeIsTheDerivativeWhileStickingAndSliding) {
 }
 
 TEST(Hysteresis, FreeContinuationDecreasesHysteresisToZero) {
-    // g(0) = 0.1 falls with max|g| / travel = 2.1 and is zero at -1/21; h decreases with it.
+    // Mean force: g(0) = 0.1, and below the domain g falls with slope max|g| / travel = 2.1 and is zero at x = -1/21.
+    // The hysteresis h decreases to zero there too.
     const HysteresisNetwork object{
         {1, {}, {}, {}, {2.0}, 0.1}, {{}, 0.0, 0.05}, test::unit_domain(Continuation::Free), 0.01};
     EXPECT_NEAR(object.hysteresis_force().at(-0.5 / 21.0).value, 0.025, 1e-12);

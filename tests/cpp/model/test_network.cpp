@@ -88,7 +88,8 @@ TEST(Network, LinearContinuationNeverFallsAndKeepsTheEnergyBoundedBelow) {
 
 TEST(Network, FreeContinuationEndsAtZeroForce) {
     const WaveletNetwork pushing{{1, {}, {}, {}, {2.0}, 0.1}, unit_domain(Continuation::Free)};
-    // The edge pushes the tool out, so the line falls with at least max|f| / travel = 2.1 instead of 2.
+    // At the edge of the domain the force pushes the tool out, so the continuation falls with a slope of at least
+    // max|f| / travel = 2.1, although the fitted slope is 2.
     EXPECT_NEAR(force(pushing, -0.02), 0.1 - 0.02 * 2.1, 1e-9);
     EXPECT_EQ(force(pushing, -0.05 - 1e-9), 0.0);
     EXPECT_EQ(force(pushing, -10.0), 0.0);

@@ -67,7 +67,8 @@ TEST(RadialNetwork, OfOneInputIsTheWaveletNetwork) {
     }
 }
 
-/// Returns eq. 4 and its gradient, term by term with the library's exponential.
+/// Returns force and gradient of the network of several inputs (eq. 4 of the paper), term by term with the standard
+/// library's exponential.
 double plain(const NetworkParameters& network, std::span<const double> x, std::span<double> gradient) {
     const std::size_t d = network.dimension;
     double sum = network.bias;
@@ -91,7 +92,7 @@ double plain(const NetworkParameters& network, std::span<const double> x, std::s
     return sum;
 }
 
-// Every instruction set of this machine.
+// Repeats the test with every instruction set of this machine.
 TEST(RadialNetwork, ValueAndGradientInOnePassSatisfyEquation4) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{8};

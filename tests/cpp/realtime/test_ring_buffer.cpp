@@ -38,7 +38,7 @@ TEST(RingBuffer, RefusesElementsWhenFullAndKeepsThoseItAccepted) {
     EXPECT_EQ(out[0], 3);
 }
 
-/// Two related numbers: a partly written pair is detected.
+/// A record of two numbers in a fixed relation: the test detects a record that is read while partly written.
 struct Pair {
     std::uint64_t value = 0;
     std::uint64_t inverse = ~std::uint64_t{0};

@@ -41,7 +41,7 @@ TEST(Prediction, MeanFormulaEqualsWeightedStepsFromTheFirstTick) {
     test::Random random{11};
     for (const int m : {1, 2, 3, 8, 16}) {
         HalfSamplePrediction prediction{m};
-        std::vector<double> x{0.4};  // at rest before the first tick
+        std::vector<double> x{0.4};  // handle at rest before the first tick
         prediction.reset(x[0]);
         for (int k = 0; k < 40; ++k) {
             const double now = x.back() + (k == 0 ? 0.0 : test::uniform(random, -1.0, 1.0));
@@ -62,8 +62,8 @@ TEST(Prediction, MeanFormulaEqualsWeightedStepsFromTheFirstTick) {
     }
 }
 
-/// Returns max over theta of -Re of sum v_j z^-j: the damping that a prediction adds to a spring's need, divided by K
-/// T.
+/// Returns the damping that a prediction adds to the need of a spring, divided by K T: max over theta of -Re of sum
+/// v_j z^-j at frequency theta, with the filter taps v_j.
 double largest_advance(const std::vector<double>& v) {
     double largest = -1.0;
     for (int k = 0; k <= 2000; ++k) {
@@ -148,7 +148,8 @@ TEST(PredictedDirect, PlayFollowsTheMeasuredPosition) {
     const ConstantHysteresis object{{0.0, 0.0}, {0.0, 1.0}, 0.1};
     PredictedDirect structure{object, 1};
     structure.reset(0.0);
-    (void)structure.step(0.15);                            // x_hat = 0.225; the play moves to 0.05, not 0.125
+    // Predicted position x_hat = 0.225; the play operator follows the measured position: to 0.05, not 0.125.
+    (void)structure.step(0.15);
     EXPECT_NEAR(structure.step(0.15).force, 1.0, 1e-12);   // (0.15 - 0.05) / 0.1
     EXPECT_NEAR(structure.step(0.05).force, -0.5, 1e-12);  // x_hat = 0: (0 - 0.05) / 0.1
     EXPECT_NEAR(structure.step(0.05).force, 0.0, 1e-12);   // the play is still at 0.05

@@ -61,7 +61,8 @@ TEST(EnergyConsistent, SwitchedStepNeverGivesEnergy) {
     EXPECT_LT(before, 0.5 * object.at(0.3, {}).energy);
 }
 
-/// The switched step f or D, computed without the solver, for a step from `from`.
+/// Solution of one step of the energy-consistent structure from the position `from`, computed without the solver. The
+/// step uses either the force f or the difference quotient D of the energy.
 struct SwitchedStep {
     const WaveletNetwork& object;
     double from;
@@ -108,14 +109,15 @@ struct SwitchedStep {
         }
         return count;
     }
-    /// Returns the root that the rule in the class comment selects.
+    /// Returns the solution that the rule in the class comment of the energy-consistent structure selects.
     [[nodiscard]] double expected(double far) const {
         const double root = first_root([&](double y) { return by_energy(y); }, from, far);
         return generates(root) ? root : first_root([&](double y) { return by_force(y); }, from, root);
     }
 };
 
-// With s = 1.5 p the switched step has up to three roots.
+// If the steepest falling slope s is 1.5 times the slope p of the load line, the energy-consistent step has up to
+// three solutions.
 TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRuleAmongThree) {
     test::Random random{91};
     int three = 0;
@@ -142,7 +144,7 @@ TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRuleAmongThree) {
             const double far = step.by_force(from) < 0.0 ? from + 2.0 : from - 2.0;
             const double expected = step.expected(far);
             if (std::abs(expected - from) < 1e-3) {
-                continue;  // the quotient above loses digits
+                continue;  // the difference quotient loses digits in a short step
             }
             ++tried;
             ASSERT_NEAR(rendered.environment_position, expected, 1e-9)
@@ -154,7 +156,8 @@ TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRuleAmongThree) {
     EXPECT_GT(three, tried / 300) << "the case is about steps with several roots";
 }
 
-// docs/certificate.md, behind a coupling: G eta >= the gain of stored and kinetic energy, for any slope and any root.
+// docs/certificate.md, behind a coupling: in every step, G eta (force times displacement) is at least the increase of
+// stored and kinetic energy, for any slope and any solution.
 TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
     test::Random random{92};
     int most = 0;

@@ -32,11 +32,12 @@ constexpr double period = 1e-3;
 constexpr VirtualCoupling coupling{100.0, 0.02};
 
 struct ForceError {
-    double at_end;      ///< at the end of the tick that holds the force
-    double at_instant;  ///< at the instant of the sample
+    double at_end;      ///< force error at the end of the tick that holds the force
+    double at_instant;  ///< force error at the instant of the sample
 };
 
-/// Returns the RMS of F_k - f(handle) over 4000 ticks of the scene of spec section 6.
+/// Returns the RMS of the rendered force F_k minus the model force f(handle position), over 4000 ticks of the
+/// click-and-wall scene of spec section 6.
 template <class S>
 ForceError force_error(S structure) {
     SimulatedDevice device{DeviceProfile{}, Hand{}};
@@ -62,42 +63,47 @@ void expect_within_5_percent(ForceError measured, double at_end, double at_insta
     EXPECT_NEAR(measured.at_instant, at_instant, 0.05 * at_instant);
 }
 
-// spec section 6, the table: "direct | 0.00362 | 0.00037"
+// spec section 6, RMS force error of direct rendering: 0.00362 N*m at the end of the tick, 0.00037 N*m at the sample
 TEST(Scene, Direct) {
     expect_within_5_percent(force_error(Direct{ClickAndWall{}}), 0.00362, 0.00037);
 }
 
-// spec section 6, the table: "massless, compensated | 0.00362 | 0.00037"
+// spec section 6, RMS force error of massless, compensated rendering: 0.00362 N*m at the end of the tick, 0.00037 N*m
+// at the sample
 TEST(Scene, MasslessCompensated) {
     const VirtualCoupling softer_damper{coupling.stiffness, 0.005};
     const Compensated<ClickAndWall> object{ClickAndWall{}, coupling.stiffness};
     expect_within_5_percent(force_error(Massless{object, softer_damper, period}), 0.00362, 0.00037);
 }
 
-// spec section 6, the table: "massless | 0.1202 | 0.1202"
+// spec section 6, RMS force error of massless rendering: 0.1202 N*m at the end of the tick, 0.1202 N*m at the sample
 TEST(Scene, Massless) {
     expect_within_5_percent(force_error(Massless{ClickAndWall{}, coupling, period}), 0.1202, 0.1202);
 }
 
-// spec section 6, the table: "implicit, m = 0.001, B_o = 0 | 0.1231 | 0.1227"
+// spec section 6, RMS force error of the implicit structure with m = 0.001, B_o = 0: 0.1231 N*m at the end of the
+// tick, 0.1227 N*m at the sample
 TEST(Scene, ImplicitUndamped) {
     expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.0}, coupling, period}),
                             0.1231, 0.1227);
 }
 
-// spec section 6, the table: "implicit, m = 0.001, B_o = 0.5 | 0.2530 | 0.2532"
+// spec section 6, RMS force error of the implicit structure with m = 0.001, B_o = 0.5: 0.2530 N*m at the end of the
+// tick, 0.2532 N*m at the sample
 TEST(Scene, ImplicitDamped) {
     expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}),
                             0.2530, 0.2532);
 }
 
-// spec section 6, the table: "explicit, m = 0.001, B_o = 0.5 | 0.2530 | 0.2532"
+// spec section 6, RMS force error of the explicit structure with m = 0.001, B_o = 0.5: 0.2530 N*m at the end of the
+// tick, 0.2532 N*m at the sample
 TEST(Scene, ExplicitDamped) {
     expect_within_5_percent(force_error(Explicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}),
                             0.2530, 0.2532);
 }
 
-/// Returns the largest |y| in the last tenth of a free motion, divided by that in the first tenth.
+/// Returns the largest object position |y| in the last tenth of a free motion, divided by the largest |y| in the first
+/// tenth.
 template <class S>
 double growth(S structure, int ticks) {
     structure.reset(0.0);
@@ -163,7 +169,8 @@ TEST(Implicit, IsStableAtAMillion) {
     }
 }
 
-// The paper's section 4.3: x_k + (T^2/m) f(x_k) = 2 x_{k-1} - x_{k-2} + (T^2/m) F_k
+// The step in section 4.3 of the paper, for object position x_k and applied force F_k: x_k + (T^2/m) f(x_k) = 2
+// x_{k-1} - x_{k-2} + (T^2/m) F_k
 TEST(Implicit, SolvesThePapersEquation) {
     const ClickAndWall object;
     Implicit structure{object, Inertia{0.001, 0.0}, coupling, period};
@@ -196,12 +203,13 @@ TEST(Massless, BalancesTheCouplingAtEveryTick) {
     }
 }
 
-/// Falls with slope -s within f_0 / s of 0, pushes away from 0 with f_0 outside, and ends at a wall.
+/// Object whose force falls with slope -s for |x| < f_0 / s, pushes away from 0 with f_0 at larger |x|, and ends at a
+/// wall.
 struct PushingOut {
     using State = Stateless;
     double push;     ///< f_0
     double falling;  ///< s
-    double wall;     ///< start of a wall of slope 1
+    double wall;     ///< position at which a wall of stiffness 1 begins
 
     [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
         const double width = push / falling;
@@ -218,7 +226,8 @@ struct PushingOut {
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
 
-/// Work of a hand for every sample, F d + A d^2, against the clipped force and the damping of a device.
+/// Work of a hand in every sample, F d + A d^2, with displacement d, against the clipped force F and the damping b = A
+/// T of a device with period T.
 struct HandWork {
     double device_damping;  ///< A = b/T
     double limit;           ///< of the device
@@ -234,7 +243,8 @@ struct HandWork {
     }
 };
 
-/// Stretches the coupling quickly, lets the mass fly, and slows it down with a spring just below the limit.
+/// Moves a handle that first stretches the coupling quickly, then lets the mass fly, then slows the mass down with a
+/// coupling force just below the force limit of the device.
 template <class S>
 double work_of_a_throw(S structure, double limit) {
     constexpr double stiffness = 90.0;
@@ -285,7 +295,8 @@ TEST(ForceLimit, FallingForceWithMassGivesEnergy) {
     const PushingOut object{1.0, 0.31, 7.5};
     const Inertia mass{7.0, 0.0};
     constexpr double limit = 1.34;
-    // State on the cycle when the hand reverses: position -0.0826, moved by 1.0850 in the last sample.
+    // State of the periodic motion when the hand reverses: position of the handle -0.0826, moved by 1.0850 in the last
+    // sample.
     constexpr double last = -0.08262168687;
     constexpr double before = -1.16758952181;
     Implicit<PushingOut> structure{object, mass, {1.0, 0.0}, 1.0, {}, limit, {}};
@@ -293,7 +304,7 @@ TEST(ForceLimit, FallingForceWithMassGivesEnergy) {
     const double there =
         structure.drive(7.0 * (last - before) + object.at(last, {}).force).environment_position;
     ASSERT_NEAR(there, last, 1e-9);
-    const double side = limit + last + 1e-6;  // the coupling is always at its limit
+    const double side = limit + last + 1e-6;  // the coupling force is always at the force limit of the device
     HandWork hand{0.5, limit, side, limit};
     double force = limit;
     double moved = 0.0;
@@ -312,7 +323,8 @@ TEST(ForceLimit, FallingForceWithMassGivesEnergy) {
     EXPECT_LT(hand.work, -0.41);
 }
 
-/// Checks each step of a structure with mass; `residual(y, G)` is the object's side of the step minus G.
+/// Checks that each step of a structure with mass solves its equation. `residual(y, G)` is the object's side of this
+/// equation minus the coupling force G.
 template <class S, class Residual>
 int limited_steps(S structure, double limit, VirtualCoupling spring, test::Random& random,
                   Residual residual) {
@@ -391,7 +403,8 @@ TEST(ForceLimit, OfAMasslessObjectLimitsItsForce) {
     }
 }
 
-// spec section 6: "f~ is the curve (x - f(x)/K_c, f(x))", of slope K_c f' / (K_c - f')
+// spec section 6: the compensated model f~ has the points (x - f(x)/K_c, f(x)) and the slope K_c f' / (K_c - f'), with
+// coupling stiffness K_c
 TEST(Compensated, SubtractsTheComplianceOfTheSpring) {
     const ClickAndWall object;
     const Compensated<ClickAndWall> compensated{object, 100.0};
@@ -457,7 +470,7 @@ ForceModel spring_model(double stiffness) {
     return {NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0}, test::unit_domain()};
 }
 
-/// Returns the model f = 5 x + 0.2 v.
+/// Returns a model with the force f = 5 x + 0.2 v, for position x and velocity v.
 ForceModel dashpot_model() {
     return ForceModel::of_velocity({2, {}, {}, {}, {5.0, 0.2}, 0.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}});
 }
@@ -531,12 +544,13 @@ TEST(Scheme, IsRefusedAtAPeriodAtWhichItDiverges) {
     scheme.structure = StructureKind::Implicit;
     EXPECT_NO_THROW(validate(scheme, spring_model(1e6), period));
 
-    // Every way to render must check it, not only the name.
+    // Every function that renders a scheme must check the scheme, not only the function that reads the name of the
+    // structure.
     scheme.structure = StructureKind::Explicit;
     EXPECT_THROW((void)simulate(spring_model(2861.0), scheme, {}, {}, 10), std::invalid_argument);
     EXPECT_THROW((void)motion_driven(spring_model(2861.0), scheme, {}, period), std::invalid_argument);
 
-    // While it sticks, h / r is part of the slope.
+    // While the play operator does not move, hysteresis over play radius, h / r, is part of the slope.
     const ForceModel both{
         NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
     scheme.play_radius = 1e-4;
@@ -544,7 +558,7 @@ TEST(Scheme, IsRefusedAtAPeriodAtWhichItDiverges) {
     scheme.play_radius = 3e-5;
     EXPECT_THROW(validate(scheme, both, period), std::invalid_argument);
 
-    // Compensated, 45 N*m/rad behind 50 is 450.
+    // Compensation makes a slope of 45 N*m/rad behind a coupling of 50 N*m/rad ten times steeper: 450 N*m/rad.
     scheme = {StructureKind::Explicit, {50.0, 0.0}, {2e-4, 0.15}, true, 0.0};
     EXPECT_NEAR(steepest_slope(scheme, spring_model(45.0)), 450.0, 1e-9);
     EXPECT_NO_THROW(validate(scheme, spring_model(40.0), period));

@@ -10,10 +10,11 @@
 #include "palpate/model/environment.hpp"
 #include "palpate/rendering/structure.hpp"
 
-// Checks that every time step with a mass behind a coupling must pass.
+// Checks that every time integration method of a mass behind a coupling must pass.
 namespace palpate::test {
 
-/// A hardening spring with its energy. It is smooth, so the order of a time step can be measured.
+/// Spring whose stiffness increases with its displacement, with its stored energy. The force is smooth, so the order
+/// of a time integration method can be measured.
 struct Hardening {
     using State = Stateless;
 
@@ -28,7 +29,7 @@ struct Hardening {
 inline constexpr VirtualCoupling coupling{100.0, 0.02};
 inline constexpr Inertia inertia{0.05, 0.3};
 
-/// Returns the position after `duration` from rest at 0.3 under a constant force.
+/// Returns the position of the mass after `duration`, starting at rest at 0.3, under a constant force.
 template <class S>
 double driven(S structure, double duration, double period) {
     structure.reset(0.3);
@@ -40,8 +41,8 @@ double driven(S structure, double duration, double period) {
     return rendered.environment_position;
 }
 
-/// Returns the order of a time step from its errors at T and T/2. The reference is the fourth-order Runge-Kutta
-/// solution.
+/// Returns the order of a time integration method from its errors at periods T and T/2. The reference is the
+/// fourth-order Runge-Kutta solution.
 template <class Make>
 double order(Make make) {
     constexpr double duration = 0.256;
@@ -67,7 +68,7 @@ double order(Make make) {
     return std::log2(coarse / fine);
 }
 
-/// Moves the device to 0.2 and waits: 100 (0.2 - y) = 20 y + 300 y^3 at rest.
+/// Moves the device to 0.2 and waits until the object rests at position y: 100 (0.2 - y) = 20 y + 300 y^3.
 template <class S>
 void expect_the_force_of_the_coupling_at_rest(S structure) {
     structure.reset(0.0);

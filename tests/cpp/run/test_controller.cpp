@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-/// A device with prescribed readings, for tests of the controller with invalid ones.
+/// A device that returns prescribed readings, some of them invalid, to test the controller.
 class ScriptedDevice {
   public:
     Opened open() { return {}; }

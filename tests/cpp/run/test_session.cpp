@@ -43,14 +43,14 @@
 
 namespace {
 
-/// True in the loop's thread while it ticks.
+/// True in the thread of the control loop while the loop executes a tick.
 thread_local bool watched = false;
 
 std::atomic<int> allocations{0};
 std::atomic<int> locks{0};
 std::atomic<int> exceptions{0};
 
-// Unused under sanitizers, which have their interposers.
+// Not used under sanitizers, which replace the same library functions.
 [[maybe_unused]] void count_if_watched(std::atomic<int>& counter) {
     if (watched) {
         counter.fetch_add(1, std::memory_order_relaxed);
@@ -144,7 +144,8 @@ constexpr auto throws = [] {
 };
 constexpr auto calls_the_system = [] { (void)syscall(SYS_getppid); };
 
-/// Passes each record to the real sinks, and starts the observation with the first tick.
+/// Passes each record to the real recorder, and starts counting forbidden actions at the first tick of the control
+/// loop.
 template <class Recorder>
 struct WatchedSink {
     Recorder& recorder;
@@ -179,8 +180,8 @@ ForceModel velocity_model() {
                                    {{0.0, -1.0}, {1.0, 1.0}, {}, {}, std::nullopt});
 }
 
-/// Runs the real loop at 10 kHz with its real recorder. `before` runs in the loop's thread before it starts, `after` in
-/// that thread after its end.
+/// Runs the real control loop at 10 kHz with its real recorder. `before` runs in the loop's thread before the loop
+/// starts, `after` runs in the same thread after the loop ends.
 template <class ForbiddenAction, class Before, class After>
 Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenAction action, Before before,
                    After after, int predict = 0) {
@@ -224,7 +225,8 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenActi
             if constexpr (std::is_same_v<After, std::remove_const_t<decltype(nothing)>>) {
                 loop.join();
             } else {
-                _exit(counts.ticks > 0 ? 0 : 1);  // the filtered thread cannot end in another way
+                // The thread with the system-call filter cannot end in another way.
+                _exit(counts.ticks > 0 ? 0 : 1);
             }
         });
     return counts;
@@ -266,7 +268,7 @@ TEST(RealTimePath, CountersDetectAllocationsLocksAndExceptions) {
     EXPECT_GE(counted(throws).exceptions, 1);
 }
 
-/// Shared memory in which a filtered child stores the number of the system call that killed it.
+/// Shared memory in which a child process stores the number of the forbidden system call that ended it.
 int* shared_call_number() {
     static auto* const number = static_cast<int*>(
         mmap(nullptr, sizeof(int), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
@@ -278,7 +280,8 @@ void report_system_call(int /*signal*/, siginfo_t* info, void* /*context*/) {
     _exit(99);
 }
 
-/// Restricts this thread to sleeping until a deadline, reading the clock and ending the process.
+/// Restricts the calling thread to three system calls: sleeping until a deadline, reading the clock and ending the
+/// process.
 void forbid_system_calls() {
     struct sigaction action{};
     action.sa_sigaction = report_system_call;
@@ -312,7 +315,7 @@ void sleep_until_killed() {
     }
 }
 
-/// Returns the number of the system call at which the loop was killed; 0 if it ran to its end.
+/// Returns the number of the system call at which the kernel ended the loop; 0 if the loop ran to its end.
 template <class ForbiddenAction>
 int system_call_in_the_loop(ForbiddenAction action, StructureKind kind, const ForceModel& rendered) {
     *shared_call_number() = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that every defect of a session is found and stated with its cure.
+// Tests that the session report states every defect of a session, with its cure.
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -13,9 +13,10 @@
 namespace palpate {
 namespace {
 
-/// A session of 1000 punctual ticks over its whole domain.
+/// A session of 1000 ticks without delay, with handle positions over the whole domain of the model.
 struct Judged {
-    std::unique_ptr<SessionReport> report = std::make_unique<SessionReport>();  // large, so on the heap
+    // On the heap, because a session is too large for the stack.
+    std::unique_ptr<SessionReport> report = std::make_unique<SessionReport>();
     LoopSettings settings;
     RecordSinks sinks;
     SessionExpectation expected{false, 1e-3, {0.0, 1.0}, "rad", {}};
@@ -110,7 +111,7 @@ TEST(SessionVerdict, RefusesASessionWithoutForce) {
 
 TEST(SessionVerdict, RefusesARecordingWithoutMotion) {
     Judged still;
-    still.sinks.positions = {0.5, 0.5015};  // fewer than two encoder steps
+    still.sinks.positions = {0.5, 0.5015};  // handle moved by fewer than two encoder steps
     expect(still, "usable: the handle covered 0.0015 rad", "move the handle over the whole object");
     still.expected.recorded = true;
     expect(still, "no: ", "so the force over position is unknown");

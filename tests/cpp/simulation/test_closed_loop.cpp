@@ -29,7 +29,7 @@ DeviceProfile random_device(test::Random& random) {
     return device;
 }
 
-/// Returns the error of the account, divided by the throughput.
+/// Returns the error of the energy account, divided by the total energy that was exchanged.
 double open_balance(const DeviceProfile& device, double start_velocity, const ClosedLoopEnd& end) {
     const double kinetic =
         0.5 * device.inertia * (end.handle.velocity * end.handle.velocity - start_velocity * start_velocity);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scripted faults in random order, in virtual time: tests of the forces, of the exit, and of the files.
+// Simulates device faults in random order, in virtual time, and tests the forces, the exit status and the files of
+// each run.
 #include <unistd.h>
 
 #include <algorithm>
@@ -29,13 +30,13 @@ namespace {
 
 constexpr double period_s = 1e-3;
 
-/// One late tick; all others are punctual.
+/// Timing in which one tick is late and all other ticks are on time.
 struct LateTick {
     std::uint64_t tick = 0;
     Nanoseconds by = 0;
 };
 
-/// A clock whose deadlines are all met except one, without waiting.
+/// A clock that meets all deadlines except one, without real waiting.
 class VirtualClock {
   public:
     explicit VirtualClock(LateTick late) : late_{late} {}
@@ -51,7 +52,7 @@ class VirtualClock {
     Nanoseconds now_ = 0;
 };
 
-/// Stores the forces sent to the device, and its closing.
+/// Stores the forces sent to the device, and the moment at which the device is closed.
 struct Observed {
     std::vector<double> forces;
     bool closed = false;
@@ -94,7 +95,7 @@ struct Rendering {
     GuardSettings guards;
 };
 
-/// Returns a spring of 8 N*m/rad over half a turn of the knob: forces up to 4 N*m.
+/// Returns a spring of 8 N*m/rad over half a revolution of the knob, with forces up to 4 N*m.
 ForceModel spring() {
     NetworkParameters network;
     network.linear = {8.0};
@@ -147,7 +148,8 @@ void expect_safe(const Rendering& run) {
         }
         last = tick.force;
     }
-    ASSERT_EQ(run.observed.forces.size(), run.ticks.size() + 2);  // with the first sample, and the last zero
+    // Rows include the first sample and the last command, zero force.
+    ASSERT_EQ(run.observed.forces.size(), run.ticks.size() + 2);
     for (std::size_t k = 0; k < run.ticks.size(); ++k) {
         ASSERT_EQ(run.observed.forces[k + 1], run.ticks[k].force);
     }
@@ -168,7 +170,7 @@ TEST(Faults, RunWithoutFaultsIsOrderly) {
     EXPECT_GT(largest->force, 2.0);
 }
 
-// A force that was held longer than certified is outside the certificate, for any later motion.
+// If a device held a force longer than certified, the certificate is not valid for any later motion of this run.
 TEST(Faults, TickLaterThanCertifiedEndsTheRunWithZeroForceAndAReason) {
     LoopSettings settings;
     settings.duration_s = 1.0;

@@ -25,7 +25,8 @@ std::vector<double> square_law(std::span<const double> motion, double /*step_s*/
     return force;
 }
 
-/// A handle whose position is x(t), and forces that are f of the position `ahead` after the start of each tick.
+/// A handle whose position is x(t), with held forces equal to the model force f at the time `ahead` after the start of
+/// each tick.
 struct Motions {
     std::vector<double> start, middle, end, applied;
 
@@ -42,12 +43,14 @@ struct Motions {
     [[nodiscard]] HeldForces held() const noexcept { return {start, middle, end, applied, applied}; }
 };
 
-// Held from the start of the tick at velocity v: too small by f' v T / 2 on average, by f' v T at the end.
+// A force held from the start of the tick at velocity v is too small by f' v T / 2 on average and by f' v T at the
+// end, with slope f' and period T.
 TEST(ForceError, HoldIsLateByHalfASampleInTheMeanAndByOneAtTheEnd) {
     constexpr double v = 0.5;
     const Motions motions{2000, 0.0, [&](double t) { return 1.0 + v * t; }};
     const ForceError error = force_error(motions.held(), period, square_law);
-    // RMS of 20 x v T / 2 over x from 1 to 2, and the work, integral of it over x from 1 to 2.
+    // Expected values: RMS of 20 x v T / 2 over positions x from 1 to 2, and the work, the integral of 20 x v T / 2
+    // over the same positions.
     const double mean = 20.0 * v * period / 2.0 * std::sqrt(7.0 / 3.0);
     EXPECT_NEAR(error.instant, 0.0, 1e-12);
     EXPECT_NEAR(error.mean, mean, 1e-3 * mean);
@@ -77,11 +80,13 @@ TEST(ForceError, ForceAheadByOneSampleHasNoErrorAtTheEndAndTheFullMeanError) {
 }
 
 TEST(ForceError, FollowsACurvedMotionWithinTheTick) {
-    // x = a t^2 within one tick; f held at 0: the mean of f is 10 a^2 T^4 / 5, the work -10 (a T^2)^3 / 3.
+    // Handle at x = a t^2 within one tick, force held at 0: the mean of f is 10 a^2 T^4 / 5, the work -10 (a T^2)^3 /
+    // 3.
     constexpr double a = 2e5;
     const Motions motions{1, 0.0, [&](double t) { return a * t * t; }};
     const ForceError error = force_error(motions.held(), period, square_law);
-    // Four parts have an error of 5 % for this motion, which reverses; two ends alone would have an error of 50 %.
+    // For this motion, which reverses, integration over four parts of the tick has an error of 5 %; integration from
+    // both ends only would have an error of 50 %.
     EXPECT_NEAR(error.mean, 10.0 * a * a * std::pow(period, 4) / 5.0, 0.08 * 0.08);
     EXPECT_NEAR(error.work, -10.0 * std::pow(a * period * period, 3) / 3.0, 0.08 * 0.0267);
 }
@@ -131,7 +136,8 @@ TEST(ForceError, TraceHoldsTheMiddleOfEachTickAndTheMeanOfADelayedForce) {
     line.bias = -0.1;
     Hand no_hand;
     no_hand.stiffness = no_hand.damping = 0.0;
-    // A constant force: in the middle of each tick the handle is a T^2 / 8 away from the straight line.
+    // At constant force the handle deviates in the middle of each tick from the straight line by a T^2 / 8, with
+    // acceleration a and period T.
     const Domain domain{{-1.0}, {1.0}, {}, {}, std::nullopt};
     const Trace thrown = simulate({line, domain}, scheme, device, no_hand, 50);
     const double deviation = 0.1 / device.inertia * 1e-6 / 8.0;

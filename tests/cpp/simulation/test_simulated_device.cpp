@@ -89,7 +89,8 @@ TEST(SimulatedDevice, DelaysLimitsAndRoundsTheForce) {
     }
 }
 
-// Newton's law by hand: no force for a quarter of the second tick, the first command for the rest.
+// Expected motion by Newton's law: no force for the first quarter of the second tick, the first command for the
+// remaining time.
 TEST(SimulatedDevice, AppliesACommandAFractionOfASampleLate) {
     DeviceProfile profile;
     profile.delay_s = 1.25 * profile.period_s;

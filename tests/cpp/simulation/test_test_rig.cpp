@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the simulated rig: its numbers relative to a model, and the choices of the user.
+// Tests the simulated test rig: its values follow from the model, unless the user gives other values.
 #include "palpate/simulation/test_rig.hpp"
 
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-/// Returns a switch whose release force is 0.1 N smaller, over `travel` metres.
+/// Returns a switch with a travel of `travel` metres, whose release force is 0.1 N smaller than its press force.
 ForceModel keyswitch(double travel, std::optional<double> play_radius = {}) {
     const Domain domain{{0.0}, {travel}, Continuation::Linear, Continuation::Linear, std::nullopt};
     return {NetworkParameters{1, {}, {}, {}, {0.8 / travel}, 0.1}, {{}, 0.0, 0.05}, domain, play_radius};

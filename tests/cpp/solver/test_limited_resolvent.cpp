@@ -25,7 +25,7 @@ using test::uniform;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// Finds the only root of c(f(y)) + p y = q by bisection.
+/// Finds the only position y with c(f(y)) + p y = q by bisection; c is the force limit, p y the load line.
 template <class E>
 double bisected(const LimitedEnvironment<E>& object, const typename E::State& state, LoadLine line) {
     double low = (line.intercept - object.force_limit()) / line.slope;
@@ -37,7 +37,7 @@ double bisected(const LimitedEnvironment<E>& object, const typename E::State& st
     return 0.5 * (low + high);
 }
 
-/// Checks a motion of random jumps and returns the number of steps at which the limit is active.
+/// Applies random jumps of the position and returns the number of steps in which the force limit is active.
 template <class E, class Solver>
 int expect_the_bisected_root(Random& random, const LimitedEnvironment<E>& object,
                              const LimitedResolvent<Solver>& solver, double p) {
@@ -146,7 +146,7 @@ TEST(LimitedResolvent, FindsARootOfALoadLineThatIsNotUnique) {
 }
 
 TEST(LimitedResolvent, NeverExceedsTheLimitBehindAMasslessCoupling) {
-    // A spring of 200 N/m behind 300 N/m and 0.05 N s/m, limited to 2 N.
+    // A spring of 200 N/m behind a coupling of 300 N/m and 0.05 N s/m, on a device with a force limit of 2 N.
     const LimitedEnvironment object{test::Spring{200.0}, 2.0};
     const VirtualCoupling coupling{300.0, 0.05};
     const PiecewiseForce spring{

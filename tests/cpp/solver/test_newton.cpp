@@ -62,7 +62,7 @@ TEST(LoadLineSolver, StatusIsTheReasonOfTheEnd) {
 }
 
 TEST(LoadLineSolver, ReportsNotUniqueOnAFallingBranch) {
-    // f(y) + p y has the slope -2 + 1: 0 is a solution, but no motion would stop there.
+    // The function f(y) + p y has the slope -2 + 1 < 0: y = 0 is a solution, but a motion would leave this solution.
     const Solution solution = LoadLineSolver{}.solve(test::Spring{-2.0}, {}, {1.0, 0.0}, 0.0);
     EXPECT_EQ(solution.status, Status::NotUnique);
 }
@@ -82,7 +82,7 @@ TEST(LoadLineSolver, FindsARootForAnySlopesInItsBracket) {
 
 // spec section 5: "from the previous solution, the first root met in the direction of -residual"
 TEST(LoadLineSolver, EndsOnTheFirstRootInTheDirectionOfTheResidual) {
-    // A snap-through whose falling flank (-15) is steeper than the load line rises (5): up to three roots.
+    // A force that falls with slope -15, more steeply than the load line rises (slope 5): up to three solutions.
     const test::ClickAndWall object;
     const double p = 5.0;
     LoadLineSolver solver;

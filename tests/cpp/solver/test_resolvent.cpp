@@ -28,7 +28,7 @@ WaveletNetwork random_scene(Random& random, std::size_t wavelets,
     return {test::random_network(random, wavelets), test::unit_domain(continuation, continuation)};
 }
 
-/// Returns a p for which p + f' > 0 everywhere, with a small or large margin.
+/// Returns a slope p of the load line for which p + f' > 0 at every position, with a small or large margin.
 double unique_slope(Random& random, const WaveletNetwork& network) {
     const double edges =
         std::min(network.curve().below().at_edge.slope, network.curve().above().at_edge.slope);
@@ -37,7 +37,7 @@ double unique_slope(Random& random, const WaveletNetwork& network) {
            (slope.upper - slope.lower) * std::exp(uniform(random, -2.5, 4.0));
 }
 
-/// Returns f in extended precision, inside the domain.
+/// Returns the force f in extended precision, at positions inside the domain.
 long double exact(const NetworkParameters& network, long double x) {
     long double sum = static_cast<long double>(network.linear[0]) * x + network.bias;
     for (std::size_t i = 0; i < network.weight.size(); ++i) {
@@ -47,7 +47,7 @@ long double exact(const NetworkParameters& network, long double x) {
     return sum;
 }
 
-/// Returns the solution inside the domain in extended precision, by bisection.
+/// Returns the solution y of f(y) + p y = q inside the domain in extended precision, by bisection.
 long double exact_solution(const NetworkParameters& network, long double p, long double q) {
     long double low = 0.0L;
     long double high = 1.0L;
@@ -58,7 +58,7 @@ long double exact_solution(const NetworkParameters& network, long double p, long
     return 0.5L * (low + high);
 }
 
-/// Returns a soft spring, a click that falls with slope -15, and a wall: 10 wavelets over [0, 0.6] rad.
+/// Returns the force of a soft spring, a click that falls with slope -15, and a wall: 10 wavelets over [0, 0.6] rad.
 WaveletNetwork switch_and_wall() {
     NetworkParameters network{1, {}, {}, {}, {12.0}, 0.0};
     const auto add = [&](double alpha, double beta, double weight) {
@@ -144,8 +144,8 @@ TEST(Resolvent, IsExactAtTheEdges) {
 TEST(Resolvent, HasNoTableIfTheErrorCannotBeCertified) {
     Random random{64};
     const WaveletNetwork network = random_scene(random, 8);
-    // NaN, an accuracy beyond double precision, too small a table, the slope of another load line: Newton's method
-    // solves.
+    // Cases without a table of the inverse function, in which Newton's method solves: a NaN, an accuracy beyond double
+    // precision, too few table cells, and the slope of another load line.
     EXPECT_FALSE((Resolvent{network.curve(), std::nan("")}).tabulated());
     EXPECT_FALSE((Resolvent{network.curve(), 2000.0, {1e-18}}).tabulated());
     EXPECT_FALSE((Resolvent{network.curve(), 2000.0, {1e-12, 100}}).tabulated());
@@ -207,7 +207,8 @@ TEST(Resolvent, RendersLikeNewton) {
     }
 }
 
-/// Returns a click that falls with slope -15, a second one after it, and a wall: 8 wavelets over [0, 0.6] rad.
+/// Returns the force of a click that falls with slope -15, a second click after it, and a wall: 8 wavelets over [0,
+/// 0.6] rad.
 WaveletNetwork two_clicks() {
     NetworkParameters network = switch_and_wall().parameters();
     network.alpha.insert(network.alpha.end(), {45.0, 38.0});
@@ -305,8 +306,8 @@ TEST(Resolvent, FollowsTheBranchRuleAtEveryFold) {
         for (int i = 0; i <= 400; ++i) {
             const double start = place(i * (fine / 400));
             const double at_start = total[static_cast<std::size_t>(i * (fine / 400))];
-            // The right-hand sides are sorted, those above the start upward and those below it downward. The first root
-            // then moves only outward.
+            // The right-hand sides q are sorted, those above the start upward and those below the start downward. The
+            // first solution then only moves away from the start.
             for (const int direction : {1, -1}) {
                 int k = i * (fine / 400);
                 const double highest = *std::max_element(folds.begin(), folds.end()) + 2.0;
@@ -381,7 +382,8 @@ TEST(Resolvent, RepeatsWithEveryTurnOfAKnob) {
             const auto residual = [&](double y) { return network.at(y, {}).force + p * y - q; };
             ASSERT_NEAR(residual(solution.position), 0.0, 1e-11 * (p + fall) * (1.0 + std::abs(x)))
                 << k << " " << j;
-            // No root may lie between; tested in steps of 1 / 500 of a turn.
+            // No solution may lie between the start and the returned solution; the test checks steps of 1 / 500 of the
+            // distance.
             const double direction = residual(before) < 0.0 ? 1.0 : -1.0;
             const double distance = direction * (solution.position - before);
             ASSERT_GE(distance, -1e-9) << k << " " << j;
@@ -428,7 +430,7 @@ TEST(CertifiedSolver, IsExactAtTheKinksAtTheEdges) {
         ASSERT_TRUE(solver.unique(p));
         for (int j = 0; j < 100; ++j) {
             const double edge = j % 2 == 0 ? 0.0 : 1.0;
-            // The tangent of a step from a slightly larger distance may end on the wrong side of the edge.
+            // If a step starts slightly farther away, its tangent may end on the wrong side of the domain edge.
             const auto near_kink = [&](double from, double to) {
                 return edge +
                        (uniform(random, -1.0, 1.0) < 0.0 ? -1.0 : 1.0) * std::exp(uniform(random, from, to));
@@ -445,7 +447,8 @@ TEST(CertifiedSolver, IsExactAtTheKinksAtTheEdges) {
     }
 }
 
-// Tests 401 x 401 pairs of the last and the new right-hand side, for load lines from just unique to steep.
+// Tests 401 x 401 pairs of the last and the new right-hand side q, for load lines from just above the least unique
+// slope to steep slopes.
 TEST(CertifiedSolver, EndsWithinFourEvaluationsAfterEveryJump) {
     const WaveletNetwork network = switch_and_wall();
     const double fall = test::steepest_fall(piecewise(network.curve()));
@@ -479,7 +482,8 @@ TEST(CertifiedSolver, EndsWithinFourEvaluationsAfterEveryJump) {
     }
 }
 
-// A fold is so near that a p smaller by a thousandth would create it. The full tier tests 10^6 steps.
+// The load line is close to non-unique: a slope p smaller by a thousandth would give several solutions. The full test
+// tier tests 10^6 steps.
 TEST(CertifiedSolver, EndsWithinFourEvaluationsNearAFold) {
     Random random{70};
     long steps = 0;
@@ -498,7 +502,8 @@ TEST(CertifiedSolver, EndsWithinFourEvaluationsNearAFold) {
             continue;
         }
         const double p = fall * (1.0 + std::exp(uniform(random, std::log(1e-4), 0.0)));
-        // The tables with the cells between them, and the cells alone.
+        // Solver with the table of the inverse function and the cells for the remaining positions, and solver with the
+        // cells alone.
         const Resolvent resolvent{network.curve(), p};
         const CertifiedSolver& solver = resolvent.solver();
         ASSERT_TRUE(resolvent.unique(p)) << k << " p / fall = " << p / fall;

@@ -22,7 +22,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-/// Returns a random pair over [0, 1] whose hysteresis is one or two bumps above a constant.
+/// Returns a random mean force and hysteresis over [0, 1]; the hysteresis is one or two bumps above a constant.
 HysteresisNetwork random_pair(Random& random, std::size_t wavelets, double play_radius,
                               Continuation continuation = Continuation::Free) {
     const NetworkParameters network = test::random_network(random, wavelets);
@@ -33,7 +33,8 @@ HysteresisNetwork random_pair(Random& random, std::size_t wavelets, double play_
     return {network, hysteresis, test::unit_domain(continuation, continuation), play_radius};
 }
 
-/// Returns a p for which every slide is unique, with a small or large margin.
+/// Returns a slope p of the load line for which the solution is unique in both sliding directions of the play
+/// operator, with a small or large margin.
 double unique_slope(Random& random, const HysteresisNetwork& pair) {
     const double common = pair.force().slope_bounds().lower;
     const double hysteresis = pair.hysteresis_force().slope_bounds().largest();
@@ -42,7 +43,8 @@ double unique_slope(Random& random, const HysteresisNetwork& pair) {
     return std::max(hysteresis - common, edges) * std::exp(uniform(random, 0.1, 2.0));
 }
 
-// A motion that presses, releases and reverses anywhere, through sticking and sliding and past both edges.
+// A motion that presses, releases and reverses at any position, with the play operator at rest or sliding, and past
+// both edges of the domain.
 TEST(SlidingResolvent, AgreesWithNewton) {
     Random random{71};
     int steps = 0;
@@ -101,7 +103,7 @@ TEST(SlidingResolvent, NeedsAtMostTwoEvaluationsWhileSticking) {
     EXPECT_GT(evaluations, 0);
 }
 
-/// Returns the rounding error of f, and of s = (y - play) / r.
+/// Returns the rounding error of the force f, and of the direction state s = (y - play) / r.
 double rounding_of(const HysteresisNetwork& pair, double x) {
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     const double hysteresis = pair.hysteresis_force().value_bounds().largest();
@@ -110,7 +112,8 @@ double rounding_of(const HysteresisNetwork& pair, double x) {
            8.0 * epsilon * (std::abs(x) + 1.0) * hysteresis / pair.play_radius();
 }
 
-// Random jumps of q and of the play, for load lines that are unique by 1e-4 to 1. The full tier tests 10^6 steps.
+// Random jumps of the right-hand side q and of the play operator. Load lines exceed the slope that makes the solution
+// unique by 1e-4 to 1. The full test tier tests 10^6 steps.
 TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     Random random{76};
@@ -125,7 +128,8 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
             domain = {{0.1}, {1.1}, Continuation::Linear, Continuation::Linear, 1.0};
         }
         const auto wavelets = static_cast<std::size_t>(1 + k % 12);
-        // Every seventh hysteresis falls below zero, which is valid for a model but impossible for a passive object.
+        // Every seventh hysteresis has negative values; the model format allows them, but a passive object cannot have
+        // them.
         HysteresisParameters hysteresis{std::vector<double>(wavelets), 0.0,
                                         uniform(random, k % 7 == 6 ? -0.1 : 0.3, k % 7 == 6 ? 0.1 : 1.0)};
         for (double& weight : hysteresis.weight) {
@@ -148,8 +152,8 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
         CertifiedSolver::Memory alone{0.5};
         auto state = pair.start(0.5);
         for (int j = 0; j < 500; ++j) {
-            // A jump of the play as well, or to either side of the position where it starts to slide, or a short
-            // distance.
+            // A jump of q together with the play operator, a jump to either side of the position at which the play
+            // operator starts to slide, or a short distance.
             if (j % 3 == 0) {
                 state = pair.start(uniform(random, -0.3, 1.4));
             }
@@ -203,7 +207,7 @@ TEST(SlidingResolvent, UsesNewtonIfTheLoadLineIsNotUnique) {
     EXPECT_EQ(memory.newton.position, before.newton.position);
 }
 
-/// Moves both structures along one motion.
+/// Moves two structures along the same motion.
 template <class S, class T>
 void expect_same_rendering(Random& random, S structure, T reference, double tolerance) {
     structure.reset(0.4);

@@ -24,7 +24,7 @@ ForceBounds slopes(double lower, double upper) {
     return bounds;
 }
 
-/// Returns a device whose encoder and command are without steps.
+/// Returns a device without encoder steps and command steps.
 DeviceProfile smooth(double viscous_damping, int delay_samples = 0) {
     DeviceProfile device;
     device.viscous_damping = viscous_damping;
@@ -45,7 +45,8 @@ constexpr std::array<StructureKind, 3> coupled{StructureKind::Massless, Structur
                                                StructureKind::EnergyConsistent};
 
 TEST(Certificate, DirectNeedsHalfAPeriodOfTheSlopeAndTheDelayInFull) {
-    // 62 N*m/rad at 1 ms needs 0.031, and 0.062 more for a sample of delay. Slopes of -15 add nothing.
+    // A slope of 62 N*m/rad at a period of 1 ms needs a damping of 0.031 N*m*s/rad, and 0.062 more for each sample of
+    // delay. Falling slopes of -15 N*m/rad need no additional damping.
     EXPECT_TRUE(certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.031)).certified());
     EXPECT_FALSE(certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.0309)).certified());
     EXPECT_TRUE(
@@ -54,7 +55,8 @@ TEST(Certificate, DirectNeedsHalfAPeriodOfTheSlopeAndTheDelayInFull) {
         certify(slopes(-15.0, 62.0), scheme_of(StructureKind::Direct), smooth(0.0929, 1)).certified());
 }
 
-/// Returns the damping divided by T M that direct rendering with a prediction needs, M = 62 N*m/rad.
+/// Returns the device damping, divided by T M, that direct rendering with a prediction needs; T is the period, M = 62
+/// N*m/rad the steepest slope.
 double predicted_share(double falling, int predict, double delay_samples = 0.0) {
     Scheme scheme = scheme_of(StructureKind::Direct);
     scheme.predict = predict;
@@ -79,11 +81,12 @@ TEST(Certificate, PredictionFromMoreSamplesNeedsLessDamping) {
 }
 
 TEST(Certificate, PredictionOfALateForceCanNeedLessDampingThanNoPrediction) {
-    // Q = z^-1 - z^-2 / 2: a spring needs 1.25 T K instead of 1.5 T K.
+    // With the prediction filter Q = z^-1 - z^-2 / 2 a spring of stiffness K needs a damping of 1.25 T K instead of
+    // 1.5 T K.
     EXPECT_NEAR(predicted_share(0.0, 1, 1.0), 1.299, 0.001);
     EXPECT_NEAR(predicted_share(1.0, 1, 1.0), 1.414, 0.001);
     EXPECT_NEAR(predicted_share(0.0, 1, 2.0), 2.000, 0.001);
-    // The need for a fraction of a sample lies between.
+    // The damping for a delay of a fraction of a sample lies between the values for the neighbouring whole delays.
     for (const int predict : {1, 4}) {
         double before = predicted_share(0.0, predict, 1.0);
         for (const double delay : {1.02, 1.25, 1.5, 1.75, 1.98, 2.0}) {
@@ -118,7 +121,8 @@ TEST(Certificate, JitterOfALateDeviceRaisesTheNeedOfAPredictionContinuously) {
 }
 
 TEST(Certificate, PredictionRaisesTheErrorOfTheEncoder) {
-    // (m + 3) / (m + 1) half steps: 2 at m = 1, 7/5 at m = 4.
+    // A prediction from m samples increases the required friction to (m + 3) / (m + 1) half encoder steps: 2 at m = 1,
+    // 7/5 at m = 4.
     Scheme scheme = scheme_of(StructureKind::Direct);
     DeviceProfile device = smooth(10.0);
     device.encoder_step = 1e-3;
@@ -144,7 +148,8 @@ TEST(Certificate, PredictionWithHysteresisNeedsHalfOfTheSteepestSlopeMore) {
     EXPECT_FALSE(certify(play, scheme, smooth(0.06199)).certified());
     scheme.predict = 16;
     EXPECT_FALSE(certify(play, scheme, smooth(0.06199)).certified()) << "the same for every m";
-    // The play has the error of one reading, x_hat of (m + 3) / (m + 1) readings.
+    // The play operator has the position error of one reading; the predicted position x_hat has an error of (m + 3) /
+    // (m + 1) readings for m samples.
     scheme.predict = 1;
     DeviceProfile device = smooth(1.0);
     device.encoder_step = 1e-3;
@@ -167,7 +172,7 @@ TEST(Certificate, PredictionOfAForceOfVelocityIsRefused) {
 
 TEST(Certificate, AFallingForceNeedsDampingOnlyWithDelay) {
     EXPECT_TRUE(certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.0)).certified());
-    // A sample of delay needs half a period of the slope.
+    // With one sample of delay a falling slope needs a damping of half a period times this slope.
     EXPECT_TRUE(certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.0311, 1)).certified());
     EXPECT_FALSE(
         certify(slopes(-62.0, 0.0), scheme_of(StructureKind::Direct), smooth(0.0309, 1)).certified());
@@ -194,18 +199,20 @@ TEST(Certificate, BehindACouplingTheNeedIsThatOfTheCoupling) {
 }
 
 TEST(Certificate, MasslessWithoutDampingIsAStaticForceOfTheSeriesSlope) {
-    // K_c f' / (K_c + f') = 100 * 300 / 400 = 75.
+    // Slope of model and coupling in series: K_c f' / (K_c + f') = 100 * 300 / 400 = 75.
     const Scheme scheme = scheme_of(StructureKind::Massless, {100.0, 0.0});
     EXPECT_TRUE(certify(slopes(0.0, 300.0), scheme, smooth(0.0376)).certified());
     EXPECT_FALSE(certify(slopes(0.0, 300.0), scheme, smooth(0.0374)).certified());
-    // Falling parts become steeper: -50 becomes -100. With a sample of delay this needs half a period of the slope.
+    // In series with the coupling a falling slope of -50 becomes steeper: -100. With a sample of delay this slope
+    // needs a damping of half a period times the slope.
     EXPECT_TRUE(certify(slopes(-50.0, 0.0), scheme, smooth(0.0501, 1)).certified());
     EXPECT_FALSE(certify(slopes(-50.0, 0.0), scheme, smooth(0.0499, 1)).certified());
     EXPECT_FALSE(certify(slopes(-100.0, 0.0), scheme, smooth(10.0)).certified());
 }
 
 TEST(Certificate, CompensationCancelsTheCoupling) {
-    // With B_c = 0 the compensated massless structure is direct rendering, in every inequality.
+    // With coupling damping B_c = 0 the compensated massless structure gives the same force as direct rendering, so
+    // all inequalities are equal.
     Scheme scheme = scheme_of(StructureKind::Massless, {100.0, 0.0});
     scheme.compensated = true;
     DeviceProfile device = smooth(0.06, 1);
@@ -220,12 +227,12 @@ TEST(Certificate, CompensationCancelsTheCoupling) {
 }
 
 TEST(Certificate, CouplingAndDampingLimitTheFallingSlope) {
-    // Massless: s_ < K_c + B_c / T = 120.
+    // Massless structure: the steepest falling slope s_ must be less than K_c + B_c / T = 120.
     const Scheme massless = scheme_of(StructureKind::Massless, {100.0, 0.02});
     EXPECT_TRUE(certify(slopes(-119.9, 5.0), massless, smooth(1.0)).certified());
     EXPECT_FALSE(certify(slopes(-120.1, 5.0), massless, smooth(1.0)).certified());
-    // With mass and a force limit: s_ <= 2 B_o / T = 400, for any coupling and mass. The energy-consistent step is
-    // certified for any slope.
+    // With object mass and a force limit the steepest falling slope s_ must be at most 2 B_o / T = 400, for any
+    // coupling and mass. The energy-consistent structure is certified for any slope.
     for (const double mass : {0.01, 1.0}) {
         const Scheme implicit = scheme_of(StructureKind::Implicit, {100.0, 0.02}, {mass, 0.2});
         EXPECT_TRUE(certify(slopes(-399.9, 5.0), implicit, smooth(1.0)).certified());
@@ -240,8 +247,8 @@ TEST(Certificate, CouplingAndDampingLimitTheFallingSlope) {
     EXPECT_TRUE(certify(slopes(-5000.0, 5.0), consistent, smooth(1.0)).certified());
 }
 
-// spec of the certificate: "Falling slopes with mass and limit fail", s = 0.31 K_c, m = 7 K_c T^2, B_o = 0. The motion
-// is in ForceLimit.DoesNotKeepAFallingForceWithMassFromGivingEnergy.
+// spec of the certificate: "Falling slopes with mass and limit fail", for s = 0.31 K_c, m = 7 K_c T^2, B_o = 0. The
+// test ForceLimit.DoesNotKeepAFallingForceWithMassFromGivingEnergy contains a motion that takes energy out.
 TEST(Certificate, RefusesAFallingObjectThatGivesEnergyAtAForceLimit) {
     const Scheme scheme = scheme_of(StructureKind::Implicit, {100.0, 0.0}, {7.0 * 100.0 * 1e-6, 0.0});
     EXPECT_EQ(certify(slopes(-31.0, 0.0), scheme, smooth(1.0)).verdict, Verdict::Refused);
@@ -257,8 +264,8 @@ TEST(Certificate, WithoutAForceLimitTheCouplingLimitsTheFallingSlopeOfAMass) {
 }
 
 TEST(Certificate, RefusesAStepWithoutACertainSolution) {
-    // At the limit the object moves alone. m/T^2 + B_o/T > s_ gives one solution; 2 m/T^2 + B_o/T > s_/2 gives at least
-    // one.
+    // While the coupling force is at the force limit, the object moves independently of the handle. With falling slope
+    // s_, m/T^2 + B_o/T > s_ gives exactly one solution; 2 m/T^2 + B_o/T > s_/2 gives at least one solution.
     const Scheme implicit = scheme_of(StructureKind::Implicit, {1e4, 0.0}, {1e-4, 0.2});
     EXPECT_TRUE(certify(slopes(-299.0, 5.0), implicit, smooth(10.0)).certified());
     EXPECT_FALSE(certify(slopes(-301.0, 5.0), implicit, smooth(10.0)).certified());
@@ -397,7 +404,7 @@ TEST(ExplicitScheme, IsStableWithTheStiffestCouplingAndThenTheLeastDamping) {
         const DeviceProfile device = smooth(std::exp(test::uniform(random, -4.0, 0.0)));
         const Scheme chosen = explicit_scheme(bounds, device, {});
         if (!holds(bounds, chosen, chosen.coupling, device)) {
-            continue;  // no tried object is stable
+            continue;  // no tried stiffness of the object is stable
         }
         ++stable;
         EXPECT_LE(chosen.coupling.stiffness, 0.9 * stiffest_coupling(0.0, 0.0, device));
@@ -474,7 +481,8 @@ TEST(Certificate, ExplicitNeedAgreesWithTheReference) {
 
 TEST(Certificate, TheExplicitStructureIsAtMostStable) {
     const Scheme scheme = scheme_of(StructureKind::Explicit, {100.0, 0.02}, {0.001, 0.5});
-    // (4 m - 2 (B_o + B_c) T) / T^2 = 2960, of which the coupling uses 100.
+    // Largest slope of the explicit structure (4 m - 2 (B_o + B_c) T) / T^2 = 2960, of which the coupling stiffness
+    // uses 100.
     const Certificate below = certify(slopes(2.0, 2800.0), scheme, smooth(0.24));
     EXPECT_EQ(below.verdict, Verdict::StableLocally) << below.reason;
     for (const Inequality& line : below.inequalities) {
@@ -491,7 +499,8 @@ TEST(Certificate, TheExplicitStructureIsAtMostStable) {
 }
 
 TEST(Certificate, ComparisonSceneIsCertifiedForNoCoupledStructure) {
-    // Slopes -15.2 to 62 on the default device: b = 0.06, f_c = 0, 65536 counts a turn.
+    // Slopes from -15.2 to 62 N*m/rad on the default device: damping b = 0.06, friction f_c = 0, 65536 encoder counts
+    // per revolution.
     const ForceBounds scene = slopes(-15.2, 62.0);
     for (const StructureKind structure : {StructureKind::Massless, StructureKind::Implicit,
                                           StructureKind::EnergyConsistent, StructureKind::Explicit}) {
@@ -668,7 +677,7 @@ TEST(ForceBounds, MeanForceOfAPeriodicModelNeedsFriction) {
 }
 
 TEST(ForceBounds, AMassBehindACouplingUsesTheMeanOfTheUnlimitedForce) {
-    // A narrow peak on a constant: its mean is 0, the mean of the limited force is not 0.
+    // Force of a narrow peak plus a constant: its mean is 0, but the mean of the limited force is not 0.
     NetworkParameters peak;
     peak.alpha = {12.0};
     peak.beta = {0.5};
@@ -684,7 +693,8 @@ TEST(ForceBounds, AMassBehindACouplingUsesTheMeanOfTheUnlimitedForce) {
     EXPECT_GT(mean(StructureKind::Direct), 1e-3);
     EXPECT_EQ(mean(StructureKind::Massless), mean(StructureKind::Direct));
     EXPECT_EQ(mean(StructureKind::Implicit), 0.0);
-    // Hysteresis dissipates the energy that the mean force gives, but not in the energy-consistent step.
+    // Hysteresis dissipates at least the energy that a non-zero mean force gives, except in the energy-consistent
+    // structure.
     peak.bias += 0.01;
     const ForceModel pair{peak, {{0.0}, 0.0, 0.05}, turn, 0.01};
     const auto of_pair = [&](StructureKind kind) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of stored certificates: every number is recomputed, and only bounds that are wider than necessary are accepted.
+// Tests the check of stored certificates: the check recomputes every number, and accepts bounds of the force only if
+// they are at least as wide as the recomputed bounds.
 #include <functional>
 #include <limits>
 #include <string>
@@ -29,7 +30,7 @@ Scheme direct() {
     return scheme;
 }
 
-/// Returns a device that is strong enough for all models here.
+/// Returns a device that satisfies the certificates of all models in this file.
 DeviceProfile strong() {
     DeviceProfile device;
     device.viscous_damping = 1e4;
@@ -48,7 +49,7 @@ std::string disagreement(const Certificate& stored, const ForceModel& model) {
     }
 }
 
-/// Returns the certificate that follows from other bounds.
+/// Returns the certificate that follows from different bounds of the force.
 Certificate with_bounds(const Certificate& certificate, const std::function<void(ForceBounds&)>& change) {
     ForceBounds bounds = certificate.bounds;
     change(bounds);
@@ -74,7 +75,7 @@ TEST(CertificateCheck, AcceptsAComputedCertificate) {
     EXPECT_EQ(disagreement(certify(model, direct(), strong()), model), "");
 }
 
-// An older release used wider bounds; its proofs remain valid.
+// An older release computed wider bounds of the force; certificates with wider bounds remain valid.
 TEST(CertificateCheck, AcceptsWiderBoundsAndRefusesNarrowerOnes) {
     const ForceModel model = hysteretic();
     const Certificate certificate = certify(model, direct(), strong());
@@ -84,7 +85,7 @@ TEST(CertificateCheck, AcceptsWiderBoundsAndRefusesNarrowerOnes) {
             return [&widen, amount](ForceBounds& bounds) { widen(bounds, amount); };
         };
         EXPECT_EQ(disagreement(with_bounds(certificate, by(1e-3)), model), "") << name;
-        if (name != "mean_force") {  // it is 0 here and cannot be smaller
+        if (name != "mean_force") {  // this bound is 0 here and cannot be smaller
             const std::string wrong = disagreement(with_bounds(certificate, by(-1e-3)), model);
             EXPECT_EQ(wrong.rfind("certificate.bounds." + name + " is ", 0), 0U) << name << ": " << wrong;
         }
@@ -106,7 +107,8 @@ TEST(CertificateCheck, RefusesABoundThatIsNotANumber) {
     EXPECT_FALSE(agree(std::numeric_limits<double>::quiet_NaN(), 1.0));
 }
 
-// Wider bounds with the lines of the narrower ones. The lines must follow from the bounds.
+// Replaces the bounds by wider ones but keeps the inequalities of the narrower bounds. The check must refuse, because
+// the inequalities must follow from the stored bounds.
 TEST(CertificateCheck, RefusesLinesThatDoNotFollowFromTheStoredBounds) {
     const ForceModel model = hysteretic();
     Certificate certificate = certify(model, direct(), strong());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests lines of the certificate behind a coupling with optimised motions and an independent energy account: force
-// times motion, plus damping, sample by sample. The simulated devices are not used.
+// Tests inequalities of the certificate for structures with a virtual coupling. Optimised motions try to take energy
+// out; an independent account sums force times motion, plus damping, sample by sample. The simulated devices are not
+// used.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -22,7 +23,7 @@
 namespace palpate {
 namespace {
 
-/// A spring with bumps of its energy, V = K x^2 / 2 + sum of a exp(-((x - c) / w)^2).
+/// A spring with bumps in its stored energy, V = K x^2 / 2 + sum of a exp(-((x - c) / w)^2).
 struct Bumps {
     using State = Stateless;
     struct Bump {
@@ -45,7 +46,7 @@ struct Bumps {
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 
-    /// Returns the slopes, with a margin for positions between the samples.
+    /// Returns the steepest slopes of the force, with a margin for positions between the samples.
     [[nodiscard]] Interval slopes() const {
         Interval found{stiffness, stiffness};
         for (double x = -6.0; x <= 6.0; x += 0.002) {
@@ -55,7 +56,7 @@ struct Bumps {
         return {found.lower - margin, found.upper + margin};
     }
 
-    /// Returns the energy at a position above the least, of the force clipped to a limit.
+    /// Returns the stored energy at a position minus the least stored energy, for the force clipped to a limit.
     [[nodiscard]] double held(double place, double limit) const {
         constexpr double step = 1e-3;
         double energy = 0.0;
@@ -92,8 +93,9 @@ std::ostream& operator<<(std::ostream& out, const CoupledScene& scene) {
                << ", b = " << scene.device.viscous_damping;
 }
 
-/// Returns the least energy that a hand has put in after any sample, that after the last sample, and the throughput.
-/// `parts` contains, for each sample, the motion before the command changes and the motion after it.
+/// Returns three sums: the least energy that a hand has put in after any sample, the energy after the last sample, and
+/// the total exchanged energy. `parts` contains, for each sample, the motion before the command changes and the motion
+/// after the change.
 struct Account {
     double least = 0.0;
     double last = 0.0;  ///< after the last sample
@@ -148,7 +150,7 @@ Account account_of(const CoupledScene& scene, const Parts& parts) {
     }
 }
 
-/// Sets exactly the damping that the certificate requires, times `share`. Returns false if no damping is sufficient.
+/// Sets the device damping that the certificate requires, times `share`. Returns false if no damping is sufficient.
 bool set_damping(CoupledScene& scene, double share) {
     ForceBounds bounds;
     bounds.slope = scene.slopes;
@@ -185,7 +187,7 @@ CoupledScene random_scene(test::Random& random, bool linear) {
         scene.device.delay_s += test::uniform(random, 0.1, 0.9);
     }
     scene.device.force_limit = random() % 4 == 0 ? 1e9 : std::exp(test::uniform(random, -3.0, 1.0));
-    // Starts at rest at the nearest position without force.
+    // Starts at rest at the nearest position at which the force is zero.
     for (int k = 0; k < 300 && !linear; ++k) {
         const double force = scene.object.at(scene.start, {}).force;
         scene.start -= std::clamp(force / scene.slopes.largest(), -0.1, 0.1);
@@ -230,7 +232,8 @@ double optimised(test::Random& random, const CoupledScene& scene, int trials) {
             const double first = share > 0.0 ? test::uniform(random, 0.0, 1.2) : 0.0;
             const std::size_t end = samples / 2 + random() % (samples / 2);
             parts.assign(samples, {0.0, 0.0});
-            const bool strokes = random() % 2 == 0;  // at constant speed, with rests between
+            // Handle at constant speed, with rests between the strokes.
+            const bool strokes = random() % 2 == 0;
             double speed = 0.0;
             for (std::size_t k = 0; k < end; ++k) {
                 if (random() % 12 == 0) {
@@ -277,8 +280,8 @@ TEST(CoupledAccount, OptimisedMotionsTakeNoEnergyOutOfCertifiedScenes) {
     }
 }
 
-// The same search finds energy below the bound: the held coupling is exact if its object is a wall, or a spring that
-// resonates with it.
+// The same search finds motions that take energy out if the damping is below the bound: the bound of a held coupling
+// force is exact if the object is a wall, or a spring that resonates with the coupling.
 TEST(CoupledAccount, OptimisedMotionsFindEnergyBelowTheBoundOfTheHeldCoupling) {
     test::Random random{42};
     int tried = 0;

@@ -35,7 +35,7 @@ TEST(DirectLines, JitterAddsTheLongerPeriodAndTheCloserSamples) {
     late.jitter_s = 1e-9;
     EXPECT_NEAR(device_need(late, {1.0, 1.0}), steady, 1e-5);
     late.jitter_s = 1e-4;
-    // Windows of 1 ms; a neighbour before or after overlaps at most 0.1 ms: Lambda^2 = 1.1 / 1.1.
+    // Averaging windows of 1 ms; windows before and after overlap by at most 0.1 ms: Lambda^2 = 1.1 / 1.1.
     EXPECT_NEAR(device_need(late, {1.0, 1.0}), 1.5, 1e-9);
     late.delay_s = 2e-3;  // Lambda^2 = (2 + 1.1 + 1 + 0.1) / 1.1
     EXPECT_NEAR(device_need(late, {1.0, 1.0}), 0.5 + std::sqrt(4.2 / 1.1), 1e-9);
@@ -133,7 +133,8 @@ TEST(DirectLines, NarrowestPlayIsJustCertified) {
     EXPECT_TRUE(std::isinf(narrowest_play(sliding, device(0.0), 0.0, 1.0)));
 }
 
-/// Without delay the play of the reading is treated as exact: h / r adds to the friction once.
+/// Without delay the play operator of the encoder reading is treated as exact: the slope h / r (hysteresis over play
+/// radius) increases the required friction only once.
 TEST(DirectLines, EncoderErrorOfHysteresisIncludesStickingOnce) {
     ForceBounds bounds;
     bounds.hysteresis = true;
@@ -150,11 +151,12 @@ TEST(DirectLines, EncoderErrorOfHysteresisIncludesStickingOnce) {
     profile.coulomb_friction *= 0.999;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
     profile.coulomb_friction = (20.0 + 80.0) * 0.5e-3;
-    profile.viscous_damping = 0.5e-3 * 60.0;  // with twice the stick no slope is added
+    profile.viscous_damping = 0.5e-3 * 60.0;  // friction includes h / r twice: no slope is added
     EXPECT_TRUE(certify(bounds, direct, profile).certified());
     profile.coulomb_friction *= 0.99;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
-    bounds.hysteresis_per_play = bounds.hysteresis_force.upper / 0.4e-3;  // a play smaller than half a step
+    // A play radius smaller than half an encoder step.
+    bounds.hysteresis_per_play = bounds.hysteresis_force.upper / 0.4e-3;
     profile.coulomb_friction = (20.0 + 1.5 * bounds.hysteresis_per_play) * 0.5e-3;
     profile.viscous_damping = 10.0;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
@@ -176,8 +178,8 @@ struct Pieces {
     }
 };
 
-/// Returns the energy that a hand puts in during the second turn of a closed motion, divided by the losses of friction
-/// and damping.
+/// Returns the energy that a hand puts in during the second repetition of a closed motion, divided by the losses of
+/// friction and damping.
 double share_put_in(const Pieces& g, const Pieces& h, double r, const std::vector<double>& positions,
                     double B, double friction) {
     double work = 0.0;
@@ -225,7 +227,7 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
             bounds.sliding = std::max(bounds.sliding, std::abs(g.slope(k)) + steep);
         }
         DeviceProfile profile = device(0.0, 1.0);
-        profile.coulomb_friction = 0.0;  // of the line that counts h / r once
+        profile.coulomb_friction = 0.0;  // the friction follows from the inequality that counts h / r once
         const std::vector<Inequality> lines = hysteresis_inequalities(bounds, profile);
         const double B = lines[1].right / profile.period_s;
         for (const double share : {1.0, 0.5}) {
@@ -243,7 +245,8 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
                         static_cast<std::size_t>(unit(random) * static_cast<double>(next.size()));
                     for (std::size_t k = 0; k < next.size(); ++k) {
                         next[k] += k == one || trial % 5 == 0 ? change * normal(random) : 0.0;
-                        if (k == one && trial % 3 == 0) {  // near the edge of a count
+                        // Handle near the border between two encoder counts.
+                        if (k == one && trial % 3 == 0) {
                             next[k] = std::floor(next[k]) + 0.5 + (unit(random) < 0.5 ? -1e-6 : 1e-6);
                         }
                     }

@@ -22,7 +22,7 @@ std::vector<double> prediction(int m) {
     return taps;
 }
 
-/// A periodic force of straight pieces of equal width, and its energy above its least.
+/// A periodic force of straight pieces of equal width, and its stored energy minus the least stored energy.
 struct Zigzag {
     std::vector<double> force;  ///< at 0, 1, 2, ...; then periodic
 
@@ -76,7 +76,8 @@ TEST(HeldForce, FallingSlopesNeedLessThanRisingOnesWithDelay) {
     EXPECT_NEAR(delayed_need(1, 0.0, {0.0, 1.0}), 0.50, 0.005);
     EXPECT_NEAR(delayed_need(2, 0.0, {0.0, 1.0}), 0.82, 0.005);
     EXPECT_NEAR(delayed_need(3, 0.0, {0.0, 1.0}), 1.15, 0.005);
-    // With one sample of delay they add nothing up to twice the rising slope.
+    // With one sample of delay, falling slopes need no additional damping while they are at most twice the steepest
+    // rising slope.
     EXPECT_NEAR(delayed_need(1, 0.0, {1.0, 2.0}), 1.5, 1e-12);
     EXPECT_GT(delayed_need(1, 0.0, {1.0, 2.2}), 1.505);
 }
@@ -157,21 +158,22 @@ TEST(HeldForce, WithoutAFilterBothLinesOfAFractionAreClose) {
     }
 }
 
-/// Times and filter of the commands, in nominal periods.
+/// Sample times, command times and prediction filter, in nominal periods.
 struct Timing {
     std::vector<double> taps;  ///< the command of sample k is f(x_k - sum of taps[j - 1] d_{k-j})
-    double delay = 0.0;        ///< from a sample to its command
+    double delay = 0.0;        ///< delay from a sample to its command
     double jitter = 0.0;       ///< samples are taken at k + u_k, 0 <= u_k <= jitter
 };
 
-/// A motion that repeats after as many samples as `late` has elements.
+/// A closed motion that repeats after as many samples as `late` has elements.
 struct Cycle {
     double start = 0.0;
     std::vector<double> late;   ///< u_k
-    std::vector<double> moved;  ///< between two events (samples and commands), in order of time
+    std::vector<double> moved;  ///< displacement between two events (samples and commands), in order of time
 };
 
-/// Returns the energy that a hand must put in for one turn of a cycle, divided by the loss of the damping b.
+/// Returns the energy that a hand must put in for one repetition of a closed motion, divided by the energy that the
+/// damping b dissipates.
 double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing, double b) {
     const auto count = static_cast<int>(cycle.late.size());
     struct Event {
@@ -188,7 +190,8 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
     }
     std::stable_sort(events.begin(), events.end(),
                      [](const Event& one, const Event& other) { return one.time < other.time; });
-    // The handle rests in a part of length 0; the rest of the turn is reduced in proportion to time.
+    // The handle does not move in a part of duration 0; the other displacements are reduced in proportion to time, so
+    // that the motion closes.
     std::vector<double> time(events.size());
     std::vector<double> moved(events.size());
     double turn = 0.0;
@@ -205,7 +208,7 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
         if (events[e].sample >= 0) {
             position[static_cast<std::size_t>(events[e].sample)] = x;
         } else {
-            acting = events[e].command;  // the last command of the turn acts at its start
+            acting = events[e].command;  // the last command of the repetition still acts at its start
         }
         moved[e] -= time[e] > 1e-9 ? turn * time[e] / count : 0.0;
         x += moved[e];
@@ -232,7 +235,7 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
     return lost > 0.0 ? work / lost + 1.0 : 1.0;
 }
 
-/// Returns the least share found by hill descent over closed cycles.
+/// Returns the least quotient of work and damping loss that hill descent over closed motions finds.
 double worst_share(const Zigzag& law, const Timing& timing, double b, std::mt19937& random) {
     std::uniform_real_distribution<double> unit{0.0, 1.0};
     std::normal_distribution<double> normal;
@@ -292,7 +295,8 @@ Scene random_scene(std::size_t pieces, std::mt19937& random) {
     return scene;
 }
 
-/// Returns the number of scenes in which a motion gives energy at `share` of the need. It must be 0 at the full need.
+/// Returns the number of scenes in which a motion takes energy out at `share` of the needed damping. At the full need
+/// this number must be 0.
 template <class Need>
 int violated(double share, int scenes, Need need) {
     std::mt19937 random{7};

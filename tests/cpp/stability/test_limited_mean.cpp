@@ -35,7 +35,8 @@ NetworkParameters balanced(NetworkParameters network, double force_limit) {
     return network;
 }
 
-/// Returns the energy that a hand takes out in one slow turn: the limited force summed over fine steps.
+/// Returns the energy that a hand takes out in one slow revolution of the wheel: the limited force summed over fine
+/// steps.
 double given_in_a_turn(const ForceModel& model, double force_limit, double side = 0.0) {
     constexpr int steps = 200'000;
     double given = 0.0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measured boundaries against theory: all failures are beyond the bounds, and exact bounds are reached.
+// Tests measured failure limits against theory: every failure is on the unsafe side of the proved bound, and an exact
+// bound is reached.
 #include "limits/failure_maps.hpp"
 #include "limits/hands.hpp"
 
@@ -16,8 +17,8 @@
 namespace palpate::bench {
 namespace {
 
-/// Returns the least and largest quotient of measured and theoretical limit. A limit without a failure counts as
-/// `none`.
+/// Returns the least and largest quotient of measured and theoretical limit. A point at which no value failed counts
+/// as `none`.
 Interval ratios(const FailureMap& map, std::size_t first, std::size_t last, double none = 1.0) {
     Interval found{1e300, -1e300};
     for (std::size_t line = first; line <= last; ++line) {
@@ -40,12 +41,13 @@ TEST(FailureMaps, ExplicitBoundIsExactOverTwoDecadesOfMassAndDamping) {
     expect_between(ratios(explicit_map(test::cases(5)), 0, 2), 0.99, 1.01);
 }
 
-// spec section 7: b >= T M / 2 + t_d L is needed and not merely enough
+// spec section 7: the device damping b >= T M / 2 + t_d L is necessary, not only sufficient
 TEST(FailureMaps, SpringJustAboveItsBoundOscillatesWithAHeavyHand) {
     expect_between(ratios(damping_map(3), 0, 2), 1.0, 1.02);
 }
 
-// A spring against a bound for every force with slopes from 0 to its stiffness: within 4 %.
+// Compares a spring with the bound for every force whose slope lies between 0 and the stiffness of the spring: they
+// agree within 4 %.
 TEST(FailureMaps, PredictionFailsJustAboveItsBoundForEveryNumberOfSamplesAndDelay) {
     const FailureMap map = prediction_map(test::cases(5));
     expect_between(ratios(map, 0, 2), 1.0, 1.04);
@@ -122,7 +124,8 @@ TEST(FailureMaps, GuardsStopTheLimitCycleOfATooStiffWall) {
     }
 }
 
-// The bound is for every passive hand: a heavy hand needs all of it, a light one almost all.
+// The required damping is valid for every passive hand: a heavy hand needs all of the damping, a light hand almost
+// all.
 TEST(FailureMaps, BoundSlackIsSmallForALightHandAndLargeForADampingHand) {
     const FailureMap map = hand_map(3);
     for (std::size_t delay = 0; delay <= 2; ++delay) {
@@ -134,7 +137,8 @@ TEST(FailureMaps, BoundSlackIsSmallForALightHandAndLargeForADampingHand) {
     expect_between(ratios(map, 3, 3), 2.0, 2.3);
 }
 
-// A heavy hand swings slowly and does not feel a lag, so its need is far below the bound.
+// A heavy hand oscillates slowly, so the delay of the force matters little: the damping that the hand needs is far
+// below the bound.
 TEST(FailureMaps, HeavyHandAllows18TimesTheStiffnessWithAPrediction) {
     const FailureMap map = hand_map(3);
     const FailureLine& plain = map.lines[0];
@@ -175,7 +179,8 @@ TEST(Guards, ChangeForcesByAtMostTwoPercentAndHalveFaults) {
     }
 }
 
-/// Returns true if a loop of a hand, within the play or across it, takes more energy out of a model than it stored.
+/// Returns true if a closed motion of a hand, with or without sliding of the play operator, takes more energy out of a
+/// model than the model stored.
 bool generates(const ForceModel& model, const DeviceProfile& device) {
     constexpr std::size_t ticks = 3000;
     Scheme scheme;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the order and of the special cases of the compared time steps.
+// Tests the order of accuracy and the special cases of the time integration methods that the benchmarks compare.
 #include "solvers/time_steps.hpp"
 
 #include <cmath>
