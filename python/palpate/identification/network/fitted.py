@@ -127,9 +127,7 @@ class FittedNetwork:
         factor = scale.factor
         notes = self.notes
         if factor != 1.0:
-            multiplied = (
-                f"The recorded forces were multiplied by {factor:g} for the fit, and so are forces in these notes."
-            )
+            multiplied = f"For the fit, and in these notes, the recorded forces are multiplied by {factor:g}."
             notes = (multiplied, *notes)
         if scale.offset:
             offset = force_unit.text(scale.offset)
