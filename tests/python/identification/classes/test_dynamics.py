@@ -86,7 +86,7 @@ def test_velocity_and_hysteresis_are_accepted_only_if_present(
 def test_decision_on_each_term_reports_its_gain() -> None:
     decisions = identify(moved(1, damping=0.03)).notes["model_selection"]
     (accepted,) = (line for line in decisions if line.startswith("damping: accepted"))
-    assert "squared error on held-out stretches -" in accepted
+    assert "squared error on held-out sections -" in accepted
     assert ", BIC -" in accepted
     assert any(line.startswith("mass: not accepted (BIC ") for line in decisions)
 

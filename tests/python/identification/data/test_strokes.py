@@ -149,7 +149,8 @@ def test_equal_strokes_do_not_change_the_model() -> None:
     """Equal to the last bit to the model of the same rows without order."""
     force = loop(h=0.0)
     ordered = identify(Recording.from_arrays(IN_AND_OUT, force))
-    assert "hysteresis: not accepted (press and release force do not differ by 4 standard errors)" in notes(ordered)
+    decision = "hysteresis: not accepted (press and release force do not differ by 4 standard errors)"
+    assert decision in notes(ordered)
     rows = np.random.default_rng(5).permutation(800)
     shuffled = strokes_of([bare(rows, force)], named=False)
     assert shuffled.side is None
