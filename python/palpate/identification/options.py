@@ -108,8 +108,8 @@ class IdentifyOptions:
     """
 
     inputs: str | tuple[str, ...] = "auto"
-    """"auto": the model selection decides, with position and the further inputs of the recording. Or names, as
-    a tuple or separated by commas: position, then hysteresis, velocity (from time) or columns."""
+    """"auto": the model selection decides, with position and the further inputs of the recording. Or names,
+    as a tuple or separated by commas: position, then hysteresis, velocity (from time) or columns."""
     max_wavelets: int = 64
     """Largest network that is tried [-]"""
     criterion: str = "bic"

@@ -228,7 +228,7 @@ def test_hysteresis_is_rendered_with_a_certified_play_radius() -> None:
 def test_coupling_is_used_only_if_required_and_its_spring_is_subtracted() -> None:
     chosen = plan(model_by_hand(), SMOOTH, coupling_stiffness=100.0)
     assert (chosen.structure, chosen.scheme.compensated) == ("massless", True)
-    assert chosen.refused[0] == "direct: a coupling is required, and this structure has none"
+    assert chosen.refused[0] == "direct: a coupling is required, and this structure has no coupling"
 
 
 def test_object_with_mass_is_implicit_without_encoder_steps_and_else_stable_only() -> None:
