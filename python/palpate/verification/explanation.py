@@ -147,8 +147,8 @@ def _of_position(
     yield Explanation(
         left(position + best, side),
         f"the model fits if {recording.file_unit('position').text(abs(best))} is "
-        f"{'added to' if best > 0.0 else 'subtracted from'} the recorded position: its zero may have "
-        "moved. Correct it in the file",
+        f"{'added to' if best > 0.0 else 'subtracted from'} the recorded position: the zero of the "
+        "position may have moved. Correct the positions in the file",
         order=5,
     )
 

@@ -200,7 +200,7 @@ class Hysteresis(ModelClass):
                 f"the opposite sign of the recorded force does not help (NRMSE {turned / spread:.3g}). The "
                 "object may release stored energy, as a latch does: give --no-hysteresis-nonnegative"
             )
-        sentence = f"the hysteresis generates energy on a part of the loop ({cost}); {cure}"
+        sentence = f"hysteresis gains energy on a part of the loop ({cost}); {cure}"
         if best.rmse > USABLE_NRMSE * spread:
             report.sign_findings.append(usable(sentence))
             report.findings.append(usable(sentence))
