@@ -196,7 +196,8 @@ def test_force_error_is_zero_if_slopes_are_within_the_limit() -> None:
 
 
 def test_steep_contact_of_a_switch_is_limited_only_at_the_contact() -> None:
-    """Both strokes begin there with one force: the decrease of h beyond the edge would be too steep."""
+    """Press and release start with the same force at the end of the domain: a decrease of the hysteresis h
+    below the domain would be too steep."""
     model = keyswitch_by_hand(beta=[[0.0]], weight=[0.3], bias=0.33, bias_hysteresis=0.02)
     weak = slide(viscous_damping=0.35)
     chosen = plan(model, weak)

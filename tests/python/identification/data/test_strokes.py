@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hysteresis of recordings that state neither a direction nor time."""
+"""Hysteresis of recordings with neither a direction column nor time."""
 
 import json
 from dataclasses import replace
@@ -218,7 +218,7 @@ def measured_files(data: Path) -> list[Path]:
 
 
 def test_measured_strokes_are_found_in_the_order_of_rows(data: Path) -> None:
-    """At most 1 % of the rows get the other stroke: those that rest at the reversal."""
+    """At most 1 % of the rows get the wrong stroke: rows of a pause at a reversal."""
     files = measured_files(data)
     assert files
     for path in files:
