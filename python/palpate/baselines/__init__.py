@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Baselines: the methods of the paper's related work, and those of common practice.
 
-All have the same interface: ``fit(X, y)`` returns the estimator, ``predict(X)`` the force, ``n_parameters_``
-counts every fitted real number. X (n, 1 to 3) holds position and, if known, velocity and acceleration.
+All methods have the same interface: ``fit(X, y)`` returns the estimator, ``predict(X)`` the force,
+``n_parameters_`` counts every fitted real number. X (n, 1 to 3) holds position and, if known, velocity and
+acceleration.
 """
 
 from .comparison import PASSIVE_SPLINE, Compared, baselines, comparable, compare

@@ -32,23 +32,25 @@ class Compared:
 
     name: str
     nrmse: float
-    """RMSE over the standard deviation of the force on the held-out rows; NaN if the fit was refused"""
+    """RMS error divided by the standard deviation of the force on the held-out rows [-]; NaN if the fit was
+    refused"""
     n_parameters: int
     seconds: float
     """Duration of fit and choice of the setting [s]"""
     refused: str | None = None
-    """Reason why it could not be fitted"""
+    """Reason why the baseline could not be fitted"""
 
 
 PASSIVE_SPLINE = "smoothing spline, two strokes, h >= 0"
-"""The same two splines, but press is never below release: a fair comparison for a passive model."""
+"""Name of the baseline of two splines in which the press force is never below the release force, for a fair
+comparison with a passive model."""
 
 LEAST_STROKE_SHARE = 0.1
-"""Least share of the travel of a stroke."""
+"""Least share of the travel that a stroke must cover [-]."""
 
 
 def baselines(strokes: bool) -> dict[str, Estimator]:
-    """Returns every baseline by name; with strokes, separate ones for press and release."""
+    """Returns every baseline by name; with strokes, each baseline has separate fits for press and release."""
     single: dict[str, Estimator] = {
         "linear zones (Haptic Camera)": LinearZones(),
         "tissue parameters": TissueParameters(),
@@ -68,15 +70,16 @@ def comparable(recording: Recording) -> NDArray[np.bool_]:
 
 
 def compare(recordings: Sequence[Recording], every: int) -> list[Compared]:
-    """Fits each baseline to all rows except every `every`-th, and judges it on those.
+    """Fits each baseline to all rows except every `every`-th row, and computes its error on the excluded
+    rows.
 
     If the recordings distinguish strokes, each baseline is fitted to press and release separately. These are
-    two models, but the identified one is a single model. Rows without a direction are left out.
+    two fits, but the identified model is a single one. Rows without a direction are left out.
     """
     strokes = all(map(_has_strokes, recordings))
     tables = [_columns(part, strokes) for part in recordings]
     width = min(X.shape[1] for X, _ in tables)
-    # the stroke is last; velocity and acceleration only if every recording has them
+    # the stroke is the last column; velocity and acceleration are columns only if every recording has them
     X = np.concatenate([table[:, [*range(width - strokes), *([-1] * strokes)]] for table, _ in tables])
     y = np.concatenate([part.force for part in recordings])
     used = np.concatenate([rows for _, rows in tables])
@@ -112,7 +115,7 @@ def _has_strokes(recording: Recording) -> bool:
 
 
 def _columns(recording: Recording, strokes: bool) -> tuple[Float2D, NDArray[np.bool_]]:
-    """Returns position, velocity and acceleration if known, the stroke last; and the usable rows."""
+    """Returns columns of position, velocity and acceleration (if known) and stroke, and the usable rows."""
     columns, rows = [recording.position], np.ones(len(recording), dtype=np.bool_)
     if recording.time is not None:
         try:

@@ -20,16 +20,16 @@ HELD_OUT_EVERY = 5
 """Every fifth of the fitted rows is used to choose missing settings."""
 
 SIZES = (2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
-"""Numbers of table entries that are tried."""
+"""Numbers of entries of a force table that are tried."""
 
 SMOOTHINGS = (30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.0, 0.9, 0.8)
-"""Residuals of a smoothing spline that are tried [multiples of the noise]."""
+"""Largest residuals of a smoothing spline that are tried [multiples of the noise]."""
 
 MOST_FITTED_ROWS = 20_000
-"""Largest number of fitted rows; longer data is thinned evenly."""
+"""Largest number of fitted rows; of longer data an evenly spread part is used."""
 
 EXPONENTS = (0.5, 6.0)
-"""Range of the exponent of the tissue law [-]."""
+"""Smallest and largest exponent of the tissue law of Hunt and Crossley [-]."""
 
 THRESHOLDS = (0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001)
 """Largest residuals of linear zones that are tried [share of the range of the force]."""
@@ -103,7 +103,8 @@ class PerStroke:
     estimator
         Estimator that is copied and fitted to each stroke.
     passive : bool
-        Replaces both by their mean if release is above press, because that loop would generate energy.
+        Replaces press and release force by their mean if the release force is above the press force, because
+        such a loop would generate energy.
     """
 
     estimator: Estimator
@@ -134,12 +135,13 @@ class PerStroke:
 class LookupTable:
     """Forces at evenly spaced positions with straight lines between them, fitted by least squares.
 
-    f(x) = (1 - t) f_i + t f_(i+1), t = (x - x_i) / (x_(i+1) - x_i). Outside, the table keeps its end values.
+    f(x) = (1 - t) f_i + t f_(i+1), t = (x - x_i) / (x_(i+1) - x_i). Outside the table the force keeps its end
+    values.
 
     Parameters
     ----------
     size : int, optional
-        Number of entries; by default the one that predicts held-out rows best.
+        Number of entries; by default the number that predicts held-out rows best.
     """
 
     size: int | None = None
@@ -148,7 +150,7 @@ class LookupTable:
         """Fits to the first column of X (n, d), the position, and y (n,)."""
         size = self.size or best_of(SIZES, lambda entries, A, b: LookupTable(entries).fit(A, b), X, y)
         x, mean, count = merged(X[:, 0], y)
-        # Entries without rows between them are not determined: leave them out.
+        # Entries without rows near them are not determined by the data: leave these entries out.
         entries = np.linspace(x[0], x[-1], size)
         cell = np.clip(np.searchsorted(entries, x, side="right") - 1, 0, size - 2)
         held = np.isin(np.arange(size - 1), cell)
@@ -177,7 +179,8 @@ class SmoothingSpline:
 
     FITPACK's algorithm (Dierckx 1975) adds knots at the largest error until sum_k (y_k - f(x_k))^2 <=
     smoothing * n * sigma^2. The noise sigma^2 is estimated from the difference of each row from the mean of
-    its neighbours along x. The median excludes jumps. Outside, the spline keeps its end values.
+    its neighbours along x. The median excludes jumps. Outside the recorded positions the force keeps its end
+    values.
 
     Parameters
     ----------
@@ -195,11 +198,11 @@ class SmoothingSpline:
         x, mean, count = merged(X[:, 0], y)
         if len(x) < 5:
             raise ValueError(f"there are {len(x)} positions: a cubic spline needs at least 5")
-        # The spline cannot remove the scatter of rows with equal position.
+        # A spline cannot follow the scatter of the forces of rows with equal position.
         scatter = float(np.sum((y - mean[np.searchsorted(x, X[:, 0])]) ** 2))
         allowed = max(multiple * len(y) * _noise(X[:, 0], y) - scatter, 0.0)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # FITPACK warns if it stops at its largest number of knots
+            warnings.simplefilter("ignore")  # FITPACK warns if the largest number of knots is reached
             self.spline_ = UnivariateSpline(x, mean, w=np.sqrt(count), s=allowed, k=3, ext=3)
         interior = len(self.spline_.get_knots()) - 2
         self.n_parameters_ = len(self.spline_.get_coeffs()) + interior
@@ -222,8 +225,8 @@ def _noise(x: Float1D, y: Float1D) -> float:
 class HuntCrossley:
     """F = k d^p (1 + lambda v) + F_0 with the depth d = max(x - x_0, 0) (Hunt and Crossley 1975).
 
-    k, k lambda and F_0 are linear for given x_0 and p, so only these two are searched, from several starts.
-    Velocity is used if X contains it.
+    k, k lambda and F_0 are linear for given x_0 and p, so only x_0 and p are searched, from several start
+    values. Velocity is used if X contains it.
     """
 
     def fit(self, X: Float2D, y: Float1D) -> HuntCrossley:
@@ -354,13 +357,14 @@ def _solved(design: Float2D, y: Float1D) -> Float1D:
 
 
 def _best_cut(x: Float1D, design: Float2D, y: Float1D, allowed: float) -> int | None:
-    """Returns the row before which to divide a zone, or None if it is good enough or cannot be divided."""
+    """Returns the row before which to divide a zone; None if its error is small enough or it cannot be
+    divided."""
     least = LEAST_ZONE_ROWS * design.shape[1]
     rest = y - design @ _solved(design, y)
     if len(y) < 2 * least or float(np.sqrt(np.mean(rest**2))) <= allowed:
         return None
     cuts = np.unique(np.linspace(least, len(y) - least, MOST_ZONE_BOUNDARIES).astype(np.int64))
-    # rows of one position stay together
+    # rows of equal position stay in one zone
     cuts = np.unique(np.searchsorted(x, x[cuts], side="left"))
     cuts = cuts[(cuts >= least) & (cuts <= len(y) - least)]
     if len(cuts) == 0:

@@ -25,7 +25,7 @@ class Decision:
     """Decision on one model class, printed as ``straight line: accepted (BIC -426)``."""
 
     model_class: str
-    """In words"""
+    """Name of the model class in words"""
     outcome: Literal["accepted", "not accepted", "not tested"]
     reason: str
 
@@ -44,7 +44,8 @@ def decided(model_class: str, accepted: bool, reason: str) -> Decision:
 
 
 def latest(decisions: Iterable[Decision]) -> tuple[tuple[Decision, ...], tuple[Decision, ...]]:
-    """Returns the last decision on each model class, in order of the first ones, and the replaced ones."""
+    """Returns the last decision on each model class, in order of first decisions, and the replaced earlier
+    decisions."""
     last: dict[str, Decision] = {}
     replaced: list[Decision] = []
     for decision in decisions:
@@ -65,10 +66,10 @@ def squared_error_change(share: float, error: float, on: str) -> str:
     Parameters
     ----------
     share : float
-        Fall of the squared error, as a share of it.
+        Relative decrease of the squared error [-].
     error : float
         Standard error of `share`.
     on : str
-        Name of the rows of the error.
+        Name of the rows on which the error was computed.
     """
     return f"squared error on {on} {signed(-100.0 * share)} +- {100.0 * error:.2g} %"

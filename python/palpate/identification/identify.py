@@ -91,7 +91,8 @@ def identify(
         require_in_range("position", each.position)
         require_in_range("force", each.force)
     rows = rows_of(recordings, settings)
-    # The matrices have a few hundred rows: threads cost more than they bring, and change the last digits.
+    # The matrices have a few hundred rows: several threads make the computation slower and change the last
+    # digits of the result.
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_rows(replace(rows, findings=(*isolated, *rows.findings)), settings)
     source = Source.merged(part.source for part in recordings)
@@ -132,21 +133,23 @@ def fit_environment(
     Parameters
     ----------
     positions : (n, d)
-        Positions, growing into the object, and further inputs of the force.
+        Positions, which increase into the object, and further inputs of the force.
     force : (n,)
         Force of the object against the tool.
     side : (n,), optional
-        +1 in rows of a stroke into the object, -1 out of it, 0 for neither (left out to judge hysteresis).
+        Direction of each row: +1 into the object, -1 out of the object, 0 neither (left out of the test of
+        hysteresis).
     options : IdentifyOptions, optional
     starts : sequence of int, optional
-        Rows at which a continuous motion starts. With it, and without side, hysteresis is tried with the play
-        operator, s = (x - pi)/r (d = 1).
+        Indices of rows at which a continuous motion starts. If `starts` is given without `side`, hysteresis
+        is tried with the play operator, s = (x - pi)/r (d = 1).
     names : sequence of str, optional
-        Of the inputs, for the sentences.
+        Names of the inputs, for messages.
     weight : (n,), optional
-        Samples that each row represents, above 0; 1 without it.
+        Number of samples that each row represents, above 0; by default 1.
     within : float
-        Sum of squares of the force inside rows that represent several samples.
+        Sum of squared differences of the samples from the force of their row, if a row represents several
+        samples.
     units : mapping of str to Unit, optional
         Units of position and force, for the messages.
 
@@ -157,7 +160,7 @@ def fit_environment(
     Raises
     ------
     palpate.InputError
-        For data that cannot be identified, and for a hysteresis input that the data cannot give.
+        The data cannot be identified, or the options name hysteresis and the data has no direction or motion.
     """
     options = options or IdentifyOptions()
     given = names or ("position", *(f"input {k}" for k in range(2, positions.shape[-1] + 1)))
@@ -169,7 +172,7 @@ def fit_environment(
 
 
 def fit_rows(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
-    """Identify a force law from rows; as :func:`fit_environment`."""
+    """Identifies a force law from rows, as :func:`fit_environment` does from arrays."""
     require_usable(rows, options)
     if scale := ForceScale.of(rows.force, options):
         return _fitted(rows.scaled(scale), scale.scaled_options(options)).unscaled(scale, rows.force_unit)
@@ -177,7 +180,8 @@ def fit_rows(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
 
 
 def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
-    """Without rows of no direction, where hysteresis is accepted, else with them."""
+    """Identifies without the rows of direction 0; if hysteresis is then not accepted, identifies with all
+    rows."""
     side = rows.side
     if side is not None and not ((side > 0).any() and (side < 0).any()):
         rows, side = replace(rows, side=None), None
@@ -206,7 +210,7 @@ def model_of(
     options: IdentifyOptions,
     verdict: Verdict,
 ) -> Model:
-    """The model of an identified network, with the verdict on it."""
+    """Returns the model of an identified network, with its verdict."""
     return Model(
         kind=_kind(network),
         inputs=network.inputs,

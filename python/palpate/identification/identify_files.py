@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""identify_files: from files that may be larger than memory to a model, block by block.
+"""identify_files: identifies a model from files that may be larger than memory, one block of rows after the
+other.
 
-A block of rows becomes a summary: for each cell of position and each stroke the count, the mean position and
-force, and the sums of squares and products about them. Two summaries merge into one that represents both
-(Chan, Golub and LeVeque 1979), so cells hold the sums of one pass over all rows, to rounding.
+A block of rows becomes a summary: for each position cell and each stroke the number of rows, the mean
+position and force, and the sums of squares and products of the differences from these means. Two summaries
+merge into one for the rows of both (Chan, Golub and LeVeque 1979), so that the sums equal those of one pass
+over all rows, up to rounding.
 
-Cells are single positions while these are few, else intervals [k 2^level, (k + 1) 2^level): cells of one
-level nest in those of the next, and no range has to be known before. The summary of a block depends on its
-rows alone, and blocks are merged in their order, not that of the workers: the result is always the same.
+A cell is a single position if there are few positions, else an interval [k 2^level, (k + 1) 2^level). Two
+cells of one level form one cell of the next level, so that the range of positions need not be known in
+advance. The summary of a block depends on its rows alone, and blocks are merged in the order of rows: the
+result does not depend on the order in which workers finish.
 """
 
 from __future__ import annotations
@@ -50,16 +53,17 @@ LEAST_KNOWN_SHARE = 0.5
 """Share of the rows whose direction must be known to test hysteresis [-]."""
 
 MOST_CELLS = 8192
-"""Largest number of position cells that are kept apart: as fine as identification needs."""
+"""Largest number of position cells of a summary: enough for the resolution of an identification."""
 
-UNKNOWN_STROKES = "no column states the direction, and the order of rows does not show it"
-"""Reason for which hysteresis is not tested."""
+UNKNOWN_STROKES = "the files have no direction column, and the order of rows does not show the direction"
+"""Reason why hysteresis is not tested."""
 
 SCATTER_CELLS = 16
-"""Neighbouring cells in which the force of single rows is compared with one line."""
+"""Number of neighbouring position cells in which the force of single rows is compared with one straight
+line."""
 
 Progress = Callable[[int, int], None]
-"""Receives the parts that are read and the parts in all."""
+"""Function that receives the number of parts read so far and the number of all parts."""
 
 
 def identify_files(
@@ -96,7 +100,7 @@ def identify_files(
     progress : callable
         Called with (parts read, parts in all).
     part_rows : int
-        Rows that a worker reads at a time, about.
+        Approximate number of rows that a worker reads at a time.
     position, force, time, direction, units, negate, invalid
         As in :func:`palpate.read_recording`.
     **options
@@ -151,7 +155,7 @@ def identify_files(
     notes: list[str] = []
     for recording, found in zip(recordings, of_file, strict=True):
         _require_all_rows(recording, found)
-        # The source of the model holds the columns, but not the form of the file.
+        # Returns the source of a model: the columns of the files, without the format of the files.
         sentences = [note for note in recording.notes[:1] if "read as" in note]
         sentences += [*recording.notes[1:], *found.left_out.sentences(recording.places())]
         notes += [f"{recording.path}: {each}" for each in sentences] if len(recordings) > 1 else sentences
@@ -163,23 +167,25 @@ def identify_files(
 
 @dataclass
 class PartRead:
-    """Rows read from a part of a file, or from parts that follow each other."""
+    """Summary of the rows read from one part of a file, or from successive parts."""
 
     summary: Summary | None = None
-    """None where no row is usable"""
+    """Summary of the usable rows; None if no row is usable"""
     rows: int = 0
     """Rows that were read"""
     left_out: LeftOut = field(default_factory=LeftOut)
 
     def add(self, summary: Summary | None, rows: int) -> None:
-        """Add rows that follow, and the summary of those that are used."""
+        """Adds the following rows: the numbers of read and left out rows, and the summary of the used
+        rows."""
         self.rows += rows
         if summary is not None:
             self.summary = summary if self.summary is None else merged(self.summary, summary)
 
 
 def read_part(work: tuple[LongRecording, tuple[int, int]]) -> PartRead:
-    """Read one part of one file. Without a column of directions they are taken from the order of rows."""
+    """Reads one part of one file. Without a direction column the directions are taken from the order of
+    rows."""
     recording, part = work
     found = PartRead()
     for block in recording.blocks(part):
@@ -196,7 +202,7 @@ def read_part(work: tuple[LongRecording, tuple[int, int]]) -> PartRead:
 
 
 def _require_all_rows(recording: LongRecording, read: PartRead) -> None:
-    """Check that every row of the file was used or was left out and counted.
+    """Checks that the numbers of used rows and of left out rows add up to all rows of the file.
 
     Raises
     ------
@@ -214,7 +220,8 @@ def _require_all_rows(recording: LongRecording, read: PartRead) -> None:
 def _error_on_rows(
     summary: Summary, network: FittedNetwork, side: Float1D | None, period: float | None
 ) -> float:
-    """RMS error on the rows of a summary; the network is a line within each cell."""
+    """Returns the RMS error of a network on the rows of a summary; the network is taken as straight within a
+    cell."""
     position, lower = summary.position, float(network.lower[0])
     if period is not None:
         position = lower + period * modulo((position - lower) / period)
@@ -278,13 +285,14 @@ def _identified(
 
 
 def _known_strokes(summary: Summary) -> bool:
-    """Both directions occur, and most rows have one."""
+    """True if both directions occur and most rows have a direction."""
     press, release = (float(summary.count[summary.side == side].sum()) for side in (1, -1))
     return min(press, release) > 0.0 and press + release >= LEAST_KNOWN_SHARE * summary.rows
 
 
 def _untested(summary: Summary, force_unit: Unit) -> Finding:
-    """Hysteresis could not be tested; reports the largest difference that the rows allow."""
+    """Returns a finding that hysteresis could not be tested, with the largest difference of strokes that the
+    rows allow."""
     scatter = summary.scatter
     reach = float(np.ptp(summary.force)) or 1.0
     return usable(
@@ -308,21 +316,21 @@ def _require_summable(settings: IdentifyOptions) -> None:
 
 @dataclass(frozen=True)
 class Summary:
-    """Sums over the rows of each cell; arrays (m,), in rising order of cell, then side."""
+    """Sums over the rows of each cell: arrays (m,), sorted by cell, then by direction."""
 
     level: int | None
-    """Cells are 2^level wide [position], or single positions where it is None"""
+    """Exponent of the cell width, 2^level [position]; None: each cell is a single position"""
     cell: Float1D
-    """The cell's number, or the position itself"""
+    """Number of the cell; the position if cells are single positions"""
     side: NDArray[np.int8]
-    """+1 into the object, -1 out of it, 0 neither or not known"""
+    """Direction: +1 into the object, -1 out of the object, 0 neither or not known"""
     count: Float1D
     position: Float1D
     """Mean"""
     force: Float1D
     """Mean"""
     xx: Float1D
-    """Sum of squares of position about its mean"""
+    """Sum of squared differences of the positions from their mean"""
     xy: Float1D
     yy: Float1D
     lower: float
@@ -331,7 +339,7 @@ class Summary:
 
     @property
     def rows(self) -> float:
-        """Number of rows that it represents."""
+        """Number of rows that the summary represents."""
         return float(self.count.sum())
 
     @property
@@ -343,7 +351,7 @@ class Summary:
 
     @property
     def correlation(self) -> float:
-        """Of position and force over all rows; 0 where one of them is constant."""
+        """Correlation of position and force over all rows [-]; 0 if position or force is constant."""
         dx = self.position - np.average(self.position, weights=self.count)
         dy = self.force - np.average(self.force, weights=self.count)
         xx = float(self.count @ (dx * dx) + self.xx.sum())
@@ -352,7 +360,8 @@ class Summary:
 
     @property
     def within(self) -> float:
-        """Sum of squares of the force within cells that slopes across them do not explain [force^2]."""
+        """Sum of squared force differences within cells that a slope of the force does not explain
+        [force^2]."""
         if self.level is None:
             return float(self.yy.sum())
         _, group = np.unique(np.floor(self.cell / POOLED_CELLS), return_inverse=True)
@@ -362,7 +371,8 @@ class Summary:
 
     @property
     def scatter(self) -> float:
-        """Standard deviation of the force about one line in each interval of SCATTER_CELLS cells [force]."""
+        """Standard deviation of the force from a straight line in each interval of SCATTER_CELLS cells
+        [force]."""
         group = np.argsort(np.argsort(self.position, kind="stable")) // SCATTER_CELLS
         total = np.bincount(group, self.count)
         dx, dy = (
@@ -379,11 +389,11 @@ class Summary:
 def summarise(
     position: Float1D, force: Float1D, side: NDArray[np.int8] | None, most_cells: int = MOST_CELLS
 ) -> Summary:
-    """The summary of one block of rows, at least one."""
+    """Returns the summary of one block with at least one row."""
     side = np.zeros(len(position), dtype=np.int8) if side is None else side
     lower, upper = float(position.min()), float(position.max())
     level = None
-    # as many distinct positions in the first rows already: no need to sort the others
+    # the first rows already have too many distinct positions: no need to sort all rows
     if len(np.unique(position[: 4 * most_cells])) > most_cells or len(np.unique(position)) > most_cells:
         level = _level_for(lower, upper, most_cells)
     cell = position if level is None else np.floor(np.ldexp(position, -level))
@@ -393,20 +403,21 @@ def summarise(
 
 
 def merged(first: Summary, second: Summary, most_cells: int = MOST_CELLS) -> Summary:
-    """One summary for the rows of both."""
+    """Returns one summary for the rows of two summaries."""
     lower, upper = min(first.lower, second.lower), max(first.upper, second.upper)
     levels = [summary.level for summary in (first, second) if summary.level is not None]
     both = _joined(first, second, max(levels) if levels else None, lower, upper)
     if both.level is None and len(np.unique(both.cell)) > most_cells:
         both = _joined(first, second, _level_for(lower, upper, most_cells), lower, upper)
-    # a coarser level that the range requires, not the number of cells in use: gaps may be filled later
+    # a level for the whole range of positions, not for the cells in use: later rows may fill gaps
     if both.level is not None and (needed := _level_for(lower, upper, most_cells)) > both.level:
         both = _joined(first, second, needed, lower, upper)
     return both
 
 
 def _level_for(lower: float, upper: float, most_cells: int) -> int:
-    """The finest level at which the range takes at most most_cells cells (and the one it begins in)."""
+    """Returns the smallest level (cell width 2^level) at which the range of positions has at most most_cells
+    + 1 cells."""
     return math.ceil(math.log2(max(upper - lower, np.finfo(float).tiny) / most_cells))
 
 
@@ -420,7 +431,7 @@ def _joined(first: Summary, second: Summary, level: int | None, lower: float, up
 
 
 def _at_level(summary: Summary, level: int | None) -> Float1D:
-    """The summary's cells, numbered at a level no finer than its own."""
+    """Returns the numbers of the cells of the summary at a level with the same or wider cells."""
     if level is None:
         return summary.cell
     if summary.level is None:
@@ -431,13 +442,14 @@ def _at_level(summary: Summary, level: int | None) -> Float1D:
 def _grouped(
     level: int | None, cell: Float1D, side: NDArray[np.int8], columns: Float2D, lower: float, upper: float
 ) -> Summary:
-    """Columns (6, k), count, means of x and y, xx, xy, yy, gathered by cell and side."""
+    """Merges columns (6, k) by cell and direction: count, mean position x, mean force y, and the sums xx, xy,
+    yy."""
     distinct, place = np.unique(cell, return_inverse=True)
     key = 3 * place.astype(np.int64) + (side + 1)
     used, group = np.unique(key, return_inverse=True)
     count, x, y, xx, xy, yy = columns
     total = np.bincount(group, count)
-    # means about a value of the group itself: no digits are lost to a large offset
+    # means are computed relative to a value of the group, so that a large offset does not cost digits
     first = np.zeros(len(used), dtype=np.int64)
     first[group[::-1]] = np.arange(len(group))[::-1]
     x0, y0 = x[first], y[first]
@@ -472,12 +484,13 @@ def in_order(
     scheduler: str | None = None,
     done: Callable[[int], None] = lambda count: None,
 ) -> Iterator[Result]:
-    """work(item) of every item, in their order.
+    """Returns work(item) of every item, in the order of items.
 
     Parameters
     ----------
     work : callable
-        Its result must depend on the item alone: then the results do not depend on the worker.
+        Function of an item. Its result must depend on the item alone, so that it does not depend on the
+        worker.
     items : sequence
         Sent to the workers.
     jobs : int
@@ -486,7 +499,7 @@ def in_order(
         Address of a Dask scheduler, such as "tcp://host:8786": joblib hands the same work to it. Work that a
         lost worker had is done again by another.
     done : callable
-        Receives the number of items that are done, after each.
+        Receives the number of finished items after each item.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The settings of an identification: every default lives here and nowhere else."""
+"""Settings of an identification with all their defaults."""
 
 import ast
 import inspect
@@ -17,7 +17,7 @@ from ..arguments import shown
 from ..errors import InputError
 
 RESERVED_INPUTS = ("auto", "position", "hysteresis", "velocity")
-"""Words of `inputs` that do not name columns."""
+"""Values of the option `inputs` that do not name columns."""
 
 CHOICES: dict[str, tuple[str, ...]] = {
     "criterion": ("bic", "aicc", "gcv", "fpe", "fresh", "perceptual"),
@@ -26,7 +26,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "loss": ("squares", "huber"),
     "filters": ("matched", "paper-implicit", "paper-explicit"),
 }
-"""Settings that are words, and their choices."""
+"""Settings with a fixed set of words, and the allowed words."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +40,15 @@ class SearchOptions:
     """
 
     selection: str = "orthogonal"
-    """How wavelets are taken from the frame: orthogonal, residual or backward"""
+    """How wavelets are selected from the frame: orthogonal, residual or backward"""
     evidence: float = 10.0
-    """Fall of the criterion that a more complex model class must show; 10 is very strong evidence [-]"""
+    """Least decrease of the criterion for a more complex model class; 10 is very strong evidence [-]"""
     patience: int = 3
-    """Wavelets without improvement, for each input, after which growth stops [-]"""
+    """Number of added wavelets without improvement, for each input, after which growth stops [-]"""
     refine: bool = True
     """False: dilations and translations stay on the frame"""
     refinement: str = "projection"
-    """How wavelets are refined: by variable projection, or all parameters by quasi-newton as published"""
+    """How wavelets are refined: by variable projection, or all parameters by quasi-newton as in the paper"""
     refine_steps: int = 8
     """Refinement steps after each wavelet that was added or removed [-]"""
     final_steps: int = 30
@@ -58,23 +58,24 @@ class SearchOptions:
     frame_step: float = 0.5
     """b0, the translation step of the frame in units of 1/dilation [-]"""
     max_candidates: int = 4096
-    """Members of the truncated frame at most [-]"""
+    """Largest number of candidate wavelets in the frame [-]"""
     resolved_by: int = 7
-    """Distinct positions, on every stroke, that a wavelet's core |u| <= sqrt(3) must hold [-]"""
+    """Least number of distinct positions, on every stroke, in a wavelet's core |u| <= sqrt(3) [-]"""
     max_positions: int = 1024
-    """Distinct positions that are kept apart, twice as many for each further input; more are gathered in as
-    many cells [-]"""
+    """Largest number of distinct positions, doubled for each further input; with more, positions are gathered
+    in this number of cells [-]"""
     filters: str = "matched"
     """matched, or as published: paper-implicit (figure 11), paper-explicit (figure 13)"""
     assumed_mass: float = 1e-3
-    """m of the paper's figures [force/position s^2]"""
+    """Mass m of the paper's figures [force s^2/position]"""
     assumed_damping: float = 0.5
-    """B_o of its figure 13 [force/position s]"""
+    """Object damping B_o of the paper's figure 13 [force s/position]"""
     play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
-    """Play radii tried for hysteresis where a recording has time but no direction; the best one between the
-    least and the largest is found [share of the travel]"""
+    """Play radii tried for hysteresis if a recording has time but no direction; the best radius between the
+    smallest and the largest is searched [share of the travel]"""
     contact_share: float = 0.02
-    """Share of the force's range; with |f(lower)| below it the object is left there: "free" below [-]"""
+    """Largest force at the lower end of the domain, as a share of the force range, at which the tool leaves
+    the object there: continuation "free" below the domain [-]"""
 
     def __post_init__(self) -> None:
         _require(self)
@@ -86,7 +87,7 @@ class SearchOptions:
 
     @classmethod
     def parsed(cls, given: Mapping[str, str]) -> "SearchOptions":
-        """The settings from texts, as a command line gives them.
+        """Returns the settings from texts, as given on a command line.
 
         Raises
         ------
@@ -98,7 +99,7 @@ class SearchOptions:
 
 @dataclass(frozen=True)
 class IdentifyOptions:
-    """Settings of :func:`palpate.identify`; each field is a keyword of it.
+    """Settings of :func:`palpate.identify`; each field is a keyword argument of this function.
 
     Raises
     ------
@@ -107,26 +108,28 @@ class IdentifyOptions:
     """
 
     inputs: str | tuple[str, ...] = "auto"
-    """"auto": the model selection decides, over the position and the recording's further inputs. Or names, as
-    a tuple or with commas between: position, then hysteresis, velocity (from time) or columns."""
+    """"auto": the model selection decides, with position and the further inputs of the recording. Or names,
+    as a tuple or separated by commas: position, then hysteresis, velocity (from time) or columns."""
     max_wavelets: int = 64
     """Largest network that is tried [-]"""
     criterion: str = "bic"
     """Stopping rule: bic, aicc, gcv, fpe, or on held-out rows: fresh, perceptual"""
     loss: str = "squares"
-    """squares, or huber: rows far from the others weigh as little as these"""
+    """squares: least squares; huber: rows far from the model get less weight"""
     hysteresis_nonnegative: bool = True
-    """Impose h >= 0 over the domain, so that every loop loses energy"""
+    """Impose hysteresis h >= 0 over the domain, so that every loop of press and release loses energy"""
     slope_bounds: tuple[float, float] | None = None
-    """(min, max) of df/dx, imposed over the domain [force/position]"""
+    """(min, max) of the slope df/dx, imposed over the domain [force/position]"""
     monotone: bool = False
-    """Impose df/dx >= 0 over the domain"""
+    """Impose a slope df/dx >= 0 over the domain"""
     fixed_force: tuple[float, float] | None = None
-    """(position, force) that f goes through, with hysteresis the mean of both strokes [position, force]"""
+    """(position, force) of a point of the force law; with hysteresis, of the mean force of both strokes
+    [position, force]"""
     coupling_stiffness: float | None = None
-    """K_c: df/dx <= 0.9 K_c (`compensated_share`) is imposed over the domain [force/position]"""
+    """Stiffness K_c of the virtual coupling: slope df/dx <= 0.9 K_c (`compensated_share`) is imposed over the
+    domain [force/position]"""
     period: float | None = None
-    """Period of an environment that repeats, such as a knob [position]"""
+    """Period of a periodic force law, such as of a knob [position]"""
     search: SearchOptions = field(default_factory=SearchOptions)
     """Further settings of the search, which few identifications need to change"""
 
@@ -151,7 +154,8 @@ class IdentifyOptions:
 
     @property
     def slope_limits(self) -> tuple[float, float] | None:
-        """All slope settings as one (min, max), infinite where not limited; None if neither is set."""
+        """Slope limits (min, max) from all slope settings, infinite if not limited; None without slope
+        settings."""
         low, high = self.slope_bounds or (-math.inf, math.inf)
         if self.monotone:
             low = max(low, 0.0)
@@ -183,7 +187,7 @@ _LEAST_WHOLE = {
     "resolved_by": 3,
     "max_positions": 16,
 }
-"""Settings that are whole numbers and their least value."""
+"""Settings that are whole numbers, and the least allowed value of each."""
 
 _LOWER_BOUND = {
     "evidence": -math.inf,
@@ -195,11 +199,11 @@ _LOWER_BOUND = {
     "coupling_stiffness": 0.0,
     "period": 0.0,
 }
-"""Settings that are real numbers and their exclusive lower bound."""
+"""Settings that are real numbers; each must be above its number here."""
 
 
 def _require(options: IdentifyOptions | SearchOptions) -> None:
-    """Checks words, switches and numbers.
+    """Checks the values of settings that are words, True or False, or numbers.
 
     Raises
     ------
@@ -222,12 +226,12 @@ def _require(options: IdentifyOptions | SearchOptions) -> None:
 
 
 def _parsed(name: str, text: str) -> Any:
-    """The value of a search setting from its text.
+    """Returns the value of a search setting from its text.
 
     Raises
     ------
     InputError
-        The setting is unknown, or the text is not of its type.
+        The setting is unknown, or the text has the wrong type.
     """
     known = {each.name: each.default for each in fields(SearchOptions)}
     if name not in known:
@@ -247,7 +251,7 @@ def _parsed(name: str, text: str) -> Any:
 
 
 def kind_of(each: Field[Any]) -> str:
-    """The type of a field as text."""
+    """Returns the type of a field as text."""
     return each.type if isinstance(each.type, str) else inspect.formatannotation(each.type)
 
 
@@ -257,10 +261,11 @@ def default_of(each: Field[Any]) -> Any:
 
 
 def described_fields(kind: type[IdentifyOptions | SearchOptions] = IdentifyOptions) -> str:
-    """The fields of options as a list of parameters, from the texts beneath them."""
+    """Returns the fields of options as a parameter list for a docstring, from the docstrings of the
+    fields."""
     try:
         tree = ast.parse(inspect.getsource(kind)).body[0]
-    except (OSError, SyntaxError):  # an installation without its source
+    except (OSError, SyntaxError):  # the source file is not installed
         tree = ast.Pass()
     texts: dict[str, str] = {}
     for each, text in pairwise(tree.body if isinstance(tree, ast.ClassDef) else []):
@@ -274,7 +279,7 @@ def described_fields(kind: type[IdentifyOptions | SearchOptions] = IdentifyOptio
 
 
 def options_from(keywords: Mapping[str, Any]) -> IdentifyOptions:
-    """Options from keywords; an unknown keyword is refused."""
+    """Returns options from keyword arguments; an unknown keyword is refused."""
     known = [field.name for field in fields(IdentifyOptions)]
     for name in keywords:
         if name not in known:
@@ -300,7 +305,7 @@ def _require_names(inputs: object) -> None:
 
 
 def _is_pair(values: object) -> bool:
-    """True for two real numbers."""
+    """True if the value is a pair of real numbers."""
     is_number = (int, float, np.integer, np.floating)
     return (
         isinstance(values, (tuple, list))

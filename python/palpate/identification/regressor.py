@@ -40,8 +40,8 @@ SETTINGS = {
     for each in fields(IdentifyOptions)
     if each.name in ("max_wavelets", "criterion", "loss", "search")
 }
-"""Settings of :class:`IdentifyOptions` that need no recording, with their defaults. search = None stands for
-the default search settings."""
+"""Settings of :class:`IdentifyOptions` that need no recording, with their defaults. The value None of search
+means the default search settings."""
 
 LEAST_RELATIVE_RANGE = 1e-12
 """Least range of a column over its largest absolute value [-]. Below it the column is constant."""

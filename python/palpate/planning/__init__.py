@@ -3,7 +3,7 @@
 
 Model and device -> candidate structures, the simplest first (`candidates`, with `limited_network` if the
 device is too weak) -> certificate -> `Plan` with its force error, or the reasons of the refusal with the
-device property that would help. `search` runs these steps. `simulation` renders a plan in virtual time.
+device property that must be better. `search` runs these steps. `simulation` renders a plan in virtual time.
 """
 
 from .. import _core

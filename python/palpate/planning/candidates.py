@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Candidate structures for a model on a device, the simplest first. Each is certified or refused."""
+"""Candidate structures for a model on a device, the simplest first. Each structure is certified or
+refused."""
 
 from __future__ import annotations
 
@@ -34,23 +35,25 @@ _COUPLING_DAMPING_SHARE = 0.2
 """Default coupling damping of a structure with mass [share of the device's damping]"""
 
 _PLAY_ENLARGEMENT = 1.02
-"""Play radius that is tried if the computed one is just refused [share of the computed one]"""
+"""Play radius that is tried if the computed play radius is refused by a rounding error [share of the computed
+radius]"""
 
 _PREDICTION_SAMPLES = (1, 2, 4, 8, 16)
-"""Samples tried for a prediction. Few give less delay and force error; many need less damping [-]"""
+"""Numbers of previous samples that are tried for a prediction [-]. Few samples give less delay and force
+error; many need less damping"""
 
 _LATE_TICK_PERIODS = 1.25
-"""Time between two samples for which a chosen prediction must be certified, unless none is
-[longest time between samples of the device]
+"""Time between two samples for which the prediction of a plan must be certified; if no rendering is, less is
+accepted [longest time between samples of the device]
 """
 
 _LEAST_HYSTERESIS = 1.0 / 64.0
-"""Smallest share of h that is rendered [-]"""
+"""Smallest share of the hysteresis h that is rendered [-]"""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Network, its scheme, and the certificate of both on a device."""
+    """Model to be rendered, its structure with settings, and the certificate of both on a device."""
 
     rendered: ForceModel
     certificate: Certificate
@@ -62,7 +65,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Reason why a structure does not apply."""
+    """Reason why a structure cannot render a model."""
 
     reason: str
 
@@ -81,13 +84,13 @@ class Task:
     """B_o [force*s/position]"""
     play_radius: float | None = None
     predict: int | None = None
-    """Samples of the prediction. 0: none; None: chosen by the plan"""
+    """Number of previous samples of the prediction. 0: no prediction; None: chosen by the plan"""
     may_limit: bool = True
-    """True if a limited network may be rendered in place of the identified one"""
+    """True if a network with limited slopes may be rendered in place of the identified model"""
 
     @property
     def dynamic(self) -> bool:
-        """True if the object has mass or damping besides its force."""
+        """True if the object has mass or damping in addition to its force over position."""
         return bool(self.mass) or bool(self.object_damping)
 
     @property
@@ -102,11 +105,12 @@ class Task:
 
     @property
     def usual_play(self) -> float:
-        """The caller's play radius, or the usual one [position]."""
+        """The caller's play radius, or the usual play radius for the device [position]."""
         return self.play_radius or default_play_radius(self.model, self.device.encoder_step)
 
     def certified(self, scheme: Scheme, rendered: ForceModel | None = None) -> Candidate:
-        """Returns a scheme for the model, or for a network in its place, with its certificate."""
+        """Returns the structure and settings for the model, or for a network in its place, with the
+        certificate."""
         rendered = rendered or self.model
         return Candidate(rendered, certify(rendered, scheme, self.device))
 
@@ -131,11 +135,11 @@ class Task:
     def not_direct(self) -> Refusal | None:
         """Refuses direct rendering for an object with mass, or if a coupling is required."""
         return self.not_static() or (
-            Refusal("a coupling is required, and this structure has none") if self.coupling else None
+            Refusal("a coupling is required, and this structure has no coupling") if self.coupling else None
         )
 
     def only_direct(self) -> Refusal | None:
-        """Refuses a prediction: only the direct structure of the identified model supports it."""
+        """Refuses a prediction: only the direct structure of the identified model supports a prediction."""
         if not self.predict:
             return None
         return Refusal(
@@ -144,7 +148,7 @@ class Task:
 
 
 _NOT_LIMITED = Refusal("the identified model must be rendered without changes")
-"""Refusal of a structure that would change the model."""
+"""Reason to refuse a structure that would change the model."""
 
 
 def _direct(task: Task) -> Candidate | Refusal:
@@ -153,7 +157,8 @@ def _direct(task: Task) -> Candidate | Refusal:
         return refusal
     found = task.certified(task.direct_scheme(task.model))
     if found.certificate.refused and task.chooses_play:
-        # Bounds of the sum g' + h / r can be wider than the sum of the bounds, which gave r.
+        # The proved bounds of the slope g' + h / r can be wider than the sum of the bounds of g' and h / r,
+        # from which the play radius r was computed.
         wider = min(_PLAY_ENLARGEMENT * found.scheme.play_radius, task.longest_play)
         again = task.certified(_direct_with(wider, found.scheme.predict))
         found = found if again.certificate.refused else again
@@ -182,7 +187,7 @@ def _direct_limited(task: Task) -> Candidate | Refusal:
 
 
 def _massless(task: Task) -> Candidate | Refusal:
-    """Renders the model minus the coupling's spring behind the coupling, with limited slopes."""
+    """Renders the model minus the spring of the coupling behind the coupling, with limited slopes."""
     if refusal := task.not_static():
         return refusal
     if not task.coupling:
@@ -246,7 +251,8 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
 
 
 def _explicit(task: Task) -> Candidate | Refusal:
-    """Renders with the structure of the paper, which is stable at best."""
+    """Renders with the explicit structure of the paper, which can be certified as stable, but not as
+    passive."""
     if refusal := task.only_direct():
         return refusal
     scheme = explicit_scheme(
@@ -262,7 +268,7 @@ def _explicit(task: Task) -> Candidate | Refusal:
 
 
 Propose = Callable[[Task], Candidate | Refusal]
-"""Returns the candidate of a structure, or its refusal."""
+"""Returns the certified or refused candidate of a structure, or the reason why it does not apply."""
 
 
 def _of_position(propose: Propose) -> Propose:
@@ -283,7 +289,7 @@ class CandidateStructure:
     """A structure that a plan can choose."""
 
     use: str
-    """Its rendering or its purpose, in a few words"""
+    """Rendering or purpose of the structure, in a few words"""
     propose: Propose
 
 
@@ -312,10 +318,11 @@ def _direct_with(play_radius: float, predict: int) -> Scheme:
 
 
 def _predicted(found: Candidate, task: Task) -> Candidate:
-    """Adds a prediction with the fewest certified samples; returns `found` if none is certified.
+    """Adds the certified prediction with the fewest samples; returns `found` if no prediction is certified.
 
-    A prediction needs damping, which shortens the allowed delay of a tick. That time must remain
-    `_LATE_TICK_PERIODS`, or the time without prediction. If only predictions are certified, any is allowed.
+    A prediction needs damping, which shortens the allowed time between samples. This time must be at least
+    `_LATE_TICK_PERIODS`, or the allowed time without prediction. If direct rendering is certified only with a
+    prediction, every certified prediction is allowed.
     """
     if task.predict is not None or task.model.of_velocity:
         return found
@@ -336,7 +343,8 @@ def _no_slope(device: DeviceProfile) -> Refusal:
 
 
 def _within(model: ForceModel, low: float, high: float, device: DeviceProfile) -> ForceModel | None:
-    """Returns the model if its slopes are within limits, else the nearest one that is, balanced; or None."""
+    """Returns the model if its slopes are within limits, else the nearest model with limited slopes, or
+    None."""
     limited = model if _fits(model, low, high) else limit_slopes(model, low, high)
     return None if limited is None else _balanced(limited, device)
 
@@ -347,13 +355,15 @@ def _fits(model: ForceModel, low: float, high: float) -> bool:
 
 
 def _balanced(model: ForceModel, device: DeviceProfile) -> ForceModel:
-    """Shifts a periodic model so that its mean force, limited by the device, is 0."""
+    """Subtracts a constant from the force of a periodic model, so that its mean, after the force limit, is
+    0."""
     shift = passive_shift(model, device.force_limit)
     return with_network(model, bias=model.bias + shift) if shift else model
 
 
 def _hysteresis_limited(model: ForceModel, task: Task) -> ForceModel:
-    """Limits the slopes or reduces h, by the smaller force error; does both if neither suffices."""
+    """Limits the slopes or reduces the hysteresis h, whichever gives the smaller force error; does both if
+    needed."""
 
     def holds(candidate: ForceModel) -> bool:
         return not certify(candidate, task.direct_scheme(candidate), task.device).refused

@@ -39,7 +39,7 @@ def example_profiles() -> dict[str, tuple[Path, tuple[str, ...]]]:
 
 
 def profile_file(name: str) -> Path:
-    """Returns the file of this name if it exists, else the example of this name."""
+    """Returns the file of this name if it exists, else the example profile of this name."""
     file, example = Path(name), EXAMPLES / f"{name}.toml"
     return example if not file.exists() and example.exists() else file
 
@@ -50,10 +50,10 @@ def mechanical_units(position_unit: str) -> tuple[str, str, str]:
 
 
 class DeviceProfile(_core.device.DeviceProfile):
-    """Properties of a haptic device of one degree of freedom; SI units, rotary or linear.
+    """Properties of a rotary or linear haptic device of one degree of freedom, in SI units.
 
-    ``b`` and ``f_c`` are damping and friction of the mechanism, on which a certificate relies. Use a lower
-    bound if one of them is not known, and an upper bound for unknown delay, steps or jitter.
+    A certificate relies on the damping ``b`` and the friction ``f_c`` of the mechanism. Use a lower bound for
+    unknown damping or friction, and an upper bound for unknown delay, steps or jitter.
 
     The keyword arguments are the fields of the core's DeviceProfile, listed there with their units. The
     defaults are those of a simulated knob.
@@ -81,10 +81,10 @@ class DeviceProfile(_core.device.DeviceProfile):
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"{file} is not TOML: {error}") from None
         except UnicodeDecodeError:
-            raise InputError(f"{file} is not TOML: it is not text") from None
+            raise InputError(f"{file} is not TOML: the file is not text") from None
         except RecursionError:
-            raise InputError(f"{file}: it is nested too deeply; a profile has no tables") from None
-        except ValueError as error:  # an integer with more digits than Python converts, or an invalid date
+            raise InputError(f"{file}: the file is nested too deeply; a profile has no tables") from None
+        except ValueError as error:  # TOML with an integer of too many digits for Python, or an invalid date
             reason = str(error)
             if "integer string conversion" in reason:
                 reason = f"a number has more than {sys.get_int_max_str_digits()} digits; write 17 or fewer"

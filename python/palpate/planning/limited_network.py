@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Search for the nearest network that a device can render: slopes limited, otherwise as identified.
 
-The nearest force with slopes between two limits is an isotonic regression. It differs from the model on
-intervals around slopes that are too steep, and has kinks at their ends. Smoothing by a narrow positive kernel
-rounds the kinks and keeps the limits. Further wavelets represent only the change; they are chosen one by one
-(orthogonal least squares, values and slopes). A last least squares over all wavelets imposes the limits. So
-the limits are certified, and elsewhere the model does not change.
+The nearest force with slopes between two limits is an isotonic regression. This force differs from the model
+on intervals around slopes that are too steep, and has kinks at the ends of these intervals. Smoothing by a
+narrow positive kernel rounds the kinks and keeps the slope limits. Further wavelets represent only the change
+of the force; they are chosen one by one (orthogonal least squares, values and slopes). A final least squares
+over all wavelets imposes the slope limits, so that they are proved. Elsewhere the model does not change.
 """
 
 from __future__ import annotations
@@ -30,52 +30,55 @@ from ..identification.network.separable import Block, SeparableProblem
 from .plan import SAMPLES, strokes, with_network
 
 LONGEST_PLAY = 0.1
-"""Largest play radius [share of the travel]; a wider one feels like play, not like hysteresis."""
+"""Largest play radius [share of the travel]; a larger play radius feels like play, not like hysteresis."""
 
 _USED_SLOPE = 1.02
 """Slope for which a device is used [share of that of the model]; a network is fitted just below its limits"""
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
-"""Standard deviation of the kernel [share of the travel]; True if the force must be restoring at both ends,
-<= 0 at the lower and >= 0 at the upper one: otherwise it begins, or continues, too steeply.
-"""
+"""Tried pairs. First: standard deviation of the smoothing kernel [share of the travel]. Second: True if the
+force must be restoring at both ends of the domain, <= 0 at the lower and >= 0 at the upper end; otherwise the
+force can be too steep there."""
 
 _PROJECTED_SHARE = 0.985
-"""Share of a limit for the nearest force; the rest is for the error of the network [-]"""
+"""Share of a slope limit that the nearest force may reach; the remaining share allows for the error of the
+network [-]"""
 
 _IMPOSED_SHARE = 0.997
-"""Share of a limit that is imposed; the rest is for bounds wider than the true range [-]"""
+"""Share of a slope limit that is imposed on the network; the remaining share allows for proved bounds wider
+than the true slopes [-]"""
 
 _SUFFICIENT_ERROR = 2e-5
 """RMS error at which no further wavelets are added [share of the force's range]"""
 
 _SUFFICIENT_SLOPE_ERROR = 0.01
-"""Error of the slope at which no further wavelets are added [share of the smaller limit]"""
+"""Error of the slope at which no further wavelets are added [share of the smaller slope limit]"""
 
 _MOST_WAVELETS = 64
 """Largest number of further wavelets [-]"""
 
 _LEAST_NEW_SHARE = 1e-5
-"""Least share of a candidate's squared norm outside the chosen ones [-]"""
+"""Least share of the squared norm of a candidate wavelet that is orthogonal to the chosen wavelets [-]"""
 
 _SCALE_RATIO = 1.6
 """Ratio of adjacent dilations in the frame of the candidates [-]."""
 _SCALE_STEP = 0.75
-"""Translation step over width in that frame [-]."""
+"""Translation step divided by the width of a wavelet in the frame of the candidates [-]."""
 
 _STICKLESS_PLAY = 1e9
-"""Play radius that adds no slope in the stick phase [travels]"""
+"""Very large play radius, which adds no slope after a reversal [travels]"""
 
 
 @lru_cache(maxsize=8)
 def sliding_bounds(model: ForceModel, force_limit: float = math.inf) -> ForceBounds:
-    """Returns proved bounds while sliding, continuations included: those of a play that adds no slope."""
+    """Returns proved bounds of the slopes of both strokes, continuations included, without the slope after a
+    reversal."""
     travel = float(model.upper[0] - model.lower[0])
     return force_bounds(model, _STICKLESS_PLAY * travel if model.hysteretic else 0.0, force_limit)
 
 
 def sliding_slopes(model: ForceModel) -> tuple[float, float]:
-    """Returns the smallest and largest slope of these bounds."""
+    """Returns the smallest and the largest slope of proved bounds."""
     bounds = sliding_bounds(model)
     return bounds.slope_min, bounds.slope_max
 
@@ -85,7 +88,8 @@ def renderable_slopes(
 ) -> tuple[float, float]:
     """Returns the (lowest, highest) slope for which direct rendering is certified, divided as in the model.
 
-    With hysteresis these are slopes while sliding; a stick adds `stick` = h/r.
+    With hysteresis these are the slopes of the strokes; after a reversal the slope is larger by `stick` =
+    h/r.
     """
     low, high = (-math.inf, math.inf) if model is None else sliding_slopes(model)
     return stability.renderable_slopes(
@@ -96,7 +100,7 @@ def renderable_slopes(
 def play_radius_for(model: ForceModel, device: DeviceProfile) -> float:
     """Returns the narrowest certified play radius for direct rendering, at least 4 encoder steps.
 
-    It is infinite if none is certified up to `LONGEST_PLAY`.
+    Returns infinity if no play radius up to `LONGEST_PLAY` is certified.
     """
     longest = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
     narrowest = fewest_encoder_steps_in_play * device.encoder_step
@@ -106,7 +110,7 @@ def play_radius_for(model: ForceModel, device: DeviceProfile) -> float:
 
 
 def limit_slopes(model: ForceModel, low: float, high: float) -> ForceModel | None:
-    """Returns a network whose slopes are proved to be within limits, or None if none was found.
+    """Returns a network whose slopes are proved to be within limits, or None if no such network was found.
 
     Parameters
     ----------
@@ -127,7 +131,7 @@ def limit_slopes(model: ForceModel, low: float, high: float) -> ForceModel | Non
 
 
 def scale_hysteresis(model: ForceModel, share: float) -> ForceModel:
-    """Returns the model with h multiplied by a share, which reduces the difference of the strokes."""
+    """Returns the model with its hysteresis h multiplied by a share."""
     names = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
     return with_network(model, **{name: share * getattr(model, name) for name in names})
 
@@ -135,7 +139,8 @@ def scale_hysteresis(model: ForceModel, share: float) -> ForceModel:
 def _limited_once(
     model: ForceModel, low: float, high: float, sigma: float, restoring: bool
 ) -> ForceModel | None:
-    """Returns the model with the fitted change, or None if its continuations are steeper than the limit."""
+    """Returns the model plus the fitted change of its force, or None if a continuation is steeper than the
+    limit."""
     x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
     forces = strokes(model, x)
     changes = _changes_needed(
@@ -160,7 +165,8 @@ def _limited_once(
 def _changes_needed(
     x: Float1D, strokes: Float2D, low: float, high: float, sigma: float, model: ForceModel, restoring: bool
 ) -> Float2D:
-    """Returns changes (k, n) of strokes that limit their slopes with rounded kinks; zero elsewhere."""
+    """Returns the changes (k, n) of the force of each stroke that limit its slope, with rounded kinks; 0
+    elsewhere."""
     n, step = len(x), x[1] - x[0]
     margin = int(np.ceil(6.0 * sigma / step))
     before = after = 0
@@ -168,7 +174,7 @@ def _changes_needed(
         before = after = n - 1
         wide = [np.concatenate([f[:-1] - f[-1] + f[0], f, f[1:] + f[-1] - f[0]]) for f in strokes]
     else:
-        # At a free end the force starts at zero, and the change there must not require a force.
+        # At a free end the tool leaves the object with force 0: the change must keep this force.
         before, after = (n if side == "free" else 0 for side in (model.below, model.above))
         wide = [np.pad(force, (before, after)) for force in strokes]
     grid = x[0] + step * (np.arange(len(wide[0])) - before)
@@ -191,11 +197,13 @@ def _changes_needed(
 
 
 def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high: float) -> Float2D:
-    """Returns strokes (2, n) with less pressing force at the start of contact if it is too steep there.
+    """Returns strokes (2, n) with less press force at the start of contact if the press force is too steep
+    there.
 
-    Beyond the edge h decreases with g over g / g', and the slope of pressing is g' (1 + h / g). At the limit
-    this is too steep if pressing begins above `high` / slope times the end of releasing. The slope is that of
-    releasing over the `near` samples that the rounding of kinks reaches.
+    Below the domain the mean force g and the hysteresis h decrease to 0 over the length g / g', so that the
+    slope of press is g' (1 + h / g). This slope is above the limit `high` if press starts above `high` /
+    slope times the end of release, where slope is the release slope over the `near` samples that the rounding
+    of kinks changes.
     """
     press, release = strokes
     first = release[edge]
@@ -207,7 +215,7 @@ def _begun_together(grid: Float1D, strokes: Float2D, edge: int, near: int, high:
 
 
 def _extended(force: Float1D, margin: int) -> Float1D:
-    """Returns a force and its straight continuations."""
+    """Returns a force with straight continuations at both ends."""
     steps = np.arange(1, margin + 1)
     before = force[0] - steps[::-1] * (force[1] - force[0])
     after = force[-1] + steps * (force[-1] - force[-2])
@@ -217,7 +225,8 @@ def _extended(force: Float1D, margin: int) -> Float1D:
 def _fitted(
     model: ForceModel, x: Float1D, wanted: Float2D, alpha: Float1D, beta: Float1D, low: float, high: float
 ) -> ForceModel:
-    """Fits the model's and further wavelets by least squares, with the slope limits and h >= 0 imposed."""
+    """Fits the wavelets of the model and further wavelets by least squares, with slope limits and h >= 0
+    imposed."""
     lower, travel = model.lower, model.upper - model.lower
     box = ((x - lower) / travel)[:, None]
     ones = np.ones_like(x)
@@ -247,7 +256,8 @@ def _fitted(
     least = sliding_bounds(limited).loss_min
     if least >= 0.0:
         return limited
-    # The bound h >= 0 is imposed up to rounding, but must be proved: raise h by the difference.
+    # The least squares keeps h >= 0 only up to rounding, but h >= 0 must be proved: add the missing
+    # difference to h.
     return with_network(limited, bias_hysteresis=new["bias_hysteresis"] - 1.01 * least)
 
 
@@ -274,9 +284,11 @@ def _chosen(
     sigma: float,
     close: float,
 ) -> Sequence[int]:
-    """Chooses candidates one by one for changes (outputs, n), in addition to a line and the model's wavelets.
+    """Chooses candidate wavelets one by one for changes (outputs, n) of the force, in addition to a line and
+    the model's wavelets.
 
-    Values and slopes are fitted together; sigma times a slope has the weight of a value.
+    Forces and slopes are fitted together; `sigma` times an error of the slope counts as much as an error of
+    the force.
     """
 
     def both(values: Float2D, slopes: Float2D) -> Float2D:
@@ -297,7 +309,7 @@ def _chosen(
     residual = targets - basis @ (basis.T @ targets)
     left = columns - basis @ (basis.T @ columns)
     norms = np.square(columns).sum(axis=0)
-    # A pivoted Cholesky factor of the candidates' Gram matrix.
+    # Each step extends a pivoted Cholesky factor of the candidates' Gram matrix.
     gram, products = left.T @ left, left.T @ residual
     size = np.diag(gram).copy()
     rest = float(np.square(residual).sum())

@@ -28,13 +28,13 @@ _CERTIFICATE = {
     "stable-locally": "stable (local) only",
     "refused": "refused",
 }
-"""Verdict of a certificate to its text."""
+"""Maps the verdict of a certificate to a sentence."""
 
 ACCEPTED_FORCE_ERROR = 0.1
 """Default limit of the force error [share of the range of the identified force]"""
 
 SAMPLES = 1001
-"""Number of positions over the domain [-]"""
+"""Number of positions over the domain at which the force error is computed [-]"""
 
 NETWORK = (
     "alpha",
@@ -68,7 +68,7 @@ class Plan:
     """The identified model; the plan never changes it. Force errors refer to it."""
     scheme: Scheme
     certificate: Certificate | None = None
-    """Certificate of the rendered model on a device; None if nothing was certified"""
+    """Certificate of the rendered model on a device; None for a plan made by hand"""
     refused: tuple[str, ...] = ()
     """Refused simpler structures, each with the failed inequality and its margin"""
     limited: Model | None = None
@@ -76,7 +76,7 @@ class Plan:
     accept_force_error: float = ACCEPTED_FORCE_ERROR
     """Largest force error that is accepted [share of the range of the identified force]"""
     needs: str = ""
-    """Device property that `model` needs; empty if `model` is rendered, or if none helps"""
+    """Device property that `model` needs; empty if `model` is rendered, or if no property helps"""
 
     def __post_init__(self) -> None:
         instance_of("model", self.model, Model, "make one with palpate.identify or palpate.load_model")
@@ -101,14 +101,16 @@ class Plan:
 
     @cached_property
     def force_error(self) -> StaticForceError:
-        """Felt minus identified force at rest, caused by a limited network and a soft coupling."""
+        """Felt force minus identified force for a handle at rest, caused by a limited network and a soft
+        coupling."""
         return static_force_error(self.model, self.rendered, self.scheme)
 
     @property
     def verdict(self) -> Verdict:
         """Verdict on the plan: on its certificate and its force error.
 
-        It is "no" if no structure holds on the device, or if the force error exceeds the limit.
+        The verdict is "no" if no structure is certified for the device, or if the force error exceeds its
+        accepted limit.
         """
         return Verdict((*self._certificate_findings(), *self._force_findings()))
 
@@ -138,7 +140,8 @@ class Plan:
         )
 
     def stored(self) -> Model:
-        """Returns the identified model with this plan and its certificate in it, ready to be saved.
+        """Returns a copy of the identified model that contains this plan and its certificate, ready to be
+        saved.
 
         Raises
         ------
@@ -172,16 +175,18 @@ class Plan:
 
     @property
     def description(self) -> str:
-        """Structure and its changes to the identified network, in words."""
+        """Name of the structure and its changes to the identified model, in words."""
         return ", ".join(
             [*_words(self.scheme), *([] if self.limited is None else ["with a limited network"])]
         )
 
     @property
     def slopes_behind_coupling(self) -> tuple[float, float]:
-        """Steepest felt slope and that of the model; a coupling makes it softer [force/position].
+        """Steepest felt slope and steepest slope of the model [force/position]; a coupling reduces the felt
+        slope.
 
-        If the coupling was subtracted from the model, the bounds of the certificate are for the remainder.
+        If the spring of the coupling was subtracted from the model, the slope bounds of the certificate are
+        those of the difference.
         """
         assert self.certificate is not None
         steepest = max(0.0, self.certificate.bounds.slope_max)
@@ -226,11 +231,11 @@ class Plan:
         return rows
 
     def certified_for(self, device: DeviceProfile) -> Plan:
-        """Returns the plan with its certificate on a device, which may be a refusal."""
+        """Returns the plan with its certificate on a device; the verdict of the certificate can be no."""
         return replace(self, certificate=certify(self.rendered, self.scheme, device))
 
     def check_for(self, device: DeviceProfile) -> None:
-        """Refuses a plan that diverges on this device, and a device other than that of the certificate.
+        """Refuses a plan that would diverge on a device, and a device that is not the one of the certificate.
 
         Raises
         ------
@@ -313,9 +318,10 @@ def _percent(share: float) -> str:
 
 @dataclass(frozen=True)
 class StaticForceError:
-    """Felt minus identified force at rest, over the domain and both strokes.
+    """Felt force minus identified force for a handle at rest, over the domain and both strokes.
 
-    It contains the effect of a limited network and a soft coupling, not of damping, delay or encoder.
+    The force error contains the effects of a limited network and a soft coupling, not those of damping, delay
+    or encoder.
     """
 
     largest: float
@@ -323,20 +329,22 @@ class StaticForceError:
     rms: float
     """[force]"""
     share: float
-    """`largest` over the range of the identified force [-]"""
+    """Largest force error divided by the range of the identified force [-]"""
     rms_share: float
-    """`rms` over the population standard deviation of the identified force [-]"""
+    """RMS force error divided by the population standard deviation of the identified force [-]"""
 
 
 def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Scheme) -> StaticForceError:
-    """Returns the force error at rest if a scheme renders `rendered` in place of `identified`.
+    """Returns the force error for a handle at rest if `rendered` is rendered in place of the model
+    `identified`.
 
     Parameters
     ----------
     identified, rendered : ForceModel
-        Of one position, on the same domain; or the same model of position and velocity.
+        Two models of one position on the same domain, or the same model of position and velocity twice.
     scheme : Scheme
-        A coupling makes the rendered force softer: the felt slope is K_c f' / (K_c + f').
+        Structure and coupling. With coupling stiffness K_c the felt slope is K_c f' / (K_c + f'), where f' is
+        the slope of the model.
     """
     exact = scheme.compensated or not scheme.has_coupling
     if exact and rendered is identified:
@@ -362,13 +370,13 @@ def network_of(model: ForceModel) -> dict[str, Any]:
 
 
 def strokes(model: ForceModel, x: Float1D) -> Float2D:
-    """Returns (1, n) the force, or (2, n) pressing and releasing."""
+    """Returns the force (1, n), or with hysteresis the press and release forces (2, n)."""
     sides = (1.0, -1.0) if model.hysteretic else (None,)
     return np.array([model.force(x, direction=side) for side in sides])
 
 
 def _share(error: float, size: float, force: Float2D) -> float:
-    """Returns the error over the size of the force, or over the largest |force| of a constant force."""
+    """Returns an error divided by `size`, or by the largest |force| if the force is constant."""
     size = size or float(np.abs(force).max())
     return 0.0 if error == 0.0 else error / size if size else math.inf
 
@@ -380,7 +388,7 @@ def _behind_coupling(model: ForceModel, scheme: Scheme, x: Float1D) -> Float2D:
 
 
 def _single_strokes(model: ForceModel) -> list[ForceModel]:
-    """Returns models without hysteresis, one for each stroke: f, or g + h and g - h."""
+    """Returns one model without hysteresis for each stroke: f, or press g + h and release g - h."""
     if not model.hysteretic:
         return [model]
     names = ("weight", "linear", "bias")

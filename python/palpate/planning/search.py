@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Search for the plan of a model: the first certified candidate, and the device property that it needs."""
+"""Search for the plan of a model: the first certified candidate structure, or the device property that is too
+weak."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ from .limited_network import sliding_bounds
 from .plan import ACCEPTED_FORCE_ERROR, Plan, network_of, require_force, static_force_error, with_network
 
 _FORCE_UNIT = {"rad": "N*m", "m": "N"}
-"""Position unit of a device to its force unit."""
+"""Maps the position unit of a device to its force unit."""
 
 
 def plan(
@@ -133,7 +134,7 @@ def plan(
         if not chosen.certificate.refused:
             break
         refused.append(f"{name}: {chosen.certificate.reason}")
-    assert chosen is not None  # the direct or the explicit structure always has a scheme
+    assert chosen is not None  # at least one of the direct and the explicit structure always applies
     identified = chosen.rendered is task.model
     planned = Plan(
         model,
@@ -168,13 +169,14 @@ def _require_number(name: str, value: object) -> None:
 
 
 _AMPLE_DOUBLINGS = (40.0, 14.0, 8.0)
-"""Doublings after which a property is ample; too many can make an explicit structure diverge [-]"""
+"""Number of doublings of a device property after which it is large enough for any model [-]; more can make an
+explicit structure diverge"""
 
 _BISECTIONS = 15
-"""Bisections of the doublings, for the least sufficient value within 0.1 % [-]"""
+"""Number of bisections that find the least sufficient value of a device property within 0.1 % [-]"""
 
 Fits = Callable[[DeviceProfile], bool]
-"""Returns True if a device suffices."""
+"""Function that returns True if a model can be rendered on a device."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +184,7 @@ class _Property:
     """A property of a device that can be improved."""
 
     improved: Callable[[DeviceProfile, float], DeviceProfile]
-    """Returns the device with this property improved by a factor, rounded to three digits"""
+    """Function that returns the device with this property improved by a factor, rounded to three digits"""
     text: Callable[[DeviceProfile], str]
     """Requirement that an improved device just meets, in words"""
 
@@ -237,7 +239,7 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
 def _candidates(task: Task) -> tuple[str, ...]:
     """Returns the candidate structures that render the identified model and meet the requirements."""
     if task.dynamic:
-        return tuple(CANDIDATES)  # those without mass do not apply
+        return tuple(CANDIDATES)  # structures without mass do not apply
     if task.coupling:
         return ("massless", "explicit") if task.model.hysteretic else ("massless",)
     return ("direct",)
@@ -249,7 +251,7 @@ def _properties(
     """Returns damping, friction, rate and encoder as properties."""
     force, position = ("N*m", "rad") if device.position_unit == "rad" else ("N", "m")
     steepest = max(sliding_bounds(model).steepest, 1e-9)
-    # A property that is 0 cannot be doubled: begin far below the need of the model.
+    # A property that is 0 cannot be doubled: start with a value far below the need of the model.
     b = device.viscous_damping or 1e-3 * device.longest_period_s * steepest
     f_c = device.coulomb_friction or 1e-3 * (device.encoder_step * steepest + device.force_step) or 1e-9
 
@@ -285,7 +287,7 @@ def _properties(
 
 
 def _improved(device: DeviceProfile, properties: Sequence[_Property], fits: Fits) -> DeviceProfile | None:
-    """Returns the device with the least improvement of these properties that fits, or None."""
+    """Returns the device with the least sufficient improvement of these properties, or None."""
 
     def after(doublings: Sequence[float]) -> DeviceProfile:
         changed = device
@@ -318,7 +320,8 @@ def _changed(device: DeviceProfile, **fields: float) -> DeviceProfile:
 
 
 def _rounded(towards: Callable[[float], int], value: float) -> float:
-    """Rounds to three digits in the safe direction: the printed number suffices."""
+    """Rounds a device property to three digits in the safe direction, so that the printed number is
+    sufficient."""
     if value == 0.0:
         return 0.0
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)

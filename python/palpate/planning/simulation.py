@@ -37,17 +37,19 @@ _TOLERATED_ERROR_SHARE = 0.02
 """Largest force error without a finding [share of the force range]"""
 
 _COMPENSATED_DAMPING_RATIO = 0.25
-"""Coupling damping of the compensated structure over that of the others; (f'/K_c)^2 of it is felt."""
+"""Coupling damping of the compensated structure divided by that of the other structures [-]; the share
+(f'/K_c)^2 of this damping is felt."""
 
 _COMPARED_PREDICTION = 4
-"""Samples of the prediction in a comparison [-]"""
+"""Number of previous samples of the prediction in a comparison of structures [-]"""
 
 _NAMES = {int(value): name for name, value in Status.__members__.items()}
-"""Status value to its name."""
+"""Maps the value of a status to its name."""
 
 
 def rig_for(model: Model) -> TestRig:
-    """Returns the test rig for a model: default knob and hand, scaled to the model unless it is an angle."""
+    """Returns the test rig for a model: default knob and hand, scaled to the model unless its position is an
+    angle."""
     return _core.simulation.rig_for(model, is_angle=model.units["position"] == "rad")
 
 
@@ -131,23 +133,24 @@ class ForceError:
     """Rendered minus identified force at the handle's true position, RMS over all ticks [N*m or N]."""
 
     end: float
-    """At the end of the tick that holds the force; favours a force that is ahead of the motion"""
+    """Error at the end of the tick in which the force is held; a force ahead of the motion makes it
+    smaller"""
     instant: float
-    """At the sampling instant: contains only structure and encoder"""
+    """Error at the sampling instant: contains only the effects of structure and encoder"""
     mean: float
-    """Of the mean over each tick"""
+    """Error of the mean force over each tick"""
     band: float
-    """Of that mean below 50 Hz: the part that a hand can follow"""
+    """Error of the mean force over each tick below 50 Hz: the part that a hand can follow"""
     work: float
-    """Work of the error over the whole time [J]; negative if the rendering gives energy"""
+    """Work of the force error over the whole time [J]; negative if the rendering gives energy to the hand"""
 
 
 def force_error(plan: Plan, rendered: Recording) -> ForceError:
     """Returns the errors of a simulated rendering against the identified model, at the true handle position.
 
     With F the force of the device, x the true motion and T the period, the error of the mean over tick k is
-    the integral of F(t) - f(x(t)) over the tick, divided by T. The error below 50 Hz is its sequence after a
-    low-pass filter without phase.
+    the integral of F(t) - f(x(t)) over the tick, divided by T. The error below 50 Hz is the sequence of these
+    errors after a low-pass filter without phase.
 
     Parameters
     ----------
@@ -244,7 +247,7 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
 
 
 def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Float1D:
-    """Returns the identified force along a motion, without structure or coupling.
+    """Returns the force of the identified model along a motion, without structure or coupling.
 
     Play state and velocity are included.
 
@@ -253,7 +256,7 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
     plan : Plan
         Model and play radius.
     position : (n,) array
-        A motion, in order [rad or m].
+        Positions of a motion, in order of time [rad or m].
     period_s : float, optional
         Time between positions [s]; only a force that depends on velocity needs it.
 
@@ -271,7 +274,7 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
 
 @dataclass(frozen=True)
 class Comparison:
-    """One structure of a comparison: its recording, or the reason of its refusal."""
+    """One structure of a comparison: the recording of its rendering, or the reason of its refusal."""
 
     scheme: Scheme
     recording: Recording | None

@@ -31,7 +31,7 @@ _PREFIXES = ((1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "\u00b5"), (1e-9, "n"))
 """SI prefixes, the largest first."""
 
 _PREFIXED = ("m", "N", "N*m", "A")
-"""Units that take every prefix. An angle takes none above 1, other units none."""
+"""Units that can have every SI prefix. An angle has no prefix above 1, other units have no prefix."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def scale_for(unit: str, *values: npt.ArrayLike) -> Scale:
 
 
 def _least(size: float) -> float:
-    """Returns the smallest value that is drawn with a prefix of this size."""
+    """Returns the smallest value that is drawn with an SI prefix of this size."""
     return size if size > 1.0 else 0.1 * size
 
 

@@ -95,7 +95,8 @@ def draw_measured_and_modelled(
 
 
 def _draw_band(axes: Axes, position: Float1D, half: Float1D, line: Any) -> None:
-    """Draws the edges of a band about zero. Lines are visible in front of dots, also in black and white."""
+    """Draws the edges of a band around zero as lines, which are visible in front of dots, also in black and
+    white."""
     order = np.argsort(position, kind="stable")
     at, width = thinned(position[order], half[order])
     for edge in (width, -width):

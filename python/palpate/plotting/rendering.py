@@ -53,7 +53,8 @@ def draw_real_against_rendered(
     """
     x = scale_for(units["position"], real[0], rendered[0])
     y = scale_for(units["force"], real[1], rendered[1])
-    # The dots are wider than the line in front of them: both are visible if the two agree.
+    # The dots of the recorded force are wider than the line of the rendered force, so that both are visible
+    # if they agree.
     axes.plot(
         *thinned(real[0] * x.factor, real[1] * y.factor),
         color="0.6",
@@ -74,7 +75,8 @@ def draw_real_against_rendered(
 def draw_structures(
     axes: Axes, names: Sequence[str], mean: Sequence[float], end: Sequence[float], force_unit: str
 ) -> None:
-    """Draws the RMS force error of each structure on a log axis: of the mean of a tick, and at its end.
+    """Draws the RMS force error of each structure on a log axis: of the mean force of a tick, and at the end
+    of a tick.
 
     Parameters
     ----------
@@ -85,7 +87,7 @@ def draw_structures(
     mean, end : sequence of float
         Their force errors [N*m or N].
     force_unit : str
-        The unit of both.
+        Unit of the force errors.
     """
     x = scale_for(force_unit, mean, end)
     place = np.arange(len(names), dtype=np.float64)
@@ -129,7 +131,7 @@ class RootLocus:
     poles: NDArray[np.complex128]
     """(k, n, 2)"""
     chosen: NDArray[np.complex128]
-    """(k, 2) with the damping of the scheme"""
+    """(k, 2) poles with the object damping of the scheme"""
 
 
 def root_locus(scheme: Scheme, slopes: Float1D, period_s: float) -> RootLocus:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closed-loop verification: a recorded motion moves the device, or a recorded force the environment.
+"""Closed-loop verification: a recorded motion moves the simulated device, or a recorded force moves the
+virtual object.
 
 The recording is sampled on the even time grid of a controller, with recorded or assumed time.
 """
@@ -27,7 +28,7 @@ MOST_SAMPLES = 20_000_000
 """Largest number of samples of a motion on an even grid; limits memory."""
 
 ASSUMED_STROKE_S = 1.0
-"""Time in which an assumed motion crosses the range of positions once [s]."""
+"""Time in which the assumed motion of a recording without time crosses the range of positions once [s]."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class ClosedLoop:
     """Rendered scheme, after replacements"""
     period_s: float
     assumed_speed: float | None
-    """[position unit per second]: assumed because the recording has no time; None: time is recorded"""
+    """Assumed speed of the motion if the recording has no time [position unit per second]; None if time is
+    recorded"""
     time: Float1D
     """(k,) [s]"""
     recorded_position: Float1D
@@ -50,9 +52,9 @@ class ClosedLoop:
     """Motion-driven: rendered force. Force-driven: recorded force."""
     environment_position: Float1D
     rmse: float
-    """Motion-driven: of the force. Force-driven: of the position."""
+    """RMS error; motion-driven: of the force, force-driven: of the position."""
     nrmse: float
-    """rmse over the population standard deviation of the recorded signal"""
+    """RMS error divided by the population standard deviation of the recorded signal [-]"""
     status: Mapping[str, int]
     """Number of ticks with each status"""
     units: Mapping[str, str]
@@ -76,7 +78,7 @@ def motion_driven(
     recording : Recording
         Its motion is resampled every `period_s`; without time it has the speed `stroke_speed`.
     scheme : Scheme, optional
-        Structure and coupling; by default the direct structure.
+        Structure and coupling of the rendering; by default the direct structure.
     period_s : float
         Sample time [s].
     stroke_speed : float, optional
@@ -105,7 +107,7 @@ def force_driven(
     period_s: float = paper_sample_time_s,
     stroke_speed: float | None = None,
 ) -> ClosedLoop:
-    """Drives the environment alone with the recorded force (figure 14 of the paper).
+    """Moves the virtual object alone, without device, by the recorded force (figure 14 of the paper).
 
     Force over the resulting position is figure 15 of the paper.
 
@@ -228,8 +230,8 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
     period_s : float
         Sample time [s].
     stroke_speed : float, optional
-        That speed [position unit per second]; by default the range of positions in one second. Only for a
-        recording without time.
+        Constant speed of a recording without time [position unit per second]; by default the range of
+        positions in one second.
 
     Raises
     ------
@@ -248,7 +250,7 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
     if not 0 < speed < np.inf:
         raise InputError(f"stroke_speed is {speed}: must be > 0 and finite")
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(recording.position)))])
-    with np.errstate(over="ignore"):  # a motion of infinite length is refused below
+    with np.errstate(over="ignore"):  # an infinite duration of the motion is refused by a later check
         time = way / speed
     return _sampled(recording, time, period_s, speed)
 
@@ -265,7 +267,7 @@ def _sampled(recording: Recording, time: Float1D, period_s: float, assumed_speed
             f"the motion lasts {time[-1]:.4g} s, more than {MOST_SAMPLES} samples of {period_s:g} s: "
             + ("choose a larger period" if assumed_speed is None else "choose a higher stroke speed")
         )
-    # If an assumed motion rests, several rows have the same time: keep the last of them.
+    # Successive rows with equal position get the same assumed time: keep the last of these rows.
     last = np.append(np.diff(time) > 0, True)
     samples = int(time[-1] / period_s * (1 + 1e-12)) + 1
     if samples < 2:

@@ -16,16 +16,19 @@ from .metrics import normalised, root_mean_square
 from .prediction import Prediction
 
 REPORTED_NRMSE_RATIO = 0.5
-"""Largest NRMSE under an explanation that is reported, as a share of the NRMSE without it [-]."""
+"""Largest ratio of the NRMSE with a changed recording to the NRMSE of the unchanged recording, at which the
+change is reported [-]."""
 
 EQUIVALENT_NRMSE_RATIO = 1.2
-"""Largest ratio to the least NRMSE at which a simpler explanation is preferred [-]."""
+"""Largest ratio of the NRMSE of a simpler explanation to the least NRMSE of all explanations, at which the
+simpler one is preferred [-]."""
 
 FACTOR_TOLERANCE = 0.02
-"""Largest relative difference of a factor from the factor of a unit [-]."""
+"""Largest relative difference of a fitted factor from the factor between two units, at which a wrong unit is
+reported [-]."""
 
 OFFSETS_PER_GRID = 41
-"""Number of position offsets on a grid."""
+"""Number of position offsets that are tried on one grid."""
 
 OFFSET_GRIDS = 3
 """Number of grids of position offsets, each finer than the previous one."""
@@ -36,12 +39,12 @@ MOST_ROWS = 2000
 
 @dataclass(frozen=True)
 class Explanation:
-    """Change of the recording after which the model fits it."""
+    """Change of a recording after which the model fits the recording."""
 
     nrmse: float
     sentence: str
     order: int
-    """Rank of the explanation; the simplest has the lowest"""
+    """Rank of the explanation; the simplest explanation has the lowest rank"""
 
 
 def explanation(model: Model, recording: Recording, prediction: Prediction) -> Explanation | None:
@@ -75,7 +78,7 @@ def _share(error: Float1D, force: Float1D) -> float:
 
 
 def _of_force(force: Float1D, modelled: Float1D, unit: Unit) -> Iterator[Explanation]:
-    """Yields the sign, an offset and a factor of the force."""
+    """Yields changes of the recorded force: opposite sign, an offset, a factor."""
     yield Explanation(
         _share(modelled + force, force),
         "the model fits with the opposite sign of the recorded force: give --negate force",
@@ -103,7 +106,8 @@ def _of_force(force: Float1D, modelled: Float1D, unit: Unit) -> Iterator[Explana
 def _of_position(
     model: Model, position: Float1D, side: Float1D | None, force: Float1D, recording: Recording
 ) -> Iterator[Explanation]:
-    """Yields the direction, and the sign, the unit and an offset of the position."""
+    """Yields changes of the recorded direction (press and release exchanged) and position (opposite sign,
+    unit, offset)."""
 
     def left(at: Float1D, s: Float1D | None) -> float:
         modelled = model.force(at) if s is None else model.force(at, direction=s)
@@ -134,7 +138,7 @@ def _of_position(
                     "its unit with --units",
                     order=4,
                 )
-    # Search the offset on a grid over the travel, then on finer grids around the best one.
+    # Search the position offset on a grid over the travel, then on finer grids around the best offset.
     best, step = 0.0, 2.0 * float(model.upper[0] - model.lower[0]) / (OFFSETS_PER_GRID - 1)
     for _ in range(OFFSET_GRIDS):
         grid = best + step * (np.arange(OFFSETS_PER_GRID) - OFFSETS_PER_GRID // 2)
@@ -143,8 +147,8 @@ def _of_position(
     yield Explanation(
         left(position + best, side),
         f"the model fits if {recording.file_unit('position').text(abs(best))} is "
-        f"{'added to' if best > 0.0 else 'subtracted from'} the recorded position: its zero may have "
-        "moved. Correct it in the file",
+        f"{'added to' if best > 0.0 else 'subtracted from'} the recorded position: the zero of the "
+        "position may have moved. Correct the positions in the file",
         order=5,
     )
 

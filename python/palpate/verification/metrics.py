@@ -13,13 +13,14 @@ from ..model import Model
 from ..verdict import FORCE_FLOOR, FORCE_JND
 
 STIFFNESS_JND = 0.23
-"""Just noticeable difference of stiffness, as a share of it (Jones and Hunter 1990: about 23 %)."""
+"""Just noticeable difference of stiffness, as a share of the stiffness (Jones and Hunter 1990: about 23
+%)."""
 
 STIFFNESS_CELLS = 20
 """Number of equal cells over the range of positions in which a local stiffness is computed."""
 
 _LEAST_CELL_ROWS = 5
-"""Least number of rows of a cell for its stiffness."""
+"""Least number of rows of a cell from which a local stiffness is computed."""
 
 
 def root_mean_square(values: Float1D) -> float:
@@ -54,12 +55,14 @@ def durbin_watson(residual: Float1D) -> float:
 
 
 def force_floor(force: Float1D) -> float:
-    """Returns the smallest just noticeable difference for a recording of this force, in its unit."""
+    """Returns the smallest just noticeable difference of a recorded force, 1 % of its largest value, in its
+    unit."""
     return FORCE_FLOOR * float(np.abs(force).max())
 
 
 def share_within_force_jnd(reference: Float1D, error: Float1D) -> float:
-    """Returns the share of samples with an error below 7 % of the local force, or below the floor."""
+    """Returns the share of samples with an error below 7 % of the local force, or below the smallest just
+    noticeable difference."""
     allowed = np.maximum(FORCE_JND * np.abs(reference), force_floor(reference))
     return float(np.mean(np.abs(error) <= allowed))
 
@@ -73,7 +76,7 @@ def share_within_stiffness_jnd(position: Float1D, reference: Float1D, error: Flo
     Parameters
     ----------
     position : (n,) array
-        Rows of one stroke, in any order.
+        Positions of the rows of one stroke, in any order.
     reference, error : (n,) array
         Reference force, and the compared force minus it.
     """
@@ -105,22 +108,23 @@ _COMPARED_POSITIONS = 2001
 
 @dataclass(frozen=True)
 class Stroke:
-    """Two models along one stroke, at the positions of both domains."""
+    """Forces of two models along one stroke, at positions in the domains of both models."""
 
     name: str
-    """press or release; empty if neither model distinguishes them"""
+    """Name of the stroke, press or release; empty if neither model distinguishes press and release"""
     position: Float1D
     """(n,) [m or rad]"""
     first: Float1D
     """(n,) force of the first model [N or N*m]"""
     second: Float1D
-    """(n,) force of the second model"""
+    """(n,) force of the second model [N or N*m]"""
     perceptible: Float1D
-    """(n,) just noticeable difference of the force"""
+    """(n,) just noticeable difference of the force [N or N*m]"""
 
     @property
     def worst(self) -> float:
-        """Largest difference over the just noticeable difference; below 1 a hand cannot feel it."""
+        """Largest force difference divided by the just noticeable difference [-]; below 1 a hand cannot feel
+        the difference."""
         return float(np.max(np.abs(self.second - self.first) / self.perceptible))
 
 
@@ -137,7 +141,7 @@ def compare(first: Model, second: Model) -> tuple[Stroke, ...]:
     Returns
     -------
     tuple of Stroke
-        Press and release if one of the models distinguishes them, else one.
+        Press and release if one of the models distinguishes these strokes, else one stroke.
 
     Raises
     ------

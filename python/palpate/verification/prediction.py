@@ -28,7 +28,7 @@ _UNSTATED = ""
 """Unit that is not stated."""
 
 _STRUCTURE = "structure"
-"""Metadata key of the rendered structure."""
+"""Metadata key of a flight record for the rendered structure."""
 
 _OBJECT_POSITION = "environment_position"
 """Stem of the column with the position of the virtual object."""
@@ -36,19 +36,19 @@ _OBJECT_POSITION = "environment_position"
 
 @dataclass(frozen=True)
 class Prediction:
-    """Force of a model at the rows of a recording for which the model gives one."""
+    """Force of a model at the rows of a recording for which the model can compute a force."""
 
     rows: NDArray[np.bool_]
     """(n,) rows of the recording that are used"""
     force: Float1D
-    """(k,) force of the model at these rows"""
+    """(k,) force of the model at the used rows"""
     extrapolated: int
-    """Number of these rows outside the model's domain"""
+    """Number of used rows outside the model's domain"""
     notes: tuple[str, ...]
     position: Float1D
-    """(k,) positions of the force"""
+    """(k,) positions at which the force was computed"""
     side: Float1D | None = None
-    """(k,) hysteresis input in [-1, 1]; None for a model without hysteresis"""
+    """(k,) direction state in [-1, 1]; None for a model without hysteresis"""
 
 
 def predict(model: Model, recording: Recording, *, play_radius: float | None = None) -> Prediction:
@@ -56,10 +56,10 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
 
     For a hysteresis model s = +-1 is the direction of the recording, and rows without direction are left out.
     Without direction, time and play radius, the strokes follow from the order of rows. Without a direction,
-    or with a play radius, the play operator follows the positions in their order. The radius is the first
-    known one: `play_radius`, that of the flight record, of the model, of its plan, 1 % of the travel. A
-    flight record behind a virtual coupling is compared at the position of the virtual object. A flight record
-    with prediction is compared at the predicted position.
+    or with a play radius, the play operator follows the positions in their order. The play radius is the
+    first one available of: `play_radius`, the radius of the flight record, of the model, of its plan, or 1 %
+    of the travel. A flight record behind a virtual coupling is compared at the position of the virtual
+    object. A flight record with prediction is compared at the predicted position.
 
     Raises
     ------
@@ -78,7 +78,8 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
 
 
 def _moving(model: Model, recording: Recording, play_radius: float | None) -> Prediction:
-    """Adds the force of mass and damping: m a + B v, with the time of the recording."""
+    """Adds the force of mass and damping, m a + B v, with acceleration a and velocity v from the time of the
+    recording."""
     if recording.time is None:
         raise InputError(
             "the recording has no time, which the mass or damping of the model needs: give --time NAME"
@@ -135,12 +136,12 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
 
 @dataclass(frozen=True)
 class _State:
-    """Hysteresis input of the rows of a recording."""
+    """Direction state of the rows of a recording."""
 
     side: Float1D
     """(n,) in [-1, 1]"""
     known: NDArray[np.bool_]
-    """(n,) rows with a hysteresis input"""
+    """(n,) True for rows with a known direction state"""
     notes: tuple[str, ...]
 
 
@@ -173,14 +174,14 @@ def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius
         notes += (f"{left_out} rows before the motion has covered twice the play radius are not compared.",)
     side = play.side[whole.rows]
     if flight.predicted and flight.object_position is not None:
-        # The play operator follows the handle; the force is that of a trial move from its position.
+        # The play operator follows the position of the handle; the force is computed at a predicted position.
         ahead = flight.object_position - recording.position
         side = np.clip(side + ahead / radius, -1.0, 1.0)
     return _State(side, known, notes)
 
 
 def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tuple[float, str]:
-    """Returns the play radius and its origin."""
+    """Returns the play radius and, in words, where its value comes from."""
     for radius, origin in (
         (play_radius, "as given"),
         (flight.play_radius, "that of the flight record"),
@@ -195,7 +196,7 @@ def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tu
 
 
 def _gaps(time: Float1D | None) -> NDArray[np.intp]:
-    """Returns the rows at which a motion starts after a gap of time."""
+    """Returns the indices of rows at which a motion starts after a gap of time."""
     if time is None or len(time) < 2:
         return np.empty(0, dtype=np.intp)
     steps = np.diff(time)
@@ -203,7 +204,7 @@ def _gaps(time: Float1D | None) -> NDArray[np.intp]:
 
 
 def require_same_units(model: Model, units: Mapping[str, str]) -> None:
-    """Refuses a recording whose units differ from those of the model. Unstated units always fit."""
+    """Refuses a recording whose units differ from those of the model. Unstated units are always accepted."""
     for role in ("position", "force"):
         model_unit, unit = model.units[role], units[role]
         if model_unit != unit and _UNSTATED not in (model_unit, unit):
@@ -215,14 +216,15 @@ def require_same_units(model: Model, units: Mapping[str, str]) -> None:
 
 @dataclass(frozen=True)
 class FlightRecord:
-    """Statements of a flight record; None for other recordings."""
+    """Statements of a flight record on its rendering; None for other recordings."""
 
     play_radius: float | None = None
     """[position]"""
     object_position: Float1D | None = None
-    """(n,) position at which the force was computed: behind a coupling, or predicted"""
+    """(n,) position at which the force was computed: that of the virtual object behind a coupling, or
+    predicted"""
     predicted: bool = False
-    """True if it is a predicted position of the handle"""
+    """True if the position is a predicted position of the handle"""
 
 
 def flight_of(recording: Recording) -> FlightRecord:
@@ -244,8 +246,9 @@ def flight_of(recording: Recording) -> FlightRecord:
 def with_strokes(model: Model, recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     """Returns the recording with strokes from its order of rows and a note; otherwise unchanged.
 
-    Used if the model differs between press and release, and neither time nor a play radius is known. A
-    recording without reversal may be sorted by position; its stroke is the one whose force is nearer.
+    Strokes are added if the model differs between press and release, and neither time nor a play radius is
+    known. A recording without reversal may be sorted by position; all rows then get the stroke whose model
+    force is nearer.
     """
     known = recording.direction is not None or recording.time is not None or model.play_radius is not None
     if known or not model.hysteretic:

@@ -29,13 +29,15 @@ BLOCK_ROWS = 50_000
 """Rows whose Jacobian is in memory at a time."""
 
 SLOPE_STEP = 1e-5
-"""Half the distance of the two Jacobians whose difference gives that of the slope [domain]."""
+"""Half the distance of the two positions whose Jacobians give, by their difference, the Jacobian of the slope
+[share of the domain]."""
 
 LEAST_EIGENVALUE_SHARE = 1e-12
-"""Eigenvalues of J'J on unit columns below this share of the largest are rounding errors."""
+"""Share of the largest eigenvalue of J'J (columns of unit norm) below which an eigenvalue is a rounding error
+[-]."""
 
 LARGEST_RHO = 0.999
-"""Largest autocorrelation that is used: one independent residual in two thousand."""
+"""Largest autocorrelation of residuals that is used [-]: one independent residual in two thousand."""
 
 
 @dataclass(frozen=True)
@@ -44,14 +46,16 @@ class Uncertainty:
 
     model: Model
     covariance: Float2D
-    """(p, p) of bias, slope and weights of g (and of h), dilations, translations"""
+    """(p, p) covariance of bias, slope and weights of the mean force (and of the hysteresis), dilations and
+    translations"""
     sigma: float
     """Standard deviation of the residuals [force]"""
     autocorrelation: float
-    """Lag-1, of the residuals in recorded order"""
+    """Lag-1 autocorrelation of the residuals in recorded order [-]"""
 
     def force(self, position: Float1D, direction: Float1D | None = None) -> Float1D:
-        """Returns the standard error (n,) of the force; twice it is a 95 % band. Outside: as at the edge."""
+        """Returns the standard error (n,) of the force; outside the domain, that at its edge. Twice this
+        value is a 95 % band."""
         inside = np.clip(position, self.model.lower[0], self.model.upper[0])
         return self._error(_jacobian(self.model, inside, direction))
 
@@ -74,7 +78,7 @@ def uncertainty(model: Model, recordings: Recording | Sequence[Recording]) -> Un
     ------
     InputError
         The model has several inputs, a mass or a damping, or hysteresis while a recording has no direction;
-        or the rows do not outnumber the parameters.
+        or there are not more rows than parameters.
     """
     if model.dimension != 1 or model.mass is not None or model.damping is not None:
         raise InputError(
@@ -110,7 +114,8 @@ def _blocks(position: Float1D, direction: Float1D | None) -> Iterator[tuple[Floa
 
 
 def _jacobian(model: Model, position: Float1D, direction: Float1D | None) -> Float2D:
-    """Returns df/dtheta (n, p); for the weights of h the columns of g times the stroke."""
+    """Returns df/dtheta (n, p); the columns for the hysteresis are those of the mean force times the
+    direction +1 or -1."""
     x = np.ascontiguousarray(position, dtype=np.float64)[:, None]
     value, (by_alpha,), (by_beta,) = wavelet_jacobian(x, model.alpha, model.beta)
     linear = np.concatenate([np.ones_like(x), x - model.lower, value], axis=1)

@@ -52,7 +52,8 @@ class Verification:
     """Errors of a model on a recording. Forces are in the recording's unit (`units`)."""
 
     nrmse: float
-    """RMSE over the population standard deviation of the recorded force, on the evaluated rows"""
+    """RMS error divided by the population standard deviation of the recorded force, on the evaluated rows
+    [-]"""
     rmse: float
     mse: float
     r2: float
@@ -62,9 +63,10 @@ class Verification:
     within_jnd: float
     """Share of samples within 7 % of the local force, or within `jnd_floor`"""
     jnd_floor: float
-    """1 % of the largest |force| of the evaluated rows"""
+    """Smallest just noticeable difference: 1 % of the largest |force| of the evaluated rows"""
     stiffness_within_jnd: float | None
-    """Share of position cells whose stiffness is within 23 %; None if no cell has enough rows"""
+    """Share of position cells in which the stiffness of the model is within 23 % of the recorded stiffness;
+    None if no cell has enough rows"""
     whiteness: float
     """Lag-1 autocorrelation of the residuals in recorded order: 0 is white"""
     durbin_watson: float
@@ -86,7 +88,7 @@ class Verification:
 
     @property
     def rows(self) -> NDArray[np.bool_]:
-        """(rows of the recording,) True for evaluated rows"""
+        """Array over the rows of the recording: True for evaluated rows"""
         return self.prediction.rows
 
     @property
@@ -170,20 +172,22 @@ def verify(
 
 
 def columns_of(model: Model) -> list[str]:
-    """Returns the columns of the model's inputs except position; a velocity may come from time."""
+    """Returns the columns of the model's inputs except position; velocity is computed from time if not
+    recorded."""
     known = model.data.columns
     return [known.get(name, name) for name in model.inputs[1:] if name != "velocity" or name in known]
 
 
 def is_fresh(identified_on: Source, data: Source) -> bool:
-    """Returns True if the model has not seen the data: another file, or held-out rows of the same file."""
+    """Returns True if the model was identified on other data: another file, or other rows of the same
+    file."""
     same_file = not set(data.sha256.split()).isdisjoint(identified_on.sha256.split())
     held_out = data.held_out and data.held_out_every == identified_on.held_out_every
     return not same_file or held_out
 
 
 def _stiffness_share(recording: Recording, rows: NDArray[np.bool_], residual: Float1D) -> float | None:
-    """Returns the mean of the shares of the strokes; each stroke has a separate stiffness."""
+    """Returns the share of position cells within the stiffness JND, averaged over press and release."""
     position, reference = recording.position[rows], recording.force[rows]
     strokes = np.zeros(len(position)) if recording.direction is None else recording.direction[rows]
     shares = [
@@ -200,12 +204,14 @@ def findings_of(model: Model, recording: Recording, found: Verification) -> tupl
 
 
 def circumstances(model: Model, recording: Recording, found: Verification) -> tuple[Finding, ...]:
-    """Returns the findings that do not judge the error: on the compared rows and on the likely cause."""
+    """Returns the findings on the compared rows and on the likely cause of an error, without those on its
+    size."""
     return (*_of_cause(model, recording, found), *_of_rows(model, recording, found))
 
 
 def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Finding]:
-    """Returns findings on the rows: seen before, outside the domain, or left out."""
+    """Returns findings on rows that the model was identified on, rows outside the domain, and rows left
+    out."""
     findings = []
     if not found.fresh:
         findings.append(

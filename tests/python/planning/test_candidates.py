@@ -33,7 +33,8 @@ def wheel() -> Model:
 
 
 def given_in_a_turn(model: Model, force_limit: float) -> float:
-    """Returns the energy of one slow turn: the limited force summed over fine steps [J]."""
+    """Returns the energy of one slow revolution of the wheel: the limited force summed over fine steps
+    [J]."""
     x = TURN * (np.arange(100_000) + 0.5) / 100_000
     return float(abs(np.clip(model.force(x), -force_limit, force_limit).mean()) * TURN)
 

@@ -196,7 +196,8 @@ def test_force_error_is_zero_if_slopes_are_within_the_limit() -> None:
 
 
 def test_steep_contact_of_a_switch_is_limited_only_at_the_contact() -> None:
-    """Both strokes begin there with one force: the decrease of h beyond the edge would be too steep."""
+    """Press and release start with the same force at the end of the domain: a decrease of the hysteresis h
+    below the domain would be too steep."""
     model = keyswitch_by_hand(beta=[[0.0]], weight=[0.3], bias=0.33, bias_hysteresis=0.02)
     weak = slide(viscous_damping=0.35)
     chosen = plan(model, weak)
@@ -228,7 +229,7 @@ def test_hysteresis_is_rendered_with_a_certified_play_radius() -> None:
 def test_coupling_is_used_only_if_required_and_its_spring_is_subtracted() -> None:
     chosen = plan(model_by_hand(), SMOOTH, coupling_stiffness=100.0)
     assert (chosen.structure, chosen.scheme.compensated) == ("massless", True)
-    assert chosen.refused[0] == "direct: a coupling is required, and this structure has none"
+    assert chosen.refused[0] == "direct: a coupling is required, and this structure has no coupling"
 
 
 def test_object_with_mass_is_implicit_without_encoder_steps_and_else_stable_only() -> None:

@@ -31,7 +31,7 @@ def spring(stiffness: float = 2.0, hysteresis: float = 0.0, **change: Any) -> Mo
 
 
 def sweep(stiffness: float = 2.0, timed: bool = True, seconds: float = 4.0) -> Recording:
-    """Returns a slow sweep of a spring, from rest."""
+    """Returns the recording of a slow motion of a spring that starts at rest."""
     t = np.arange(round(seconds * 1000)) * 1e-3
     x = 0.25 * (1 - np.cos(np.pi * t))
     return Recording.from_arrays(x, stiffness * x, t if timed else None, units=RAD)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model selection: model classes from the simplest on, over the rows of one recording.
+"""Model selection over the rows of one recording: tries model classes in order, the simplest first.
 
-A class is judged on the same samples by the same criterion as the one below it, with its constraints imposed.
-It is accepted only if the criterion falls by `evidence` (of :class:`SearchOptions`) or more and if the error
-falls on held-out rows too. The notes hold the gain of every class, accepted or not.
+A model class is compared with the next simpler accepted class on the same samples by the same criterion, with
+constraints imposed. It is accepted only if the criterion decreases by at least `evidence` (of
+:class:`SearchOptions`) and the error on held-out rows decreases too. The notes hold the decrease for every
+class, accepted or not.
 """
 
 from __future__ import annotations
@@ -29,11 +30,12 @@ from ..search.growth import Grown, Growth
 from .dynamics import Dynamics
 
 REGROWTH_ERROR_RATIO = 1.01
-"""Ratio of the RMS errors with and without constraints above which wavelets are grown to suit them [-]."""
+"""Ratio of the RMS errors with and without constraints above which a network is grown again for the
+constraints [-]."""
 
 SMALLER_NETWORK_STANDARD_ERRORS = 3.0
-"""Fall of the error on held-out rows that a smaller network must show [standard errors]. It is more than 1
-because each further trial may succeed by chance."""
+"""Decrease of the error on held-out rows that a network of reduced size must show [standard errors]. The
+value is above 1 because each further trial may succeed by chance."""
 
 HELD_OUT_STOP_REASON = "held-out rows"
 """Stop reason of growth if held-out rows refused a larger network."""
@@ -42,7 +44,7 @@ VELOCITY_INPUTS = ("position", "velocity")
 """Inputs of a force that depends on the motion."""
 
 NETWORK_CLASSES = {("position",): "position", VELOCITY_INPUTS: "velocity"}
-"""Inputs of a network and the name of its model class; others: network."""
+"""Maps the inputs of a network to the name of its model class; "network" for all other inputs."""
 
 
 class ClassSelection:
@@ -53,13 +55,13 @@ class ClassSelection:
     data : Rows
     options : IdentifyOptions
     classes : sequence of ModelClass
-        Tried in this order, the simplest first.
+        Model classes in the order in which they are tried, the simplest first.
     cells : int
-        Distinct positions that are kept apart.
+        Largest number of distinct positions; with more, positions are gathered in cells.
     previous : ClassSelection, optional
-        A selection over nearly the same rows: growth begins with the wavelets that it ended with.
+        Model selection over nearly the same rows: growth starts with its final wavelets.
     on_held_out : bool
-        False: the criterion alone decides, not the held-out rows.
+        False: the criterion decides without held-out rows.
     """
 
     def __init__(
@@ -75,7 +77,7 @@ class ClassSelection:
         self.data, self.options, self.classes, self.cells = data, options, classes, cells
         self.report: Report = Report(list(previous.report.path) if previous else [])
         self.start_basis: dict[str, Basis] = dict(previous.start_basis) if previous else {}
-        """Wavelets of each model class that growth begins with"""
+        """Wavelets at the start of growth, for each model class"""
         self.samples = Samples(data, options, cells)
         self.judge = Judge(self.samples, options, self.report, on_held_out=on_held_out)
         single = data.side is None and (data.starts is None or len(data.names) > 1)
@@ -86,17 +88,18 @@ class ClassSelection:
         if self.samples.used < given:
             self.report.notes.append(f"{self.samples.used} of {given} rows are used, evenly spread.")
         self.best = constant(self)
-        """The candidate of the highest class that the judge accepted"""
+        """Candidate of the most complex accepted model class"""
         self.try_classes(classes)
 
     def try_classes(self, classes: Sequence[type[ModelClass]]) -> None:
-        """Tries model classes one after the other, each above the best candidate so far."""
+        """Tries model classes in order; each is compared with the best candidate so far."""
         for model_class in classes:
             if model_class.possible(self):
                 self.best = model_class(self).better(self.best)
 
     def repeated(self, data: Rows, *, cells: int | None = None, keep: bool = False) -> ClassSelection:
-        """Selects the same classes over changed rows. With keep, growth begins where this selection ended."""
+        """Repeats the model selection over changed rows. With `keep`, growth starts from the final
+        wavelets."""
         return ClassSelection(
             data,
             self.options,
@@ -108,7 +111,7 @@ class ClassSelection:
 
     @cached_property
     def rows(self) -> Compressed:
-        """Compressed rows without a hysteresis input."""
+        """Compressed rows without a direction state."""
         return self.samples.rows()
 
     def candidate(
@@ -121,7 +124,7 @@ class ClassSelection:
         rows: Compressed | None = None,
         strokes: HysteresisInput | None = None,
     ) -> Candidate:
-        """A candidate on the compressed rows, those without a hysteresis input if no others are given."""
+        """Returns a candidate on compressed rows; by default these have no direction state."""
         n_parameters = problem.n_parameters(len(solution.basis))
         if strokes is not None and strokes.play_radius is not None:
             n_parameters += 1
@@ -130,7 +133,8 @@ class ClassSelection:
 
     @cached_property
     def motion(self) -> Dynamics | None:
-        """The motion of rows over position alone, where no inputs are named."""
+        """Motion of the rows for mass and damping; None if the options name inputs or there are further
+        inputs."""
         data = self.data
         decides = data.parts and len(data.names) == 1 and self.options.inputs == "auto"
         return Dynamics(data, self.options) if decides else None
@@ -138,21 +142,21 @@ class ClassSelection:
     def grown(
         self, problem: SeparableProblem, start: Basis, model_class: str, most: int | None = None
     ) -> Grown:
-        """A network grown from the wavelets of start, its path reported."""
+        """Grows a network from the wavelets of `start` and reports the tested networks."""
         grown = self.growth.grow(problem, start, model_class, most=most)
         self.report.path.extend(grown.path)
         return grown
 
     def recorded(self, candidate: Candidate) -> Candidate:
-        """The candidate, with its point on the path."""
+        """Adds a candidate to the list of tested networks and returns it."""
         self.report.path.append(candidate.point(self.options.criterion))
         return candidate
 
     def constrained(self, candidate: Candidate) -> Candidate:
-        """The candidate with its constraints, and their cost in the notes.
+        """Returns the candidate with constraints imposed; adds the change of its error to the notes.
 
-        If they cost more than a little, the network is grown further on forces that keep them; the result is
-        taken if the criterion prefers it once the constraints are imposed on the true forces again.
+        If the constraints raise the RMS error by more than a few percent, the network is grown further on
+        forces that keep the constraints. The larger network is taken if the criterion prefers it.
         """
         options, problem = self.options, candidate.problem
         bounds = self.bounds(problem)
@@ -162,7 +166,7 @@ class ClassSelection:
         if kept is candidate.solution:
             return candidate
         if problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse and any(bound.seam for bound in bounds):
-            # Equal slopes at both ends of a period may cost more than the corner that they avoid.
+            # Equal slopes at both ends of a period may raise the error more than a corner of the force there.
             bounds = [bound for bound in bounds if not (bound.seam and bound.of_slope)]
             kept = impose(problem, candidate.solution, bounds)
         worse = problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse
@@ -178,7 +182,8 @@ class ClassSelection:
         return replace(candidate, solution=kept, n_parameters=candidate.n_parameters + more)
 
     def _cost_of(self, bounds: Sequence[Bound], free: Candidate, rmse: float) -> str:
-        """Sentences on imposed bounds: their cost, and the largest height of release above press."""
+        """Returns a note on imposed constraints: the change of the error, and the largest excess of release
+        over press force."""
         names, unit = " and ".join(dict.fromkeys(bound.name for bound in bounds)), self.data.force_unit
         note = (
             f"{in_words(free.model_class)}: {names} imposed over the whole domain, which changes the RMS "
@@ -195,7 +200,7 @@ class ClassSelection:
         )
 
     def bounds(self, problem: SeparableProblem) -> list[Bound]:
-        """The bounds that the options require."""
+        """Returns the constraints that the options require."""
         slopes, reach = self.options.slope_limits, float(self.data.reach[0])
         return domain_bounds(
             problem,
@@ -206,12 +211,13 @@ class ClassSelection:
         )
 
     def _judged_on(self, problem: SeparableProblem, solution: Solution) -> float:
-        """Criterion of a solution on the rows of another problem of the same form."""
+        """Returns the criterion of a solution on the rows of another problem with the same wavelets."""
         moved = problem.with_coefficients(solution, solution.coefficients)
         return criterion_of(problem, moved, self.options.criterion)
 
     def _fixed_in_box(self) -> tuple[float, float] | None:
-        """The fixed force, its position in the unit box."""
+        """Returns the fixed force of the options and its position in the unit box; None without a fixed
+        force."""
         if self.options.fixed_force is None:
             return None
         (place, fixed), lower, reach = self.options.fixed_force, self.data.lower[0], self.data.reach[0]
@@ -224,23 +230,23 @@ class ClassSelection:
 
 
 class ModelClass(ABC):
-    """A kind of force law that may be accepted above the candidates of simpler classes."""
+    """Model class: a kind of force law that is compared with candidates of simpler classes."""
 
     def __init__(self, selection: ClassSelection) -> None:
         self._selection = selection
 
     @classmethod
     def possible(cls, selection: ClassSelection) -> bool:
-        """True if the options and the rows allow this class."""
+        """True if the options and the rows allow this model class."""
         return True
 
     @abstractmethod
     def better(self, below: Candidate) -> Candidate:
-        """The candidate of this class if the judge accepts it, else the one below."""
+        """Returns the candidate of this model class if it is accepted, else the simpler candidate."""
 
 
 class Linear(ModelClass):
-    """A straight line over every input, where there are rows enough."""
+    """Model class linear: a straight line over every input, if there are enough rows."""
 
     def better(self, below: Candidate) -> Candidate:
         selection = self._selection
@@ -252,7 +258,7 @@ class Linear(ModelClass):
 
 
 class Network(ModelClass):
-    """A wavelet network over the inputs, named after them."""
+    """Model class of a wavelet network over the inputs; its name depends on the inputs."""
 
     def __init__(self, selection: ClassSelection) -> None:
         super().__init__(selection)
@@ -264,9 +270,10 @@ class Network(ModelClass):
         return selection.options.max_wavelets > 0
 
     def better(self, below: Candidate) -> Candidate:
-        """The network that is accepted, or the candidate below.
+        """Returns the accepted network, or the simpler candidate.
 
-        If held-out rows refuse a network that the criterion prefers, networks of half its size are tried.
+        If the error on held-out rows refuses a network that the criterion prefers, networks of half the size
+        are tried.
         """
         size, errors = self._selection.options.max_wavelets, 1.0
         if below.problem.n_parameters(1) >= below.problem.samples:
@@ -281,7 +288,7 @@ class Network(ModelClass):
         return below
 
     def _of_size(self, size: int) -> Candidate:
-        """A network of at most that many wavelets, with its constraints."""
+        """Returns a network of at most `most` wavelets, with constraints imposed."""
         selection = self._selection
         whole = size == selection.options.max_wavelets
         problem = selection.samples.problem(selection.rows)
@@ -296,7 +303,8 @@ class Network(ModelClass):
 
 
 def constant(selection: ClassSelection) -> Candidate:
-    """The mean force, which every selection starts from."""
+    """Returns the candidate of model class constant, the mean force, with which every model selection
+    starts."""
     straight = straight_line(selection)
     rows, problem = straight.rows, straight.problem
     coefficients = np.zeros_like(straight.solution.coefficients)
@@ -309,7 +317,7 @@ def constant(selection: ClassSelection) -> Candidate:
 
 
 def straight_line(selection: ClassSelection) -> Candidate:
-    """The straight line without its constraints."""
+    """Returns the candidate of model class linear, a straight line, without constraints."""
     problem = selection.samples.problem(selection.rows)
     solution = problem.solve(Basis.empty(problem.dimension))
     return selection.candidate("linear", problem, solution, selection.options.criterion)

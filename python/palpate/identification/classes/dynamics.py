@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Velocity, mass and damping: F = m a + B v + f(x), linear in m and B once the wavelets are given.
+"""Fits mass m and damping B of F = m a + B v + f(x), which is linear in m and B for given wavelets of f.
 
-f is found from raw positions and forces. For m and B every column is filtered by one zero-phase low-pass L:
-L F is regressed on L a, L v, L 1, L x and L psi_i(x) (with hysteresis on L s, L s x, L s psi_i(x) too), which
-is exact for any f; L f(x) is not f(L x). Three time constants of L are left out at both ends of a piece.
-Samples behind L are no longer independent: they count for as many as their autocorrelation leaves.
+The force f over position is fitted to unfiltered positions and forces. For m and B every column is filtered
+by the same low-pass L without phase: L F is regressed on L a, L v, L 1, L x and L psi_i(x) (with hysteresis
+on L s, L s x, L s psi_i(x) too), which is exact for any f; L f(x) is not f(L x). Three time constants of L
+are left out at both ends of a piece. Filtered samples are not independent: the number of independent samples
+is computed from their autocorrelation.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,16 +26,17 @@ from ..options import IdentifyOptions
 from ..search.evidence import CRITERIA, CRITERION_NAMES, ON_HELD_OUT_ROWS, Moving
 
 FOLDS = 10
-"""Number of stretches of the recording that are held out one after the other."""
+"""Number of sections of the recording; each section is held out once."""
 
 TERMS = ("damping", "mass")
-"""Coefficients of the columns v and a."""
+"""Names of the coefficients of velocity and acceleration."""
 
 
 class FoldedRegression:
-    """Least squares of a filtered force on filtered columns, any choice of them, fold by fold.
+    """Least squares of a filtered force on any choice of filtered columns, with each section of the recording
+    held out once.
 
-    No mean squared error below `least` counts: no sensor sees it.
+    A mean squared error below `least` is replaced by `least`: no force sensor resolves it.
     """
 
     def __init__(
@@ -48,7 +50,7 @@ class FoldedRegression:
         self._n_static = n_static
 
     def value(self, two_sided: bool, names: Sequence[str], criterion: str) -> float:
-        """Criterion of the regression on these columns."""
+        """Returns the criterion of the regression with the named terms, with or without hysteresis."""
         columns = self._columns(two_sided, names)
         gram = self._grams.sum(axis=0)
         rss = _rss(gram, columns, self._solution(gram, columns))
@@ -57,14 +59,14 @@ class FoldedRegression:
         return self._independent * float(np.log(share)) + CRITERIA[criterion](self._independent, p)
 
     def solved(self, two_sided: bool, names: Sequence[str]) -> dict[str, float]:
-        """The coefficients of these names."""
+        """Returns the fitted values of the named terms, mass or damping."""
         columns = self._columns(two_sided, names)
         return dict(zip(names, self._solution(self._grams.sum(axis=0), columns).tolist(), strict=False))
 
     def held_out_gain(
         self, two_sided: bool, without: Sequence[str], with_it: Sequence[str]
     ) -> tuple[float, float]:
-        """Fall of the squared error in folds that were left out of the fit, as a share, and its error."""
+        """Returns the relative decrease of the squared error on held-out sections, and its standard error."""
         errors = np.array(
             [
                 [self._left_out(fold, self._columns(two_sided, names)) for fold in range(FOLDS)]
@@ -80,7 +82,8 @@ class FoldedRegression:
         return _rss(self._grams[fold], columns, self._solution(kept, columns))
 
     def _columns(self, two_sided: bool, names: Sequence[str]) -> list[int]:
-        """Columns of the table: target, v, a, then those of f (and of s)."""
+        """Returns indices of table columns. The table holds force, velocity, acceleration, columns of f, and
+        those times s."""
         static = self._n_static if two_sided else self._single
         return [1 + TERMS.index(name) for name in names] + list(range(3, 3 + static))
 
@@ -90,22 +93,23 @@ class FoldedRegression:
 
 
 def _rss(gram: Float2D, columns: list[int], solution: Float1D) -> float:
-    """Residual sum of squares of a solution on the rows of a Gram matrix whose column 0 is the target."""
+    """Returns the residual sum of squares of coefficients, from a Gram matrix whose column 0 is the force."""
     quadratic = solution @ gram[np.ix_(columns, columns)] @ solution
     return max(float(gram[0, 0] - 2.0 * solution @ gram[columns, 0] + quadratic), 0.0)
 
 
 SAMPLES_PER_TIME_CONSTANT = 2.0
-"""Samples of a filtered column that are kept for each time constant of L [-]: more are nearly equal."""
+"""Number of kept samples of a filtered column for each time constant of the low-pass [-]: more samples would
+be nearly equal."""
 
 LEAST_INDEPENDENT_SAMPLES = 40.0
 """Least number of independent samples for a decision on damping and mass."""
 
 LEAST_SPEED_SPREAD = 0.19
-"""Least standard deviation of the speed along the motion over its mean [-]: that of speeds from 1 to 2. Below
-it v is close to its sign, and damping cannot be distinguished from friction."""
+"""Least standard deviation of the speed along the motion divided by the mean speed [-]: that of speeds spread
+evenly from 1 to 2. With a smaller spread damping cannot be distinguished from friction."""
 
-SHORT_MOTION = "the motion between gaps of time is too short or too noisy"
+SHORT_MOTION = "the motion of the recording between gaps of time is too short or too noisy"
 """Reason for which damping and mass are not tested."""
 
 SMOOTHING_SPEED_SHARE = 0.1
@@ -116,12 +120,12 @@ MOST_ROWS = 20_000
 
 
 class Dynamics:
-    """The motion of a recording, from which the share of velocity and acceleration in its force is found.
+    """Motion of a recording, from which mass and damping of the object are found.
 
     Parameters
     ----------
     data : Rows
-        With the pieces of motion between gaps of time.
+        Rows of the recording, with the continuous motions between gaps of time.
     options : IdentifyOptions
     """
 
@@ -136,14 +140,15 @@ class Dynamics:
         self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
 
     def accepted(self, basis: Basis, side: Float1D | None) -> tuple[dict[str, float], list[Decision]]:
-        """Returns damping and mass, those that are accepted with f on these wavelets, and all decisions.
+        """Returns accepted values of damping and mass for given wavelets of the force, and the decisions on
+        both.
 
         Parameters
         ----------
         basis : Basis
             Wavelets in the unit box.
         side : (n,), optional
-            Hysteresis input that f may need too.
+            Direction state of each row; None without hysteresis.
         """
         regression = self._regression(basis, side)
         if regression is None:
@@ -176,14 +181,14 @@ class Dynamics:
                 continue
             share, error = regression.held_out_gain(use, without, with_it)
             found = regression.solved(use, with_it)[name]
-            measured = squared_error_change(share, error, "held-out stretches")
+            measured = squared_error_change(share, error, "held-out sections")
             if share > error and found > 0.0:
                 decisions.append(decided(name, True, f"{measured}, {change}"))
                 continue
             names = tuple(other for other in names if other != name)
             reason = f"{measured}, must fall by more than {100 * error:.2g} %"
             if not found > 0.0:
-                reason = f"its value is {found:.4g} {self._unit_of(name)}, a passive object needs more than 0"
+                reason = f"the fitted {name} is {found:.4g} {self._unit_of(name)}, a passive object has > 0"
             decisions.append(decided(name, False, f"{reason}; {change}"))
         return regression.solved(use, names), decisions
 
@@ -195,12 +200,14 @@ class Dynamics:
         return f"{force}*s/{position}" if name == "damping" else f"{force}*s^2/{position}"
 
     def values(self, basis: Basis, side: Float1D | None, names: Sequence[str]) -> dict[str, float]:
-        """Values of these terms with f on these wavelets; empty where the motion is too short for them."""
+        """Returns the fitted mass or damping for given wavelets of the force; empty if the motion is too
+        short."""
         regression = self._regression(basis, side)
         return {} if regression is None else regression.solved(side is not None, names)
 
     def moving(self, values: dict[str, float]) -> Moving:
-        """The terms of these values, with m L a + B L v at every row."""
+        """Returns given mass and damping with their force m L a + B L v at every row, filtered by the
+        low-pass L."""
         total, known = np.zeros(len(self._data.force)), np.ones(len(self._data.force), dtype=bool)
         for name, derive in (
             ("damping", lambda part: part.velocity),
@@ -212,18 +219,19 @@ class Dynamics:
         return Moving(values.get("damping"), values.get("mass"), total, known.astype(float))
 
     def velocity(self) -> tuple[Float1D, NDArray[np.bool_]]:
-        """L v at every row (n,), and the rows (n,) that have one."""
+        """Returns the filtered velocity at every row (n,), and True (n,) for rows that have a velocity."""
         return self._at_rows(lambda part: part.velocity)
 
     def _at_rows(self, derive: Callable[[Piece], Float1D]) -> tuple[Float1D, NDArray[np.bool_]]:
         return at_rows(self._parts, self._low_pass, derive, len(self._data.force))
 
     def share_of_velocity(self, residual: Float1D, basis: Basis, *, friction: bool) -> float:
-        """Share of a residual (n,) that functions of velocity and position explain.
+        """Returns the share of the variance of a residual (n,) that functions of velocity and position
+        explain.
 
-        These are v|v|, and v times 1, x and psi_i(x), with the wavelets of the force over position. With
-        friction, the smoothed sign of v takes part as v does, and the share is corrected for the number of
-        functions.
+        The functions are v|v|, and v times 1, x and psi_i(x), with velocity v, position x and the wavelets
+        psi_i of the force. With `friction`, functions with the smoothed sign of v in place of v are added,
+        and the share is corrected for the number of functions.
         """
         velocity, known = self.velocity()
         rows = np.flatnonzero(known)[:: max(1, -(-int(known.sum()) // MOST_ROWS))]
@@ -243,7 +251,8 @@ class Dynamics:
         return float(1.0 - (1.0 - share) * len(r) / max(len(r) - table.shape[1], 1))
 
     def _spread_of_speeds(self) -> float:
-        """Standard deviation of |v| over its mean, both along the way, where rests and turns count little."""
+        """Returns the standard deviation of the speed divided by its mean, both averaged over the distance
+        moved, so that pauses and reversals have little weight."""
         speed = np.abs(np.concatenate([fixed[:, 1] for fixed in self._fixed]))
         first, second, third = (float(np.sum(speed**power)) for power in (1, 2, 3))
         return float(np.sqrt(max(third * first / second**2 - 1.0, 0.0)))
@@ -290,7 +299,8 @@ class Dynamics:
         )
 
     def _correlation_time(self) -> float:
-        """Samples of white noise behind L that count for one: the sum of squares of their autocorrelation."""
+        """Returns the number of samples of low-pass filtered white noise that contain the information of one
+        independent sample: the sum of squares of their autocorrelation."""
         period = self._parts[0].period
         impulse = np.zeros(4 * self._low_pass.margin(period) + 1)
         impulse[len(impulse) // 2] = 1.0

@@ -22,26 +22,29 @@ from ..search.evidence import Candidate, RowError
 from .class_selection import ClassSelection
 
 USABLE_NRMSE = 0.1
-"""NRMSE above which a model is usable with a reservation: a tenth of the force's spread [-]."""
+"""NRMSE above which a model is usable with a reservation: the RMS error is then a tenth of the standard
+deviation of the force [-]."""
 
 UNFIT_NRMSE = 0.5
 """NRMSE above which a model is unfit: it leaves a quarter of the force's variance unexplained [-]."""
 
 ROWS_PER_PARAMETER = 7
-"""Rows for each parameter below which the error between the rows may exceed that of the fit by a fifth."""
+"""Number of rows for each parameter below which the error between the rows may exceed the error on the rows
+by a fifth."""
 
 ROWS_PER_PARAMETER_IF_FEW = 10
-"""The same with fewer than FEW_ROWS rows, which may miss a bend of the force."""
+"""Number of rows for each parameter that is required with fewer than FEW_ROWS rows, which may miss a bend of
+the force."""
 
 FEW_ROWS = 500
 """Number of rows below which ROWS_PER_PARAMETER_IF_FEW applies."""
 
 AMPLE_ROWS_PER_PARAMETER = 1000
-"""Rows for each parameter from which repeated rows are not counted."""
+"""Number of rows for each parameter from which no search for repeated rows is needed."""
 
 
 def error_findings(nrmse: float, rows: str) -> list[Finding]:
-    """Findings on the error alone; `rows` says on which rows it was computed."""
+    """Returns findings on the size of the NRMSE; `rows` names the rows on which the NRMSE was computed."""
     if nrmse <= USABLE_NRMSE:
         return []
     judge = no if nrmse > UNFIT_NRMSE else usable
@@ -55,9 +58,9 @@ def error_findings(nrmse: float, rows: str) -> list[Finding]:
 
 
 def size_findings(network: FittedNetwork, recordings: Sequence[Recording]) -> list[Finding]:
-    """Findings on too few rows for the number of parameters.
+    """Returns a finding if there are too few rows for the number of parameters.
 
-    Rows that repeat another one do not count, and correlated noise makes each row count for less.
+    Repeated rows are counted once, and rows with correlated noise are counted as fewer independent rows.
     """
     rows = sum(map(len, recordings))
     if not recordings or rows >= AMPLE_ROWS_PER_PARAMETER * network.n_parameters:
@@ -84,7 +87,7 @@ def size_findings(network: FittedNetwork, recordings: Sequence[Recording]) -> li
 def verdict_of(
     network: FittedNetwork, recordings: Sequence[Recording], side: Float1D | None = None
 ) -> Verdict:
-    """The verdict on a network that was identified from recordings, with the direction (n,) of all rows."""
+    """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
     findings = [*findings_of(recordings, side), *network.findings]
     findings += size_findings(network, recordings)
     findings += error_findings(network.nrmse, "the rows of the identification")
@@ -92,30 +95,34 @@ def verdict_of(
 
 
 LARGE_UNEXPLAINED_SHARE = 0.5
-"""Share of the mean square error that position cannot explain, from which wavelets stay wide [-]."""
+"""Share of the mean squared error that position cannot explain, from which narrow wavelets are not used
+[-]."""
 
 REPORTED_UNEXPLAINED_SHARE = 0.25
-"""The same share from which a finding reports it [-]."""
+"""Share of the mean squared error that position cannot explain, from which a finding reports the share
+[-]."""
 
 LEAST_CAUSE_SHARE = 0.4
 """Least share of the variance of the residual that a named cause explains [-]."""
 
 TIME_BLOCKS = 40
-"""Number of stretches of the recording whose mean residuals show a dependence on time."""
+"""Number of sections of the recording; their mean residuals show a dependence on time."""
 
 TRAVEL_PARTS = 8
-"""Number of parts of the travel, in each of which the residual may depend differently on the direction."""
+"""Number of parts of the travel; the dependence of the residual on direction may differ between the parts."""
 
 MOST_ROWS = 50_000
-"""Largest number of rows, evenly spread, for the estimate of a share."""
+"""Largest number of rows, evenly spread, for the estimate of the share of variance that a cause explains."""
 
 
 def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None = None) -> float:
-    """Variance of the force (n,) between neighbours in position (n,), of one stroke where side is given.
+    """Returns the variance of the force (n,) around the straight line between its two neighbours in position
+    (n,).
 
-    Rows are in recorded order. A row between its own predecessor and successor counts as explained.
+    Rows are in recorded order; neighbours are on the same stroke if `side` is given. A row whose neighbours
+    in position are also its neighbours in time has no variance.
     """
-    shuffled = np.random.default_rng(0).permutation(len(position))  # equal positions: neighbours at any time
+    shuffled = np.random.default_rng(0).permutation(len(position))  # equal positions: random order
     position, force = position[shuffled], force[shuffled]
     keys = (position,) if side is None else (position, side[shuffled])
     order = np.lexsort(keys)
@@ -129,7 +136,7 @@ def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None
     right = np.clip(right, 0.0, 1.0)[inner]
     between = (1.0 - right) * y[:-2][inner] + right * y[2:][inner]
     apart = y[1:-1][inner] - between
-    # rows of one sweep, neighbours in the recording as well, differ by the structure of the force itself
+    # successive rows of one stroke differ because the force changes with position
     steps = np.abs(np.diff(shuffled[order]))
     swept = ((steps[1:] == 1) & (steps[:-1] == 1))[inner]
     variance = np.where(swept, 0.0, apart**2 / (1.0 + right**2 + (1.0 - right) ** 2))
@@ -137,31 +144,33 @@ def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None
 
 
 def unexplained_share(position: Float1D, force: Float1D, side: Float1D | None) -> float:
-    """Share of the force's variance that position, and the sign of side, cannot explain [-]."""
+    """Returns the share of the variance of the force that position and stroke cannot explain [-]."""
     rows, spread = _thinned(force), float(np.var(force))
     side = None if side is None else np.sign(side[rows])
     return unexplained_variance(position[rows], force[rows], side) / spread if spread > 0.0 else 0.0
 
 
 def large_unexplained_share(nrmse: float) -> float:
-    """Share that cannot be explained from which it is most of a model's error."""
+    """Returns the unexplained share of the force variance from which it is most of the error of a model with
+    this NRMSE."""
     return LARGE_UNEXPLAINED_SHARE * nrmse**2
 
 
 def _thinned(values: Float1D) -> slice:
-    """Rows, evenly spread, that are enough."""
+    """Returns a slice of at most about MOST_ROWS rows, evenly spread."""
     return slice(None, None, max(1, len(values) // MOST_ROWS))
 
 
 def likely_cause(position: Float1D, residual: Float1D) -> tuple[str, str]:
-    """Likely cause of a residual (n,) at positions (n,) in recorded order, and the cure."""
+    """Returns the likely cause of a residual (n,) at positions (n,) in recorded order, and the cure."""
     part = np.argsort(np.argsort(position, kind="stable"), kind="stable") * TRAVEL_PARTS // len(position)
     ahead = np.sign(np.gradient(position))
     by_direction = _explained(residual, 3 * part + ahead.astype(np.intp) + 1) - _explained(residual, part)
     in_time = _explained(residual, np.arange(len(residual)) * TIME_BLOCKS // len(residual))
     if max(by_direction, in_time) < LEAST_CAUSE_SHARE:
         return (
-            "another input (a second position, the place on the object, velocity), or noise of the force",
+            "the force depends on another input (a second position, the place on the object, velocity) or "
+            "has noise",
             "record the other inputs as columns and name them with --inputs, or identify each place "
             "separately",
         )
@@ -171,13 +180,14 @@ def likely_cause(position: Float1D, residual: Float1D) -> tuple[str, str]:
             "record a direction or a time column, so that hysteresis can be identified",
         )
     return (
-        "time: the force changes at a constant position (relaxation, creep or drift)",
+        "the force changes with time at a constant position (relaxation, creep or drift)",
         "record continuous strokes without pauses, or remove the pauses",
     )
 
 
 def _explained(values: Float1D, group: NDArray[np.intp]) -> float:
-    """Share of the variance of values (n,) between groups (n,), less the share expected by chance."""
+    """Returns the share of the variance of values (n,) between groups (n,), minus the share of random
+    groups."""
     _, index, count = np.unique(group, return_inverse=True, return_counts=True)
     mean = np.bincount(index, values) / count
     total = float(np.sum((values - values.mean()) ** 2))
@@ -195,14 +205,14 @@ def explained_findings(
     nrmse: float,
     force_unit: Unit = UNSTATED_UNIT,
 ) -> list[Finding]:
-    """A finding if most of a model's error is force that position cannot explain.
+    """Returns a finding if position cannot explain most of a model's error.
 
     Parameters
     ----------
     position, force, residual : (n,)
         Rows in recorded order, and the residual of the model.
     side : (n,) or None
-        Direction, where the model has hysteresis.
+        Direction of each row, for a model with hysteresis.
     nrmse : float
         Of the model.
     force_unit : Unit
@@ -230,22 +240,24 @@ def explained_findings(
 
 
 CELL_ERROR_RATIO = 1.5
-"""Ratio of the error on rows to the error on cells above which the cells were too wide [-]."""
+"""Ratio of the RMS error on the rows to that on the position cells of the fit, above which the cells were too
+wide [-]."""
 
 REPORTED_NRMSE = 0.02
-"""NRMSE on rows below which that ratio is not reported [-]."""
+"""NRMSE on the rows below which cells that are too wide are not reported [-]."""
 
 MOST_SAMPLED_ROWS = 10_000
-"""Largest number of rows, evenly spread, for the spread of the force."""
+"""Largest number of rows, evenly spread, for the standard deviation of the force."""
 
 EXTREME_SHARE = 0.01
-"""Share of the rows, those with the most extreme forces, that must not decide the NRMSE alone [-]."""
+"""Share of the rows with the most extreme forces; they must not determine the NRMSE alone [-]."""
 
 LEAST_ROWS = 100
-"""Least number of rows of which one percent is a row."""
+"""Least number of rows for the check of extreme forces: 1 % of them is one row."""
 
 HIDDEN_ERROR_RATIO = 1.2
-"""Ratio of the NRMSE without these rows to the reported NRMSE above which a finding reports it [-]."""
+"""Ratio of the NRMSE without the rows of extreme force to the NRMSE over all rows, above which a finding
+reports both [-]."""
 
 POSITIONS_BETWEEN_ROWS = 4001
 """Number of positions over the domain, besides the extrema of each wavelet, where the force is computed."""
@@ -255,11 +267,12 @@ USABLE_EXCESS = 0.25
 Models of measured switches, domes and springs exceed it by less than 0.1."""
 
 UNFIT_EXCESS = 1.0
-"""The same, from which the model is unfit [-]."""
+"""Share of the range of the recorded forces by which the model exceeds them, from which the model is unfit
+[-]."""
 
 
 def extreme_force_findings(error: RowError, force_unit: Unit = UNSTATED_UNIT) -> list[Finding]:
-    """A finding if few rows of extreme force hide a large error of all others."""
+    """Returns a finding if few rows of extreme force hide a large error of all other rows."""
     rows = np.flatnonzero(error.weight > 0.0)
     if len(rows) < LEAST_ROWS or error.spread == 0.0 or _plainly_small(error, rows):
         return []
@@ -282,7 +295,8 @@ def extreme_force_findings(error: RowError, force_unit: Unit = UNSTATED_UNIT) ->
 
 
 def _plainly_small(error: RowError, rows: NDArray[np.intp]) -> bool:
-    """True if the error is small for the spread of all but the most extreme forces, of some rows (k,)."""
+    """True if the error is small compared with the spread of the forces (k,) without the most extreme
+    ones."""
     some = error.force[rows[:: max(1, len(rows) // MOST_SAMPLED_ROWS)]]
     low, high = np.quantile(some, (EXTREME_SHARE, 1.0 - EXTREME_SHARE))
     inner = some[(some >= low) & (some <= high)]
@@ -297,9 +311,11 @@ def excess_findings(
     position_unit: Unit = UNSTATED_UNIT,
     force_unit: Unit = UNSTATED_UNIT,
 ) -> list[Finding]:
-    """A finding if a model of one input leaves the range of the recorded forces between the rows.
+    """Returns a finding if the force of a model leaves the range of the recorded forces at positions between
+    the rows.
 
-    A stroke begins with a play of 2 r, without sliding; a force that repeats is without such ends.
+    With play radius r, a stroke reaches its own force only after 2 r from its start; a periodic force has no
+    such part.
     """
     reach = float(np.ptp(force))
     if len(network.lower) > 1 or not reach > 0.0:
@@ -342,7 +358,8 @@ def cell_findings(
     position_unit: Unit = UNSTATED_UNIT,
     force_unit: Unit = UNSTATED_UNIT,
 ) -> list[Finding]:
-    """A finding if the error on rows is far above the error on the cells that were fitted."""
+    """Returns a finding if the RMS error on the rows is far above the RMS error on the fitted position
+    cells."""
     if on_rows.nrmse <= REPORTED_NRMSE or on_rows.rmse <= CELL_ERROR_RATIO * on_cells:
         return []
     return [
@@ -356,7 +373,8 @@ def cell_findings(
 
 
 def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
-    """A finding if growth ended at max_wavelets while neighbouring residuals are still correlated."""
+    """Returns a finding if growth ended at max_wavelets although neighbouring residuals are still
+    correlated."""
     limit = options.max_wavelets
     if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
         return []
@@ -371,7 +389,8 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
 
 
 def identified(selection: ClassSelection) -> FittedNetwork:
-    """The accepted model in the units of the data, with its error on the rows, all notes and all findings."""
+    """Returns the accepted network in the units of the recording, with its error on the rows, all notes and
+    findings."""
     best, report, options = selection.best, selection.report, selection.options
     data, error, network = best.data, best.error, best.network
     single, counted = len(data.names) == 1, error.weight

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model class hysteresis: f = g + s h, with s from strokes or from the play operator."""
+"""Model class hysteresis: f = g + s h, with mean force g, hysteresis h, and direction state s from strokes or
+a play operator."""
 
 from __future__ import annotations
 
@@ -24,29 +25,30 @@ from .class_selection import ClassSelection, ModelClass, straight_line
 from .findings import USABLE_NRMSE
 
 REPORTED_ERROR_RATIO = 2.0
-"""Ratio of the RMS errors with and without h >= 0 above which a cure is reported [-]."""
+"""Ratio of the RMS errors with and without the constraint h >= 0 above which a cure is reported [-]."""
 
 FIRST_MAX_WAVELETS = 4
-"""Largest number of wavelets with hysteresis until the next search of the play radius."""
+"""Largest number of wavelets of a network with hysteresis before the second search of the play radius."""
 
 MOST_RADIUS_SEARCHES = 6
 """Largest number of searches of the play radius."""
 
 LEAST_KNOWN_SHARE = 0.5
-"""Least share of the rows with a known hysteresis input for a play radius [-]."""
+"""Least share of the rows with a known direction state at which a play radius is tried [-]."""
 
 RADIUS_TOLERANCE = 1e-3
 """Relative tolerance of the play radius [-]."""
 
 RADIUS_SEARCH_RATIO = 2.0
-"""Largest ratio of a searched play radius to the best one so far, or its inverse [-]."""
+"""Largest ratio of a tried play radius to the best radius so far, or of the best to the tried radius [-]."""
 
 MOST_ROWS = 100_000
-"""Largest number of rows for the comparison of two radii. More are thinned evenly."""
+"""Largest number of rows for the comparison of two play radii; of more rows an evenly spread part is used."""
 
 
 class Hysteresis(ModelClass):
-    """g + s h on top of the wavelets of the candidate below, if it is accepted or named as an input."""
+    """Network with hysteresis, f = g + s h; it is grown if the criterion accepts hysteresis or the options
+    name it."""
 
     name = "hysteresis"
 
@@ -83,17 +85,18 @@ class Hysteresis(ModelClass):
         strokes = self._play.best_of_options(below.solution.basis)
         if strokes is not None:
             return self._play.with_first_states(self._of(below, strokes))
-        untested = "the motions between gaps of time are too short, or never turn back"
+        untested = "the motions of the recording between gaps of time are too short, or never turn back"
         if self._named:
             raise InputError(f"inputs names hysteresis: {untested}")
         self._selection.report.decisions.append(Decision("hysteresis", "not tested", untested))
         return below
 
     def _of(self, below: Candidate, strokes: HysteresisInput) -> Candidate:
-        """The better of the candidate below and hysteresis with this input.
+        """Returns the better of the simpler candidate and a network with hysteresis for given direction
+        states.
 
-        h >= 0 has a mean, which the wavelets of g, the slope and the bias show at once: if the criterion does
-        not fall at all with these, growing a network would be in vain.
+        A hysteresis h >= 0 has a mean, which a fit with the wavelets of the simpler candidate already shows.
+        If the criterion does not decrease with these wavelets, no network with hysteresis is grown.
         """
         selection, judge, named, samples = (
             self._selection,
@@ -117,18 +120,19 @@ class Hysteresis(ModelClass):
         best = judge.better(single, kept)
         if best is single and best.n_wavelets < below.n_wavelets:
             self._selection.report.notes.append(
-                f"{best.n_wavelets} of {below.n_wavelets} wavelets over position are kept. The removed ones "
-                "modelled the difference between press and release."
+                f"{best.n_wavelets} of {below.n_wavelets} wavelets over position are kept. The removed "
+                "wavelets modelled the difference between press and release."
             )
         self._report_sign(best, kept, free)
         return best
 
     def _grown(self, below: Candidate, found: Candidate) -> Candidate:
-        """A network with hysteresis; the play radius is found once hysteresis is certain.
+        """Returns a network with hysteresis; the play radius is searched after the criterion accepts
+        hysteresis.
 
-        Wavelets grown at a wrong radius, or for a single force, model the error of the radius. A radius found
-        on few wavelets compensates for missing ones. So growth begins again from an empty basis, and the
-        radius is sought again whenever the network may be twice as large.
+        Wavelets grown at a wrong play radius, or without hysteresis, model the error of the radius. A radius
+        found with too few wavelets compensates for the missing wavelets. So growth starts again without
+        wavelets, and the radius is searched again each time the allowed number of wavelets doubles.
         """
         assert found.strokes is not None
         selection, play, most = self._selection, self._play, self._selection.options.max_wavelets
@@ -154,11 +158,12 @@ class Hysteresis(ModelClass):
         return found
 
     def _single_valued(self, hysteresis: Candidate) -> Candidate:
-        """A force of position alone on the wavelets of hysteresis, those it does not need removed.
+        """Returns a single-valued force with the wavelets of a network with hysteresis; superfluous wavelets
+        are removed.
 
-        Where hysteresis is there but not with h >= 0, this is the remaining part. A network grown on position
-        alone will not do: strokes that a periodic motion samples at different places look like one rapidly
-        changing force.
+        This force is used if the data has hysteresis that contradicts h >= 0. A network grown without
+        hysteresis is not used: press and release, sampled at different positions by a periodic motion, would
+        look like one rapidly changing force.
         """
         selection = self._selection
         problem = selection.samples.problem(selection.rows)
@@ -173,7 +178,8 @@ class Hysteresis(ModelClass):
         return found if selection.judge.accepts(line, found) else line
 
     def _report_sign(self, best: Candidate, kept: Candidate, free: Candidate) -> None:
-        """Names the cure if h >= 0 costs much: the other sign, or h of either sign."""
+        """Reports a cure if the constraint h >= 0 raises the error much: the opposite sign of a column, or no
+        constraint."""
         if kept.rmse <= REPORTED_ERROR_RATIO * free.rmse:
             return
         spread, report = self._selection.spread, self._selection.report
@@ -181,18 +187,18 @@ class Hysteresis(ModelClass):
         turned = self._turned_rmse(free)
         if turned < math.sqrt(kept.rmse * free.rmse):
             cure = (
-                f"with the opposite sign of the force the NRMSE is {turned / spread:.3g}. Press and release "
-                "may be exchanged: give --negate force or --negate position"
+                f"with the opposite sign of the recorded force the NRMSE is {turned / spread:.3g}. Press and "
+                "release may be exchanged: give --negate force or --negate position"
             )
         elif crosses_where_steep(free.problem, free.solution):
             cure = (
-                "release lies above press where the force is steep. The force may be recorded late: try "
-                "--force-late-s"
+                "the release force is above the press force where the force is steep. The force may be "
+                "recorded late: try --force-late-s"
             )
         else:
             cure = (
-                f"the opposite sign of the force does not help (NRMSE {turned / spread:.3g}). The object may "
-                "release stored energy, as a latch does: give --no-hysteresis-nonnegative"
+                f"the opposite sign of the recorded force does not help (NRMSE {turned / spread:.3g}). The "
+                "object may release stored energy, as a latch does: give --no-hysteresis-nonnegative"
             )
         sentence = f"hysteresis gains energy on a part of the loop ({cost}); {cure}"
         if best.rmse > USABLE_NRMSE * spread:
@@ -202,7 +208,8 @@ class Hysteresis(ModelClass):
             report.notes.append(sentence)
 
     def _turned_rmse(self, free: Candidate) -> float:
-        """RMS error of hysteresis with h <= 0, as with the sign of the force turned."""
+        """Returns the RMS error with the constraint h <= 0, which is h >= 0 for the opposite sign of the
+        force."""
         if free.problem.dimension > 1:
             return math.inf
         turned = replace(free.problem, readout=free.problem.readout * np.array([[1.0], [-1.0]]))
@@ -210,12 +217,12 @@ class Hysteresis(ModelClass):
 
 
 class PlaySearch:
-    """Looks for the play operator that a recording's motions went through.
+    """Searches the play radius that fits the motions of a recording best.
 
     Parameters
     ----------
     samples : Samples
-        Of one position; every start of a motion is known.
+        Rows of one position, with the starts of all motions.
     options : IdentifyOptions
     """
 
@@ -225,10 +232,11 @@ class PlaySearch:
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
     def best_of_options(self, basis: Basis) -> HysteresisInput | None:
-        """The hysteresis input of that radius of the options which helps most on given wavelets.
+        """Returns the direction states for the play radius of the options with the smallest error on given
+        wavelets.
 
-        None where the motions between gaps of time are too short for any of them, or never turn back: g + h
-        alone is one force of position, and h could be anything.
+        Returns None if the motions between gaps of time are too short for every play radius, or never
+        reverse: with one stroke only the sum g + h is determined.
         """
         if not self._usable:
             return None
@@ -236,10 +244,11 @@ class PlaySearch:
         return min(self._usable, key=lambda strokes: self._residual_squares(strokes, basis, known))
 
     def with_best_radius(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
-        """The hysteresis input of the radius around the one tried that helps most on given wavelets.
+        """Returns the direction states for the best play radius near the given one, on given wavelets.
 
-        The same one, if no other is better by as much as a model class has to be. Hysteresis must be certain:
-        a radius that may be anything also fits other differences between press and release, such as damping.
+        Keeps the given radius unless another radius lowers the criterion by as much as a model class must.
+        Call only for accepted hysteresis: a free play radius also fits other differences between press and
+        release, such as damping.
         """
         radius = strokes.play_radius or 0.0
         least, most = (each.play_radius or 0.0 for each in (self._usable[0], self._usable[-1]))
@@ -257,7 +266,8 @@ class PlaySearch:
         return self._of(math.exp(found.x)) if falls > self._evidence else strokes
 
     def with_first_states(self, found: Candidate) -> Candidate:
-        """The candidate with each motion's play has_start where its first force says."""
+        """Returns the candidate with the start value of the direction state of each motion computed from its
+        first force."""
         if found.play_radius is None:
             return found
         g, h = found.parts_at(self._samples.data.box[self._starts])
@@ -271,14 +281,16 @@ class PlaySearch:
 
     @cached_property
     def _usable(self) -> list[HysteresisInput]:
-        """The plays of the radii tried for which enough rows are known, both ways, the smallest first."""
+        """Direction states for each tried play radius, the smallest first, if enough rows of both strokes are
+        known."""
         tried = [self._of(radius) for radius in self._radii]
         return [one for one in tried if one.known.mean() >= LEAST_KNOWN_SHARE and one.both_ways]
 
     def _residual_squares(self, strokes: HysteresisInput, basis: Basis, known: NDArray[np.bool_]) -> float:
-        """Sum of squares that the best weights on given wavelets leave in these rows, for all radii the same.
+        """Returns the residual sum of squares of the best weights on given wavelets, over the rows `known`.
 
-        The random error of rows that only one radius knows must not decide between radii.
+        All play radii are compared on the same rows, so that the random error of further rows has no
+        influence.
         """
         strokes = replace(strokes, known=known)
         problem = self._samples.problem(self._samples.rows(strokes), strokes)
@@ -286,7 +298,7 @@ class PlaySearch:
 
 
 def _thinned(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """At most MOST_ROWS of these rows (n,), evenly spread."""
+    """Selects at most MOST_ROWS of the rows (n,), evenly spread."""
     thin = np.zeros_like(rows)
     thin[:: max(1, -(-len(rows) // MOST_ROWS))] = True
     return np.asarray(rows & thin)

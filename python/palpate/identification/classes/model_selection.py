@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The model selection of one recording: all model classes, and the revisions that its rows may need."""
+"""Model selection of one recording: all model classes, repeated if outliers, wide cells or correlated noise
+require it."""
 
 from __future__ import annotations
 
@@ -26,43 +27,47 @@ from .findings import USABLE_NRMSE, large_unexplained_share, unexplained_share
 from .hysteresis import Hysteresis
 
 MOST_HALVINGS = 3
-"""Largest number of times that the cells are halved."""
+"""Largest number of times that the width of the position cells is halved."""
 
 MOST_DYNAMIC_SELECTIONS = 2
-"""Times that the model is selected again, each time with better values of damping and mass."""
+"""Number of times that the model is selected again, each time with better values of damping and mass."""
 
 LEAST_GAIN_OVER_DAMPING = 0.05
-"""Least fall of the squared error, as a share, for velocity as an input in addition to constant damping [-].
+"""Least relative decrease of the squared error for velocity as an input in addition to constant damping [-].
 A force of two inputs is harder to render."""
 
 LEAST_GAIN_WITHOUT_DAMPING = 0.25
-"""The same without constant damping, such as for Coulomb friction [-]: its sign changes with that of the
-velocity."""
+"""Least relative decrease of the squared error for velocity as an input without constant damping [-], for
+example for Coulomb friction, whose sign changes with that of the velocity."""
 
 LEAST_GAIN_OVER_HYSTERESIS = 0.75
-"""The same if hysteresis was accepted [-]: it is easier to render and certify."""
+"""Least relative decrease of the squared error for velocity as an input if hysteresis was accepted [-]:
+hysteresis is easier to render and certify."""
 
 MOST_CORRELATION_ESTIMATES = 5
-"""Largest number of estimates of the correlation of noise."""
+"""Largest number of times that the correlation of noise is estimated."""
 
 LEAST_INDEPENDENT_SHARE = 0.02
-"""Least share of independent samples of noise [-]. Below it a residual is memory or drift."""
+"""Least share of independent samples of noise [-]. With a smaller share the residual is not noise but memory
+or drift."""
 
 SETTLED_INDEPENDENT_RATIO = 0.8
 """Ratio of the new to the previous share of independent samples above which the selection is not repeated
 [-]."""
 
 LARGE_NRMSE = 0.2
-"""NRMSE above which wavelets stay wide if position cannot explain most of it [-]."""
+"""NRMSE above which narrow wavelets are not used if position cannot explain most of the error [-]."""
 
 LEAST_HALF_CORE = 1.0 / 64.0
-"""Half of the core of these wavelets [share of the travel]."""
+"""Least half width of the core of wavelets if position cannot explain most of the error [share of the
+travel]."""
 
 
 def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) -> ClassSelection:
-    """Selects a model: the classes at rest, revised where the rows require it, then those in motion.
+    """Selects a model: first the model classes without velocity, mass and damping, then those with them.
 
-    Cells are halved until they are fine enough. Outliers are weighed down if the loss is Huber's.
+    The width of position cells is halved until their error is small. Outliers get less weight if the loss is
+    Huber's.
     """
     rows = rows.limited()
     given, robust = rows.weight, options.loss == "huber"
@@ -91,12 +96,12 @@ def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) ->
 
 
 def correlated_noise(first: ClassSelection) -> ClassSelection:
-    """The model selected again on fewer independent samples, if the noise is correlated in recorded order.
+    """Selects the model again with fewer independent samples if the noise is correlated in recorded order.
 
-    Wavelets that follow the noise hide part of its correlation, so that it is estimated again after each
-    selection. Of all results that one is taken whose prediction of a row, from the residual of the row
-    before, is best for its size: an unfitted structure is correlated too, but the prediction from the force
-    itself beats it.
+    Wavelets that fit noise hide a part of its correlation, so that the correlation is estimated again after
+    each selection. The result is the model with the best BIC of the residuals after each residual is
+    predicted from the previous one. An unfitted part of the force is correlated too, but a model that fits
+    this part predicts better.
     """
     data = first.data
     if data.counted is not None or first.options.criterion in ON_HELD_OUT_ROWS:
@@ -122,12 +127,12 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
     chosen = min(found, key=lambda each: each[0])[1]
     full = first.best.stop_reason == "max_wavelets"
     if full and 2 * chosen.best.n_wavelets > first.best.n_wavelets:
-        return first  # the residual of so many wavelets is unfitted structure rather than noise
+        return first  # the residual of this network is an unfitted part of the force rather than noise
     return chosen
 
 
 def no_finer_than_explained(first: ClassSelection) -> ClassSelection:
-    """The model selected again with wide wavelets, if position cannot explain most of a large error.
+    """Selects the model again with wide wavelets if position cannot explain most of a large error.
 
     Rows that differ for another reason, such as time during a pause, differ by as much between neighbouring
     positions as anywhere: narrow wavelets then give slopes that the object does not have.
@@ -154,7 +159,7 @@ def no_finer_than_explained(first: ClassSelection) -> ClassSelection:
 
 
 class MassAndDamping(ModelClass):
-    """Mass and damping, added to a model at rest that is selected again without their force."""
+    """Model class dynamics: adds mass and damping, then selects the model again on forces without theirs."""
 
     @classmethod
     def possible(cls, selection: ClassSelection) -> bool:
@@ -169,7 +174,7 @@ class MassAndDamping(ModelClass):
         best, current, names = below, selection, tuple(values)
         for _ in range(MOST_DYNAMIC_SELECTIONS):
             if not values or min(values.values()) <= 0.0:
-                break  # a passive object has none below zero: the values of the round before stay
+                break  # a passive object has no negative mass or damping: keep the previous values
             moving = motion.moving(values)
             weight = moving.known if data.weight is None else moving.known * data.weight
             still = replace(data, force=data.force - moving.force, weight=weight)
@@ -190,15 +195,17 @@ class MassAndDamping(ModelClass):
 
 
 class Velocity(ModelClass):
-    """A network over position and velocity, where damping or friction depends on both."""
+    """Model class velocity: a network over position and velocity, for damping or friction that depends on
+    both."""
 
     @classmethod
     def possible(cls, selection: ClassSelection) -> bool:
-        """True if the motion may decide; a force that repeats has one input."""
+        """True if the recorded motion allows velocity as an input, and the model is not periodic."""
         return selection.motion is not None and selection.data.period is None
 
     def better(self, below: Candidate) -> Candidate:
-        """The network if it lowers the squared error by the least share or more, else the one below."""
+        """Returns the network over position and velocity if the squared error decreases enough, else the
+        simpler candidate."""
         data, report, motion, moving = (
             self._selection.data,
             self._selection.report,
@@ -248,10 +255,10 @@ class Velocity(ModelClass):
 
 
 STATIC_CLASSES = (Linear, Network, Hysteresis)
-"""Model classes above the constant force, the simplest first, that do not depend on the motion."""
+"""Model classes other than constant that do not depend on velocity, the simplest first."""
 
 REVISIONS = (correlated_noise, no_finer_than_explained)
-"""Steps that select a model at rest again where its residual requires it."""
+"""Functions that select a model without velocity, mass and damping again if its residual requires it."""
 
 DYNAMIC_CLASSES = (MassAndDamping, Velocity)
-"""Model classes above them that need the motion."""
+"""Model classes with velocity, mass or damping, tried last."""

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rows of a fit: compressed to one weighted row for each position, and held out to judge on.
+"""Rows of a fit, compressed to one weighted row for each position, and held-out rows.
 
-An encoder repeats its positions, and the least squares of eq. 4 needs of equal positions only their
-count, their mean force and the sum of squares within the group:
-sum_k (y_k - f(x))^2 = w (mean y - f(x))^2 + within.
-Positions that do not repeat are gathered in cells. The mean position and mean force of a cell are exact
-to second order (:func:`binning_error` estimates the rest), and the part of the within-sum that the slope
-across the cell explains is removed, so that the remainder measures noise. With many inputs no grid of cells
-is both fine and small; then a share of the rows, evenly spread over the recording, represents all.
+An encoder repeats its positions. For w samples y_k at one position x the least squares of the paper's eq. 4
+needs only w, the mean force and `within`, the sum of squared differences from the mean force: sum_k (y_k -
+f(x))^2 = w (mean y - f(x))^2 + within. Positions that do not repeat are gathered in cells; a cell is replaced
+by its mean position and mean force. The error of this is of second order in the cell width
+(:func:`binning_error` estimates it). The part of `within` that the slope of the force across the cell
+explains is removed, so that the remainder measures noise. With many inputs a grid of narrow cells has too
+many cells; then a part of the rows, evenly spread over the recording, represents all rows.
 """
 
 from __future__ import annotations
@@ -25,18 +25,19 @@ from ...verdict import FORCE_FLOOR, FORCE_JND
 from .limits import NO_LIMITS, RowLimits, distinct_rows
 
 SIDE_LEVELS = 16
-"""Number of cells of the hysteresis input over [-1, 1]. +-1, where a sliding contact stays, are centres of
-two."""
+"""Number of cells of the direction state over [-1, 1]. Two cells have their centres at -1 and +1, the values
+during a stroke."""
 
 POOLED_CELLS = 4
-"""Neighbouring cells with a common slope (2 per input if there are several)."""
+"""Number of neighbouring position cells that share one slope of the force; with several inputs at least 2 per
+input."""
 
 SIDE_PARTS = 8
-"""Number of parts of the travel, in each of which the slope of the force over the hysteresis input is
+"""Number of parts of the travel; in each part the slope of the force over the direction state is taken as
 constant."""
 
 LEAST_CELLS_PER_AXIS = 8
-"""Least number of cells along each input. With fewer, rows are dropped instead of gathered."""
+"""Least number of cells along each input. With fewer cells, rows are dropped instead of gathered in cells."""
 
 
 @dataclass(frozen=True)
@@ -46,41 +47,44 @@ class Compressed:
     positions: Float2D
     """(m, d)"""
     force: Float1D
-    """(m,) mean force of a row's samples"""
+    """(m,) mean force of the samples of each row"""
     weight: Float1D
-    """(m,) samples that a row represents"""
+    """(m,) number of samples that each row represents"""
     side: Float1D | None
-    """(m,) hysteresis input s in [-1, 1], or None"""
+    """(m,) direction state s in [-1, 1]; None without hysteresis"""
     spread: Float2D
-    """(m, d) variance of the positions within a row; 0 where they were equal"""
+    """(m, d) variance of the positions of the samples of each row; 0 for equal positions"""
     within: float
-    """Sum of squares about the rows' own forces: an error that models of these inputs cannot explain"""
+    """Sum of squared differences of the samples from the mean force of their row: no model of these inputs
+    can reduce it"""
     samples: float
-    """Rows of the recording that are represented, or the sum of their weights"""
+    """Number of represented rows of the recording, or the sum of their weights"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the samples"""
+    """Dependence, force resolution and position noise of the samples"""
     cells: int = 0
-    """Cells that positions are gathered in, where there are more of them"""
+    """Largest number of distinct positions; with more, positions are gathered in this number of cells"""
 
     def reweighted_to(self, samples: float) -> Compressed:
-        """The same rows, representing that many samples."""
+        """Returns the rows with weights multiplied such that they represent `samples` samples."""
         more = samples / self.samples
         return replace(self, weight=more * self.weight, within=more * self.within, samples=samples)
 
 
 class Compressor:
-    """Groups the rows of one recording by position, once; compresses it with or without a hysteresis input.
+    """Groups the rows of a recording by position, and compresses them with or without a direction state.
 
     Parameters
     ----------
     positions : (n, d)
     force : (n,)
     max_positions : int
-        With more distinct positions than this they are gathered in that many cells of a regular grid.
+        Largest number of distinct positions; with more, positions are gathered in this number of cells of a
+        regular grid.
     weight : (n,), optional
-        Samples that each row represents, >= 0; 1 without it. A row of weight 0 is left out.
+        Number of samples that each row represents, >= 0; by default 1. A row of weight 0 is left out.
     within : float
-        Sum of squares about the rows themselves, where they represent several samples.
+        Sum of squared differences of the samples from the force of their row, if a row represents several
+        samples.
     limits : RowLimits
         Limits of the information in the samples.
     """
@@ -97,7 +101,7 @@ class Compressor:
     ) -> None:
         self._within, self._limits, self._cells = within, limits, max_positions
         self.kept = np.arange(len(force)) if weight is None else np.flatnonzero(weight > 0.0)
-        """The rows that represent all."""
+        """Indices of the rows that represent all rows."""
         self._key, self._per_axis = _position_key(positions[self.kept], max_positions)
         if 0 < self._per_axis < LEAST_CELLS_PER_AXIS:
             self.kept = self.kept[np.linspace(0, len(self.kept) - 1, max_positions).round().astype(np.int64)]
@@ -112,13 +116,13 @@ class Compressor:
         return len(self._force)
 
     def samples(self, only: NDArray[np.bool_] | None = None) -> float:
-        """Samples that the rows represent, or only (n,) of them."""
+        """Returns the number of samples of all rows, or of the rows selected by `only` (n,)."""
         return float(self._weight.sum() if only is None else self._weight[only[self.kept]].sum())
 
     def rows(self, side: Float1D | None = None, only: NDArray[np.bool_] | None = None) -> Compressed:
-        """Compressed rows; those of different side (n,), the hysteresis input in [-1, 1], are kept apart.
+        """Returns compressed rows; rows with different direction state `side` (n,) in [-1, 1] are not merged.
 
-        With only (n,), these rows of the recording alone.
+        `only` (n,) selects rows of the recording.
         """
         key = self._key
         if only is not None:
@@ -142,8 +146,8 @@ class Compressor:
         if self._per_axis:
             dx = self._positions - x[group]
             spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])
-            # All sides of a cell and its neighbours share one slope: it costs the same degrees of freedom
-            # in all model classes.
+            # The rows of a cell and its neighbours share one slope for all direction states, so that the
+            # slopes need the same degrees of freedom in all model classes.
             block = self._pooled()
             dy = _without_slopes(dy, dx, block, weight)
             ds = _without_slopes(ds, dx, block, weight) if ds.any() else ds
@@ -155,7 +159,7 @@ class Compressor:
         return Compressed(x, y, count, merged_side, spread, within, samples, self._limits, self._cells)
 
     def _part(self, rows: NDArray[np.bool_]) -> Compressor:
-        """The same cells with fewer rows."""
+        """Returns a compressor of some of the rows, with the same cells."""
         part = copy(self)
         part.kept = np.arange(np.count_nonzero(rows))
         part._key, part._positions = self._key[rows], self._positions[rows]
@@ -164,7 +168,8 @@ class Compressor:
         return part
 
     def _pooled(self) -> NDArray[np.int64]:
-        """(rows,) the block of neighbouring cells that a row's cell belongs to."""
+        """Returns for each row (rows,) the number of the block of neighbouring cells that contains its
+        cell."""
         d = self._positions.shape[1]
         grid = (self._per_axis,) * d
         together = max(2, round(POOLED_CELLS ** (1.0 / d)))
@@ -173,16 +178,18 @@ class Compressor:
 
 
 def binning_error(rows: Compressed, curvature: Float2D) -> float:
-    """RMS error [force] that the cells put into a fit with second derivatives curvature (m, d) at the rows.
+    """Estimates the RMS error [force] from cells for a force with second derivatives `curvature` (m, d) at
+    the rows.
 
-    The mean of f over a cell differs from f at its mean position by sum_j f_jj Var(x_j) / 2 to leading order.
+    The mean of the force f over a cell differs from f at the mean position by about sum_j f_jj Var(x_j) / 2.
     """
     bias = 0.5 * np.sum(curvature * rows.spread, axis=1)
     return float(np.sqrt(np.average(bias * bias, weights=rows.weight)))
 
 
 def _without_slopes(values: Float1D, over: Float2D, block: NDArray[np.int64], weight: Float1D) -> Float1D:
-    """Values (n,) less the part that one slope over each column of (n, d) explains in every block (n,)."""
+    """Returns values (n,) minus a linear function of the columns of `over` (n, d), fitted in each block
+    (n,)."""
     d = over.shape[1]
     products = [[np.bincount(block, weight * a * b) for b in (*over.T, values)] for a in over.T]
     table = np.array(products).transpose(2, 0, 1)
@@ -191,7 +198,8 @@ def _without_slopes(values: Float1D, over: Float2D, block: NDArray[np.int64], we
 
 
 def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.int64], int]:
-    """Group number of each row, and the cells along each axis: 0 where a group is one position only."""
+    """Returns the group number of each row, and the number of cells along each axis; 0 if each group is one
+    position."""
     d = positions.shape[1]
     if d == 1:
         distinct = np.unique(positions[:, 0])
@@ -209,7 +217,7 @@ def _position_key(positions: Float2D, max_positions: int) -> tuple[NDArray[np.in
 
 
 def _ranked(key: NDArray[np.int64], weight: Float1D) -> tuple[NDArray[np.int64], Float1D]:
-    """Group numbers without gaps (n,), and the weight of each group (groups,)."""
+    """Returns consecutive group numbers (n,), and the weight of each group (groups,)."""
     count = np.bincount(key, weight).astype(np.float64)
     rank = np.cumsum(count > 0) - 1
     return rank[key], np.asarray(count[count > 0], dtype=np.float64)
@@ -220,11 +228,11 @@ def _mean(group: NDArray[np.int64], count: Float1D, weighted: Float1D) -> Float1
 
 
 SEAM_SHARE = 0.02
-"""Share of the period at each end whose rows are repeated beyond the other end for the fit [-]."""
+"""Share of the period at each end whose rows are copied to the opposite end for the fit [-]."""
 
 
 def around_seam(rows: Compressed) -> Compressed:
-    """The rows with those near each end repeated one period further on.
+    """Copies the rows of a periodic model near each end of the period to the opposite end.
 
     A row and its copy share the weight. Wavelets near one end are then fitted to the rows of both ends.
     """
@@ -245,21 +253,23 @@ def around_seam(rows: Compressed) -> Compressed:
 
 
 HELD_OUT_EVERY = 5
-"""One row of this number of rows, or one stretch of stretches, is held out."""
+"""One of this number of rows, or of sections of the recording, is held out."""
 
 HELD_OUT_BLOCKS = 50
-"""Number of stretches of a motion, some of which are held out: adjacent samples are correlated."""
+"""Number of sections of a recording, of which every fifth is held out as a whole: adjacent samples are
+correlated."""
 
 TRIMMED_SHARE = 0.1
-"""Share of the groups at each end that a trimmed gain drops [-]."""
+"""Share of the groups of rows with the largest and with the smallest change of error that the trimmed mean
+drops [-]."""
 
 MOST_HELD_OUT_ROWS = 20_000
-"""Largest number of held-out rows; more are thinned evenly."""
+"""Largest number of held-out rows; of more, an evenly spread part is used."""
 
 
 @dataclass(frozen=True)
 class HeldOutRows:
-    """Rows of a recording in the unit box that a problem was not made of."""
+    """Rows of a recording that are not used for the fit; positions in the unit box."""
 
     positions: Float2D
     """(k, d)"""
@@ -275,7 +285,8 @@ class HeldOutRows:
         )
 
     def errors(self, readings: Float2D, alpha: Float2D, beta: Float2D) -> Float1D:
-        """Force less the network's (k,), from its readings of g (and h): (1 or 2, 1 + d + N)."""
+        """Returns the recorded force minus the force of a network (k,); `readings` (1 or 2, 1 + d + N) are
+        its coefficients of mean force and hysteresis."""
         columns = np.concatenate(
             [
                 np.ones((len(self.force), 1)),
@@ -289,7 +300,8 @@ class HeldOutRows:
         return np.asarray(self.force - modelled)
 
     def in_jnd(self, errors: Float1D) -> Float1D:
-        """Errors (k,) in just noticeable differences: 7 % of the local force, or the floor."""
+        """Returns errors (k,) in just noticeable differences: 7 % of the local force, at least 1 % of the
+        largest force."""
         return np.asarray(errors / np.maximum(FORCE_JND * np.abs(self.force), self._floor))
 
     @property
@@ -298,7 +310,8 @@ class HeldOutRows:
 
 
 def held_out_rows(n: int, starts: Sequence[int] | None) -> NDArray[np.bool_]:
-    """Rows (n,) that are held out: stretches of a motion where its starts are given, else single rows."""
+    """Returns the held-out rows (n,): sections of a motion if the starts of motions are given, else single
+    rows."""
     index = np.arange(n)
     if starts is None or n < HELD_OUT_EVERY * HELD_OUT_BLOCKS:
         return np.asarray(index % HELD_OUT_EVERY == HELD_OUT_EVERY // 2)
@@ -306,7 +319,7 @@ def held_out_rows(n: int, starts: Sequence[int] | None) -> NDArray[np.bool_]:
 
 
 def inside(rows: Float2D, others: Float2D) -> NDArray[np.bool_]:
-    """Rows (k, d) that lie within the range of other rows (m, d) in every input: True where they do (k,)."""
+    """Returns True (k,) for rows (k, d) within the range of other rows (m, d) in every input."""
     if len(others) == 0:
         return np.zeros(len(rows), dtype=np.bool_)
     within: NDArray[np.bool_] = (rows >= others.min(axis=0)) & (rows <= others.max(axis=0))
@@ -314,10 +327,12 @@ def inside(rows: Float2D, others: Float2D) -> NDArray[np.bool_]:
 
 
 def gain(below: Float1D, above: Float1D, *, trim: float = 0.0) -> tuple[float, float]:
-    """Fall of the mean squared error from errors below (k,) to above (k,) as a share, and its standard error.
+    """Returns the relative decrease of the mean squared error from `below` (k,) to `above` (k,), and its
+    standard error.
 
-    The rows are taken in HELD_OUT_BLOCKS groups, so that correlated errors count once. With trim, this share
-    of the groups is dropped at both ends: where the error grows most and where it falls most.
+    The standard error is computed from HELD_OUT_BLOCKS groups of rows, because errors of adjacent rows are
+    correlated. `trim` is the share of groups to drop at both ends: those with the largest increase and those
+    with the largest decrease of the error.
     """
     square = np.array([below * below, above * above])
     groups = np.array(

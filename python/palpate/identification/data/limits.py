@@ -17,49 +17,52 @@ from ..._typing import Float1D, Float2D
 from ..options import IdentifyOptions
 
 FORCE_RESOLUTION = 2.0**-16
-"""Error below which errors do not count [share of the range of the force]: one step of a 16-bit converter. A
-rendered force is recorded without noise, and a criterion would add wavelets down to its last digit."""
+"""Force error below which errors are ignored [share of the range of the force]: one step of a 16-bit
+converter. A simulated force has no noise, so that a criterion would add wavelets until the error is a
+rounding error."""
 
 REPEATED_ROWS_SHARE = 1.0 / 3.0
-"""Share of rows equal to the previous row above which repeated rows count once [-]."""
+"""Share of rows that equal the previous row, above which repeated rows are used once [-]."""
 
 PROBED_ROWS = 7
-"""Number of rows whose occurrences are counted first. They show if a table may contain all rows several
-times."""
+"""Number of rows whose copies are counted first. They show if a table may contain every row several times."""
 
 LEAST_LEVELS = 3
-"""Least number of distinct forces for a force step."""
+"""Least number of distinct force values for which a force step is computed."""
 
 ROWS_PER_LEVEL = 2.0
-"""Least number of rows for each distinct force of a converter [-]: equal steps are then no coincidence."""
+"""Least number of rows for each distinct force value [-]: equal differences of force values are then not a
+coincidence."""
 
 MOST_SAMPLED_ROWS = 8192
-"""Largest number of rows that show if a force has few distinct values."""
+"""Largest number of rows that are examined for few distinct force values."""
 
 GRID_TOLERANCE = 0.02
-"""Largest deviation from a multiple of the force step [steps]."""
+"""Largest deviation of a force difference from a multiple of the force step [steps]."""
 
 STEP_ERROR = 1.0 / 3.0
-"""RMS error, in steps, below which a force in steps resolves nothing: uniform errors have 1/sqrt(12) [-]"""
+"""RMS error in force steps below which the force step hides the error [-]; uniform rounding errors have
+1/sqrt(12)"""
 
 LEAST_CORRELATION = 0.15
-"""Correlation of neighbouring residuals below which they count as independent [-]."""
+"""Correlation of neighbouring residuals below which the residuals are taken as independent [-]."""
 
 SIGNIFICANT_STANDARD_ERRORS = 5.0
-"""Least correlation that is not chance [standard errors]."""
+"""Least correlation of neighbouring residuals that is not random [standard errors]."""
 
 LEAST_NOISE_EVENNESS = 0.8
-"""Least evenness of correlated residuals that are noise [-]: 1 for normal noise. An unfitted structure is
-large in a few places and small in others."""
+"""Least ratio of the median to the RMS of correlated residuals, 1 for normal noise, at which they are taken
+as noise [-]. Residuals of an unfitted force are large at a few positions and small at others."""
 
 MOST_ORDERED_ROWS = 50_000
-"""Largest number of rows in recorded order for the estimate of noise."""
+"""Largest number of successive rows for the estimate of position noise."""
 
 LEAST_REVERSALS = 0.1
-"""Least share of position steps that reverse the previous one, for position noise [-]."""
+"""Least share of position steps opposite to the previous step, for an estimate of position noise [-]."""
 
 LARGEST_NOISE_STEP = 0.02
-"""Largest step of position noise [share of the travel]. Larger reversed steps belong to a shuffled table."""
+"""Largest position step that can be noise [share of the travel]. Larger steps back and forth belong to a
+shuffled table."""
 
 
 @dataclass(frozen=True)
@@ -69,21 +72,22 @@ class RowLimits:
     independent: float = 1.0
     """Share of the samples that are independent (0, 1]"""
     force_error: float = 0.0
-    """RMS error that nothing below is resolved of [force]"""
+    """RMS error that the force step hides [force]; a criterion does not count smaller errors"""
     position_noise: float = 0.0
-    """Standard deviation of the position's noise [box]"""
+    """Standard deviation of the position noise [box]"""
 
 
 NO_LIMITS = RowLimits()
-"""Independent, exact rows."""
+"""Limits of rows that are independent and exact."""
 
 LEAST_EQUAL_REPEATS = 0.99
-"""Least share of the rows with the same number of occurrences, in a file that contains itself several times
-[-]. At a joint the stroke of a row can change."""
+"""Least share of rows with the same number of copies, in a file that was joined from copies of one recording
+[-]. Where two copies meet, the stroke of a row can change."""
 
 
 def distinct_rows(table: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Finds the same as np.unique(table, axis=0), ten times faster: it compares whole rows as records.
+    """Finds the distinct rows of a table, as np.unique(table, axis=0), but ten times faster by sorting the
+    columns.
 
     Parameters
     ----------
@@ -92,11 +96,11 @@ def distinct_rows(table: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray
     Returns
     -------
     chosen : (k,) int
-        One row of the table for each that differs, in the order of their columns.
+        Index of one row for each distinct row, in sorted order.
     group : (n,) int
-        Which of them each row is.
+        Number of the distinct row that equals each row of the table.
     count : (k,) int
-        Rows of the table for each.
+        Number of rows of the table that equal each distinct row.
     """
     order = np.lexsort(table.T[::-1])
     ordered = table[order]
@@ -109,9 +113,11 @@ def distinct_rows(table: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray
 
 
 def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[NDArray[np.bool_], str]:
-    """Rows (n,) that repeat others and must not count again, and a sentence; none where repeats are few.
+    """Returns the rows (n,) that repeat others, so that they are used once, and a note; no rows if few are
+    repeated.
 
-    Held samples repeat the row before. A file that was joined to itself holds each row equally often.
+    Held samples repeat the previous row. A file joined from copies of one recording has the same number of
+    copies of each row.
     """
     columns = [*positions.T, force] if side is None else [*positions.T, force, side]
     again = np.zeros(len(force), dtype=bool)
@@ -130,7 +136,8 @@ def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[
 
 
 def force_step(force: Float1D) -> float:
-    """Step of a force that only takes multiples of one; 0 where it does not, or takes a value in few rows."""
+    """Returns the step of a force whose values differ by multiples of one step; 0 if there is no such
+    step."""
     sample = force[:: max(1, len(force) // MOST_SAMPLED_ROWS)]
     if len(np.unique(sample)) * ROWS_PER_LEVEL > len(sample):
         return 0.0
@@ -147,7 +154,8 @@ def force_step(force: Float1D) -> float:
 
 
 def correlation(residual: Float1D) -> float:
-    """Correlation of neighbouring residuals (n,) in recorded order; 0 where it may be chance or structure."""
+    """Returns the correlation of neighbouring residuals (n,) in recorded order; 0 if it can be random, or an
+    unfitted force."""
     power = float(residual @ residual)
     if power == 0.0 or len(residual) < 2:
         return 0.0
@@ -158,12 +166,14 @@ def correlation(residual: Float1D) -> float:
 
 
 def independent_share(rho: float) -> float:
-    """Independent samples per sample of noise with this correlation of neighbours, (1 - rho) / (1 + rho)."""
+    """Returns the share of independent samples of noise with correlation rho of neighbours: (1 - rho) / (1 +
+    rho)."""
     return (1.0 - rho) / (1.0 + rho)
 
 
 def innovation_deviance(residual: Float1D, n_parameters: int, least: float) -> float:
-    """BIC of residuals (n,) in recorded order with one correlation of neighbours; least is a mean square."""
+    """Returns the BIC of residuals (n,) after each is predicted from the previous one; `least` is the least
+    mean square."""
     n, power = len(residual), max(float(residual @ residual), np.finfo(float).tiny)
     rho = float(residual[1:] @ residual[:-1]) / power
     new = residual[1:] - rho * residual[:-1]
@@ -171,10 +181,11 @@ def innovation_deviance(residual: Float1D, n_parameters: int, least: float) -> f
 
 
 def position_noise(position: Float1D) -> float:
-    """Noise of a position (n,) in recorded order: size of the steps that reverse the step before [box].
+    """Returns the noise of a position (n,) in recorded order: median size of steps opposite to the previous
+    step [box].
 
-    During a pause the position only moves by its noise, and a force that changes meanwhile does not depend on
-    it.
+    During a pause the position changes only by noise, and a change of force in the pause does not depend on
+    the position.
     """
     first = max(0, (len(position) - MOST_ORDERED_ROWS) // 2)
     steps = np.diff(position[first : first + MOST_ORDERED_ROWS])
@@ -192,21 +203,23 @@ LARGE_OFFSET_RATIO = 1e3
 """Ratio of the mean force to the range of the force above which the mean is subtracted before the fit [-]."""
 
 UNSCALED_EXPONENT = 50
-"""A force range from 2^-50 to 2^50 is not scaled [-]."""
+"""Largest exponent of two of a force that is not scaled for the fit [-]: forces from 2^-50 to 2^50."""
 
 
 @dataclass(frozen=True)
 class ForceScale:
-    """The fit sees (force - offset) * factor."""
+    """Scale of the force for the fit: the fit uses (force - offset) * factor."""
 
     offset: float = 0.0
     factor: float = 1.0
 
     @classmethod
     def of(cls, force: Float1D, options: IdentifyOptions) -> ForceScale:
-        """The scale that a force (n,) needs; the identity for ordinary numbers.
+        """Returns the scale that avoids overflow and lost digits for a force (n,); ordinary forces are not
+        scaled.
 
-        The perceptual criterion compares errors with the force itself, so that its offset stays.
+        The criterion "perceptual" compares errors with the local force, so that no offset is subtracted for
+        it.
         """
         reach = float(np.ptp(force))
         mean = float(np.mean(force)) if reach > 0.0 and options.criterion != "perceptual" else 0.0
@@ -221,11 +234,11 @@ class ForceScale:
         return self.offset != 0.0 or self.factor != 1.0
 
     def scaled(self, force: Float1D) -> Float1D:
-        """Force (n,) that the fit uses."""
+        """Returns the scaled force (n,) for the fit."""
         return (force - self.offset) * self.factor
 
     def scaled_options(self, options: IdentifyOptions) -> IdentifyOptions:
-        """The options, with those that hold a force or a slope in the scale of the fit."""
+        """Returns the options with their forces and slopes in the scale of the fit."""
         factor = self.factor
         slopes, fixed, coupling = options.slope_bounds, options.fixed_force, options.coupling_stiffness
         return replace(

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wrong readings: isolated rows are left out before the fit, rows far from the model are weighed down in it.
+"""Handles wrong readings: drops isolated rows before the fit, and reduces the weight of rows far from the
+model.
 
-One position at 10^6 times the travel moves all other rows into one cell, and nothing can be resolved there. A
-row is isolated if few rows lie beyond a gap many times larger than the range of all others, in short runs of
-the recording. A force may rise that much at a wall that is touched briefly; so a force is isolated only where
-rows of ordinary force lie at smaller and at larger positions.
+One wrong position at 10^6 times the travel puts all other rows into one position cell, in which no force over
+position is resolved. A row is isolated if its value is separated from the values of all other rows by a gap
+many times larger than their range, and if few rows, in short runs, have such values. A force can rise this
+much at a wall that is touched briefly, so a force is isolated only if rows of ordinary force exist at smaller
+and at larger positions.
 
-Huber's loss is quadratic up to k standard deviations of the residual and linear beyond (Huber 1964). It is
-minimised by least squares with weights min(1, k s / |residual|), which are computed again after each fit; s
-comes from the median absolute residual, which outliers do not move. A linear loss still lets one row of 10^4
-standard deviations decide. So the first fit leaves out every row that is far from the median of its
-neighbours, and later fits leave out those of them that are also far from the model.
+Huber's loss is quadratic for a residual up to k standard deviations s and linear for a larger residual (Huber
+1964). It is minimised by least squares with weights min(1, k s / |residual|), which are computed again after
+each fit. s is computed from the median absolute residual, which outliers do not change. One row with a
+residual of 10^4 standard deviations can still change the fit. So the first fit leaves out every row that is
+far from the median of its neighbours. Later fits leave out the rows that are far from this median and from
+the model.
 """
 
 from __future__ import annotations
@@ -33,14 +36,15 @@ MOST_ISOLATED_SHARE = 0.01
 """Largest share of the rows that may be isolated [-]."""
 
 LEAST_ROWS = 100
-"""Number of rows below which only one row may be isolated, by a larger gap: the steps of sparse tables may
-grow by factors."""
+"""Number of rows below which only one row may be isolated, by a larger gap: in a table of few rows the
+differences of values may grow by factors."""
 
 ISOLATED_GAP_RATIO = 10.0
 """Ratio of the gap to the range of the other rows above which rows are dropped [-]."""
 
 SPARSE_GAP_RATIO = 1000.0
-"""The same for a recording of few rows [-]."""
+"""Ratio of the gap to the range of the other rows above which a row is dropped from a recording of few rows
+[-]."""
 
 REPORTED_GAP_SHARE = 0.2
 """Ratio of a gap that is reported to a gap at which rows are dropped [-]."""
@@ -49,7 +53,7 @@ LONGEST_RUN = 3
 """Largest number of successive rows with a wrong reading."""
 
 LEAST_OTHERS = 3
-"""Least number of distinct values of the other rows."""
+"""Least number of distinct values of the rows that are not isolated."""
 
 MOST_SAMPLED_ROWS = 10_000
 """Largest number of rows, evenly spread, for the range of most values."""
@@ -58,9 +62,9 @@ MOST_NAMED_ROWS = 3
 """Largest number of rows that a finding names."""
 
 
-@np.errstate(over="ignore", invalid="ignore")  # a range may exceed the largest number; it is refused later
+@np.errstate(over="ignore", invalid="ignore")  # a range may overflow; such values are refused later
 def without_isolated(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Finding]]:
-    """The recordings without isolated rows, and findings on these rows."""
+    """Returns the recordings without isolated rows, and findings on the isolated rows."""
     counts = [len(recording) for recording in recordings]
     position = np.concatenate([recording.position for recording in recordings])
     force = np.concatenate([recording.force for recording in recordings])
@@ -84,9 +88,10 @@ def without_isolated(recordings: Sequence[Recording]) -> tuple[list[Recording], 
 def isolated(
     values: Float1D, gap: float, most: float, count: Float1D | None = None, width: float = 0.0
 ) -> NDArray[np.bool_]:
-    """At most so many rows (n,) beyond a gap so many times larger than the range of the others.
+    """Returns True (n,) for isolated rows: at most `most` rows, separated by `gap` times the range of the
+    others.
 
-    Each value represents count (n,) rows that spread over a width.
+    Each value represents `count` (n,) rows, whose values spread over `width`.
     """
     far = np.abs(values - _median(values, count))
     order = np.argsort(far, kind="stable")
@@ -104,12 +109,12 @@ def isolated(
 
 
 def refuse_isolated(position: Float1D, count: Float1D, width: float) -> None:
-    """Refuse sums over cells (m,) of a width, each of count rows, if few rows stretch the range of all.
+    """Refuses positions of cells (m,), each of `count` rows and of a width, if a few rows are isolated.
 
     Raises
     ------
     InputError
-        Names the positions of these rows.
+        Some rows are isolated; the message names their positions.
     """
     total = float(count.sum())
     apart = isolated(position, ISOLATED_GAP_RATIO, MOST_ISOLATED_SHARE * total, count, width)
@@ -119,13 +124,13 @@ def refuse_isolated(position: Float1D, count: Float1D, width: float) -> None:
     named = ", ".join(f"{value:.4g}" for value in position[apart][:MOST_NAMED_ROWS])
     raise InputError(
         f"{int(count[apart].sum())} of {int(total)} rows have a position ({named}) far outside the range of "
-        f"the others, {low:.4g} to {high:.4g}. They are likely wrong readings: remove them, or identify "
+        f"the other rows, {low:.4g} to {high:.4g}. They are likely wrong readings: remove them, or identify "
         "without --out-of-core, which drops them"
     )
 
 
 def _median(values: Float1D, count: Float1D | None) -> float:
-    """Median of values (n,) that each represent count (n,) rows."""
+    """Returns the median of values (n,) that each represent `count` (n,) rows."""
     if count is None:
         return float(np.median(values))
     order = np.argsort(values, kind="stable")
@@ -140,7 +145,8 @@ def _judged(
     findings: list[Finding],
     unit: Unit,
 ) -> NDArray[np.bool_]:
-    """Rows (n,) to be dropped for their values, among the given ones; adds findings."""
+    """Returns True (n,) for rows to drop because of isolated values, among the `given` rows; adds
+    findings."""
     found = np.zeros(len(values), dtype=bool)
     if not _stretched(values):
         return found
@@ -180,7 +186,8 @@ def _judged(
 
 
 def _stretched(values: Float1D) -> bool:
-    """True if the range is so much larger than that of most values (n,) that rows may be isolated."""
+    """True if the range of all values (n,) is so much larger than that of most values that some may be
+    isolated."""
     low, high = np.quantile(
         values[:: max(1, len(values) // MOST_SAMPLED_ROWS)], (MOST_ISOLATED_SHARE, 1.0 - MOST_ISOLATED_SHARE)
     )
@@ -190,57 +197,58 @@ def _stretched(values: Float1D) -> bool:
 
 
 def _gap(values: Float1D, others: Float1D) -> float:
-    """Largest distance of values from the range of the others, in widths of that range."""
+    """Returns the largest distance of values from the range of `others`, divided by this range [-]."""
     low, high = float(others.min()), float(others.max())
     return float(np.maximum(values - high, low - values).max()) / (high - low)
 
 
 def _bracketed(position: Float1D, apart: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Rows (n,) that have others, not apart, at smaller and at larger positions."""
+    """Returns True (n,) for rows with rows that are not isolated at smaller and at larger positions."""
     others = position[~apart]
     return np.asarray((position > others.min()) & (position < others.max()))
 
 
 def _longest_run(rows: NDArray[np.bool_]) -> int:
-    """Rows in succession, at most."""
+    """Returns the largest number of successive rows that are True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(np.int8), [0]])))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 HUBER_THRESHOLD = 2.0
-"""k of Huber's loss [standard deviations]: keeps 99 % of the efficiency of least squares on data without
-outliers."""
+"""Residual at which Huber's loss becomes linear [standard deviations]: keeps 99 % of the efficiency of least
+squares on data without outliers."""
 
 OUTLIER_STANDARD_DEVIATIONS = 8.0
-"""Distance from the neighbours, and from the model, above which a row is dropped [standard deviations]."""
+"""Difference of a force from its neighbours, and from the model, above which the row is dropped [standard
+deviations]."""
 
 NEIGHBOUR_ROWS = 3
-"""Number of previous rows, and of next rows, whose median a row is compared with."""
+"""Number of previous rows, and of next rows, whose median force is compared with the force of a row."""
 
 MOST_FITS = 4
-"""Largest number of fits, each with better weights."""
+"""Largest number of fits with Huber's loss, each with new weights of the rows."""
 
 SETTLED_WEIGHT_CHANGE = 1e-3
-"""Mean change of the weights below which no further fit is needed [-]."""
+"""Mean change of the weights of the rows below which no further fit is needed [-]."""
 
 MOST_OUTLIER_SHARE = 0.2
-"""Largest share of dropped rows [-]. More cannot be outliers, and the model is unfit."""
+"""Largest share of dropped rows [-]. A larger share cannot be outliers, and the model is unfit."""
 
 
 def standard_deviation(residual: Float1D) -> float:
-    """Standard deviation of normal residuals (n,), from the median of their absolute values."""
+    """Returns the standard deviation of normal residuals (n,), from the median of their absolute values."""
     return 1.4826 * float(np.median(np.abs(residual)))
 
 
 def from_neighbours(
     box: Float2D, force: Float1D, side: Float1D | None, trusted: NDArray[np.bool_]
 ) -> Float1D:
-    """Force less the median of its trusted neighbours (n,).
+    """Returns the force of each row minus the median force of its trusted neighbours (n,).
 
-    Neighbours are those in recorded order, or those in position, on the same stroke where side (n,) says it.
-    The closer ones of the two are taken: a recorded motion may go through hysteresis, and a table may be
-    shuffled. Of the three rows before and the three rows after, those with the closer median count: a step is
-    no outlier.
+    Neighbours are adjacent rows in recorded order, or in order of position, on the same stroke if `side` (n,)
+    is given. The order with the smaller differences is used: neighbours in position can be on different
+    strokes, and a table can be shuffled. Of the three rows before and the three rows after, the group with
+    the closer median is used, so that a step of the force is not an outlier.
     """
     known = np.flatnonzero(trusted)
     if box.shape[1] > 1:
@@ -266,7 +274,8 @@ def from_neighbours(
 
 
 def suspects(box: Float2D, force: Float1D, side: Float1D | None, weight: Float1D | None) -> NDArray[np.bool_]:
-    """Rows (n,) far from the median of their neighbours; rows of weight 0 do not count as neighbours."""
+    """Returns True (n,) for rows with a force far from the median of their neighbours; rows of weight 0 are
+    no neighbours."""
     given = np.ones(len(force), dtype=bool) if weight is None else weight > 0.0
     low, high = np.quantile(force[given], (0.05, 0.95))
     found = np.zeros(len(force), dtype=bool)
@@ -284,16 +293,16 @@ def suspects(box: Float2D, force: Float1D, side: Float1D | None, weight: Float1D
 
 @dataclass(frozen=True)
 class Robust:
-    """Weights of the rows, and which rows count in the error."""
+    """Weights of the rows for the last fit, and the rows that are dropped as outliers."""
 
     weight: Float1D
-    """(n,) for the last fit"""
+    """(n,) weights of the rows for the last fit"""
     outliers: NDArray[np.bool_]
-    """(n,) rows that were left out"""
+    """(n,) True for dropped rows"""
     note: str
 
     def findings(self, residual: Float1D, force_unit: Unit = UNSTATED_UNIT) -> list[Finding]:
-        """A finding on the dropped rows; residual (n,) is that of all rows."""
+        """Returns a finding on the dropped rows; `residual` (n,) has the residuals of all rows."""
         count = int(np.count_nonzero(self.outliers))
         if not count:
             return []
@@ -317,18 +326,18 @@ def robust_weights(
     weight: Float1D | None,
     suspect: NDArray[np.bool_],
 ) -> Robust:
-    """Weights of the rows for a last fit.
+    """Returns the weights of the rows for the last fit.
 
     Parameters
     ----------
     fit : callable
-        The modelled force (n,) for given weights.
+        Returns the modelled force (n,) for given weights of the rows.
     first : (n,)
-        The modelled force without the rows that are suspect.
+        Modelled force of a fit without the rows of `suspect`.
     force, weight
         Forces (n,), samples that each row represents (n,) or None.
     suspect : (n,)
-        Rows that may be left out.
+        True for rows that may be outliers.
     """
     given = np.ones(len(force)) if weight is None else weight
     modelled, share = first, np.where(suspect, 0.0, 1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows of an identification: usable data, inputs of the force, positions modulo a period."""
+"""Rows of an identification: selects usable rows and inputs, and takes positions modulo a period."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from .outliers import Robust
 from .strokes import strokes_of
 
 LARGEST_MAGNITUDE = 1e100
-"""Largest absolute value, and inverse of the smallest travel and force, that is identified: its square does
-not overflow."""
+"""Largest accepted absolute value of position and force, and inverse of the smallest accepted travel and
+force: the square of such a value does not overflow."""
 
 
 def require_in_range(name: str, values: Float1D) -> None:
-    """Refuse values (n,), n >= 1, whose squares would overflow.
+    """Refuses values (n,), n >= 1, whose squares would overflow.
 
     Raises
     ------
     InputError
-        Names the largest value and the limit.
+        A value is too large; the message names the largest value and the limit.
     """
     if (largest := float(np.abs(values).max())) > LARGEST_MAGNITUDE:
         raise InputError(
@@ -46,39 +46,39 @@ def require_in_range(name: str, values: Float1D) -> None:
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of all recordings, one under the other, and the unit box of their positions."""
+    """Rows of all recordings in sequence, and the smallest box around their positions (the unit box)."""
 
     names: tuple[str, ...]
-    """(d,) of the inputs; the first is position"""
+    """(d,) names of the inputs; the first one is position"""
     positions: Float2D
     """(n, d)"""
     force: Float1D
     """(n,)"""
     side: Float1D | None = None
-    """(n,) direction of the stroke: +1, -1, 0 for neither; None where it is not known"""
+    """(n,) direction: +1 press, -1 release, 0 neither; None if the direction is not known"""
     starts: Sequence[int] | None = None
-    """Rows at which a motion starts, from which the play operator gives a hysteresis input (d = 1)"""
+    """Indices of rows at which a continuous motion starts, for the play operator (d = 1)"""
     parts: Sequence[Piece] = ()
-    """The motion between gaps of time (d = 1); rows count over all recordings"""
+    """Continuous motions between gaps of time (d = 1); rows are numbered over all recordings"""
     weight: Float1D | None = None
-    """(n,) samples that each row represents in the fit; None: 1"""
+    """(n,) number of samples that each row represents in the fit; None: 1 each"""
     within: float = 0.0
-    """Sum of squares inside rows that represent several samples [force^2]"""
+    """Sum of squared differences of the samples from the mean force of their row [force^2]"""
     period: float | None = None
-    """Of an environment that repeats [position]"""
+    """Period of a periodic model [position]; None otherwise"""
     decisions: tuple[Decision, ...] = ()
-    """Decisions on model classes before the selection"""
+    """Decisions on model classes that were made before the model selection"""
     notes: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
-    """Reservations for the verdict"""
+    """Findings that can lower the verdict"""
     counted: Float1D | None = None
-    """(n,) samples that each row represents in the reported error; None: 1"""
+    """(n,) number of samples that each row represents in the reported error; None: 1 each"""
     robust: Robust | None = None
-    """Outliers, where the loss is Huber's"""
+    """Weights and outliers of Huber's loss; None for least squares"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the rows"""
+    """Dependence, force resolution and position noise of the rows"""
     corners: tuple[Float1D, Float1D] | None = None
-    """(d,) least and largest corner of the box; None: those of the positions"""
+    """(d,) smallest and largest position of the unit box; None: those of the rows"""
     position_unit: Unit = UNSTATED_UNIT
     """For messages"""
     force_unit: Unit = UNSTATED_UNIT
@@ -86,12 +86,12 @@ class Rows:
 
     @cached_property
     def lower(self) -> Float1D:
-        """(d,) corner of the box [position]."""
+        """(d,) smallest position of the unit box [position]."""
         return self.positions.min(axis=0) if self.corners is None else self.corners[0]
 
     @cached_property
     def reach(self) -> Float1D:
-        """(d,) sides of the box [position]."""
+        """(d,) side lengths of the unit box [position]."""
         if self.period is not None:
             return np.array([self.period])
         return np.asarray(
@@ -100,7 +100,7 @@ class Rows:
 
     @cached_property
     def path(self) -> Float2D:
-        """(n, d) positions in units of the box, as they were moved through, not taken modulo the period."""
+        """(n, d) positions in units of the box, not taken modulo the period."""
         return (self.positions - self.lower) / self.reach
 
     @cached_property
@@ -115,31 +115,31 @@ class Rows:
 
     @property
     def reported(self) -> NDArray[np.bool_]:
-        """(n,) rows that count in the error."""
+        """(n,) True for rows that are used for the reported error."""
         rows = np.ones(len(self.force), dtype=bool) if self.counted is None else self.counted > 0.0
         return rows if self.robust is None else rows & ~self.robust.outliers
 
     def held_out(self) -> NDArray[np.bool_]:
-        """(n,) rows that are held out to judge on."""
+        """Returns True (n,) for held-out rows."""
         held_out = held_out_rows(len(self.force), self.starts)
         if self.weight is not None:
             counted = np.flatnonzero(self.weight > 0.0)
             held_out &= self.weight > 0.0
             if 2 * HELD_OUT_EVERY * np.count_nonzero(held_out) < len(counted):
-                # rows that repeat others can fill every place that is held out
+                # with regular repeats most held-out rows can have weight 0
                 held_out[:] = False
                 held_out[counted] = held_out_rows(len(counted), self.starts)
         return held_out
 
     def only(self, rows: NDArray[np.bool_]) -> Rows:
-        """Some of the rows, without their motion."""
+        """Returns some of the rows, without their continuous motions."""
         side, weight = (None if each is None else each[rows] for each in (self.side, self.weight))
         return replace(
             self, positions=self.positions[rows], force=self.force[rows], side=side, weight=weight, parts=()
         )
 
     def scaled(self, scale: ForceScale) -> Rows:
-        """The rows with the forces that the fit sees."""
+        """Returns the rows with the scaled forces of the fit."""
         return replace(
             self,
             force=scale.scaled(self.force),
@@ -149,9 +149,10 @@ class Rows:
         )
 
     def limited(self) -> Rows:
-        """The rows with the limits of their information; rows that repeat others weigh 0.
+        """Returns the rows with their dependence, force resolution and noise; rows that repeat others get
+        weight 0.
 
-        A given weight counts in the fit and in the error, without limits.
+        Rows with a given weight use it in the fit and in the error, and get no such limits.
         """
         if self.weight is not None:
             return replace(self, counted=self.weight)
@@ -169,8 +170,8 @@ def require_usable(rows: Rows, options: IdentifyOptions) -> None:
     Raises
     ------
     InputError
-        Too few rows or distinct positions, a value that is not finite, an input that never changes, an option
-        that is for one input.
+        There are too few rows or distinct positions, a value is not finite, an input is constant, or an
+        option requires a single input.
     """
     names, positions, force = rows.names, rows.positions, rows.force
     if positions.ndim != 2 or force.shape != (len(positions),):
@@ -215,12 +216,12 @@ def require_usable(rows: Rows, options: IdentifyOptions) -> None:
 
 
 def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
-    """The rows that the options require.
+    """Returns the rows of recordings with the inputs that the options require.
 
     Raises
     ------
     InputError
-        An input is not in a recording; hysteresis together with further inputs.
+        A recording has no such input, or the inputs are hysteresis together with further inputs.
     """
     names = _input_names(recordings[0], options)
     found = [input_columns(recording, names) for recording in recordings]
@@ -272,7 +273,8 @@ def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
 
 
 def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:
-    """Rows, of those that are kept, at which a recording or a piece between gaps of time begins."""
+    """Returns the indices, among kept rows, at which a recording or a continuous motion between gaps of time
+    starts."""
     starts, before = [], 0
     for recording, rows in zip(recordings, kept, strict=True):
         starts += [before + int(np.count_nonzero(rows[: piece.rows.start])) for piece in pieces(recording)]
@@ -281,14 +283,14 @@ def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) 
 
 
 def input_columns(recording: Recording, names: Sequence[str]) -> tuple[Float2D, NDArray[np.bool_]]:
-    """Inputs (n, d) by their names in the recording or its file, and the rows (n,) that have them all.
+    """Returns the named inputs (n, d) of a recording, and True (n,) for the rows that have all inputs.
 
     A velocity that is not a column of the recording is derived from its time.
 
     Raises
     ------
     InputError
-        The recording is without this input.
+        The recording does not have a named input.
     """
     columns, rows = [], np.ones(len(recording), dtype=np.bool_)
     for name in names:
@@ -327,20 +329,21 @@ def _input_names(recording: Recording, options: IdentifyOptions) -> tuple[str, .
 
 
 PERIOD_TOLERANCE = 0.01
-"""Largest deviation of the sample period from that of the filters, as a share [-]."""
+"""Largest relative deviation of a recording's sample time from the sample time of the paper's filters [-]."""
 
 
 def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
-    """Force (n,) that the network is fitted to: without the force of the assumed mass and damping.
+    """Returns the force (n,) to which the network is fitted: recorded force minus that of the assumed mass
+    and damping.
 
     Raises
     ------
     InputError
-        The recording is without time, or not sampled every millisecond.
+        The recording has no time, or its sample time is not that of the paper's filters.
     """
     period = recording.sample_period
     if recording.time is None or period is None:
-        raise InputError("the recording has no time, which the paper's filters need: give --time NAME")
+        raise InputError("the recording has no time column, which the paper's filters need: give --time NAME")
     steps = np.diff(recording.time)
     if np.abs(steps / paper_sample_time_s - 1.0).max() > PERIOD_TOLERANCE:
         raise InputError(
@@ -356,14 +359,14 @@ def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
 
 
 USABLE_GAP = 0.05
-"""Share of the period without a position above which the model is usable with a reservation [-]."""
+"""Share of the period without recorded positions above which the model is usable with a reservation [-]."""
 
 UNFIT_GAP = 0.5
-"""Share of the period without a position above which the model is unfit [-]."""
+"""Share of the period without recorded positions above which the model is unfit [-]."""
 
 
 def period_notes(position: Float1D, period: float, unit: str = "") -> tuple[str, list[Finding]]:
-    """The note and the findings on positions (n,) and a period [unit]."""
+    """Returns the note and the findings on the part of a period that positions (n,) cover."""
     lower, travel = float(position.min()), float(np.ptp(position))
     note = (
         f"The positions span {travel / period:.4g} periods of {_exact(period, unit)} and are taken modulo "
@@ -391,10 +394,10 @@ def period_notes(position: Float1D, period: float, unit: str = "") -> tuple[str,
 
 
 def _exact(value: float, unit: str) -> str:
-    """A value with six digits and its unit."""
+    """Returns a value with six digits and its unit as text."""
     return f"{value:.6g} {unit}".rstrip()
 
 
 def modulo(box: Float1D) -> Float1D:
-    """Positions in periods (n,), each in [0, 1)."""
+    """Returns positions (n,) [periods] modulo one period, in [0, 1)."""
     return np.asarray(box - np.floor(box))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Direction of the strokes of recordings that do not state it: from the order of rows, or from the force."""
+"""Finds the directions of recordings without a direction column: from the order of rows, or from the
+force."""
 
 from __future__ import annotations
 
@@ -18,40 +19,43 @@ from ...verdict import Finding, usable
 from ..decision import Decision
 
 TRAVEL_CELLS = 32
-"""Number of cells of the travel in which the strokes are compared."""
+"""Number of cells of the travel in which press force and release force are compared."""
 
 SIGNIFICANT_STANDARD_ERRORS = 4.0
-"""Least difference of the strokes for hysteresis [standard errors]."""
+"""Least difference of press and release force for a test of hysteresis [standard errors]."""
 
 LEAST_CONSISTENT_SHARE = 0.9
-"""Least share of the cells in which the press force is the higher one [-]."""
+"""Least share of the cells in which the force of one recording is above that of another for press and release
+[-]."""
 
 LEAST_MEAN_DIFFERENCE = 0.05
-"""Least mean difference of two such strokes [standard deviations of the force]. Repeated measurements of one
-stroke differ by at most 0.02."""
+"""Least mean force difference of two recordings for press and release [standard deviations of the force].
+Repeated measurements of one stroke differ by at most 0.02."""
 
 WINDOW_ROWS = 16
-"""Neighbouring rows, in order of position, that are divided into two groups of force."""
+"""Number of rows of a window; the rows are neighbours in position and are divided into two groups by
+force."""
 
 LEAST_WINDOWS = 5
-"""Least number of windows for a statement on the strokes."""
+"""Least number of windows for a finding on a difference between press and release."""
 
 LEAST_GROUP_VARIANCE = 0.85
-"""Least share of a window's variance between its two groups for two forces [-]: 0.68 for noise, 1 for two
-separate forces."""
+"""Least share of the force variance of a window between its two groups, for two forces at one position [-]:
+0.68 for noise, 1 for two separate forces."""
 
 REPORTED_SPREAD = 0.02
-"""Spread of the force at one position from which it is reported for rows in no order [share of the range]."""
+"""Standard deviation of the force at one position from which a finding reports it, for shuffled rows [share
+of the force range]."""
 
 DIRECTION_CURE = (
     "keep the rows in the order of the recording, or add a column direction with the words press and release"
 )
-"""Cure of unknown strokes in messages."""
+"""Cure in messages on unknown directions."""
 
 
 @dataclass(frozen=True)
 class Strokes:
-    """Directions of all rows of all recordings, where they are known."""
+    """Directions of all rows of all recordings, if they are known."""
 
     side: Float1D | None
     """(n,) +1 into the object, -1 out of it, 0 neither; None where hysteresis cannot be tested"""
@@ -61,16 +65,18 @@ class Strokes:
 
 
 def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
-    """Takes the strokes of recordings from their order of rows, where they do not state them.
+    """Returns the directions of recordings; without a direction column they follow from the order of rows.
 
-    Recordings of one stroke each that all run the same way are parted by their force: a passive object
-    presses back harder while it is pressed. Where press and release do not differ, hysteresis is not tested.
+    If the position of all recordings changes in the same direction, the recordings with the higher force are
+    press: the press force of a passive object is above its release force. If press and release do not differ,
+    hysteresis is not tested.
 
     Parameters
     ----------
     recordings : sequence of Recording
     named : bool
-        Hysteresis is named as an input: strokes that do not differ are returned, too.
+        True if the options name hysteresis as an input; directions are then returned even if press and
+        release do not differ.
     """
     found = [
         recording.direction if recording.direction is not None else ordered_strokes(recording)
@@ -107,19 +113,19 @@ def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
             ),
         )
     elif not named and not _Cells.of(position, force, side).differ:
-        reason = f"press and release do not differ by {SIGNIFICANT_STANDARD_ERRORS:g} standard errors"
+        reason = f"press and release force do not differ by {SIGNIFICANT_STANDARD_ERRORS:g} standard errors"
         return Strokes(None, (f"{note}.",), decisions=(Decision("hysteresis", "not accepted", reason),))
     return Strokes(side, (f"{note}.",), findings)
 
 
 @dataclass(frozen=True)
 class _Cells:
-    """Press less release in cells of the travel that hold both."""
+    """Press force minus release force in cells of the travel with rows of both strokes."""
 
     difference: Float1D
-    """(m,) mean force of press less release, at one position"""
+    """(m,) mean press force minus mean release force of a cell, at equal position [force]"""
     error: Float1D
-    """(m,) its standard error"""
+    """(m,) standard error of the difference [force]"""
 
     @classmethod
     def of(cls, position: Float1D, force: Float1D, side: Float1D) -> _Cells:
@@ -137,7 +143,7 @@ class _Cells:
             for values in (None, f, x, x * x, x * f, f * f)
         )
         mean_x, mean_f = (total / np.maximum(count, 1) for total in (x_sum, f_sum))
-        # One slope for both strokes of a cell, about their means.
+        # Both strokes of a cell share one slope of force over position.
         xx, xf, ff = (
             np.sum(square - count * one * other, axis=1)
             for square, one, other in ((xx, mean_x, mean_x), (xf, mean_x, mean_f), (ff, mean_f, mean_f))
@@ -146,14 +152,14 @@ class _Cells:
         difference = mean_f[:, 1] - mean_f[:, 0] - slope * (mean_x[:, 1] - mean_x[:, 0])
         n_out, n_in = count.T
         used = (n_in >= 2) & (n_out >= 2) & (n_in + n_out > 4)
-        # Rounding errors are the least noise.
+        # Rounding errors are the least noise of a force.
         floor = (1e-7 * float(np.ptp(f))) ** 2
         variance = np.maximum(ff - slope * xf, 0.0)[used] / (n_in + n_out - 3.0)[used] + floor
         return cls(difference[used], np.sqrt(variance * (1.0 / n_in[used] + 1.0 / n_out[used])))
 
     @property
     def differ(self) -> bool:
-        """Press and release differ on average, or somewhere."""
+        """True if press and release force differ on average, or in some cells."""
         if not len(self.difference) or not self.error.all():  # the force is constant
             return False
         weight = self.error**-2.0
@@ -166,12 +172,13 @@ class _Cells:
 
 
 def _press(recordings: Sequence[Recording]) -> Float1D | None:
-    """+1 for the recordings with the higher force, -1 for the others; None where they are not two curves."""
+    """Returns +1 for recordings with the higher force, -1 for the others; None if they do not form two
+    groups."""
     if len(recordings) < 2 or any(recording.direction is not None for recording in recordings):
         return None
 
     def above(one: Recording, other: Recording) -> int:
-        """+1, -1: the force of one is higher, lower throughout; 0: they are not apart."""
+        """Returns +1 if the force of `one` is above that of `other` in most cells, -1 if below, else 0."""
         position = np.concatenate([one.position, other.position])
         force = np.concatenate([one.force, other.force])
         side = np.repeat([1.0, -1.0], [len(one), len(other)])
@@ -193,10 +200,11 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
 
 
 def _untested(position: Float1D, force: Float1D, unit: str, why: str | None) -> Strokes:
-    """Hysteresis cannot be tested; reports by how much the strokes may differ, where the rows show it."""
+    """Returns no directions, and a finding on the possible difference of press and release if the rows show
+    one."""
     reason = why or "the position never turns back in the order of rows"
     decisions = (Decision("hysteresis", "not tested", reason),)
-    # Repetitions of a row would be groups of one force.
+    # Copies of a row would form a group with one force.
     rows = np.unique(position + 1j * force)
     if len(rows) < LEAST_WINDOWS * WINDOW_ROWS:
         return Strokes(None, decisions=decisions)
@@ -223,8 +231,9 @@ def _untested(position: Float1D, force: Float1D, unit: str, why: str | None) -> 
 
 
 def _two_groups(x: Float1D, f: Float1D) -> tuple[Float1D, Float1D, Float1D]:
-    """For windows of rows in order of position: the share of the variance between two groups of force, the
-    distance of their means, and the standard deviation, each (windows,).
+    """Divides each window of rows in order of position into two groups by force. Returns the share of the
+    force variance between the groups, the distance of their mean forces, and the standard deviation, each
+    (windows,).
     """
     rows = len(x) // WINDOW_ROWS * WINDOW_ROWS
     x, f = x[:rows].reshape(-1, WINDOW_ROWS), f[:rows].reshape(-1, WINDOW_ROWS)
@@ -243,7 +252,7 @@ def _two_groups(x: Float1D, f: Float1D) -> tuple[Float1D, Float1D, Float1D]:
 
 
 def _names(recordings: Sequence[Recording], which: Sequence[bool] | NDArray[np.bool_]) -> str:
-    """Files of some of the recordings, or their numbers."""
+    """Returns the file names of some recordings, or the numbers of recordings without a file, as text."""
     if len(recordings) == 1:
         return ", ".join(recordings[0].source.files) or "the recording"
     return ", ".join(
@@ -254,7 +263,7 @@ def _names(recordings: Sequence[Recording], which: Sequence[bool] | NDArray[np.b
 
 
 def _ways(recordings: Sequence[Recording], directions: Sequence[Int8Vector]) -> str:
-    """Number of recordings that are strokes into the object, out of it, and both."""
+    """Returns the numbers of recordings with press only, release only, and both, as text."""
     ways = [(bool((each > 0).any()), bool((each < 0).any())) for each in directions]
     words = {"press": (True, False), "release": (False, True), "both": (True, True)}
     return ", ".join(f"{ways.count(way)} {word}" for word, way in words.items() if ways.count(way))
@@ -262,35 +271,35 @@ def _ways(recordings: Sequence[Recording], directions: Sequence[Int8Vector]) -> 
 
 @dataclass(frozen=True)
 class HysteresisInput:
-    """s of every row of a recording."""
+    """Direction state s of every row of a recording."""
 
     side: Float1D
     """(n,) in [-1, 1]"""
     known: NDArray[np.bool_]
-    """(n,) rows whose s does not depend on the motion before the recording"""
+    """(n,) True for rows whose direction state does not depend on the motion before the recording"""
     play_radius: float | None = None
     """[box]"""
 
     @property
     def both_ways(self) -> bool:
-        """True if the known rows hold strokes into the object and out of it."""
+        """True if the rows with known direction state contain press and release."""
         side = self.side[self.known]
         return bool((side > 0.0).any() and (side < 0.0).any())
 
     @classmethod
     def of_strokes(cls, side: Float1D) -> HysteresisInput:
-        """+1, -1: the stroke of each row (n,)."""
+        """Returns the direction states of rows with known directions (n,), +1 or -1."""
         return cls(side, np.ones(len(side), dtype=bool))
 
     @classmethod
     def of_play(
         cls, motions: Sequence[Float1D], radius: float, first: Sequence[float] | None = None
     ) -> HysteresisInput:
-        """The play operator along motions that each begin without a history: at s = 0, or first.
+        """Returns the direction states of the play operator along motions that each start at s = 0, or at
+        `first`.
 
-        Once a motion has covered the slot's width 2 r its history is forgotten: in every state it
-        has been pushed by one edge of the slot past where the other edge could have held it. Where no motion
-        is that long, none of the rows is known better than another, and all count.
+        After a motion has covered twice the play radius, the direction state no longer depends on its start
+        value, and counts as known. If no motion is this long, all rows count as known.
         """
         side, known = [], []
         for motion, s in zip(motions, first if first is not None else [0.0] * len(motions), strict=True):

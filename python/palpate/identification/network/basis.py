@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wavelets without weights: how finely data resolve them, and the frames that a selection starts from.
+"""Wavelets without weights: the narrowest wavelets that data resolve, and the frames of candidate wavelets.
 
 The members of a frame (paper section 2.4) are a0^(-m/2) psi_v(a0^(-m) x - k b0) over all integers m and k,
 with V voices psi_v(x) = 2^(-v/V) psi(2^(-v/V) x), v = 0 .. V - 1, all on the same step b0.
@@ -40,7 +40,7 @@ class Basis:
 
 
 class Resolution:
-    """Distances from any place to the distinct ones of some positions (m, d)."""
+    """Computes distances from a place to the nearest distinct positions of a set of positions (m, d)."""
 
     def __init__(self, positions: Float2D) -> None:
         distinct = positions[distinct_rows(positions)[0]]
@@ -52,10 +52,12 @@ class Resolution:
         return self._size
 
     def reach(self, places: Float2D, count: int) -> Float1D:
-        """(N,) distance from each place (N, d) within which there are count positions, 1 <= count <= len."""
+        """Returns the radius (N,) around each place (N, d) that contains `count` positions, 1 <= count <=
+        len."""
         if self._tree is not None:
             return np.asarray(self._tree.query(places, k=[count])[0])[:, 0]
-        # On a line the nearest ones are neighbours: the best of the windows of count positions around it.
+        # On a line the nearest positions are neighbours in order: test all windows of `count` positions at
+        # the place.
         assert self._sorted is not None
         last = self._size - count
         first = np.searchsorted(self._sorted, places[:, 0])[:, None] - np.arange(count + 1)
@@ -65,20 +67,22 @@ class Resolution:
 
 
 COARSEST_CANDIDATE = 1.0
-"""Dilation of the frame's coarsest level [1/box]."""
+"""Dilation of the widest wavelets of the frame [1/box]."""
 
 MOST_LIBRARY_ENTRIES = 2**23
-"""Largest number of values in a library, 32 MiB. With many rows it has fewer candidates."""
+"""Largest number of stored values of all candidate wavelets at all rows, 32 MiB. Many rows allow fewer
+candidates."""
 
 NEGLIGIBLE_SHARE = 1e-14
-"""Spectral products below this share of the first one cannot change a printed digit of the bounds [-]."""
+"""Ratio to the first product of spectra below which a product cannot change a printed digit of the frame
+bounds [-]."""
 
 
 def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
-    """Daubechies' estimate of the frame bounds of the unit-norm Mexican hat (Daubechies 1990, section II.C).
+    """Estimates the frame bounds A, B of the unit-norm Mexican hat psi (Daubechies 1990, section II.C).
 
-    A, B = (2 pi / b0) (inf, sup over 1 <= |xi| <= a0 of sum_v sum_m |psi_v^(a0^m xi)|^2
-    -/+ sum_v sum_(k != 0) [beta_v(2 pi k / b0) beta_v(-2 pi k / b0)]^(1/2)).
+    With the Fourier transform psi^: A, B = (2 pi / b0) (inf, sup over 1 <= |xi| <= a0 of sum_v sum_m
+    |psi_v^(a0^m xi)|^2 -/+ sum_v sum_(k != 0) [beta_v(2 pi k / b0) beta_v(-2 pi k / b0)]^(1/2)).
 
     beta_v(s) = sup over xi of sum_m |psi_v^(a0^m xi)| |psi_v^(a0^m xi + s)|.
 
@@ -94,12 +98,13 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
     Returns
     -------
     (A, B) : tuple of float
-        The closer B/A is to 1, the tighter the frame; with A <= 0 the estimate cannot show that it is one.
+        The closer B/A is to 1, the tighter the frame. With A <= 0 the estimate does not prove that the
+        wavelets form a frame.
 
     Raises
     ------
     palpate.InputError
-        Naming the argument that is out of its range.
+        An argument is out of range; the message names the argument.
     """
     a0, b0, whole = number_of("a0", a0), number_of("b0", b0), number_of("voices", voices)
     if not a0 > 1.0:
@@ -108,7 +113,7 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
         raise InputError(f"b0, the translation step, is {b0!r}: must be a finite number > 0")
     if int(whole) != whole or whole < 1:
         raise InputError(f"voices is {voices!r}: must be a whole number >= 1")
-    # psi^ is below 1e-15 of its peak outside 2^-26 .. 2^4, for every voice
+    # the Fourier transform of each voice is below 1e-15 of its peak outside the frequencies 2^-26 .. 2^4
     levels = np.arange(np.floor(-26.0 / np.log2(a0)), np.ceil(5.0 / np.log2(a0)) + 1.0)
     frequency = np.linspace(1.0, a0, 1001)[:, None] * a0**levels
     diagonal, cross = np.zeros(len(frequency)), 0.0
@@ -118,7 +123,8 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
         shift, first = 1, 0.0
         while True:
             step = 2.0 * np.pi * shift / b0
-            # psi^ is even: the supremum over -xi at +s is the one over xi at -s, so both factors are this one
+            # the Fourier transform is even: the supremum over -xi at +s equals the one over xi at -s, so both
+            # factors of the product are equal
             overlap = max(
                 float((here * _spectrum((frequency + sign * step) / stretch)).sum(axis=1).max())
                 for sign in (1, -1)
@@ -133,7 +139,7 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
 
 
 def _spectrum(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Fourier transform (unitary) of the unit-norm Mexican hat, without its sign."""
+    """Returns the absolute value of the unitary Fourier transform of the unit-norm Mexican hat."""
     return np.asarray(2.0 / np.sqrt(3.0) * np.pi**-0.25 * frequency**2 * np.exp(-0.5 * frequency**2))
 
 
@@ -146,17 +152,17 @@ def truncated_frame(
     frame_step: float,
     max_candidates: int,
 ) -> Basis:
-    """Members of the single-scaling frame that have data within them, from coarsest to finest.
+    """Returns the wavelets of the single-scaling frame that have data in their core, the widest first.
 
-    Each level's translations are found by walking from the data to the lattice points around it, so that the
-    full grid, whose size grows exponentially with the inputs, is never built. From the first level that would
-    bring more than max_candidates members on, only those at lattice points that most data are nearest to are
-    taken, and finer levels are left out: refinement reaches finer ones.
+    The translations of each dilation are the lattice points around the data, so that the full grid, whose
+    size grows exponentially with the number of inputs, is never built. If a dilation would bring more than
+    max_candidates wavelets in total, only the lattice points nearest to most data are taken, and larger
+    dilations are left out: refinement can still make wavelets narrower.
 
     positions (m, d) in the unit box; dilations coarsest * frame_scale^j [1/box]; step frame_step / dilation.
     """
     d = positions.shape[1]
-    # a lattice point has 3^d neighbours: beyond three inputs only those along an input are walked to
+    # a lattice point has 3^d neighbours: with more than three inputs only neighbours along one input are used
     around = product((-1, 0, 1), repeat=d) if d <= 3 else (*np.eye(d), *-np.eye(d), np.zeros(d))
     offsets = np.array(list(around), dtype=np.int64)
     alpha: list[Float2D] = []

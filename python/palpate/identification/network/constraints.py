@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Constraints over a domain of one input: h >= 0, slope bounds, a fixed force, equal ends of a period.
+"""Constraints of a force over one position: hysteresis h >= 0, slope bounds, a fixed force, a periodic force.
 
-Each is a bound on a *reading* of the network, a combination of its channels or the slope of one, at every
-position of the domain. The least squares is solved with the bound imposed where it was found violated.
-Everywhere else it is certified: on a cell [a, b] a twice differentiable reading r stays above
-min(r(a), r(b)) - max|r''| (b - a)^2 / 8, where max|r''| over the cell comes from `derivative_bounds`.
-Cells are halved until they are certified or shown violated; violated ones give new positions to impose,
-until none is left.
+Each constraint bounds a *reading* of the network, a linear combination of the mean force g and the hysteresis
+h, or the slope of this combination, at every position of the domain. The least squares is solved with the
+constraint imposed at the positions where it was found violated. Elsewhere the constraint is proved: on an
+interval [a, b] a twice differentiable reading r stays above min(r(a), r(b)) - max|r''| (b - a)^2 / 8, where
+max|r''| over the interval comes from `derivative_bounds`. Intervals are halved until the constraint is proved
+or shown violated there. A violated interval gives a new position at which to impose the constraint, until no
+interval is violated.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,58 +25,64 @@ from .basis import Basis
 from .separable import SeparableProblem, Solution, factored
 
 IMPOSED_MARGIN = 1e-2
-"""Margin by which an imposed bound is tighter than the certified one, as a share of the RMS error [-].
-Without it certification may not end."""
+"""Margin by which an imposed constraint is tighter than the proved one, as a share of the RMS error [-].
+Without the margin the proof may need endless rounds."""
 
 POINT_TOLERANCE = 1e-9
-"""Largest deviation from a fixed force, as a share of the range of the force [-]: rounding."""
+"""Largest deviation of the force from a fixed force, as a share of the range of the force [-]; allows for
+rounding."""
 
 MOST_ROUNDS = 60
-"""Largest number of rounds of imposing and certifying. After it the solution is mixed with one that keeps all
-bounds."""
+"""Largest number of rounds of imposing and proving the constraints. After the last round the fitted force is
+mixed with a straight line that keeps all constraints."""
 
 FIRST_CELLS = 256
-"""Number of cells over the domain at the start of a certification."""
+"""Number of intervals of the domain at the start of the proof of a constraint."""
 
 MOST_HALVINGS = 40
-"""Halvings after which an undecided cell counts as violated: its width is then a rounding error."""
+"""Number of halvings after which an undecided interval counts as a violation: its width is then a rounding
+error."""
 
 PROJECTION_CELLS = 4096
-"""Number of cells of the grid on which a force is projected onto slope bounds."""
+"""Number of cells of the position grid on which the slope of a force is limited."""
 
 MOST_ALTERNATIONS = 50
-"""Largest number of alternating projections onto the lower and the upper slope bound."""
+"""Largest number of alternating projections of a force onto the lower and the upper slope bound."""
 
 
 @dataclass(frozen=True)
 class Bound:
-    """sign * (reading - limit) >= 0 over the unit box; the reading is a combination of readouts."""
+    """Constraint sign * (reading - limit) >= 0 at every position; the reading is a combination of mean force
+    and hysteresis."""
 
     readouts: tuple[float, ...]
-    """Multiples of g (and h)"""
+    """Factors of the mean force g (and the hysteresis h) in the reading"""
     of_slope: bool
-    """True if the reading is the combination's slope [force/box]"""
+    """True if the reading is the slope of the combination [force/box]"""
     name: str
-    """Name in the notes"""
+    """Name of the constraint in the notes"""
     sign: float
-    """+1: the reading stays above limit, -1: below"""
+    """+1: the reading stays above `limit`; -1: the reading stays below `limit`"""
     limit: float
     unit: float
-    """Part of the reading that weighs as much as a force of 1: 1 for a force"""
+    """Change of the reading that weighs as much as a change of the force by 1; it is 1 if the reading is a
+    force"""
     at: float | None = None
-    """The only position where it holds [box]; None: everywhere"""
+    """Position of a constraint that applies at one position [box]; None: it applies at every position"""
     seam: bool = False
-    """The reading is the difference between the two ends of the box: 0 for a force that repeats"""
+    """True if the reading is the difference between the ends of the domain, which is 0 for a periodic
+    force"""
 
     def columns(self, basis: Basis, x: Float1D) -> Float2D:
-        """(k, 2 + N) the reading at positions (k,) of one channel, as a combination of its coefficients."""
+        """Returns the factors (k, 2 + N) of the coefficients of one channel in the reading at positions
+        (k,)."""
         if not self.seam:
             return _columns(basis, self.of_slope, x)
         lower, upper = _columns(basis, self.of_slope, np.array([0.0, 1.0]))
         return np.tile(upper - lower, (len(x), 1))
 
     def channels(self, problem: SeparableProblem) -> Float1D:
-        """The reading as a combination of the problem's channels."""
+        """Returns the factors of the problem's channels in the reading."""
         return np.asarray(np.array(self.readouts) @ problem.readout)
 
 
@@ -87,10 +94,11 @@ def domain_bounds(
     fixed: tuple[float, float] | None = None,
     periodic: bool = False,
 ) -> list[Bound]:
-    """The bounds in force: h >= 0, and (min, max) of the slope [force/box] of the strokes g + h and g - h.
+    """Returns the required constraints: h >= 0, and (min, max) of the slope [force/box] of press g + h and
+    release g - h.
 
-    With fixed, (position [box], force), g goes through that point: a bound from above and one from below.
-    With periodic, g (and h) and their slopes are equal at both ends of the box.
+    `fixed` is (position [box], force): the mean force g goes through this point, by an upper and a lower
+    bound. With `periodic`, g (and h) and their slopes are equal at both ends of the domain.
     """
     two = len(problem.readout) == 2
     bounds = []
@@ -120,10 +128,11 @@ def domain_bounds(
 def moved_to_bounds(
     problem: SeparableProblem, rows: Compressed, solution: Solution, bounds: Sequence[Bound]
 ) -> Compressed:
-    """The rows with their forces moved as the solution must move to keep the bounds, noise and all.
+    """Returns the rows with their forces changed as the fitted force must change to keep the constraints;
+    noise stays.
 
-    Forces against the bounds are removed from these rows, so that a network grown on them has wavelets where
-    the bounded force law needs them. h is projected pointwise, h := max(h, 0), slopes by isotonic regression.
+    A network grown on the changed rows has wavelets at the positions where the constrained force law needs
+    wavelets. The hysteresis is limited at each position, h := max(h, 0), and slopes by isotonic regression.
     """
     bounds = [bound for bound in bounds if not bound.seam]
     grid = np.linspace(0.0, 1.0, PROJECTION_CELLS + 1)
@@ -143,9 +152,10 @@ def moved_to_bounds(
 
 
 def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -> Solution:
-    """Least squares on the basis of the free solution, all bounds kept over the unit box and certified.
+    """Fits the wavelets of an unconstrained solution by least squares, with all constraints proved at every
+    position.
 
-    The free solution itself is returned if it keeps them.
+    Returns the unconstrained solution if it keeps all constraints.
     """
     margin = IMPOSED_MARGIN * problem.resolved_rmse(free)
     rows: list[Float2D] = []
@@ -165,7 +175,8 @@ def impose(problem: SeparableProblem, free: Solution, bounds: Sequence[Bound]) -
 
 
 def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bound) -> Float1D:
-    """Positions (k,) of the unit box where the bound is violated, one a stretch; none: it is certified."""
+    """Returns the worst position of each interval where a constraint is violated (k,) [box]; empty if it is
+    proved."""
     weights = bound.channels(problem) @ solution.coefficients
 
     def excess(x: Float1D) -> Float1D:
@@ -207,7 +218,8 @@ def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bou
 
 
 def _deepest(cells: Float2D, excess: Callable[[Float1D], Float1D]) -> Float1D:
-    """The deepest of nine positions in each stretch of touching cells (2, k)."""
+    """Returns the position of the largest violation in each group of adjacent cells (2, k), from nine
+    positions per cell."""
     if cells.shape[1] == 0:
         return np.zeros(0)
     left, right = cells[:, np.argsort(cells[0])]
@@ -221,7 +233,8 @@ def _deepest(cells: Float2D, excess: Callable[[Float1D], Float1D]) -> Float1D:
 
 
 def _columns(basis: Basis, of_slope: bool, x: Float1D) -> Float2D:
-    """(k, 2 + N) bias, linear and wavelet columns of one channel, or their slopes."""
+    """Returns bias, linear and wavelet columns (k, 2 + N) of one channel at positions (k,), or their
+    slopes."""
     one, zero = np.ones((len(x), 1)), np.zeros((len(x), 1))
     if of_slope:
         return np.concatenate([zero, one, wavelet_slope_columns(x, basis.alpha, basis.beta)], axis=1)
@@ -229,7 +242,7 @@ def _columns(basis: Basis, of_slope: bool, x: Float1D) -> Float2D:
 
 
 def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, limits: Float1D) -> Float2D:
-    """Coefficients that minimise the objective subject to rows @ coefficients >= limits.
+    """Returns the coefficients that minimise the squared error subject to rows @ coefficients >= limits.
 
     In the coordinates of the Gram matrix's Cholesky factor this is a least-distance problem, which
     non-negative least squares solves (Lawson & Hanson 1974, chapter 23).
@@ -249,7 +262,8 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
 
 
 def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Float1D:
-    """Nearest force (k,) with slope within [low, high]: alternating isotonic regressions (Dykstra 1983)."""
+    """Returns the nearest force (k,) with slopes in [low, high], by alternating isotonic regressions (Dykstra
+    1983)."""
     current = force
     lower_memory, upper_memory = np.zeros_like(force), np.zeros_like(force)
     for _ in range(MOST_ALTERNATIONS):
@@ -268,7 +282,10 @@ def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Flo
 
 
 def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequence[Bound]) -> Solution:
-    """As much of the solution as keeps all bounds, the rest a straight line well inside this convex set."""
+    """Mixes a solution with the least share of a straight line, such that the mixture keeps all constraints.
+
+    The straight line keeps the constraints with a margin.
+    """
     everywhere = [bound for bound in bounds if not bound.seam]
     lows = [bound.limit for bound in everywhere if bound.of_slope and bound.sign > 0]
     highs = [bound.limit for bound in everywhere if bound.of_slope and bound.sign < 0]
@@ -302,16 +319,18 @@ COMPARED_POSITIONS = 2048
 """Number of positions at which press and release are compared."""
 
 REPORTED_HEIGHT = 3.0
-"""Least height of release above press that is reported [RMS errors]: larger than noise."""
+"""Least difference of release force minus press force that is reported [RMS errors]: larger than noise."""
 
 LATE_SLOPE_RATIO = 2.0
-"""Ratio of the slope where release lies above press to the mean slope, from which the force is late [-]."""
+"""Ratio of the slope of the force, at positions where the release force is above the press force, to the mean
+slope, from which the force is taken as delayed [-]."""
 
 
 def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
-    """True if release lies above press mainly where the force is steep, as a late force makes it.
+    """True if the release force is above the press force mainly where the force is steep, as with a delayed
+    force.
 
-    A force that is late by t makes h smaller by the slope times speed and t.
+    A force recorded with delay t reduces the hysteresis h by slope * speed * t.
     """
     places = np.linspace(0.0, 1.0, COMPARED_POSITIONS)
     columns = wavelet_columns(places, free.basis.alpha, free.basis.beta)
@@ -326,10 +345,10 @@ def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Interval in which release lies above press."""
+    """Interval of positions in which the release force is above the press force."""
 
     height: float
-    """Largest force of release minus press [force]"""
+    """Largest release force minus press force [force]"""
     start: float
     """[box]"""
     end: float
@@ -337,9 +356,11 @@ class Crossing:
 
 
 def crossing(problem: SeparableProblem, free: Solution) -> Crossing | None:
-    """Returns the interval where release lies highest above press; None if the height is small.
+    """Returns the interval where the release force exceeds the press force most; None if the difference is
+    small.
 
-    free is a solution g + s h without the bound h >= 0. Only positions measured on both strokes count.
+    `free` is a fitted force g + s h without the constraint h >= 0. Only positions measured on both strokes
+    are used.
     """
     first = max(float(block.positions.min()) for block in problem.blocks)
     last = min(float(block.positions.max()) for block in problem.blocks)

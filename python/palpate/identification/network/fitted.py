@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The outcome of an identification, as plain arrays in the units of the data."""
+"""Result of an identification: an identified network as arrays in the units of the recording."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .separable import Solution
 
 @dataclass(frozen=True)
 class PathPoint:
-    """One network on the way: rmse in the unit of force, criterion as a deviance (see stopping)."""
+    """Network that the model selection tested: its RMS error [force], and its criterion as a deviance."""
 
     model_class: str
     n_wavelets: int
@@ -31,7 +31,8 @@ class PathPoint:
 
 @dataclass(frozen=True)
 class FittedNetwork:
-    """An identified force law f = g(x) + s h(x), and how it came about."""
+    """Identified force law f = g(x) + s h(x), with mean force g, direction state s, hysteresis h, and the
+    tested networks."""
 
     inputs: tuple[str, ...]
     """(d,) names"""
@@ -40,48 +41,50 @@ class FittedNetwork:
     beta: Float2D
     """(N, d) translations [position]"""
     weight: Float1D
-    """(N,) weights of g [force]"""
+    """(N,) weights of the mean force g [force]"""
     linear: Float1D
-    """(d,) slope of g's linear part [force/position]"""
+    """(d,) slope of the linear part of the mean force g [force/position]"""
     bias: float
-    """Bias of g [force]"""
+    """Bias of the mean force g [force]"""
     weight_hysteresis: Float1D | None
-    """(N,) weights of h, or None for a single-valued force"""
+    """(N,) weights of the hysteresis h [force]; None for a single-valued force"""
     linear_hysteresis: Float1D | None
     """(d,)"""
     bias_hysteresis: float | None
     lower: Float1D
-    """(d,) domain: the least position of the data"""
+    """(d,) lower end of the domain: least position of the data"""
     upper: Float1D
-    """(d,) domain: the largest"""
+    """(d,) upper end of the domain: largest position of the data"""
     below: str = "linear"
-    """free where the object is left at the lower end, else linear"""
+    """Continuation below the domain: "free" if the tool leaves the object there; otherwise linear"""
     play_radius: float | None = None
-    """[position], where the play operator gave the hysteresis input"""
+    """Play radius [position]; None if the direction state is not from a play operator"""
     mass: float | None = None
-    """m of F = m a + B v + f, where it was fitted [force/position s^2]"""
+    """Object mass m of F = m a + B v + f, if it was fitted [force s^2/position]"""
     damping: float | None = None
-    """B, where it was fitted [force/position s]"""
+    """Object damping B of F = m a + B v + f, if it was fitted [force s/position]"""
     model_class: str = ""
-    """Name of the accepted class"""
+    """Name of the accepted model class"""
     stop_reason: str = ""
-    """The criterion that stopped growth, "max_wavelets", or "data" where they allowed no further wavelet"""
+    """Reason why growth stopped: name of the criterion, "max_wavelets", or "data" if the data allowed no more
+    wavelets"""
     n_parameters: int = 0
-    """Fitted numbers, the play radius, mass and damping included"""
+    """Number of fitted values, including play radius, mass and damping"""
     rmse: float = 0.0
-    """On the samples of the identification [force]"""
+    """RMS error on the samples of the identification [force]"""
     nrmse: float = 0.0
-    """rmse over the standard deviation of the force"""
+    """RMS error divided by the standard deviation of the force [-]"""
     path: tuple[PathPoint, ...] = ()
-    """Every network that was considered"""
+    """Networks that the model selection tested, in order"""
     decisions: tuple[Decision, ...] = ()
     """Last decision on each model class"""
     notes: tuple[str, ...] = ()
-    """Sentences on unused rows, constraints with their cost, and replaced decisions"""
+    """Sentences on unused rows, on the rise of the error by constraints, and on replaced decisions"""
     independent_rows: float = np.inf
-    """Rows of the identification, fewer where repeats or correlated noise make them depend on each other"""
+    """Number of independent rows; below the number of rows if rows are repeated or their noise is
+    correlated"""
     findings: tuple[Finding, ...] = ()
-    """Reservations for the verdict"""
+    """Findings that can lower the verdict"""
 
     def parameters(self) -> dict[str, Any]:
         """Returns network and domain as keyword arguments of :class:`ForceModel`."""
@@ -99,7 +102,7 @@ class FittedNetwork:
         }
 
     def fit(self) -> Fit:
-        """How the network came about, as a model file holds it."""
+        """Returns the model class and the tested networks, in the form of a model file."""
         path: list[PathStep] = [
             {
                 "n_wavelets": at.n_wavelets,
@@ -119,18 +122,16 @@ class FittedNetwork:
         )
 
     def unscaled(self, scale: ForceScale, force_unit: Unit = UNSTATED_UNIT) -> FittedNetwork:
-        """Returns the network in the unit of the force, which is `force_unit` in messages."""
+        """Returns the network in the unit of the recorded force, without the offset and factor of the fit."""
 
         factor = scale.factor
         notes = self.notes
         if factor != 1.0:
-            multiplied = (
-                f"The forces were multiplied by {factor:g} for the fit. Forces in these notes are multiplied."
-            )
+            multiplied = f"For the fit, and in these notes, the recorded forces are multiplied by {factor:g}."
             notes = (multiplied, *notes)
         if scale.offset:
             offset = force_unit.text(scale.offset)
-            notes = (f"An offset of {offset} was subtracted from the force for the fit.", *notes)
+            notes = (f"An offset of {offset} was subtracted from the recorded force for the fit.", *notes)
         scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor
@@ -149,9 +150,10 @@ class FittedNetwork:
     def of(
         cls, solution: Solution, readout: Float2D, lower: Float1D, reach: Float1D, **described: Any
     ) -> FittedNetwork:
-        """A solution in the units of the data: the unit box has its corner at lower and the sides reach.
+        """Returns a solution in the units of the data; the unit box starts at `lower` and has the side
+        lengths `reach`.
 
-        described holds the other fields.
+        `described` holds the other fields of the network.
         """
         d, two = len(lower), len(readout) == 2
         table = readout @ solution.coefficients
@@ -172,7 +174,7 @@ class FittedNetwork:
         )
 
     def force(self, positions: Float2D, side: Float1D | None) -> Float1D:
-        """Force at rows (n, d)."""
+        """Returns the force at positions (n, d) with direction states (n,)."""
         two, model = self.weight_hysteresis is not None, ForceModel(**self.parameters())
         inside = np.clip(positions, self.lower, self.upper)
         if len(self.lower) > 1:

@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The separable least-squares problem: linear in weights, slope and bias once the wavelets are given.
+"""Separable least-squares problem: linear in weights, slope and bias for given dilations and translations.
 
 A network f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c.x + b (paper eq. 4) is fitted to weighted rows.
-With hysteresis, f = g(x) + s h(x), where g and h share their wavelets and each wavelet has two weights.
-If s is only ever +1 or -1 the strokes are two independent least squares over the same wavelets, in the
-coordinates g + h and g - h: two blocks of one channel each. For s in between it is one block of two
-channels, 1 and s.
+With hysteresis, f = g(x) + s h(x), where g and h share their wavelets and each wavelet has two weights. If
+the direction state s is +1 or -1 in all rows, press and release are two independent least-squares problems
+over the same wavelets, for g + h and g - h: two blocks of one channel each. If s has values in between, the
+problem is one block of two channels, with factors 1 and s.
 
-Positions are those in the unit box of the data, so that dilations and translations compare.
+Positions are scaled to the unit box of the data, so that all inputs have comparable dilations and
+translations.
 
 Refinement moves all dilations and translations at once, by bounded variable projection. Weights, slopes and
 biases are eliminated (Golub & Pereyra 1973, in Kaufman's form), Levenberg-Marquardt steps are taken on
-log(alpha) and beta. Unbounded, a dilation runs away on measured switch curves and the basis turns singular.
-So dilations stay within the resolution of the positions around the wavelet, translations near the data, and a
-step is kept only if it lowers the objective: never worse than the start.
+log(alpha) and beta. Without bounds, a dilation can grow without limit on measured switch curves, and the
+least squares becomes singular. So dilations stay within the resolution of the positions around the wavelet,
+and translations near the data. A step is kept only if it lowers the squared error, so that the result is
+never worse than the start.
 """
 
 from __future__ import annotations
@@ -32,11 +34,12 @@ from ..data.limits import FORCE_RESOLUTION, NO_LIMITS, RowLimits
 from .basis import Basis, Resolution
 
 RIDGE = 1e-11
-"""Ridge on columns of unit norm [-]: keeps a nearly dependent basis solvable, far below any noise."""
+"""Ridge of the least squares on columns of unit norm [-]: keeps nearly dependent columns solvable, far below
+any noise."""
 
 
 def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve a positive semidefinite system by Cholesky on unit-norm columns."""
+    """Solves a positive semidefinite linear system by a Cholesky factorisation on columns of unit norm."""
     factor, norm = factored(gram)
     columns = right.reshape(len(gram), -1) / norm[:, None]
     solved, _ = dpotrs(factor, columns, lower=1)
@@ -44,14 +47,16 @@ def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def half_solved(gram: Float2D, right: Float2D) -> Float2D:
-    """M right with M' M the inverse of the system: products of its results are those of projections."""
+    """Returns M @ right, where M' M is the inverse of the system matrix; inner products of results are those
+    of projections."""
     factor, norm = factored(gram)
     solved, _ = dtrtrs(factor, right / norm[:, None], lower=1)
     return np.asarray(solved)
 
 
 def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
-    """(L, norm) with gram = D L L' D, D = diag(norm); only the lower triangle of L counts.
+    """Returns the factor L and `norm` with gram = D L L' D, D = diag(norm); only the lower triangle of L is
+    valid.
 
     The ridge is raised until the factorisation succeeds.
     """
@@ -69,16 +74,16 @@ def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
 
 
 CORE_RADIUS = float(np.sqrt(3.0))
-"""|u| at a wavelet's side lobe, the limit of the core that the data must resolve [-]."""
+"""|u| at the side lobe of a wavelet, which limits its core; the data must resolve the core [-]."""
 
 HALF_CORE_NOISE_RATIO = 5.0
-"""Least half width of a wavelet's core in standard deviations of the position noise [-]."""
+"""Least half width of a wavelet's core [standard deviations of the position noise]."""
 
 SIGNIFICANT_CORRELATION = 3.0
-"""Correlation of neighbouring residuals above which they are structure [standard errors]."""
+"""Correlation of neighbouring residuals above which the residuals are not noise [standard errors]."""
 
 LEAST_SLIDING_INPUT = 0.9
-"""Hysteresis input |s| above which a row belongs to its stroke [-]."""
+"""Absolute direction state |s| above which a row belongs to a stroke [-]."""
 
 TINY = float(np.finfo(float).tiny)
 """Smallest positive number, which replaces 0 in quotients and logarithms."""
@@ -86,10 +91,11 @@ TINY = float(np.finfo(float).tiny)
 
 @dataclass(frozen=True)
 class Block:
-    """Weighted rows and their channels: force = sum_k channel_k * (network k at the row's position)."""
+    """Weighted rows and their channels: force = sum_k channel_k * (force of network k at the position of the
+    row)."""
 
     positions: Float2D
-    """(m, d) in the unit box"""
+    """(m, d) positions in the unit box"""
     target: Float1D
     """(m,) sqrt(weight) * force"""
     channels: Float2D
@@ -105,9 +111,10 @@ class Block:
         return int(self.channels.shape[1])
 
     def strokes(self) -> list[Float2D]:
-        """Positions of the rows of each stroke: of those that slide, where a play lies between the strokes.
+        """Returns the positions of the rows of each stroke; rows within the play between the strokes are left
+        out.
 
-        A wavelet that only one stroke resolves would leave its two weights undetermined.
+        The two weights of a wavelet are determined only if the rows of both strokes resolve the wavelet.
         """
         if self.n_channels == 1:
             return [self.positions]
@@ -116,7 +123,8 @@ class Block:
         return [rows if len(rows) else self.positions for rows in sliding]
 
     def design(self, wavelets: Float2D) -> Float2D:
-        """(m, channels * (1 + d + N)): bias, linear and wavelet columns, channel by channel."""
+        """Returns the matrix (m, channels * (1 + d + N)) of bias, linear and wavelet columns, one channel
+        after the other."""
         first, n = 1 + self.positions.shape[1], wavelets.shape[1]
         design = np.empty((self.n_channels, first + n, len(wavelets)))
         for columns, channel in zip(design, self.channels.T, strict=True):
@@ -128,44 +136,45 @@ class Block:
 
 @dataclass(frozen=True)
 class Solution:
-    """Least squares at a fixed basis."""
+    """Solution of the least squares for fixed wavelets."""
 
     basis: Basis
     coefficients: Float2D
-    """(channels, 1 + d + N), the channels of all blocks one under the other: bias, linear, weights"""
+    """(channels, 1 + d + N) bias, slopes and weights of each channel of all blocks"""
     rss: float
-    """Residual sum of squares about the rows' mean forces"""
+    """Residual sum of squares of the mean forces of the rows [force^2]"""
     objective: float
-    """rss plus the penalty of the weights' prior; refinement lowers it"""
+    """Residual sum of squares plus the penalty on large weights [force^2]; refinement lowers this value"""
     designs: tuple[Float2D, ...]
     grams: tuple[Float2D, ...]
-    """design' design of every block, plus the prior on the weights"""
+    """Matrix design' design of every block, plus the penalty on large weights"""
     residuals: tuple[Float1D, ...]
 
 
 @dataclass(frozen=True)
 class SeparableProblem:
-    """Rows, channels, and the prior that makes every basis solvable."""
+    """Least-squares problem: rows, channels, and the penalty on large weights that makes all wavelets
+    solvable."""
 
     blocks: tuple[Block, ...]
     readout: Float2D
-    """(1, channels) or (2, channels): g (and h) as combinations of the channels' networks"""
+    """(1 or 2, channels) factors of the channels in the mean force g (and the hysteresis h)"""
     samples: float
-    """Samples of the compressed recording"""
+    """Number of samples of the compressed recording"""
     within: float
-    """Sum of squares inside its rows [force^2]"""
+    """Sum of squared differences of the samples from the mean force of their row [force^2]"""
     force_range: float
-    """Largest less smallest force, above 0"""
+    """Largest minus smallest force, above 0 [force]"""
     resolved_by: int
-    """Distinct positions of every block that a wavelet's core must hold; at most as many as there are"""
+    """Least number of distinct positions of every block that a wavelet's core must contain"""
     held_out: HeldOutRows | None = None
-    """Rows held out, for the criteria that judge on them"""
+    """Held-out rows, for the criteria that use held-out rows"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the samples"""
+    """Limits of the information in the samples: dependence, force resolution and position noise"""
     prior: float = 0.0
-    """Price of a squared weight; see :meth:`with_prior`"""
+    """Penalty factor of a squared weight [-]; see :meth:`with_prior`"""
     resolutions: tuple[Resolution, ...] = ()
-    """Of the strokes of all blocks; computed where not given"""
+    """Distances between positions for each stroke of all blocks; computed by default"""
 
     def __post_init__(self) -> None:
         known = self.resolutions or tuple(
@@ -185,34 +194,38 @@ class SeparableProblem:
         return sum(block.n_channels for block in self.blocks)
 
     def n_parameters(self, n_wavelets: int) -> int:
-        """Fitted numbers: d dilations, d translations and a weight a channel; a slope and bias a channel."""
+        """Returns the number of fitted values: for each wavelet d dilations, d translations and a weight per
+        channel; for each channel d slopes and a bias."""
         return 2 * self.dimension * n_wavelets + self.n_channels * (n_wavelets + 1 + self.dimension)
 
     def total(self, rss: float) -> float:
-        """Error over all samples [force^2] as a criterion sees it: never less than a sensor resolves."""
+        """Returns the sum of squared errors of all samples [force^2] for a criterion: at least that of the
+        force resolution."""
         least = max(FORCE_RESOLUTION * self.force_range, self.limits.force_error)
         return max(rss + self.within, least**2 * self.samples, TINY)
 
     @property
     def independent(self) -> float:
-        """Independent samples, of all samples."""
+        """Number of independent samples."""
         return self.limits.independent * self.samples
 
     def rmse(self, solution: Solution) -> float:
-        """Root mean square error over all samples [force]."""
+        """Returns the RMS error of a solution over all samples [force]."""
         return float(np.sqrt((solution.rss + self.within) / self.samples))
 
     def resolved_rmse(self, solution: Solution) -> float:
-        """The same, but never less than a sensor resolves: the unit of other errors."""
+        """Returns the RMS error of a solution over all samples, at least the force resolution [force]."""
         return float(np.sqrt(self.total(solution.rss) / self.samples))
 
     def evenness(self, solution: Solution) -> float:
-        """Median over RMS of the residuals, 1 for normal noise; small where a few places hold the error."""
+        """Returns the scaled ratio of median to RMS of |residual|: 1 for normal noise, small if few positions
+        cause the error."""
         residual = np.abs(np.concatenate(solution.residuals))
         return 1.4826 * float(np.median(residual)) / max(float(np.sqrt(np.mean(residual**2))), TINY)
 
     def neighbour_correlation(self, solution: Solution) -> float:
-        """Correlation of residuals at neighbouring positions, in standard errors; one channel, d = 1."""
+        """Returns the correlation of residuals at neighbouring positions [standard errors]; 0 with several
+        inputs or channels."""
         if self.dimension > 1 or self.n_channels > 1:
             return 0.0
         (residual,) = solution.residuals
@@ -228,26 +241,29 @@ class SeparableProblem:
         )
 
     def errors(self, solution: Solution, rows: HeldOutRows) -> Float1D:
-        """Force less the solution's at rows that the problem was not made of."""
+        """Returns the recorded force minus the force of a solution at held-out rows."""
         return rows.errors(self.readout @ solution.coefficients, solution.basis.alpha, solution.basis.beta)
 
     def with_prior(self, rss: float) -> SeparableProblem:
-        """The problem with a penalty on large weights: each is expected within the force range.
+        """Returns the problem with a penalty on weights that are large compared with the range of the force.
 
-        The penalty is as firm as one sample at this noise level, from the residual sum of squares.
+        The penalty of one weight counts as much as one sample with the noise that `rss`, a residual sum of
+        squares, shows.
 
-        Without it, a stroke without data at positions of the other one could give a wavelet there any weight.
+        Without the penalty, a wavelet at positions where one stroke has no data could get any weight for that
+        stroke.
         """
         return replace(self, prior=self.total(rss) / self.samples / self.force_range**2)
 
     def finest(self, beta: Float2D) -> Float2D:
-        """Largest dilation (N, 1) that the data around each translation resolve, on every stroke."""
+        """Returns the largest dilation (N, 1) that the positions around each translation resolve, on every
+        stroke [1/box]."""
         reach = np.max([each.reach(beta, self.resolved_by) for each in self.resolutions], axis=0)
         least = max(HALF_CORE_NOISE_RATIO * self.limits.position_noise, 1e-9)
         return np.asarray(CORE_RADIUS / np.maximum(reach, least))[:, None]
 
     def solve(self, basis: Basis) -> Solution:
-        """Weights, slopes and biases of all channels for this basis."""
+        """Fits weights, slopes and biases of all channels for given wavelets."""
         tables, designs, grams = [], [], []
         for block in self.blocks:
             design = block.design(wavelet_columns(block.positions, basis.alpha, basis.beta))
@@ -259,9 +275,10 @@ class SeparableProblem:
         return self._solution(basis, np.concatenate(tables), tuple(designs), tuple(grams))
 
     def with_coefficients(self, solution: Solution, coefficients: Float2D) -> Solution:
-        """Other coefficients (channels, 1 + d + N) on the wavelets of a solution, with the errors they leave.
+        """Returns a solution with the same wavelets, other coefficients (channels, 1 + d + N), and its
+        errors.
 
-        The solution may be that of another problem with the same positions.
+        `solution` may belong to another problem with the same positions.
         """
         return self._solution(solution.basis, coefficients, solution.designs, solution.grams)
 
@@ -286,10 +303,11 @@ class SeparableProblem:
         return np.split(coefficients, ends[:-1])
 
     def normal_equations(self, at: Solution) -> tuple[Float2D, Float1D]:
-        """Gauss-Newton matrix and descent direction of variable projection at a solved basis.
+        """Returns the Gauss-Newton matrix and the descent direction of variable projection at a solution.
 
-        With the linear unknowns eliminated the residual is P y, P the projector off the design's columns,
-        and its Jacobian in Kaufman's form is -P (d design/d theta) coefficients (Golub & Pereyra 1973,
+        With weights, slopes and biases eliminated, the residual is P y, where y holds the forces and P
+        projects onto the complement of the design's columns. The Jacobian of the residual in Kaufman's form
+        is -P (d design/d theta) coefficients, with dilations and translations theta (Golub & Pereyra 1973,
         Kaufman 1975). Steps are dimensionless, d log(alpha) and alpha d(beta), ordered (quantity, input,
         wavelet).
         """
@@ -310,7 +328,8 @@ class SeparableProblem:
         return matrix, gradient
 
     def removal_costs(self, solution: Solution) -> Float1D:
-        """Growth of the objective (N,) if one wavelet left and the linear unknowns were solved again."""
+        """Returns the increase of the penalised squared error (N,) if that wavelet were removed and the
+        linear unknowns fitted again."""
         n, first = len(solution.basis), 1 + self.dimension
         cost = np.zeros(n)
         for block, gram, table in zip(
@@ -333,7 +352,11 @@ class SeparableProblem:
 def problem_of(
     rows: Compressed, *, resolved_by: int, held_out: HeldOutRows | None = None
 ) -> SeparableProblem:
-    """The problem of compressed rows (positions in the unit box): one channel, two strokes, or 1 and s."""
+    """Returns the least-squares problem of compressed rows with positions in the unit box.
+
+    Without direction state s the problem has one channel; with s = +-1 one block per stroke; else one block
+    with the channels 1 and s.
+    """
     if rows.side is None:
         blocks = [Block.weighted(rows.positions, rows.force, rows.weight, np.ones((len(rows.force), 1)))]
         readout = np.array([[1.0]])
@@ -360,23 +383,26 @@ def problem_of(
 
 
 LEAST_DILATION = 0.5
-"""Smallest dilation [1/box]: over the unit box a wider wavelet is a parabola, as this one nearly is."""
+"""Smallest dilation [1/box]: a wider wavelet would be nearly a parabola over the unit box."""
 
 LARGEST_OVERHANG = 0.3
-"""Largest distance of a translation from the unit box [box]. From further away a wavelet is nearly straight
+"""Largest distance of a translation from the unit box [box]. A wavelet further away is nearly a straight line
 in the box."""
 
 LONGEST_STEP = 0.7
-"""Longest step of log(alpha) and of alpha beta [-]. A longer one is not linear in the basis."""
+"""Longest refinement step of log(dilation) and of dilation * translation [-]. For a longer step the
+linearisation is not valid."""
 
 MOST_IDLE_STEPS = 2
-"""Steps in succession with a smaller gain than the tolerance after which refinement ends."""
+"""Number of successive steps with a gain below the tolerance after which refinement ends."""
 
 
 def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
-    """Lower the objective from start by at most `steps` accepted or tried steps.
+    """Refines the wavelets of `start` to lower the penalised squared error, by at most `steps` accepted or
+    refused steps.
 
-    It ends early after MOST_IDLE_STEPS steps in a row that each lowered the deviance by less than tolerance.
+    Refinement ends after MOST_IDLE_STEPS successive steps that each lowered the deviance by less than
+    `tolerance`.
     """
     best, linearised = start, None
     if len(start.basis) == 0:
@@ -403,7 +429,8 @@ def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance:
 def _bounded_step(
     basis: Basis, finest: Float2D, matrix: Float2D, gradient: Float1D, step_damping: float
 ) -> Float1D:
-    """Levenberg-Marquardt step over the unknowns that bounds leave free."""
+    """Returns the Levenberg-Marquardt step of dilations and translations; a value at its bound does not move
+    further."""
     d = basis.alpha.shape[1]
     push_alpha, push_beta = gradient.reshape(2, d, len(basis)).transpose(0, 2, 1)
     held_alpha = (push_alpha > 0) & (basis.alpha >= finest * (1 - 1e-9))
@@ -430,7 +457,8 @@ def _bounded_step(
 
 
 def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> tuple[Basis, Float2D]:
-    """The basis after a step, brought back to its bounds, and the largest dilations there (N, 1)."""
+    """Returns the wavelets after a step, limited to the allowed values, and their largest allowed dilations
+    (N, 1)."""
     grow, shift = step.reshape(2, problem.dimension, len(basis)).transpose(0, 2, 1)
     beta = np.clip(basis.beta + shift / basis.alpha, -LARGEST_OVERHANG, 1 + LARGEST_OVERHANG)
     finest = problem.finest(beta)
@@ -439,15 +467,16 @@ def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> tuple[Basi
 
 
 QUASI_NEWTON_STEPS = 10
-"""Quasi-Newton steps for each requested step of variable projection: they are shorter."""
+"""Number of quasi-Newton steps for each requested step of variable projection: quasi-Newton steps are
+shorter."""
 
 
 def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
-    """Lower the objective from start; never worse than it.
+    """Refines all fitted values of `start` by a quasi-Newton method; the result is never worse than `start`.
 
-    The unknowns are the coefficients times the norms of their columns over that of the target, log(alpha) and
-    alpha_start beta, so that all are of one size. It ends where a step lowers the deviance by less than
-    tolerance, a tenth of it for each of its shorter steps.
+    The unknowns are coefficients times the norm of their column over the norm of the target, log(alpha), and
+    alpha_start beta, so that all have a similar size. Refinement ends when a step lowers the deviance by less
+    than a tenth of `tolerance`.
     """
     basis, d = start.basis, problem.dimension
     if len(basis) == 0:
@@ -508,7 +537,8 @@ def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolera
 def _gradient(
     problem: SeparableProblem, table: Float2D, basis: Basis
 ) -> tuple[float, Float2D, Float2D, Float2D]:
-    """The objective; its derivatives by coefficients (channels, 1 + d + N), log(alpha), beta (N, d)."""
+    """Returns the penalised squared error and its derivatives by coefficients (channels, 1 + d + N),
+    log(alpha) and beta (N, d)."""
     first = 1 + problem.dimension
     by_table = np.zeros_like(table)
     by_log_alpha, by_beta = np.zeros_like(basis.alpha), np.zeros_like(basis.beta)

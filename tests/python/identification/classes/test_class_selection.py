@@ -117,7 +117,8 @@ def test_rows_without_direction_are_used_if_hysteresis_is_not_accepted() -> None
 
 
 def test_strokes_that_gain_energy_do_not_become_a_rapidly_changing_force() -> None:
-    """In a periodic sweep each stroke has other positions; their alternation is not a force of position."""
+    """In a periodic motion press and release are sampled at different positions; the alternation of both
+    forces is not a force of position."""
     random = np.random.default_rng(3)
     cycle, sample = np.divmod(np.arange(1600), 80)
     phase = 2.0 * np.pi * (sample + 0.25) / 80 + 0.0005 * cycle
@@ -313,7 +314,8 @@ def test_hysteresis_is_not_tested_if_motions_are_too_short_for_any_play() -> Non
 
 
 def test_hysteresis_is_not_tested_if_the_motion_never_turns_back() -> None:
-    """Two magnets pulled apart: rows with known play are one stroke, which does not determine h."""
+    """Two magnets pulled apart: all rows with known direction state are one stroke, which does not determine
+    the hysteresis h."""
     x = np.linspace(0.0, 1.0, 3000)
     force = 1e-4 / (x + 0.08) ** 4 + np.random.default_rng(7).normal(0.0, 0.005, len(x))
     network = fit_environment(x[:, None], force, starts=[0])

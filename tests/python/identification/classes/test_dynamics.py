@@ -86,7 +86,7 @@ def test_velocity_and_hysteresis_are_accepted_only_if_present(
 def test_decision_on_each_term_reports_its_gain() -> None:
     decisions = identify(moved(1, damping=0.03)).notes["model_selection"]
     (accepted,) = (line for line in decisions if line.startswith("damping: accepted"))
-    assert "squared error on held-out stretches -" in accepted
+    assert "squared error on held-out sections -" in accepted
     assert ", BIC -" in accepted
     assert any(line.startswith("mass: not accepted (BIC ") for line in decisions)
 
@@ -204,7 +204,8 @@ def to_and_fro(seed: int, speeds: list[float], *, damping: float, noise: float =
 
 
 def test_damping_is_not_tested_at_one_speed_but_at_two() -> None:
-    """v is then its sign, and friction explains a loop of constant height equally well."""
+    """The velocity is then proportional to its sign, and Coulomb friction explains a loop of constant height
+    equally well."""
     for seed in range(1 if SCALE == 1 else 20):
         one = identify(to_and_fro(seed, [0.3] * 6, damping=0.06))
         assert (one.kind, one.damping) == ("hysteresis", None)

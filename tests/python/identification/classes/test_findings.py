@@ -188,7 +188,7 @@ def test_relaxation_is_named_and_gives_no_steep_slope() -> None:
     x, force, time = relaxation()
     model = palpate.identify(recorded(x, force, time))
     assert "explains at most" in str(model.verdict)
-    assert "the force changes at a constant position (relaxation, creep or drift)" in str(model.verdict)
+    assert "changes with time at a constant position (relaxation, creep or drift)" in str(model.verdict)
     assert model.slope_bounds is not None
     assert max(np.abs(model.slope_bounds)) < 200.0
 

@@ -294,7 +294,7 @@ def test_matched_identification_of_a_moving_object_is_closer_to_its_force() -> N
 
 def test_other_periods_than_the_papers_are_refused() -> None:
     x = np.linspace(0.0, 1.0, 100)
-    with pytest.raises(InputError, match=r"the recording has no time, which the paper's filters need"):
+    with pytest.raises(InputError, match=r"the recording has no time column, which the paper's filters need"):
         identify(Recording.from_arrays(x, x), search=SearchOptions(filters="paper-implicit"))
     with pytest.raises(InputError, match=r"are 0.01 to 0.01 s: the paper's filters need 0.001 s"):
         identify(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hysteresis of recordings that state neither a direction nor time."""
+"""Hysteresis of recordings with neither a direction column nor time."""
 
 import json
 from dataclasses import replace
@@ -149,7 +149,8 @@ def test_equal_strokes_do_not_change_the_model() -> None:
     """Equal to the last bit to the model of the same rows without order."""
     force = loop(h=0.0)
     ordered = identify(Recording.from_arrays(IN_AND_OUT, force))
-    assert "hysteresis: not accepted (press and release do not differ by 4 standard errors)" in notes(ordered)
+    decision = "hysteresis: not accepted (press and release force do not differ by 4 standard errors)"
+    assert decision in notes(ordered)
     rows = np.random.default_rng(5).permutation(800)
     shuffled = strokes_of([bare(rows, force)], named=False)
     assert shuffled.side is None
@@ -217,7 +218,7 @@ def measured_files(data: Path) -> list[Path]:
 
 
 def test_measured_strokes_are_found_in_the_order_of_rows(data: Path) -> None:
-    """At most 1 % of the rows get the other stroke: those that rest at the reversal."""
+    """At most 1 % of the rows get the wrong stroke: rows of a pause at a reversal."""
     files = measured_files(data)
     assert files
     for path in files:

@@ -44,7 +44,7 @@ def test_bounds_enclose_the_energy_of_a_function_in_the_frame() -> None:
 
 
 def test_three_vectors_of_the_plane_are_a_tight_frame() -> None:
-    """Example of the paper, section 2.4: T'T = 1.5 I, and its three coefficients reconstruct (1, 1)."""
+    """Example frame of the paper, section 2.4: T'T = 1.5 I, and its three coefficients reconstruct (1, 1)."""
     half, root = 0.5, np.sqrt(3.0) / 2.0
     frame = np.array([[0.0, 1.0], [root, half], [root, -half]])
     np.testing.assert_allclose(frame.T @ frame, 1.5 * np.eye(2), atol=1e-15)

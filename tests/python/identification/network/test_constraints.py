@@ -173,7 +173,7 @@ def test_slope_bounds_and_a_coupling_limit_the_slope_everywhere() -> None:
 
 
 def test_the_slope_limited_fit_is_close_to_the_nearest_slope_limited_force() -> None:
-    """Isotonic regression of the true force is the best force with that slope."""
+    """Isotonic regression of the true force is the nearest force with the required slope."""
     from scipy.optimize import isotonic_regression
 
     x = np.linspace(0.0, 0.6, 1200)
