@@ -66,7 +66,7 @@ _LIKELY_UNITS = {"angle": "rad", "torque": "Nm", "moment": "Nm", "current": "A"}
 LONGEST_CURE = 1000
 """Largest length of the options that an error message suggests [characters].
 
-With longer options, the message asks to shorten the column names in the file.
+Longer options are left out of the message.
 """
 
 _NUMBER_WORDS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
@@ -303,7 +303,7 @@ def _cure(
     steady: Collection[str],
     problems: Mapping[str, str],
 ) -> str:
-    """Returns the options that make a refused file readable, after a test of the choice with these options."""
+    """Returns the options that make a refused file readable; tests the choice with these options first."""
     no_cure = ". A recording needs two columns of numbers, a position and a force"
     roles, units, direction = dict(request.roles), dict(request.units), request.direction
     inputs = tuple(name for name in request.inputs if name in names)

@@ -419,7 +419,7 @@ def _may_be_header(rows: Sequence[Row], k: int, first: int) -> bool:
     """Returns True if row k can be the header above the data row `first`: both have the same number of cells.
 
     A row directly above `first` may have one cell less if each data row ends with a separator, or more if
-    data rows are incomplete.
+    cells of the data row are missing.
     """
     cells, needed = len(rows[k]), len(rows[first])
     if cells == needed:

@@ -2,7 +2,8 @@
 """Fingerprints of files, atomic writing, and recordings as CSV files.
 
 The CSV file states the role of each column and can be read without options. A flight record has the
-additional role "status": its column states for every row if the force was the model's, not changed by a guard.
+additional role "status": its column states for every row if the force was the model's force, or if a guard
+changed it.
 """
 
 from __future__ import annotations

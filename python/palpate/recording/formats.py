@@ -44,7 +44,7 @@ _ITEM_BYTES = {
 """Size of one number in a MATLAB element, by the type number of the element [bytes]."""
 
 _NUMERIC_CLASSES = range(6, 16)
-"""Class numbers of numeric MATLAB arrays. Each array holds flags, dimensions, name, values, imaginary parts."""
+"""Class numbers of numeric MATLAB arrays. An array holds flags, dimensions, name, values, imaginary parts."""
 
 _COMPLEX_FLAG = 1 << 11
 """Bit of the flags of a MATLAB array that marks complex numbers."""
@@ -433,7 +433,7 @@ def _mcap(path: Path) -> Table:
 
 
 def _named_values(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Yields the numbers and words in a JSON message, with names like ``wrench.force_N`` for nested fields."""
+    """Yields the numbers and words of a JSON message; a nested field has a name like ``wrench.force_N``."""
     if isinstance(value, dict):
         for key, item in value.items():
             yield from _named_values(item, f"{name}.{key}" if name else str(key))

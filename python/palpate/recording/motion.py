@@ -54,7 +54,7 @@ JUMPING_SHARE = 0.1
 """Share of the rows in jumps above which the rows are taken as not ordered in time [-]."""
 
 HOLD_SHARE = 0.1
-"""Least share of a stroke's rows that stay at the stroke's last position, so that these rows are a hold [-]."""
+"""Least share of a stroke's rows that stay at the stroke's last position and are a hold [-]."""
 
 HOLD_ROWS = 10
 """Least number of rows that stay at the last position of a stroke, so that these rows are a hold."""
@@ -141,7 +141,7 @@ def _resolution(x: Float1D) -> float:
 
 
 def _stroke_ends(x: Float1D, turn: float) -> list[tuple[int, int]]:
-    """Returns last row and direction of each stroke; a stroke ends if position x moves back more than `turn`."""
+    """Returns last row and direction of each stroke. A stroke ends if x moves back by more than `turn`."""
     # Positions rounded to a grid have few local extremes, even with much noise.
     grid = np.rint(x * (GRID_STEPS / turn))
     steps = np.diff(grid)
@@ -174,7 +174,7 @@ def _stroke_ends(x: Float1D, turn: float) -> list[tuple[int, int]]:
 
 
 def _rest(x: Float1D, row: int, within: float) -> tuple[int, int]:
-    """Returns first and last of the rows around `row` whose positions differ from its position by `within`."""
+    """Returns first and last row of the run around `row` in which |x - x[row]| is at most `within`."""
     away = np.abs(x - x[row]) > within
     before, after = np.flatnonzero(away[:row]), np.flatnonzero(away[row:])
     first = int(before[-1]) + 1 if len(before) else 0
@@ -252,7 +252,7 @@ class LowPass:
         return math.ceil(2.0 * MARGIN_TIME_CONSTANTS / (self.cutoff * period))
 
     def __call__(self, signal: Float1D, period: float) -> Float1D:
-        """Returns the low-passed signal (k,) without delay. Before filtering, the signal is mirrored at both ends."""
+        """Returns the low-passed signal (k,) without delay. The signal is first mirrored at both ends."""
         pole = math.exp(-self.cutoff * period)
         response = TransferFunction([(1.0 - pole) ** 2, 0.0, 0.0], [1.0, -2.0 * pole, pole * pole])
         mirrored = min(len(signal) - 1, self.margin(period))
@@ -352,7 +352,7 @@ def long_enough(parts: Sequence[Piece], low_pass: LowPass) -> list[Piece]:
 def at_rows(
     parts: Sequence[Piece], low_pass: LowPass, derive: Callable[[Piece], Float1D], n: int
 ) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Returns a low-passed derivative at the n rows of the pieces (n,), and True for rows where it exists (n,)."""
+    """Returns a low-passed derivative at the n rows of the pieces (n,), and True if it is accurate (n,)."""
     result, defined = np.zeros(n), np.zeros(n, dtype=np.bool_)
     for part in long_enough(parts, low_pass):
         margin = low_pass.margin(part.period)

@@ -20,7 +20,7 @@ from .motion import GAP_RATIO
 from .recording import Recording
 
 PLAUSIBLE_TRAVEL = {"m": (1e-7, 0.5), "rad": (1e-3, 100.0 * np.pi)}
-"""Least and largest plausible position range by unit: from a microscope tip to an arm; up to 50 revolutions."""
+"""Least and largest plausible position range by unit: from microscope tip to arm; up to 50 revolutions."""
 
 PLAUSIBLE_FORCE_RANGE = {"N*m": (1e-6, 1e3), "A": (1e-5, 1e3)}
 """Least and largest plausible difference of two forces by unit; for N it depends on the position range."""
@@ -279,7 +279,7 @@ def _usual_count(x: Float1D, value: float, travel: Travel) -> float:
 
 
 def _change_inside(f: Float1D, rows: NDArray[np.intp]) -> float:
-    """Returns how far the force inside a run of rows leaves the interval between the run's first and last force.
+    """Returns how far the force inside a run of rows leaves the interval between its first and last force.
 
     A hand is at rest when it reverses, while friction changes its sign. The force then changes from one end
     of the run to the other, but does not leave that range.

@@ -143,7 +143,10 @@ def test_a_reversed_sign_is_detected_before_any_force(quantity: str, monkeypatch
     found = check_device(push=True)
     assert not found.suitable
     assert all("push" not in settings for settings in calls)
-    assert observed(found, "sign of the force").text == "not measured: a wrong result forbids force"
+    assert (
+        observed(found, "sign of the force").text
+        == "not measured, because another observation is wrong: no force is sent"
+    )
 
 
 def push_ticks(

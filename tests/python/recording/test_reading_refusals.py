@@ -293,4 +293,7 @@ def test_time_must_be_later_than_all_times_before_it(csv_file: Write) -> None:
     lines = [*timed_rows(12), "50,90,1", "60,91,1", "nan,92,1", "120,93,1"]
     recording = read_recording(csv_file("time_ms,depth_mm,force_N", lines), invalid="drop")
     np.testing.assert_allclose(recording.position[11:], [5.5e-3, 93e-3])
-    assert recording.notes[2] == "dropped 2 rows with a time that repeats or decreases (first: line 14)"
+    assert (
+        recording.notes[2]
+        == "dropped 2 rows whose time is not later than the time of a row before (first: line 14)"
+    )
