@@ -65,7 +65,7 @@ class Check:
 
     @property
     def may_push(self) -> bool:
-        """True if no observation forbids force, so the device may push the handle. A late host does not forbid it."""
+        """True if the device may push the handle: no wrong property forbids force. A late host is allowed."""
         return not any(each.right is False and each.forbids_force for each in self.observations)
 
     @property
@@ -87,8 +87,8 @@ class Check:
         """
         if not self.may_push:
             raise InputError(
-                "this device has no profile, because a wrong result of its check forbids force; "
-                "correct it first"
+                "this device gets no profile: its check found a wrong property that makes force unsafe; "
+                "correct that property first"
             )
         inertia, damping = self.numbers["inertia"], self.numbers["viscous_damping"]
         friction = self.numbers["coulomb_friction_at_least"]
@@ -200,10 +200,8 @@ def check_device(
             check, Observation(_FORCE_SIGN, "not measured", None, "check a free handle with --push")
         )
     elif not check.may_push:
-        check = _with(
-            check,
-            Observation(_FORCE_SIGN, "not measured, because another observation is wrong: no force is sent"),
-        )
+        text = "not measured: no force is sent while another property is wrong"
+        check = _with(check, Observation(_FORCE_SIGN, text))
     else:
         force = PUSH_FORCE_SHARE * check.base.force_limit
         push_summary = measure(device, duration_s=duration_s * (1.0 - NO_FORCE_SHARE), push=force, **common)

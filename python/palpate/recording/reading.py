@@ -271,7 +271,7 @@ class LongRecording:
 
 
 class _PartPlaces:
-    """Line numbers of the rows of a part. The rows before the part are counted when a line number is needed."""
+    """Line numbers of the rows of a part. Rows before the part are counted if a line number is needed."""
 
     def __init__(self, table: LongTable, part: tuple[int, int]) -> None:
         self._table, self._part = table, part
@@ -317,9 +317,7 @@ def open_long_recording(
         drop=invalid == "drop",
     )
     if conversion.direction == "segment" and direction is None and "segment" not in table.text_names:
-        conversion = replace(
-            conversion, direction=None
-        )  # a column with segment numbers does not state the direction
+        conversion = replace(conversion, direction=None)  # segment numbers state no direction
     notes = conversion.note(dialect=table.notes), *conversion.choice.notes
     conversion = replace(conversion, choice=replace(conversion.choice, time=None, inputs=()))
     rows, parts = _require_long_table(table, file).parts(part_rows)

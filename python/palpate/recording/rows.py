@@ -135,7 +135,7 @@ class RowCheck:
             not_later,
             name,
             "holds {cell}, must be later than the time before it",
-            "whose time is not later than the time of a row before",
+            "with a time that is not later than in a row before",
         )
 
     def _refuse_or_drop(self, bad: NDArray[np.bool_], name: str, sentence: str, reason: str) -> None:

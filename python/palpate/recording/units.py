@@ -25,7 +25,7 @@ class Unit:
     """Factor of the conversion: value in SI = factor * value in this unit"""
 
     def text(self, value: float) -> str:
-        """Returns a value given in SI as text in this unit, with four significant digits and the unit's symbol."""
+        """Returns a value given in SI as text in this unit, with four significant digits and the symbol."""
         return f"{value / self.factor:.4g} {self._shown}".rstrip()
 
     def interval(self, low: float, high: float) -> str:

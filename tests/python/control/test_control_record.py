@@ -426,7 +426,7 @@ def test_a_rendered_model_is_identified_as_the_same_model(tmp_path: Path) -> Non
     palpate("identify", rendered, "-o", second)
     output = palpate("show", first, "--beside", second, "--plot", figure)
     assert output.startswith("verdict: good\n")
-    rows = output.partition("largest difference, in just noticeable ones\n")[2].splitlines()
+    rows = output.partition("largest force difference, in just noticeable differences\n")[2].splitlines()
     shares = [float(row.split()[-1]) for row in rows]
     print(f"largest difference in just noticeable ones: {shares}")
     assert shares

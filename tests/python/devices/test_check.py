@@ -143,10 +143,8 @@ def test_a_reversed_sign_is_detected_before_any_force(quantity: str, monkeypatch
     found = check_device(push=True)
     assert not found.suitable
     assert all("push" not in settings for settings in calls)
-    assert (
-        observed(found, "sign of the force").text
-        == "not measured, because another observation is wrong: no force is sent"
-    )
+    text = observed(found, "sign of the force").text
+    assert text == "not measured: no force is sent while another property is wrong"
 
 
 def push_ticks(

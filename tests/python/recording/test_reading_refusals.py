@@ -295,5 +295,5 @@ def test_time_must_be_later_than_all_times_before_it(csv_file: Write) -> None:
     np.testing.assert_allclose(recording.position[11:], [5.5e-3, 93e-3])
     assert (
         recording.notes[2]
-        == "dropped 2 rows whose time is not later than the time of a row before (first: line 14)"
+        == "dropped 2 rows with a time that is not later than in a row before (first: line 14)"
     )
