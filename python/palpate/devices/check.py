@@ -26,11 +26,11 @@ PUSH_FORCE_SHARE = 0.005
 """Force of a push [share of the largest force of the device]; too small to be felt"""
 
 _FRICTION_ADVICE = (
-    "take the hand off the handle and check for 10 s; if the friction exceeds the pushes, give it with "
-    "--coulomb-friction"
+    "take the hand off the handle and check for 10 s; if the friction exceeds the force of the pushes, state "
+    "the friction with --coulomb-friction"
 )
 _NO_FRICTION_ADVICE = (
-    "direct rendering needs friction above 0 for a certificate, because an encoder has steps"
+    "a certificate of direct rendering needs device friction above 0, because the encoder has steps"
 )
 _SHORTEST_DURATION_S = 2.0
 """Least duration of a check [s]; in this time the handle must be moved and must be at rest"""
@@ -95,7 +95,7 @@ class Check:
         if inertia is None or damping is None or friction is None:
             raise InputError(
                 "a profile needs inertia, damping and friction: check a free handle without load "
-                "for 10 s with --push; if the friction exceeds the pushes, give it with --coulomb-friction "
+                "for 10 s with --push; if the friction exceeds the pushes, state it with --coulomb-friction "
                 "(in Python coulomb_friction)"
             )
         period, jitter, delay = self.numbers["period_s"], self.numbers["jitter_s"], self.numbers["delay_s"]
@@ -308,8 +308,8 @@ def _sign(push: Push, step: float, unit: str) -> Observation:
         or push.displacement == 0.0
     ):
         advice = (
-            f"must be at least {_LEAST_SIGN_STEPS:g} encoder steps and {_LEAST_SIGN_ERRORS:g} "
-            "standard errors: take the hand off the handle"
+            f"a push must move the handle by {_LEAST_SIGN_STEPS:g} encoder steps and "
+            f"{_LEAST_SIGN_ERRORS:g} standard errors at least: take the hand off the handle"
         )
         return Observation(_FORCE_SIGN, f"not clear: {text}", None, advice)
     if push.displacement < 0.0:
@@ -322,7 +322,7 @@ def _sign(push: Push, step: float, unit: str) -> Observation:
         _FORCE_SIGN,
         text,
         push.displacement > 0.0 and push.reported_sign_agrees,
-        "exchange two wires of the motor, or reverse its sign in the firmware; do not enable force",
+        "exchange two wires of the motor, or reverse the motor's sign in the firmware; do not enable force",
         True,
     )
 

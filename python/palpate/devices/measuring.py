@@ -39,7 +39,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     """
     if object is not None:
         if device != "simulated":
-            raise InputError(f"an object needs device simulated; {device} has a real one: leave out object")
+            raise InputError(f"object needs device simulated; {device} has a real object: leave out object")
         settings["position_unit"] = object.units["position"]
         settings["force_unit"] = object.units["force"]
         if object.units["force"] == "A":

@@ -116,7 +116,8 @@ def _rate(rate_hz: float, wanted: float) -> Observation:
         "rate",
         f"{rate_hz:.1f} Hz of {wanted:g} Hz",
         bool(abs(rate_hz / wanted - 1.0) <= _RATE_TOLERANCE),
-        f"must be within {_RATE_TOLERANCE:.0%}: close other programs, or give the loop real-time priority",
+        f"the rate must be within {_RATE_TOLERANCE:.0%} of {wanted:g} Hz: close other programs, or give the "
+        "loop real-time priority",
     )
 
 
@@ -126,7 +127,7 @@ def _period(period: Mapping[str, float], wanted: float) -> Observation:
         "period",
         _percentiles(period),
         period["p999_us"] <= longest_us,
-        f"99.9 % must be below {longest_us:.0f} us: close other programs, or give the loop "
+        f"99.9 % of the periods must be below {longest_us:.0f} us: close other programs, or give the loop "
         "real-time priority",
         detail=True,
     )
@@ -142,7 +143,7 @@ def _clock(ticks: Mapping[str, Any], wanted: float) -> Observation:
         "device clock",
         f"{1e6 * mean:.1f} us per sample, spread {1e6 * float(steps.std()):.1f} us",
         bool(abs(mean * wanted - 1.0) <= _CLOCK_TOLERANCE),
-        f"must be within {_CLOCK_TOLERANCE:.1%} of {1e6 / wanted:.1f} us: the firmware does not "
+        f"the mean must be within {_CLOCK_TOLERANCE:.1%} of {1e6 / wanted:.1f} us: the firmware does not "
         "keep its stated rate",
         detail=True,
     )
@@ -154,7 +155,7 @@ def _losses(summary: Mapping[str, Any]) -> Observation:
         "samples",
         f"{lost} lost and {repeated} repeated of {ticks}",
         bool(lost + repeated <= _LARGEST_LOST_SHARE * ticks),
-        f"must be at most {_LARGEST_LOST_SHARE:.1%}: {_CABLE_ADVICE}",
+        f"at most {_LARGEST_LOST_SHARE:.1%} of the samples may be lost or repeated: {_CABLE_ADVICE}",
     )
 
 
@@ -195,8 +196,8 @@ def _velocity(ticks: Mapping[str, Any], step: float) -> Observation:
         name,
         f"{share:.2f} times the velocity from the positions",
         abs(share - 1.0) <= _VELOCITY_TOLERANCE,
-        f"must be within {_VELOCITY_TOLERANCE:.0%} of 1, a negative value is a reversed sign: correct the "
-        "firmware; do not enable force",
+        f"the ratio of both velocities must be within {_VELOCITY_TOLERANCE:.0%} of 1; a negative ratio is a "
+        "reversed sign: correct the firmware; do not enable force",
         share <= 0.0,
     )
 
@@ -217,15 +218,15 @@ def _transducer(position: Float1D, measured: Float1D, step: float) -> Observatio
             name,
             f"not clear: correlation of force and position {correlation:.2f}",
             None,
-            f"must be above {_LEAST_CORRELATION:g}: press a plain spring",
+            f"the correlation must be above {_LEAST_CORRELATION:g}: press a plain spring with the handle",
         )
     return Observation(
         name,
         f"{'correct' if correlation > 0.0 else 'reversed'}: correlation of force and position "
         f"{correlation:.2f}",
         correlation > 0.0,
-        "must be positive when an object is pressed: reverse the sign of the encoder or the transducer; do "
-        "not enable force",
+        "the correlation must be positive when an object is pressed: reverse the sign of the encoder or the "
+        "transducer; do not enable force",
         True,
     )
 

@@ -159,7 +159,7 @@ def choose_columns(
         return replace(choice, notes=(*choice.notes, note))
     message = "; ".join(problems.values())
     if "no column" in message:
-        message += f". Its columns are {listed(names)}"
+        message += f". The columns are {listed(names)}"
     raise InputError(f"{file}: {message}{_cure(names, request, unstated, text, steady, problems)}")
 
 
@@ -173,7 +173,7 @@ def _attempt(
     ]
     for option, name in (*options, *(("inputs", name) for name in request.inputs)):
         if name is not None and name not in names:
-            problems[option.strip("-")] = f"it has no column {shortened(name)!r} for {option}"
+            problems[option.strip("-")] = f"there is no column {shortened(name)!r} for {option}"
     columns = _with_units(names, request, problems)
     notes: list[str] = []
     chosen: dict[str, Column | None] = {}
@@ -207,7 +207,7 @@ def _with_units(names: Sequence[str], request: _Request, problems: dict[str, str
             problems[key] = f"--units {key}={symbol} also needs --{key} NAME, which names its column"
         elif column is None:
             problems[f"units {key}"] = (
-                f"it has no column {shortened(key)!r} for --units; leave out this option"
+                f"there is no column {shortened(key)!r} for --units; leave out this option"
             )
         elif unit is None:
             problems[f"units {key}"] = (

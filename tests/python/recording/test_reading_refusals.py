@@ -23,7 +23,7 @@ def lines(*parts: str | list[str]) -> str:
 
 PLAIN = [f"{k},{k}" for k in range(40)]
 
-# Case: (text of the file, options of reading, whole sentence).
+# Name of a case -> (text of the file, options of reading, sentence of the error).
 REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "empty": ("", {}, "press.csv is empty"),
     "metadata only": (
@@ -237,7 +237,7 @@ def test_a_decimal_comma_below_the_examined_rows_is_refused_with_the_cure(csv_fi
 
 
 def assert_sed_cures(path: Path, row: int, force: float, before: str = ": ") -> None:
-    """Checks that the command in a refusal, with the file names filled in, gives a file with this force."""
+    """Checks that the sed command in an error message changes the file so that it has the expected force."""
     command = refusal(path).split(f"{before}sed -E ")[1].split(" OLD.csv > NEW.csv")[0]
     new = path.with_name("new.csv")
     new.write_bytes(
@@ -246,7 +246,7 @@ def assert_sed_cures(path: Path, row: int, force: float, before: str = ": ") -> 
     assert read_recording(new).force[row] == force
 
 
-# Case of a bad row: (header, bad row, its name).
+# Cases of a row that cannot be used: (header of the file, the row, name of the case).
 BAD_ROWS = {
     "not a number": (HEADER, "nan,1,press", "column depth_mm holds 'nan', which is not a finite number"),
     "infinity": (HEADER, "1,-inf,press", "column force_gf holds '-inf', which is not a finite number"),
