@@ -57,7 +57,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, wanted: bool) -> 
     cls=_LazyVerbs,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
-    epilog="Example: palpate identify press.csv -o press.json",
+    epilog="Example: palpate identify press.csv -o press.json\n\nTerms: docs/glossary.md",
 )
 @click.option(
     "--version",

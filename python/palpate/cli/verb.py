@@ -20,6 +20,9 @@ from .printing import Option, Verb, talk
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+TERMS = "Terms: docs/glossary.md"
+"""Last line of each help."""
+
 PATH = click.Path(path_type=Path)
 
 _FIGURES = (".png", ".pdf", ".svg")
@@ -50,7 +53,8 @@ def verb(
     """
 
     def command(function: Callable[..., Any]) -> click.Command:
-        given = {"no_args_is_help": True, "epilog": f"Example: {example}", **settings}
+        epilog = f"Example: {example}\n\n{TERMS}"
+        given = {"no_args_is_help": True, "epilog": epilog, **settings}
         return click.command(cls=cls, **given)(interrupted_at_once()(function) if ends_at_once else function)
 
     return command

@@ -40,13 +40,15 @@ SETTINGS = {
     for each in fields(IdentifyOptions)
     if each.name in ("max_wavelets", "criterion", "loss", "search")
 }
-"""Those of :class:`IdentifyOptions` that need no recording, with defaults; search None: its own."""
+"""Settings of :class:`IdentifyOptions` that need no recording, with their defaults. search = None stands for
+the default search settings."""
 
 LEAST_RELATIVE_RANGE = 1e-12
 """Least range of a column over its largest absolute value [-]. Below it the column is constant."""
 
 MOST_ERROR_ROWS = 200_000
-"""Largest number of rows, evenly spread, for the reported error. More change at most its third digit."""
+"""Largest number of rows, evenly spread, from which the reported RMS error is computed. More rows change at
+most the third digit of the error."""
 
 
 class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
@@ -68,9 +70,10 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     Attributes
     ----------
     network_ : palpate.Model
-        The network over the columns of X that vary; it can be printed, saved and, with one input, rendered.
+        The network over the columns of X that vary. The network can be printed, saved and, with one input,
+        rendered.
     columns_ : (d,) array of int
-        Which columns those are.
+        Indices of the columns of X that vary.
     n_wavelets_, n_parameters_ : int
         Size of the network; every fitted real number is counted.
     stop_reason_ : str
@@ -80,13 +83,12 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     n_features_in_, feature_names_in_
         As in every scikit-learn estimator.
 
-    Notes
-    -----
-    The network's domain is the box of the data and, on each side, 1/(m - 1) of its width, m distinct rows: by
-    so much the extremes of a sample fall short of the range that it was drawn from. Outside the network goes
-    on from the nearest point of the domain by the gradient there, falling ones cut to 0: as a force does that
-    must not push a hand further away. Q. Zhang, *Using wavelet
-    network in nonparametric estimation*, IEEE Transactions on Neural Networks 8 (2), 1997.
+    Notes ----- The network's domain is the smallest box around the rows of X, made wider on each side by 1/(m
+    - 1) of its width for m distinct rows: the extremes of m random values lie inside their true range by
+    about this distance. Outside the domain the network continues as a straight line, with the gradient at the
+    nearest point of the domain; a falling gradient is set to 0, because a falling force would push a hand
+    further away. Q. Zhang, *Using wavelet network in nonparametric estimation*, IEEE Transactions on Neural
+    Networks 8 (2), 1997.
 
     Examples
     --------
@@ -104,7 +106,7 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
         for name, value in given.arguments.items():
             setattr(self, name, value)
 
-    # the keywords and defaults of IdentifyOptions, where scikit-learn looks for them
+    # scikit-learn reads the names and defaults of the settings from this signature
     __init__.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [
             inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD),
@@ -149,7 +151,7 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
         return self
 
     def predict(self, X: npt.ArrayLike) -> Float1D:
-        """The network at each row of X.
+        """Returns the value of the fitted network at each row of X.
 
         Parameters
         ----------
@@ -173,8 +175,8 @@ def fit_regression(
 ) -> tuple[NDArray[np.int64], FittedNetwork]:
     """Fits f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4) to rows of any meaning.
 
-    The model classes are constant, linear and network, judged by the criterion on n samples, n the sum of the
-    weights; none is tried that has as many parameters as there are samples.
+    The model classes are constant, linear and network. The criterion compares them on n samples, where n is
+    the sum of the weights. A model class with n or more parameters is not tried.
 
     Parameters
     ----------
@@ -183,14 +185,15 @@ def fit_regression(
     y : (n,)
         Finite numbers.
     weight : (n,), optional
-        Samples that each row represents, >= 0; 1 without it. A row of weight 0 is left out.
+        Number of samples that each row represents, >= 0; by default 1. A row of weight 0 is left out.
     options : IdentifyOptions
 
     Returns
     -------
     (columns, network)
-        Which columns of X the network has as inputs, the constant ones left out, and the network; its domain
-        reaches beyond the rows by the margin of a sample.
+        Indices of the columns of X that are inputs of the network (constant columns are left out), and the
+        network. The domain of the network is wider than the range of the rows by the distance of
+        :func:`_margin`.
 
     Raises
     ------
@@ -213,7 +216,8 @@ def fit_regression(
         columns, scaled = fit_regression(X, scale.scaled(y), weight, scale.scaled_options(options))
         return columns, scaled.unscaled(scale)
     varies = np.ptp(X, axis=0) > LEAST_RELATIVE_RANGE * np.abs(X).max(axis=0)
-    # a network needs an input: where none varies, the first one gets a box as wide as its value
+    # a network needs an input: if no column of X varies, the first column is the input, in a box as wide as
+    # its value
     columns = np.flatnonzero(varies) if varies.any() else np.zeros(1, dtype=np.int64)
     lower, upper = X[:, columns].min(axis=0), X[:, columns].max(axis=0)
     if not varies.any():
@@ -236,22 +240,24 @@ def fit_regression(
 
 
 def _margin(box: Float2D) -> float:
-    """Distance by which the range that rows were drawn from exceeds them, on each side [box].
+    """Returns the estimated distance of the true range of positions from the extreme rows, on each side
+    [box].
 
-    The extremes of m values drawn evenly from a range fall short of it by 1/(m + 1) of it on average, which
-    is 1/(m - 1) of their span: at most a few rows of a wavelet's core.
+    The smallest and the largest of m random values lie inside their true range by 1/(m + 1) of this range on
+    average, which is 1/(m - 1) of the span of the m values.
     """
     distinct = np.unique(box) if box.shape[1] == 1 else distinct_rows(box)[0]
     return 1.0 / max(len(distinct) - 1, 1)
 
 
 def _unit(value: Float1D) -> Float1D:
-    """A width that a number of this size can be moved by."""
+    """Returns a width that is not lost to rounding if it is added to the value: at least 1."""
     return np.maximum(1.0, np.abs(value))
 
 
 def _validated(estimator: WaveletNetworkRegressor, X: object, *y: object, **checks: Any) -> Any:
-    """X and y as scikit-learn validates them; its ValueError becomes an InputError that names them."""
+    """Returns X and y after the validation of scikit-learn; raises a ValueError of scikit-learn as
+    InputError."""
     for name, values in zip("Xy", (X, *y), strict=False):
         if np.ma.is_masked(values):
             raise InputError(f"{name} is a masked array; remove the masked rows from X, y and sample_weight")
@@ -265,7 +271,7 @@ def _validated(estimator: WaveletNetworkRegressor, X: object, *y: object, **chec
 
 
 def _plain(value: Any) -> Any:
-    """Python's own number for NumPy's, which parameter grids are made of."""
+    """Returns a NumPy number as Python number; a parameter grid of scikit-learn may hold NumPy numbers."""
     return value.item() if isinstance(value, np.generic) else value
 
 

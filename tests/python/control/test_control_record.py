@@ -404,7 +404,10 @@ def test_rows_with_a_force_changed_by_a_guard_are_dropped_and_counted(tmp_path: 
 def test_a_record_of_the_ramp_alone_is_refused_with_the_reason(tmp_path: Path) -> None:
     out = tmp_path / "rendered.csv"
     assert control(MODEL, "--duration-s", 0.1, "--record", out, *ANY_RATE).returncode == 0
-    with pytest.raises(InputError, match=r"has 0 usable rows; .* left out \(\d+ Ramp\)$"):
+    with pytest.raises(
+        InputError,
+        match=r"has 0 usable rows; .* left out \d+ rows whose force is not the model's force \(\d+ Ramp\)$",
+    ):
         read_recording(out)
 
 

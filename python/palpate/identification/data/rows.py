@@ -372,8 +372,8 @@ def period_notes(position: Float1D, period: float, unit: str = "") -> tuple[str,
     if travel <= period:
         gap = period - travel
         note = (
-            f"The positions leave a gap of {_exact(gap, unit)}, {100 * gap / period:.2g} % of the period of "
-            f"{_exact(period, unit)}. The model closes it."
+            f"The positions leave a gap of {Unit.of_si(unit).text(gap)}, {100 * gap / period:.2g} % of the "
+            f"period of {_exact(period, unit)}. The model closes it."
         )
     box = np.sort(modulo((position - lower) / period))
     steps = np.diff(np.append(box, box[0] + 1.0))

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Candidate models, the criteria that they are compared by, and the judge that accepts them.
+"""Candidate models, the criteria that compare them, and the judge that accepts or refuses a candidate.
 
-The criteria weigh the error against the number of fitted numbers. All are written as a deviance, n ln(RSS/n)
-plus a penalty for the p fitted parameters, so that their differences compare: BIC (Schwarz 1978), AICc
-(Hurvich & Tsai 1989), GCV (Craven & Wahba 1979, as n ln of the score), FPE (Akaike 1970, as n ln of the
-score). The smallest value wins.
+The criteria weigh the error against the number of fitted numbers. All are written as a deviance: n ln(RSS/n)
+plus a penalty for the p fitted parameters, where RSS is the residual sum of squares of n samples. So the
+differences of two criteria have the same scale: BIC (Schwarz 1978), AICc (Hurvich & Tsai 1989), GCV (Craven &
+Wahba 1979, as n ln of the score), FPE (Akaike 1970, as n ln of the score). The smallest value wins.
 
-Two rules judge on held-out rows instead, and need no penalty. "fresh" takes the smallest network
-whose error there is within one standard error of the least (Breiman et al. 1984); "perceptual" the smallest
-whose error there is not felt: RMS of the error over 7 % of the local force, or 1 % of the largest, below 1.
+Two rules use the error on held-out rows instead, and need no penalty. "fresh" takes the smallest network
+whose error on held-out rows is within one standard error of the least error (Breiman et al. 1984).
+"perceptual" takes the smallest network whose error on held-out rows a hand cannot feel: the RMS of error/JND
+is below 1, where the JND is 7 % of the local force, at least 1 % of the largest force.
 """
 
 from __future__ import annotations
@@ -45,15 +46,15 @@ from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
 
 MOST_BINNING_SHARE = 0.05
-"""Largest error from gathering positions in cells, as a share of the RMS error [-]. Above it the cells are
-halved."""
+"""Largest force error from replacing positions by cell means, as a share of the RMS error of the model [-].
+If the error is larger, the width of the cells is halved."""
 
 LEAST_TRIMMED_GAIN = 0.5
-"""Least fall of the trimmed squared error, as a share, that replaces a mean without a fall [-]. Half of the
-error cannot come from the few trimmed groups."""
+"""Least relative decrease of the trimmed mean squared error for which it is used in place of the full mean,
+if the full mean does not decrease [-]. The few trimmed groups cannot hold half of the error."""
 
 LEAST_HELD_OUT = 20
-"""Least number of held-out rows that can refuse a model class. Fewer are too uncertain."""
+"""Least number of held-out rows that can refuse a model class. The error on fewer rows is too uncertain."""
 
 ALL_ROWS = slice(None)
 """Every row."""
@@ -66,7 +67,7 @@ CRITERIA: dict[str, Callable[[float, int], float]] = {
     "fresh": lambda n, p: 0.0,
     "perceptual": lambda n, p: 0.0,
 }
-"""Name of the criterion to its penalty of p parameters on n samples."""
+"""Maps the name of a criterion to its penalty for p parameters on n samples."""
 
 CRITERION_NAMES = {
     "bic": "BIC",
@@ -76,32 +77,34 @@ CRITERION_NAMES = {
     "fresh": "deviance on held-out rows",
     "perceptual": "deviance in just noticeable differences",
 }
-"""Name of the criterion to its name in messages."""
+"""Maps the name of a criterion, as an option, to its name in messages."""
 
 ON_HELD_OUT_ROWS = ("fresh", "perceptual")
-"""The criteria whose error is that on held-out rows."""
+"""Criteria that use the error on held-out rows."""
 
 
 def deviance(criterion: str, rss: float, n: float, p: int) -> float:
-    """Value of a criterion: n ln(rss/n) + penalty(n, p); rss in force squared, over all n samples.
+    """Returns the value of a criterion, n ln(rss/n) + penalty(n, p), from the residual sum of squares rss
+    [force^2] of n samples and the number of parameters p.
 
-    For "perceptual" rss is in just noticeable differences squared, so that 0 is the limit of perception.
+    For "perceptual" rss is in just noticeable differences squared: at the value 0 the RMS error is one just
+    noticeable difference.
     """
     return n * math.log(rss / n) + CRITERIA[criterion](n, p)
 
 
 def standard_error(n: float) -> float:
-    """Standard error of n ln(MSE) over n samples of normal noise: n sqrt(2/n)."""
+    """Returns the standard error of n ln(mean squared error) for n samples of normal noise: n sqrt(2/n)."""
     return math.sqrt(2.0 * n)
 
 
 def enough(criterion: str, value: float) -> bool:
-    """True if no larger network is needed."""
+    """True if the error is below the just noticeable difference, so that no larger network is needed."""
     return criterion == "perceptual" and value <= 0.0
 
 
 def choice(criterion: str, values: Sequence[float], n: float) -> int:
-    """Index of the network to take, from the values of networks of rising size."""
+    """Returns the index of the network to take, from the criterion values of networks in order of size."""
     least = min(values)
     limit = {"fresh": least + standard_error(n), "perceptual": max(0.0, least)}.get(criterion, least)
     return next(index for index, value in enumerate(values) if value <= limit)
@@ -110,19 +113,19 @@ def choice(criterion: str, values: Sequence[float], n: float) -> int:
 def criterion_of(
     problem: SeparableProblem, solution: Solution, name: str, n_parameters: int | None = None
 ) -> float:
-    """Value of a criterion for a solution: the smaller the better.
+    """Returns the value of a criterion for a solution; a smaller value is better.
 
-    Without n_parameters those of the problem and the basis are counted.
+    By default n_parameters is the number of fitted values of the problem with the wavelets of the solution.
 
     Raises
     ------
     InputError
-        The criterion judges on held-out rows, and the problem has none.
+        The criterion needs held-out rows, and the problem has none.
     """
     if name in ON_HELD_OUT_ROWS:
         rows = problem.held_out
         if rows is None:
-            raise InputError(f"criterion is {name!r}: needs held-out rows, and there are none")
+            raise InputError(f"criterion is {name!r}: needs held-out rows, and no rows are held out")
         return held_out_deviance(name, rows, problem.errors(solution, rows))
     p = problem.n_parameters(len(solution.basis)) if n_parameters is None else n_parameters
     share = problem.limits.independent
@@ -130,21 +133,21 @@ def criterion_of(
 
 
 def held_out_deviance(criterion: str, rows: HeldOutRows, errors: Float1D) -> float:
-    """Criterion of a network that leaves these errors on held-out rows."""
+    """Returns the criterion of a network from its force errors on held-out rows."""
     counted = rows.in_jnd(errors) if criterion == "perceptual" else errors
     smallest = (1e-12 * float(np.ptp(rows.force))) ** 2 * len(counted)
     return deviance(criterion, max(float(counted @ counted), smallest, TINY), len(counted), 0)
 
 
 Reporter = Callable[[str, int], None]
-"""Receives the model class that is tried and the number of wavelets."""
+"""Function that receives the name of the tested model class and its number of wavelets, to show progress."""
 
 _reporter: ContextVar[Reporter | None] = ContextVar("reporter", default=None)
 
 
 @contextmanager
 def reporting_to(reporter: Reporter) -> Iterator[None]:
-    """Report every network that is tried in this context."""
+    """Calls `reporter` for every network that is tested inside the with statement."""
     token = _reporter.set(reporter)
     try:
         yield
@@ -153,45 +156,47 @@ def reporting_to(reporter: Reporter) -> Iterator[None]:
 
 
 def report(model_class: str, n_wavelets: int) -> None:
-    """Report a network that is tried now."""
+    """Reports the model class and the number of wavelets of the network that is tested now, to show
+    progress."""
     if (reporter := _reporter.get()) is not None:
         reporter(model_class, n_wavelets)
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Mass and damping, and their force."""
+    """Fitted mass and damping of the object, and the sum of their forces at each row."""
 
     damping: float | None
     mass: float | None
     force: Float1D
-    """(n,) m L a + B L v at every row"""
+    """(n,) filtered force of mass and damping at every row, m L a + B L v, with low-pass filter L [force]"""
     known: Float1D
     """(n,) 1 in the rows that have a velocity and an acceleration, else 0"""
 
 
 @dataclass(frozen=True)
 class RowError:
-    """Residuals of every row, with the samples that each represents."""
+    """Residual of every row, and the number of samples that each row represents."""
 
     residual: Float1D
     """(n,) [force]"""
     force: Float1D
     """(n,)"""
     weight: Float1D
-    """(n,) samples, 0 for a row that does not count"""
+    """(n,) number of samples of each row; 0 for a row that is left out of the error"""
     within: float = 0.0
-    """Sum of squares inside rows that represent several samples [force^2]"""
+    """Sum of squared differences of the samples from the mean force of their row [force^2]; 0 if each row is
+    one sample"""
 
     @property
     def rmse(self) -> float:
-        """Root mean square error over the samples [force]."""
+        """RMS error of all samples [force]."""
         total = float(self.weight.sum())
         return float(np.sqrt((self.weight @ self.residual**2 + self.within) / total)) if total else 0.0
 
     @property
     def nrmse(self) -> float:
-        """rmse over the standard deviation of the force; 0 for a constant force."""
+        """RMS error divided by the standard deviation of the force [-]; 0 for a constant force."""
         spread = self.spread
         return self.rmse / spread if spread > 0.0 else 0.0
 
@@ -208,24 +213,24 @@ class RowError:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A candidate model: one solution of a problem over compressed rows."""
+    """Candidate model: a solution of the least squares over the compressed rows of a recording."""
 
     model_class: str
     data: Rows
-    """The rows that its error is reported on"""
+    """All rows of the recording, on which the error of the candidate is reported"""
     rows: Compressed
     problem: SeparableProblem
     solution: Solution
     n_parameters: int
     stop_reason: str
     strokes: HysteresisInput | None = None
-    """The hysteresis input, where the model class has one"""
+    """Direction state of each row; None for a model class without hysteresis"""
     moving: Moving | None = None
-    """Mass and damping, where the model class has them"""
+    """Mass and damping; None for a model class without them"""
 
     @property
     def side(self) -> Float1D | None:
-        """(n,) hysteresis input of every row of the recording."""
+        """(n,) direction state s of every row of the recording; None without hysteresis."""
         return None if self.strokes is None else self.strokes.side
 
     @property
@@ -243,22 +248,24 @@ class Candidate:
 
     @property
     def at_lower(self) -> float:
-        """g at the lower corner of the domain [force]."""
+        """Mean force g of both strokes at the smallest position of the domain [force]."""
         table, d = self.problem.readout @ self.solution.coefficients, self.problem.dimension
         basis = self.solution.basis
         corner = wavelet_columns(np.zeros((1, d)), basis.alpha, basis.beta)[0]
         return float(table[0, 0] + table[0, 1 + d :] @ corner)
 
     def criterion(self, name: str) -> float:
-        """Value of a criterion: the smaller the better."""
+        """Returns the value of a criterion for this candidate; a smaller value is better."""
         return criterion_of(self.problem, self.solution, name, self.n_parameters)
 
     def point(self, name: str) -> PathPoint:
-        """The candidate on the path, by this criterion."""
+        """Returns this candidate as an entry of the list of tested networks, with the value of the named
+        criterion."""
         return PathPoint(self.model_class, self.n_wavelets, self.rmse, self.criterion(name))
 
     def held_out_errors(self, fitted: SeparableProblem, rows: HeldOutRows) -> Float1D:
-        """Errors (k,) on held-out rows with the linear unknowns of a problem of the other rows."""
+        """Returns the force errors (k,) on held-out rows, with weights, slopes and bias fitted to the other
+        rows."""
         if self.model_class == "constant":
             (block,) = fitted.blocks
             root = block.channels[:, 0]
@@ -267,7 +274,8 @@ class Candidate:
         return fitted.errors(fitted.solve(self.solution.basis), rows)
 
     def cells_too_wide(self) -> bool:
-        """True if gathering positions in cells may have moved the fit by more than it should."""
+        """True if the force error from replacing positions by cell means is above its limit
+        `MOST_BINNING_SHARE`."""
         if not self.rows.spread.any():
             return False
         basis, weights = self.solution.basis, self.solution.coefficients[:, 1 + self.problem.dimension :]
@@ -278,11 +286,12 @@ class Candidate:
         )
 
     def force_at(self, rows: slice = ALL_ROWS) -> Float1D:
-        """Force over position at every row (n,), or at some."""
+        """Returns the force over position (n,) of all rows, or of the rows of a slice."""
         return self._force(self.data.box[rows], None if self.side is None else self.side[rows])
 
     def parts_at(self, positions: Float2D) -> tuple[Float1D, Float1D]:
-        """g and h (k,) of a model with hysteresis at positions (k, d) in the unit box."""
+        """Returns the mean force g (k,) of both strokes and the hysteresis h (k,) at positions (k, d) in the
+        unit box."""
         middle = self._force(positions, np.zeros(len(positions)))
         return middle, self._force(positions, np.ones(len(positions))) - middle
 
@@ -291,7 +300,7 @@ class Candidate:
 
     @cached_property
     def network(self) -> FittedNetwork:
-        """The candidate in the units of the data."""
+        """The network of the candidate, in the units of the recording."""
         lower, reach, moving = self.data.lower, self.data.reach, self.moving
         return FittedNetwork.of(
             self.solution,
@@ -310,20 +319,21 @@ class Candidate:
 
     @cached_property
     def residual(self) -> Float1D:
-        """Force of every row (n,) less that of the network's evaluator, of mass and of damping."""
+        """Recorded force of every row (n,) minus the force of the network, of the mass and of the damping."""
         residual = self.data.force - self.network.force(self.data.domain, self.side)
         return residual if self.moving is None else residual - self.moving.force
 
     @cached_property
     def error(self) -> RowError:
-        """Error on the rows that count."""
+        """Error on all rows except outliers and rows that repeat others."""
         error, robust = self.error_on(self.data.counted), self.data.robust
         return (
             error if robust is None else replace(error, weight=np.where(robust.outliers, 0.0, error.weight))
         )
 
     def error_on(self, samples: Float1D | None) -> RowError:
-        """Error on rows that represent so many samples (n,), or 1; rows without a motion do not count."""
+        """Returns the error if each row represents the given number of samples (n,), or 1 sample each. Rows
+        without velocity, acceleration or direction state are left out if the model needs them."""
         weight = np.ones(len(self.residual)) if samples is None else samples
         if self.moving is not None:
             weight = weight * self.moving.known
@@ -334,7 +344,7 @@ class Candidate:
 
 @dataclass
 class Report:
-    """Path, notes and findings of a model selection."""
+    """Tested networks, decisions, notes and findings of a model selection."""
 
     path: list[PathPoint] = field(default_factory=list)
     decisions: list[Decision] = field(default_factory=list)
@@ -343,15 +353,16 @@ class Report:
     """Sentences on constraints with their cost, and on unused rows"""
     findings: list[Finding] = field(default_factory=list)
     sign_findings: list[Finding] = field(default_factory=list)
-    """Those on the signs of position and force"""
+    """Findings on a wrong sign of position or force"""
 
     def replaces(self, other: Report, note: str) -> None:
-        """Begins with the path of a selection that this one replaces, and with the reason."""
+        """Puts the tested networks of a replaced model selection and the reason of the replacement first."""
         self.path[:0] = other.path
         self.notes.insert(0, note)
 
     def add(self, other: Report, note: str) -> None:
-        """Adds the path, decisions and notes of a later selection and takes its findings."""
+        """Adds the tested networks, decisions and notes of a later model selection, and takes over its
+        findings."""
         self.path += other.path
         self.decisions += other.decisions
         self.notes += [note, *other.notes]
@@ -359,14 +370,14 @@ class Report:
 
 
 class Samples:
-    """The rows of one recording: compressed for fits, and held out to judge on.
+    """Rows of one recording: compressed rows for the fit, and held-out rows for the comparison of models.
 
     Parameters
     ----------
     data : Rows
     options : IdentifyOptions
     cells : int
-        Distinct positions that are kept apart.
+        Largest number of distinct positions; with more, neighbouring positions are replaced by their mean.
     """
 
     def __init__(self, data: Rows, options: IdentifyOptions, cells: int) -> None:
@@ -380,15 +391,15 @@ class Samples:
             limits=data.limits,
         )
         self.used = self._compressor.rows_used
-        """Rows that represent all"""
+        """Number of rows that represent all rows of the recording"""
         self._resolved_by = options.search.resolved_by
         self._for_criterion = options.criterion in ON_HELD_OUT_ROWS
 
     def rows(self, strokes: HysteresisInput | None = None) -> Compressed:
-        """Compressed rows: all of them, or those that are not held out for the criterion.
+        """Returns the compressed rows, without the held-out rows if the criterion needs held-out rows.
 
-        Rows whose hysteresis input is unknown are dropped and the others reweighted, so that all model
-        classes are judged on as many.
+        Rows with unknown direction state are dropped and the remaining rows reweighted to the same total, so
+        that all model classes are compared on the same number of samples.
         """
         only = ~self._held_out if self._for_criterion else None
         if strokes is None:
@@ -401,22 +412,24 @@ class Samples:
         return rows if self.data.period is None else around_seam(rows)
 
     def problem(self, rows: Compressed, strokes: HysteresisInput | None = None) -> SeparableProblem:
-        """Least squares over compressed rows."""
+        """Returns the least-squares problem of compressed rows."""
         held_out = self.held_out_rows(strokes) if self._for_criterion else None
         return problem_of(rows, resolved_by=self._resolved_by, held_out=held_out)
 
     def held_out_rows(
         self, strokes: HysteresisInput | None, known: NDArray[np.bool_] | None = None
     ) -> HeldOutRows:
-        """Rows that are held out, of those whose hysteresis input is known."""
+        """Returns the held-out rows with a known direction state."""
         known = strokes.known if strokes is not None else known
         rows = self._held_out if known is None else self._held_out & known
         return HeldOutRows.of(self.data.box, self.data.force, None if strokes is None else strokes.side, rows)
 
     def on_known_rows(self, below: Candidate, above: Candidate) -> Candidate:
-        """The candidate below on the rows whose hysteresis input is known for the one above.
+        """Returns the simpler candidate `below` on the rows whose direction state is known for candidate
+        `above`.
 
-        The random error of the other rows is as large as the gain that a model class must show.
+        The random error of the rows without direction state can be as large as the decrease of the criterion
+        that a model class must show.
         """
         strokes = above.strokes
         if strokes is None or strokes.known.all() or self._for_criterion:
@@ -428,11 +441,11 @@ class Samples:
         return replace(below, problem=problem, solution=solution)
 
     def held_out_gain(self, below: Candidate, above: Candidate) -> tuple[float, float]:
-        """Fall of the squared error on held-out rows as a share, and its standard error.
+        """Returns the relative decrease of the squared error on held-out rows, and its standard error.
 
-        Only rows inside the range of the fitted rows count: outside it a network is not defined by data. If
-        the mean over all groups shows no gain, but the trimmed mean a large one, the trimmed mean counts: a
-        few groups then hold rows far from all fitted rows.
+        Only held-out rows inside the position range of the fitted rows are used. If the mean over all groups
+        of rows shows no decrease, but the trimmed mean shows a large decrease, the trimmed mean is returned:
+        then a few groups hold rows far from all fitted rows.
         """
         known = None if above.strokes is None else above.strokes.known
         fitted = ~self._held_out if known is None else ~self._held_out & known
@@ -453,14 +466,15 @@ class Samples:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The comparison of two candidates."""
+    """Result of the comparison of a simpler (lower) and a more complex (upper) candidate."""
 
     accepted: bool
-    """The upper one is accepted"""
+    """True if the upper candidate is accepted"""
     reason: str
-    """Its gain, in words"""
+    """Change of criterion and error from the lower to the upper candidate, in words"""
     criterion_falls: bool
-    """The criterion falls by enough: if it is not accepted, held-out rows refuse it"""
+    """True if the criterion decreases enough; an upper candidate that is not accepted was then refused on
+    held-out rows"""
 
 
 class Judge:
@@ -473,7 +487,7 @@ class Judge:
     report : Report
         Receives a note on each decision.
     on_held_out : bool
-        False: the criterion alone decides.
+        False: the criterion decides without held-out rows.
     """
 
     def __init__(
@@ -483,11 +497,12 @@ class Judge:
         self._samples, self._report, self.on_held_out = samples, report, on_held_out
 
     def better(self, below: Candidate, above: Candidate) -> Candidate:
-        """The upper candidate if it is accepted, else the lower one; adds a note on its gain."""
+        """Returns the upper candidate if it is accepted, else the lower candidate; adds the decision to the
+        report."""
         return above if self.noted(below, above).accepted else below
 
     def noted(self, below: Candidate, above: Candidate, *, errors: float = 1.0) -> Judgement:
-        """The comparison of two candidates, with a note."""
+        """Compares two candidates and adds the decision to the report."""
         judged = self.compared(below, above, errors=errors)
         self._report.decisions.append(decided(above.model_class, judged.accepted, judged.reason))
         return judged
@@ -497,14 +512,15 @@ class Judge:
         return self.compared(below, above).accepted
 
     def fall(self, below: Candidate, above: Candidate) -> float:
-        """Fall of the criterion from one candidate to another, on the rows that both know."""
+        """Returns the decrease of the criterion from candidate `below` to `above`, on the rows usable for
+        both."""
         below = self._samples.on_known_rows(below, above)
         return below.criterion(self.criterion) - above.criterion(self.criterion)
 
     def compared(self, below: Candidate, above: Candidate, *, errors: float = 1.0) -> Judgement:
         """Compares the upper candidate with the lower one.
 
-        On held-out rows the squared error must fall by more than that many of its standard errors.
+        On held-out rows the squared error must decrease by more than `errors` of its standard errors.
         """
         name, evidence = self.criterion, self.evidence
         if not self.on_held_out:

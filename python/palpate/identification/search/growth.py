@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Number of wavelets: grow one, refine all, and when the criterion stops growth, prune and refine again.
+"""Finds the number of wavelets: adds one wavelet, refines all, repeats until the criterion stops growth, then
+removes superfluous wavelets and refines again.
 
-Growth takes the best frame member by one step of forward orthogonal selection against the refined network, so
-it fits the part that is still missing. Pruning removes wavelets that refinement made superfluous, coincident
-ones first, since of two that coincide one costs nothing to remove. N is decided again on the refined network.
+Growth adds the wavelet of the frame that reduces the error of the refined network most, by one step of
+forward orthogonal selection. Pruning removes wavelets that refinement made superfluous, the one first whose
+removal raises the error least. The number of wavelets is then decided again on the refined network.
 """
 
 from dataclasses import dataclass, replace
@@ -21,51 +22,58 @@ from .evidence import CRITERIA, ON_HELD_OUT_ROWS, choice, criterion_of, enough, 
 from .selection import Library, orthogonal_gains, residual_gains, select_backward
 
 MOST_PRUNE_TRIALS = 3
-"""Largest number of wavelets tried for removal in succession. The cheapest ones come first, so more rarely
-succeed."""
+"""Largest number of wavelets tried for removal in succession. Wavelets whose removal raises the error least
+come first, so that later trials rarely succeed."""
 
 MOST_REMOVAL_COST = 6.0
-"""Largest cost of a removal before refinement, in prices of one wavelet, that is tried [-]. Refinement seldom
-recovers more."""
+"""Largest rise of the criterion by the removal of a wavelet, before refinement, for which the removal is
+tried [penalty of one wavelet]. Refinement seldom recovers a larger rise."""
 
 LEAST_CORE_POSITIONS = 5
-"""Least number of positions in a wavelet's core if noise is too small to be taken for structure."""
+"""Least number of distinct positions in a wavelet's core if the noise is too small to be mistaken for a part
+of the force."""
 
 LEAST_NOISE_EVENNESS = 0.5
-"""Least evenness of a residual that is noise [-]: 1 for normal noise. Finer wavelets are then not tried."""
+"""Least ratio of the median to the RMS of the residuals, 1 for normal noise, at which the residuals are taken
+as noise [-]. Narrower wavelets are then not tried."""
 
 FINER_ERROR_RATIO = 4.0
-"""Least factor by which finer wavelets must reduce the error [-]. Fitted noise reduces it by less."""
+"""Least factor by which narrower wavelets must reduce the RMS error [-]. Wavelets that fit noise reduce the
+error by less."""
 
 SIGNIFICANT_CORRELATION = 3.0
-"""Correlation of neighbouring residuals above which they are structure [standard errors]."""
+"""Correlation of residuals at neighbouring positions above which the residuals are not noise [standard
+errors]."""
 
 SMOOTH_CORE_SHARE = 0.25
-"""Least share of the positions in a core while a smooth force over several inputs is tried [-]."""
+"""Least share of all positions that must lie in a wavelet's core while only wide wavelets are tried [-]; for
+several inputs."""
 
 MOST_STRETCHED = 64
-"""Largest number of frame members that are also tried stretched along each of several inputs."""
+"""Largest number of wavelets of the frame that are also tried with a changed dilation along each of several
+inputs."""
 
 MOST_REFINED_CANDIDATES = 5
-"""Largest number of these candidates that are refined before one is chosen."""
+"""Largest number of candidate wavelets that are refined before one of them is chosen."""
 
 CANDIDATE_STEPS = 4
-"""Refinement steps of each of these candidates: enough to compare them."""
+"""Number of refinement steps of each candidate wavelet before one is chosen: enough to compare them."""
 
 GROWING_TOLERANCE = 0.4
-"""Fall of the deviance by one step below which refinement ends during growth [-]: far below the penalty of a
-wavelet."""
+"""Decrease of the deviance by one refinement step below which refinement ends during growth [-]: far below
+the penalty of one wavelet."""
 
 FINAL_TOLERANCE = 0.04
-"""The same for the accepted network [-]."""
+"""Decrease of the deviance by one refinement step below which refinement of the accepted network ends [-]."""
 
 
 @dataclass(frozen=True)
 class Grown:
-    """The network that growth settled on."""
+    """Result of the growth of a network."""
 
     problem: SeparableProblem
-    """Which the solution solves, with the prior and the resolution that growth ended with"""
+    """Least-squares problem of the solution, with the weight penalty and the least number of positions in a
+    core at the end of growth"""
     solution: Solution
     criterion: float
     stop_reason: str
@@ -79,8 +87,8 @@ class Growth:
     ----------
     options : IdentifyOptions
     single : bool
-        The force is known to be single-valued: two strokes that a motion samples at different places look
-        like one force that needs ever more wavelets.
+        True if the force is known to be single-valued. Otherwise press and release, sampled at different
+        positions, can look like one force that needs ever more wavelets.
     """
 
     def __init__(self, options: IdentifyOptions, *, single: bool = True) -> None:
@@ -99,12 +107,13 @@ class Growth:
     ) -> Grown:
         """Grows from the wavelets of start to `most` wavelets at most.
 
-        If the residual is still structured, it continues with narrower wavelets than noise would allow. Noise
-        is as large everywhere, and differs from each position to the next. Finer wavelets are taken where
-        they leave a fraction of the error, or where neighbouring residuals are correlated and the criterion
-        falls as for a model class. This holds for a single-valued force alone, not for wavelets that stay on
-        the frame, nor where held-out rows judge. A smooth force over several inputs is left to wide wavelets.
-        Correlated noise, and the steps of a force, look like structure and are not.
+        If the residual is not noise, growth continues with narrower wavelets. Noise has the same size at all
+        positions and no correlation between neighbouring positions. Narrower wavelets are accepted if they
+        reduce the error by a large factor, or if neighbouring residuals are correlated and the criterion
+        decreases as much as for a new model class. Narrower wavelets are tried only for a single-valued
+        force, with refinement, and without a criterion on held-out rows. They are not tried if noise is
+        correlated, if the error is near the resolution of the force, or if wide wavelets fit a force over
+        several inputs.
         """
         search = self._search
         most = self._most if most is None else most
@@ -133,7 +142,8 @@ class Growth:
         return replace(found, problem=problem.with_prior(found.solution.rss))
 
     def library(self, problem: SeparableProblem) -> Library:
-        """The truncated frame over the rows of a problem, down to their resolution."""
+        """Returns the candidate wavelets: the frame over the positions of a problem, down to the narrowest
+        wavelet that the positions resolve."""
         search = self._search
         positions = np.concatenate([block.positions for block in problem.blocks])
         frame = truncated_frame(
@@ -147,9 +157,10 @@ class Growth:
         return Library(problem, frame)
 
     def prune(self, problem: SeparableProblem, start: Solution) -> tuple[SeparableProblem, Solution]:
-        """Removes wavelets, the cheapest first, while the refined remainder has a smaller criterion.
+        """Removes wavelets while the refined remaining network has a smaller criterion.
 
-        The prior of the problem that is returned is that of the last trial.
+        Tries first the wavelet whose removal raises the error least. The returned problem has the weight
+        penalty of the last trial.
         """
         current, value = start, self._criterion_of(problem, start)
         removed = True
@@ -179,12 +190,13 @@ class Growth:
         starts: int = MOST_REFINED_CANDIDATES,
         wide: bool = False,
     ) -> Grown:
-        """Grows from the wavelets of start until the criterion stops it, prunes, refines to the end.
+        """Grows the network of `start` until the criterion stops growth, then prunes and refines the network.
 
-        Growth continues for `patience` wavelets past the best size, and pruning starts from there: a few
-        wavelets too many let refinement find a better arrangement of the others. Where held-out rows judge,
-        they choose the size and nothing is pruned. With wide, wide wavelets alone have one try, once the
-        error is half way, in digits, from the force's range to the resolution of a sensor.
+        Growth continues for `patience` wavelets after the best criterion, and pruning starts from the largest
+        network: a few surplus wavelets let refinement find a better arrangement. If the criterion uses
+        held-out rows, it chooses the size and nothing is pruned. With `wide`, a network of wide wavelets
+        alone is tried once, when the RMS error is below sqrt(`FORCE_RESOLUTION`) times the range of the
+        force.
         """
         search, criterion = self._search, self._criterion
         problem = problem.with_prior(problem.solve(start).rss)
@@ -227,11 +239,11 @@ class Growth:
         return Grown(problem, final, path[-1].criterion, stop_reason, tuple(path))
 
     def _smooth(self, problem: SeparableProblem, start: Basis, model_class: str, most: int) -> Grown | None:
-        """A network of wide wavelets, if its error is small.
+        """Returns a network of wide wavelets, or None if its error is not small.
 
-        The best candidates are mostly narrow: each corrects a few rows, and rows are far apart over several
-        inputs, so that a network of them fits the rows well and errs between them. Wide ones
-        cannot. Where rows of one cell differ by more, they are not tried.
+        Over several inputs the rows are far apart. A narrow wavelet then corrects the force at a few rows,
+        and the network fits the rows well but has large errors between them. Wide wavelets avoid this. They
+        are not tried if the forces inside one cell differ by more than the small error.
         """
         if not _below_resolution(problem, np.sqrt(problem.within / problem.samples)):
             return None
@@ -243,7 +255,7 @@ class Growth:
         return replace(found, problem=replace(found.problem, resolved_by=problem.resolved_by))
 
     def _price(self, problem: SeparableProblem, solution: Solution) -> float:
-        """Price of one of the solution's wavelets by the criterion."""
+        """Returns the penalty of one wavelet of the solution in the criterion."""
         penalty, n = CRITERIA[self._criterion], len(solution.basis)
         return penalty(problem.independent, problem.n_parameters(n)) - penalty(
             problem.independent, problem.n_parameters(n - 1)
@@ -252,11 +264,13 @@ class Growth:
     def _with_candidate(
         self, problem: SeparableProblem, library: Library, current: Solution, starts: int
     ) -> Solution | None:
-        """The network with the frame member that helps most, or None where data allow no further wavelet.
+        """Returns the network with the candidate wavelet that reduces the error most; None if no wavelet can
+        be added.
 
-        The frame has one dilation for all inputs. Where there are several, members are tried stretched along
-        each of them as well. A few that differ are refined a little before one is taken: the one that fits
-        best unrefined often ends in a worse minimum.
+        A wavelet of the frame has one dilation for all inputs. With several inputs, wavelets with a changed
+        dilation along one input are tried as well. A few different candidates are refined by some steps
+        before one is taken, because the candidate that fits best before refinement often ends in a worse
+        minimum.
         """
         search = self._search
         if len(library) == 0 or problem.n_parameters(len(current.basis) + 1) >= problem.independent:
@@ -279,7 +293,7 @@ class Growth:
     def _improved(
         self, problem: SeparableProblem, solution: Solution, steps: int, tolerance: float = GROWING_TOLERANCE
     ) -> tuple[SeparableProblem, Solution]:
-        """Refines, then lets the prior on the weights follow the noise level that is left."""
+        """Refines the solution, then sets the weight penalty of the problem from the remaining error."""
         if self._search.refine:
             solution = self._refine(problem, solution, steps=steps, tolerance=tolerance)
         problem = problem.with_prior(solution.rss)
@@ -295,10 +309,11 @@ class Growth:
 
 
 def _below_resolution(problem: SeparableProblem, error: float) -> bool:
-    """True if an error is so near to the resolution of a sensor that finer wavelets are not worth trying."""
+    """True if an RMS error is so near the resolution of a force sensor that narrower wavelets are not
+    tried."""
     return bool(error <= FINER_ERROR_RATIO * FORCE_RESOLUTION * problem.force_range)
 
 
 def _falling(gains: Float1D) -> NDArray[np.intp]:
-    """The numbers of the candidates that gain anything, the best first."""
+    """Returns the indices of the candidates with a gain above 0, the largest gain first."""
     return np.argsort(-gains, kind="stable")[: np.count_nonzero(gains > 0.0)]

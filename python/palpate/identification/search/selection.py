@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Selection from a library: forward orthogonal, residual-based, backward elimination (Zhang 1997).
+"""Selection of wavelets from a library of candidates: forward orthogonal, residual-based, backward
+elimination (Zhang 1997).
 
 Forward orthogonal least squares (Chen, Billings & Luo 1989) measures the gain of a new candidate.
 
-Every candidate is kept orthogonal to the design so far through its Gram matrix only: taking a wavelet updates
-the projections of all others by one product with its orthonormalised columns. Linear and bias columns are
-always in. A candidate that the design already spans is never taken, so the factors stay well conditioned.
+Only the Gram matrix of each candidate is kept orthogonal to the columns of the taken wavelets: taking a
+wavelet updates the projections of all other candidates by one product with its orthonormalised columns.
+Linear and bias columns are always included. A candidate that the taken columns already span is never taken,
+so that the factors stay well conditioned.
 """
 
 from collections.abc import Sequence
@@ -21,23 +23,26 @@ from ..network.separable import LEAST_DILATION, SeparableProblem, Solution, half
 from .evidence import deviance
 
 LEAST_NEW_SHARE = 1e-5
-"""Least share of a candidate's squared norm outside the design [-]: above the rounding of seven digits."""
+"""Least share of the squared norm of a candidate that is orthogonal to the taken wavelets [-]: above the
+rounding error of seven digits."""
 
 CANDIDATES_AT_ONCE = 64
-"""Candidates whose columns are computed in one step: as many as the cache of a processor holds."""
+"""Number of candidates whose columns are computed in one step: as many as fit into the cache of a
+processor."""
 
 LEAST_DISTANCE = 1.0
-"""Distance of two candidates, in widths or as difference of log(alpha), from which refinement may end in
-different minima [-]."""
+"""Least distance of two candidate wavelets, in widths or as difference of log(dilation), at which refinement
+may end in different minima [-]."""
 
 STRETCH_FACTORS = (0.25, 0.5, 2.0, 4.0)
 """Factors of the dilation of a candidate along one input [-]."""
 
 
 class Library:
-    """Candidate wavelets with their weighted columns on every block, computed once.
+    """Candidate wavelets with their weighted columns for every block of rows, computed once.
 
-    Seven digits are enough to rank candidates and take half the memory of a library.
+    The columns have seven digits, which are enough to rank candidates and need half the memory of full
+    precision.
     """
 
     def __init__(self, problem: SeparableProblem, candidates: Basis) -> None:
@@ -61,12 +66,12 @@ class Library:
         return len(self.basis)
 
     def members(self, order: Sequence[int] | NDArray[np.intp]) -> Basis:
-        """The candidates of these numbers."""
+        """Returns the candidates with these indices."""
         chosen = np.asarray(order, dtype=np.intp)
         return Basis(self.basis.alpha[chosen], self.basis.beta[chosen])
 
     def stretched(self, problem: SeparableProblem, order: Sequence[int] | NDArray[np.intp]) -> "Library":
-        """The candidates of these numbers, and each with its dilation along one input changed."""
+        """Returns the candidates with these indices, and copies with a changed dilation along one input."""
         chosen, d = self.members(order), problem.dimension
         combinations = [(factor, k) for k in range(d) for factor in STRETCH_FACTORS]
         factors = np.ones((1 + len(combinations), 1, d))
@@ -76,7 +81,8 @@ class Library:
         return Library(problem, Basis(alpha, np.tile(chosen.beta, (len(factors), 1))))
 
     def distinct(self, order: NDArray[np.intp], count: int) -> list[int]:
-        """The first of these numbers, so many at most, that lie apart or differ in a dilation."""
+        """Returns at most `count` of the indices, the first ones, whose wavelets differ in place or
+        dilation."""
         chosen: list[int] = []
         while len(order) and len(chosen) < count:
             chosen.append(int(order[0]))
@@ -88,7 +94,8 @@ class Library:
 
 
 class OrthogonalSelection:
-    """One forward selection: start from a solved basis, compute gains, take candidates.
+    """Forward selection: starts from fitted wavelets, computes the gain of each candidate, and takes
+    candidates.
 
     For each block a candidate's columns (one a channel) have a projected Gram matrix S and a product z with
     the residual; the residual sum of squares falls by z' S^-1 z, summed over the blocks.
@@ -107,20 +114,21 @@ class OrthogonalSelection:
             self._products.append(products[:, -1])
 
     def gains(self) -> Float1D:
-        """(candidates,) fall of the residual sum of squares if that candidate were taken next."""
+        """Returns the decrease of the residual sum of squares (candidates,) if that candidate were taken
+        next."""
         total = np.zeros(len(self._library))
         for gram, left, product in zip(self._library.grams, self._grams, self._products, strict=True):
             total += _falls(gram, left, product)
         return total
 
     def take(self, index: int) -> float:
-        """Add a candidate; returns the residual sum of squares over all blocks."""
+        """Adds a candidate; returns the residual sum of squares over all blocks of rows."""
         rss = 0.0
         for b, columns in enumerate(self._library.columns):
             factor = self._factors[b]
             fresh = columns[:, index].T.astype(np.float64)
             norm = np.linalg.norm(fresh, axis=0)
-            for _ in range(2):  # twice is enough (Kahan): orthogonal to rounding
+            for _ in range(2):  # two passes make the columns orthogonal up to rounding (Kahan)
                 fresh = fresh - factor @ (factor.T @ fresh)
             basis, triangle = np.linalg.qr(fresh)
             basis = basis[
@@ -154,9 +162,11 @@ def _falls(gram: Float2D, left: Float2D, product: Float2D) -> Float1D:
 
 
 def orthogonal_gains(library: Library, current: Solution) -> Float1D:
-    """(candidates,) fall of the residual sum of squares if a candidate were added to a solved basis.
+    """Returns the decrease of the residual sum of squares (candidates,) if a candidate were added to a fitted
+    network.
 
-    The gains at the start of a selection, from the solution's own Gram matrix.
+    The result equals the gains at the start of a selection; it is computed from the Gram matrix of the
+    solution.
     """
     total = np.zeros(len(library))
     for columns, gram, design, own, residual in zip(
@@ -168,9 +178,10 @@ def orthogonal_gains(library: Library, current: Solution) -> Float1D:
 
 
 def residual_gains(library: Library, current: Solution) -> Float1D:
-    """(candidates,) fall of the residual sum of squares if a candidate were fitted to the residual alone.
+    """Returns the decrease of the residual sum of squares (candidates,) if a candidate were fitted to the
+    residual alone.
 
-    The part that the candidate shares with the network is not removed first: cheaper, less exact.
+    The projection of the candidate on the network is not removed first, which is faster but less exact.
     """
     total = np.zeros(len(library))
     for columns, gram, residual in zip(library.columns, library.grams, current.residuals, strict=True):
@@ -182,11 +193,13 @@ def residual_gains(library: Library, current: Solution) -> Float1D:
 
 @dataclass(frozen=True)
 class SelectionPath:
-    """A whole selection: candidates in their order, and the error and criterion of the first 0, 1, ..."""
+    """Result of a selection: candidates in order, and error and criterion with the first 0, 1, 2 ... of
+    them."""
 
     order: tuple[int, ...]
     rss: tuple[float, ...]
-    """[force^2] with 0, 1, 2 ... wavelets, the within-group part included"""
+    """Residual sum of squares with 0, 1, 2 ... wavelets, including the scatter of samples within a row
+    [force^2]"""
     criterion: tuple[float, ...]
     best: int
     """Number of wavelets with the smallest criterion"""
@@ -206,7 +219,8 @@ class SelectionPath:
 def select_forward(
     problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
 ) -> SelectionPath:
-    """Forward orthogonal: at every step the wavelet that lowers the error most, up to max_wavelets."""
+    """Forward orthogonal selection: each step adds the wavelet that reduces the error most, up to
+    max_wavelets."""
     start = problem.solve(Basis.empty(problem.dimension))
     selection = OrthogonalSelection(library, start)
     order: list[int] = []
@@ -223,7 +237,8 @@ def select_forward(
 def select_by_residual(
     problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
 ) -> SelectionPath:
-    """Residual-based: at every step the wavelet that fits the residual best; then all weights again."""
+    """Residual-based selection: each step adds the wavelet that fits the residual best, then refits all
+    weights."""
     current = problem.solve(Basis.empty(problem.dimension))
     order: list[int] = []
     errors = [problem.total(current.rss)]
@@ -241,9 +256,10 @@ def select_by_residual(
 def select_backward(
     problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
 ) -> SelectionPath:
-    """Backward elimination: from max_wavelets down, always the wavelet whose loss costs least.
+    """Backward elimination: removes, from max_wavelets on, the wavelet whose removal raises the error least.
 
-    A whole library has more members than data can distinguish, so forward selection comes first.
+    A library has more candidates than the data can distinguish, so a forward selection chooses the first
+    max_wavelets.
     """
     forward = select_forward(problem, library, max_wavelets=max_wavelets, criterion=criterion)
     left = list(forward.order)
@@ -264,5 +280,6 @@ def _products(rows: Float2D, columns: NDArray[np.float32]) -> Float2D:
 
 
 def _projected_gram(shadows: Float2D) -> Float2D:
-    """(channels, channels, candidates) products of the candidates' shadows (channels, k, candidates)."""
+    """Returns the Gram matrices (channels, channels, candidates) of the candidates' projections (channels, k,
+    candidates)."""
     return np.asarray(np.einsum("kpn,lpn->kln", shadows, shadows))

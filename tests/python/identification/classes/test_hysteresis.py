@@ -87,5 +87,5 @@ def test_models_of_several_inputs_are_not_compared() -> None:
     X = rng.uniform(0.0, 1.0, (400, 2))
     recording = Recording.from_arrays(X[:, 0], X.sum(axis=1), inputs={"temperature": X[:, 1]})
     model = identify(recording, inputs=("position", "temperature"))
-    with pytest.raises(InputError, match="several inputs"):
+    with pytest.raises(InputError, match="must be position only for a comparison"):
         compare(model, model)

@@ -252,7 +252,7 @@ def reported(recording: Recording) -> list[str]:
 def test_notes_give_position_where_a_late_force_crosses_its_strokes(seed: int) -> None:
     recording = pressed_onto_a_wall(LATE_S, seed)
     (note,) = reported(recording)
-    found = re.search(r"release is up to (\S+) above press between (\S+) and (\S+); ", note)
+    found = re.search(r"release is up to (\S+) above press at (\S+) to (\S+); ", note)
     assert found is not None
     depth, near, far = map(float, found.groups())
     # the wall moves by 2 v late = 0.06 mm between the strokes
