@@ -242,7 +242,7 @@ def converted(
     ----------
     table : Table
     name : str
-        Of the table, for messages.
+        Name of the table, for messages.
     file : Path, optional
         The file of the table. Without it the source is the fingerprint of the arrays.
     direction, rows, zero, torque_constant, options

@@ -144,7 +144,7 @@ class CsvFile(LongTable):
                 raise not_csv(str(self._path), error) from None
 
     def _rows(self, lines: io.TextIOWrapper) -> Iterator[tuple[int, list[str]]]:
-        """Yields line number and cells of each row. Slow: only for the first rows and for error messages."""
+        """Yields line number and cells of each row. Slow: for the first rows and error messages only."""
         reader = csv.reader(lines, delimiter=self._dialect.separator)
         for cells in reader:
             if len(cells) > 1 or (cells and cells[0].strip()):
@@ -184,7 +184,7 @@ class CsvFile(LongTable):
         except ValueError as error:
             if isinstance(error, InputError):
                 raise
-        # A number column contains text below the first rows. Find that column and read it as text.
+        # A column with numbers in its first rows contains text below them. Find it and read it as text.
         return self._read(as_text | self._columns_with_text(as_text), numbers, text)
 
     def _read(self, as_text: set[str], numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
@@ -240,7 +240,7 @@ class CsvFile(LongTable):
         self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
     ) -> Iterator[tuple[int, dict[str, Cells]]]:
         wanted = [name for name in self.names if name in numbers or name in text]
-        # Most files contain only numbers in number columns and are read fast. If a block does not, the part
+        # Most files have only numbers in columns of numbers and are read fast. If a block has text, the part
         # is read again as text, without the rows that were already returned.
         returned = 0
         for as_text in ({*text}, {*text, *numbers}):

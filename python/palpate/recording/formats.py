@@ -150,7 +150,7 @@ class ParquetFile(LongTable):
         parquet = _import_library("pyarrow.parquet", path, "Parquet", "parquet")
         self._path = path
         with readable(path, "Parquet"):
-            # Read in small pieces: a file or one of its row groups may be larger than memory.
+            # The file is read in small pieces: the file or one of its row groups may be larger than memory.
             self._file = parquet.ParquetFile(path, buffer_size=_BUFFER_BYTES, pre_buffer=False)
             schema = self._file.schema_arrow
             self._stored = tuple(str(name) for name in schema.names)

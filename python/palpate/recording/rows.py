@@ -67,13 +67,13 @@ class RowCheck:
     file : str
         The file's name, for the sentences.
     table : Places
-        Gives lines and cells for messages.
+        Gives line numbers and texts of cells for messages.
     first_row : int
         Data row of the file at which the arrays begin.
     rows : int
         Number of rows.
     drop : bool
-        Drops and counts bad rows if True; else refuses the file at the first one.
+        True: drops and counts rows that cannot be used. False: refuses the file at the first such row.
     """
 
     def __init__(self, file: str, table: Places, first_row: int, rows: int, drop: bool) -> None:

@@ -118,7 +118,7 @@ def test_a_wrong_property_is_named_and_forbids_force_if_it_is_unsafe(
 
 def test_a_device_whose_check_forbids_force_has_no_profile() -> None:
     found = judge(summary_without_force(velocity=-summary_without_force()["kept"]["velocity"]))
-    with pytest.raises(InputError, match="a wrong result of its check forbids force"):
+    with pytest.raises(InputError, match="its check found a wrong property that makes force unsafe"):
         found.profile()
 
 
