@@ -20,15 +20,15 @@
 
 namespace palpate::bindings {
 
-/// Any array-like of numbers, converted to contiguous float64.
+/// A numpy array of float64 in contiguous memory, converted from any Python sequence or array of numbers.
 using Array = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
 
-/// Accepts any object as an `ArrayLike`.
+/// Type check of `ArrayLike` that accepts any Python object.
 inline int any_object(PyObject* /*object*/) {
     return 1;
 }
 
-/// An argument of any type that numbers() converts to an Array, so that an error can name it.
+/// A Python argument of any type. numbers() converts it to an Array, so that an error message can name the argument.
 class ArrayLike : public pybind11::object {
     PYBIND11_OBJECT_DEFAULT(ArrayLike, pybind11::object, any_object)
 };
@@ -51,15 +51,16 @@ class ArrayLike : public pybind11::object {
     return {values.begin(), values.end()};
 }
 
-/// Throws std::invalid_argument with the shape unless the array is one-dimensional.
+/// Throws std::invalid_argument with the name and shape of the array unless the array is one-dimensional.
 inline void require_vector(const Array& array, const char* name) {
     if (array.ndim() != 1) {
         throw std::invalid_argument(std::string(name) + " has shape " + shape_of(array) + ", must be (n,)");
     }
 }
 
-/// Returns the numbers of an array-like as contiguous float64. Throws std::invalid_argument with the name of the
-/// argument if it contains other values than real numbers: text, None, complex or masked values.
+/// Converts a Python number, sequence or array to an array of float64 in contiguous memory. Throws
+/// std::invalid_argument with the name of the argument if it contains other values than real numbers: text, None,
+/// complex or masked values.
 [[nodiscard]] inline Array numbers(const pybind11::handle& value, const char* name) {
     namespace py = pybind11;
     const auto refuse = [name](const std::string& found) {
@@ -99,8 +100,9 @@ inline void require_vector(const Array& array, const char* name) {
     return array;
 }
 
-/// Calls work(first, count) for the parts of 0..size, on several processors if that is faster: starting a thread takes
-/// the time of some thousand samples. Call it without the interpreter's lock.
+/// Divides the indices from 0 to size - 1 into parts and calls work(first, count) for each part. Many indices are
+/// divided among several threads; few indices are not, because starting a thread takes the time of some thousand
+/// samples. Call this function without the lock of the Python interpreter.
 template <class Work>
 void in_parts(std::size_t size, const Work& work) {
     constexpr std::size_t least = 16'384;
@@ -116,13 +118,13 @@ void in_parts(std::size_t size, const Work& work) {
         try {
             others.emplace_back([&part, k] { part(k); });
         } catch (const std::system_error&) {
-            part(k);  // the system refused a thread
+            part(k);  // the system cannot start another thread
         }
     }
     part(0);
 }
 
-/// Moves a vector to numpy without a copy.
+/// Returns a numpy array that takes the memory of a vector, without copying the values.
 template <class T>
 [[nodiscard]] pybind11::array_t<T> moved(std::vector<T>&& values) {
     auto owner = std::make_unique<std::vector<T>>(std::move(values));

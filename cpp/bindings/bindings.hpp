@@ -5,7 +5,8 @@
 
 namespace palpate::bindings {
 
-// Each function fills the submodule named after the header folder. Later ones use the types of earlier ones.
+// Each function adds the Python types and functions of one folder of headers to a submodule. They must be called in
+// this order, because later functions use types that earlier functions add.
 void bind_status(pybind11::module_& module);
 void bind_model(pybind11::module_& module);
 void bind_wavelet(pybind11::module_& module);

@@ -14,12 +14,13 @@ using namespace py::literals;
 
 void bind_dynamics(py::module_& module) {
     py::class_<TransferFunction>(module, "TransferFunction",
-                                 "H(z) = (b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2) with its state.")
+                                 "Filter H(z) = (b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2) and its state.")
         .def(py::init<std::array<double, 3>, std::array<double, 3>>(), "numerator"_a, "denominator"_a)
         .def_property_readonly("numerator", &TransferFunction::numerator)
         .def_property_readonly("denominator", &TransferFunction::denominator)
-        .def("step", &TransferFunction::step, "input"_a, "Returns the next output sample.")
-        .def("reset", &TransferFunction::reset, "Sets the state to zero.")
+        .def("step", &TransferFunction::step, "input"_a,
+             "Filters the next input sample and returns the output sample.")
+        .def("reset", &TransferFunction::reset, "Sets the state of the filter to zero.")
         .def("at", &TransferFunction::at, "z"_a, "Returns H(z), for instance at z = exp(1j * omega * T).")
         .def("poles", &TransferFunction::poles)
         .def(
@@ -33,11 +34,12 @@ void bind_dynamics(py::module_& module) {
                 return output;
             },
             "input"_a,
-            "Returns the response to a signal (n,) from this state, and does not change the state.");
+            "Returns the filtered signal for an input signal (n,). The filter starts from its present\n"
+            "state and keeps this state.");
 
     py::class_<EnvironmentFilters>(
         module, "EnvironmentFilters",
-        "Integrators I1, I2 and differentiators G1, G2 of the paper's figures 10 to 14.")
+        "The paper's discrete integrators I1, I2 and differentiators G1, G2 (figures 10 to 14).")
         .def_readonly("i1", &EnvironmentFilters::i1)
         .def_readonly("i2", &EnvironmentFilters::i2)
         .def_readonly("g1", &EnvironmentFilters::g1)
@@ -50,8 +52,8 @@ void bind_dynamics(py::module_& module) {
                                        named<FilterDesign>(design, "design"));
         },
         "pair"_a, "design"_a = "paper",
-        "Returns the paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low "
-        "frequency.");
+        "Returns the paper's integrators and differentiators for the period T = 1 ms (section 4.3): as "
+        "published,\nor with unit gain at low frequency.");
 }
 
 }  // namespace palpate::bindings

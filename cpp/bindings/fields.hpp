@@ -14,11 +14,11 @@
 
 namespace palpate::bindings {
 
-/// Type of a field in Python: str for an enumeration.
+/// Type of a struct field in Python: str for an enumeration, otherwise the C++ type.
 template <class V>
 using PythonType = std::conditional_t<HasWords<V>, std::string, V>;
 
-/// Converts a field to its Python type.
+/// Converts the value of a struct field to its Python type.
 template <class V>
 PythonType<V> to_python(const V& value) {
     if constexpr (HasWords<V>) {
@@ -41,7 +41,7 @@ void set_field(T& object, PythonType<FieldType<T, k>>&& value) {
     }
 }
 
-/// Returns the keyword argument of a field. The first `required` fields are without a default.
+/// Returns the Python keyword argument for a struct field. The first `required` fields of the struct have no default.
 template <class T, std::size_t k, std::size_t required>
 auto argument_of(const T& standard) {
     const auto& field = std::get<k>(fields_of<T>);
@@ -52,7 +52,7 @@ auto argument_of(const T& standard) {
     }
 }
 
-/// All fields by name.
+/// Returns all fields of a struct as a Python dict.
 template <class T>
 pybind11::dict dict_of(const T& object) {
     pybind11::dict values;
@@ -60,9 +60,10 @@ pybind11::dict dict_of(const T& object) {
     return values;
 }
 
-/// Binds a struct by its table of fields: keyword arguments, attributes, `to_dict`, pickling, copying, comparison, hash
-/// and repr. `with_repr` is false for a class with a shorter repr; `check` throws if the fields contradict each other. An
-/// instance of a Python subclass with the same constructor keeps its type.
+/// Makes a C++ struct a Python class, from the table of the struct's fields: keyword arguments, attributes, `to_dict`,
+/// pickling, copying, comparison, hash and repr. `with_repr` is false for a class that defines its repr separately;
+/// `check` throws if the fields contradict each other. A copy of an instance of a Python subclass has the type of the
+/// subclass.
 template <class T, std::size_t required = 0>
 void bind_fields(
     pybind11::class_<T>& type, bool with_repr = true,
@@ -94,7 +95,8 @@ void bind_fields(
             });
             return values;
         },
-        "Returns the fields that are written to a file, by name, without optional ones that are not set.");
+        "Returns the fields that are written to a file, by name. Optional fields without a value are left "
+        "out.");
     type.def("__reduce__", [](const py::object& self) {
         const py::object rebuild = py::module_::import("functools").attr("partial");
         return py::make_tuple(rebuild(py::type::of(self), **dict_of(self.cast<const T&>())), py::tuple());

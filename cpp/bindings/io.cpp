@@ -17,7 +17,7 @@ using namespace py::literals;
 
 namespace {
 
-/// Converts JSON to a Python value.
+/// Converts a JSON value to a Python value.
 py::object to_python(const Json& value) {
     switch (value.type()) {
         case Json::value_t::object: {
@@ -49,8 +49,8 @@ py::object to_python(const Json& value) {
     }
 }
 
-/// Converts a Python value to JSON. An integer of more than 64 bits becomes a double, as in a file; infinity if it is
-/// too large.
+/// Converts a Python value to a JSON value. An integer of more than 64 bits becomes a double, as when a JSON file is
+/// read, or infinity if the integer is too large for a double.
 Json to_json(const py::handle& value, int depth = 0) {
     if (depth > deepest_json) {
         throw std::invalid_argument("the file is nested more than " + std::to_string(deepest_json) +
@@ -103,13 +103,12 @@ Json to_json(const py::handle& value, int depth = 0) {
 void bind_io(py::module_& module) {
     module.def(
         "read_json", [](const std::string& path) { return to_python(read_json(path)); }, "path"_a,
-        "Returns the content of a JSON file. ValueError has one sentence that begins with the name of the "
-        "file.");
+        "Returns the content of a JSON file. Raises ValueError with one sentence that begins with the\n"
+        "name of the file.");
     module.def(
         "check_model", [](const py::object& content) { (void)parse_model(to_json(content)); }, "content"_a,
-        "Checks the content of a model file and recomputes its certificate. ValueError names the path of "
-        "the\n"
-        "first wrong field, its value and the correct ones.");
+        "Checks the content of a model file and computes its certificate again. Raises ValueError with\n"
+        "the path of the first wrong field, its value and the correct values.");
     module.def(
         "profile_of",
         [](const py::object& content) {
@@ -119,11 +118,11 @@ void bind_io(py::module_& module) {
             return read;
         },
         "content"_a,
-        "Returns the device profile in the content of a file. ValueError names the first wrong field, its\n"
-        "value and the correct ones.");
+        "Returns the device profile in the content of a file. Raises ValueError with the first wrong\n"
+        "field, its value and the correct values.");
     module.def(
         "scheme_of", [](const py::object& plan) { return *detail::read_plan({to_json(plan), "plan"}); },
-        "plan"_a, "Returns the scheme of the plan of a model file.");
+        "plan"_a, "Returns the scheme (structure and its numbers) in the plan of a model file.");
     module.def(
         "checked_certificate",
         [](const ForceModel& model, const py::object& plan, const py::object& certificate) {
@@ -133,8 +132,8 @@ void bind_io(py::module_& module) {
                                              model, "");
         },
         "model"_a, "plan"_a, "certificate"_a,
-        "Returns the certificate of a model file after recomputing it from the rendered model. ValueError\n"
-        "names the field that differs, its value and the correct one.");
+        "Computes the certificate of a model file again from the rendered model and returns it. Raises\n"
+        "ValueError with the field that differs, its value and the correct value.");
 }
 
 }  // namespace palpate::bindings

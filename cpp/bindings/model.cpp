@@ -20,7 +20,7 @@ using namespace py::literals;
 
 namespace {
 
-/// An optional argument with one value for all samples, or one value for each sample.
+/// An optional array argument that has one value for all samples, or one value for each sample.
 class Broadcast {
   public:
     Broadcast(const std::optional<Array>& array, py::ssize_t samples, const char* name) {
@@ -44,7 +44,8 @@ class Broadcast {
     py::ssize_t stride_ = 0;
 };
 
-/// Returns force, slope and energy at x; for a hysteresis model by direction or by the play state.
+/// Returns force, slope and energy of a model at the position x. A hysteresis model needs the direction (+1 press, -1
+/// release) or the state of the play operator.
 EnvironmentSample sample(const ForceModel& model, double x, std::optional<double> direction,
                          std::optional<double> play) {
     if (const WaveletNetwork* network = model.network()) {
@@ -57,11 +58,11 @@ EnvironmentSample sample(const ForceModel& model, double x, std::optional<double
     return both.at(x, {*play});
 }
 
-/// Throws unless the arguments fit the inputs of the model.
+/// Throws if the model has several inputs, or if a hysteresis model is called without a direction or play state.
 void require_inputs(const ForceModel& model, bool direction, bool play) {
     detail::require(model.parameters().dimension == 1,
                     "the model has " + std::to_string(model.parameters().dimension) +
-                        " inputs: call predict(X) with X of that many columns");
+                        " inputs: call predict(X), where X has one column for each input");
     if (!model.hysteresis()) {
         return;
     }
@@ -80,7 +81,7 @@ constexpr HatQuantity quantity_of(Member member) {
                                                  : HatQuantity::Integral;
 }
 
-/// Returns one quantity at one position.
+/// Returns the force, slope or energy of a model at one position.
 template <Member member>
 double scalar(const ForceModel& model, double position, const py::object& /*velocity*/,
               const py::object& /*acceleration*/, std::optional<double> direction,
@@ -89,7 +90,7 @@ double scalar(const ForceModel& model, double position, const py::object& /*velo
     return sample(model, position, direction, play).*member;
 }
 
-/// Returns one quantity at many positions.
+/// Returns the force, slope or energy of a model at many positions.
 template <Member member>
 py::array_t<double> batch(const ForceModel& model, const ArrayLike& positions, const py::object& /*velocity*/,
                           const py::object& /*acceleration*/, const std::optional<ArrayLike>& given_direction,
@@ -121,18 +122,20 @@ py::array_t<double> batch(const ForceModel& model, const ArrayLike& positions, c
     return result;
 }
 
-/// Binds one quantity of the model. A number gives a number, an array gives an array.
+/// Adds a method for the force, slope or energy of a model. It returns a number for one position, an array for an
+/// array.
 template <Member member>
 void bind_quantity(py::class_<ForceModel>& type, const char* name, const char* doc) {
     type.def(name, &scalar<member>, doc, py::arg("position").noconvert(), py::kw_only(),
              "velocity"_a = py::none(), "acceleration"_a = py::none(), "direction"_a = py::none(),
              "play"_a = py::none());
-    type.def(name, &batch<member>, "The same for an array of positions, of any shape.", "position"_a,
-             py::kw_only(), "velocity"_a = py::none(), "acceleration"_a = py::none(),
+    type.def(name, &batch<member>,
+             "The same method for an array of positions of any shape; returns an array of this shape.",
+             "position"_a, py::kw_only(), "velocity"_a = py::none(), "acceleration"_a = py::none(),
              "direction"_a = py::none(), "play"_a = py::none());
 }
 
-/// Makes a model from the arguments of its Python constructor.
+/// Makes a ForceModel from the arguments of its Python constructor.
 ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight, const Array& linear,
                       double bias, const std::optional<Array>& weight_hysteresis,
                       const std::optional<Array>& linear_hysteresis, std::optional<double> bias_hysteresis,
@@ -153,7 +156,7 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
         given == 0 || given == 3,
         "weight_hysteresis, linear_hysteresis and bias_hysteresis must be given together or not at all");
     if (given == 0) {
-        detail::require(!play_radius, "play_radius is given for a model without hysteresis");
+        detail::require(!play_radius, "play_radius is given, but the model has no hysteresis: leave it out");
         return of_velocity ? ForceModel::of_velocity(std::move(network), std::move(domain))
                            : ForceModel{std::move(network), std::move(domain)};
     }
@@ -174,7 +177,7 @@ Array row(const std::vector<double>& values) {
     return Array(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-/// Returns the force for one row of X of a model of several inputs or with hysteresis.
+/// Returns the force of a model with several inputs or with hysteresis for one row of inputs.
 double row_force(const ForceModel& model, const double* row) {
     const std::size_t columns = model.parameters().dimension + (model.hysteresis() != nullptr ? 1 : 0);
     if (!std::all_of(row, row + columns, [](double value) { return std::isfinite(value); })) {
@@ -185,7 +188,7 @@ double row_force(const ForceModel& model, const double* row) {
                              : model.hysteresis()->sliding(row[0], row[1]).force;
 }
 
-/// Returns the forces for the rows of X.
+/// Returns the force of a model for each row of inputs in the array X.
 py::array_t<double> predict(const ForceModel& model, const ArrayLike& rows) {
     const Array x = numbers(rows, "X");
     const std::size_t columns = model.parameters().dimension + (model.hysteresis() ? 1 : 0);
@@ -210,7 +213,7 @@ py::array_t<double> predict(const ForceModel& model, const ArrayLike& rows) {
     return result;
 }
 
-/// Returns the states of a play operator along positions.
+/// Returns the states of a play operator that follows a sequence of positions.
 py::array_t<double> play_states(const Array& position, double radius, std::optional<double> start) {
     require_vector(position, "position");
     detail::require(radius > 0.0, "radius is " + std::to_string(radius) + ", must be > 0");
@@ -226,7 +229,7 @@ py::array_t<double> play_states(const Array& position, double radius, std::optio
 py::array_t<double> model_play_states(const ForceModel& model, const ArrayLike& position,
                                       std::optional<double> start) {
     detail::require(model.play_radius().has_value(),
-                    "the model has no play radius, so a motion has no play state");
+                    "the model has no play radius, so the state of the play operator is not defined");
     return play_states(numbers(position, "position"), *model.play_radius(), start);
 }
 
@@ -234,7 +237,7 @@ std::pair<double, double> pair_of(Interval interval) {
     return {interval.lower, interval.upper};
 }
 
-/// Returns true at positions outside the data.
+/// Returns true for each position outside the domain of a model.
 py::object extrapolated(const ForceModel& model, const ArrayLike& positions) {
     const Array position = numbers(positions, "position");
     require_inputs(model, true, true);
@@ -287,41 +290,43 @@ py::array_t<double> cell_derivative_bounds(const Array& alpha, const Array& beta
 void bind_model(py::module_& module) {
     py::class_<ForceModel> type(
         module, "ForceModel",
-        "A force identified over d inputs, with its domain and continuations.\n\n"
-        "f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4); with hysteresis\n"
-        "f(x, s) = g(x) + s h(x), where h has separate weights for the same wavelets.");
-    type.def(py::init(&make_model), py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a,
-             "weight_hysteresis"_a = py::none(), "linear_hysteresis"_a = py::none(),
-             "bias_hysteresis"_a = py::none(), "lower"_a, "upper"_a, "below"_a = "linear",
-             "above"_a = "linear", "period"_a = py::none(), "play_radius"_a = py::none(),
-             "of_velocity"_a = false,
-             "alpha, beta (N, d); weight (N,); linear, lower, upper (d,). of_velocity: the second of two "
-             "inputs is the "
-             "velocity. ValueError names the wrong field.");
+        "A force law of d inputs x, with its domain and the continuation of the force outside the\n"
+        "domain.\n\n"
+        "f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4). With hysteresis the force\n"
+        "is f(x, s) = g(x) + s h(x), with the mean force g of press and release, the direction state s\n"
+        "from -1 to 1, and the hysteresis h, which has separate weights for the same wavelets.");
+    type.def(
+        py::init(&make_model), py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a,
+        "weight_hysteresis"_a = py::none(), "linear_hysteresis"_a = py::none(),
+        "bias_hysteresis"_a = py::none(), "lower"_a, "upper"_a, "below"_a = "linear", "above"_a = "linear",
+        "period"_a = py::none(), "play_radius"_a = py::none(), "of_velocity"_a = false,
+        "Makes the model of N wavelets and d inputs: alpha, beta (N, d); weight (N,); linear, lower,\n"
+        "upper (d,). of_velocity is true if the second of two inputs is the velocity. Raises ValueError\n"
+        "with the wrong field.");
 
     bind_quantity<&EnvironmentSample::force>(
         type, "force",
-        "Returns the force of the object against the tool [N or N*m]: a number for a number, an array for "
-        "an\n"
-        "array.\n\n"
-        "A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius, "
-        "`play`,\n"
-        "the state of the play operator. Inputs that the model does not use are ignored; ValueError names a\n"
-        "missing one.\n"
-        "A position that is not finite gives NaN.");
-    bind_quantity<&EnvironmentSample::slope>(type, "slope",
-                                             "Returns the local stiffness df/dx; arguments as for force.");
+        "Returns the force of the object against the tool [N or N*m]: a number for one position, an\n"
+        "array for an array of positions.\n\n"
+        "A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius,\n"
+        "`play`, the state of the play operator. Arguments that the model does not use are ignored.\n"
+        "Raises ValueError with the name of a missing argument. A position that is not finite gives NaN.");
+    bind_quantity<&EnvironmentSample::slope>(
+        type, "slope",
+        "Returns the slope df/dx of the force [N/m or N*m/rad]; the arguments are "
+        "those of force().");
     bind_quantity<&EnvironmentSample::energy>(
-        type, "energy", "Returns the stored energy [J] up to a constant; arguments as for force.");
+        type, "energy",
+        "Returns the stored energy, up to a constant [J]; the arguments are those of force().");
     type.def("predict", &predict, "X"_a,
-             "Returns the force (n,) at X (n, d). A hysteresis model takes the direction as one more column. "
-             "A row\n"
-             "with a value that is not finite gives NaN.");
+             "Returns the force (n,) for the n rows of inputs X (n, d). A hysteresis model takes the\n"
+             "direction as one more column. A row with a value that is not finite gives NaN.");
     type.def("extrapolated", &extrapolated, "position"_a,
-             "Returns True if a position lies outside the identified domain.");
+             "Returns True for a position outside the domain of the model.");
     type.def(
         "play", &model_play_states, "position"_a, "start"_a = py::none(),
-        "Returns the state of the play operator along a motion (n,). Without `start` it begins at rest.");
+        "Returns the states (n,) of the model's play operator along the positions of a motion (n,). Without\n"
+        "`start` the first state is the first position.");
     type.def(
         "slope_range",
         [](const ForceModel& model, std::optional<double> radius) {
@@ -330,10 +335,10 @@ void bind_model(py::module_& module) {
             return pair_of(model.slope_bounds(radius));
         },
         "play_radius"_a = py::none(),
-        "Returns the proved (smallest, largest) slope inside the domain while sliding in either direction,\n"
-        "within 1 % of the steepest. With a play radius it also holds while a hysteresis model sticks, "
-        "which\n"
-        "adds h / r.");
+        "Returns proved bounds (smallest, largest) of the slope of the force inside the domain, in press\n"
+        "and in release. They are wider than the true range by at most 1 % of the steepest slope. With a\n"
+        "play radius r they include the slope h / r (hysteresis h), with which the force of a hysteresis\n"
+        "model changes after a reversal.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
     type.def_property_readonly("n_wavelets",
@@ -348,7 +353,7 @@ void bind_model(py::module_& module) {
     type.def_property_readonly("hysteretic", [](const ForceModel& m) { return m.hysteresis() != nullptr; });
     type.def_property_readonly(
         "of_velocity", [](const ForceModel& m) { return m.velocity() != nullptr; },
-        "True if the second of two inputs is the velocity.");
+        "True if the model has two inputs, of which the second is the velocity.");
     type.def_property_readonly("weight_hysteresis", [](const ForceModel& m) -> std::optional<Array> {
         return m.hysteresis() ? std::optional(row(m.hysteresis()->hysteresis_force().parameters().weight))
                               : std::nullopt;
@@ -370,22 +375,24 @@ void bind_model(py::module_& module) {
     type.def_property_readonly("period", [](const ForceModel& m) { return m.domain().period; });
     type.def_property_readonly("play_radius", &ForceModel::play_radius);
 
-    module.def("play", &play_states, "position"_a, "radius"_a, "start"_a = py::none(),
-               "Returns the state (n,) of the play operator of a radius along a motion (n,):\n"
-               "play_k = min(x_k + r, max(x_k - r, play_{k-1})). Without `start` it begins at rest.");
-
-    module.def("slope_bounds", &network_slope_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a,
-               "linear"_a, "bias"_a, "lower"_a, "upper"_a, "relative"_a = 0.01,
-               "Returns the proved (smallest, largest) slope of a network of one input over [lower, upper], "
-               "at most\n"
-               "`relative` times max|f'| wider than the true range.");
     module.def(
-        "derivative_bounds", &cell_derivative_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a,
-        "linear"_a, "bias"_a, "lower"_a, "upper"_a, "order"_a,
-        "Returns proved bounds (k,) of |f^(order)| of a network of one input, for orders up to 9, over the\n"
-        "cells [lower, upper], each (k,).");
+        "play", &play_states, "position"_a, "radius"_a, "start"_a = py::none(),
+        "Returns the states (n,) of a play operator of radius r along the positions x of a motion (n,):\n"
+        "play_k = min(x_k + r, max(x_k - r, play_{k-1})). Without `start` the first state is the first\n"
+        "position.");
+
+    module.def(
+        "slope_bounds", &network_slope_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a,
+        "bias"_a, "lower"_a, "upper"_a, "relative"_a = 0.01,
+        "Returns proved bounds (smallest, largest) of the slope f' of a network of one input from lower\n"
+        "to upper. They are wider than the true range by at most `relative` times the largest |f'|.");
+    module.def("derivative_bounds", &cell_derivative_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a,
+               "linear"_a, "bias"_a, "lower"_a, "upper"_a, "order"_a,
+               "Returns proved upper bounds (k,) of the absolute derivative of a network of one input,\n"
+               "for orders up to 9, in k intervals of positions from lower (k,) to upper (k,).");
     module.def("fingerprint", &fingerprint, "model"_a,
-               "Returns 16 hexadecimal digits that change with every number of the model's force.");
+               "Returns a fingerprint of a model: 16 hexadecimal digits, computed from all numbers that "
+               "determine the force.");
 }
 
 }  // namespace palpate::bindings

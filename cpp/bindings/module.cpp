@@ -7,7 +7,7 @@
 
 namespace {
 
-/// Raises bad input in Python as palpate.InputError, which is a ValueError.
+/// Converts std::invalid_argument to the Python exception palpate.InputError, which is a ValueError.
 void translate_invalid_argument(std::exception_ptr thrown) {
     try {
         std::rethrow_exception(std::move(thrown));
@@ -27,11 +27,11 @@ PYBIND11_MODULE(_core, module) {
     using namespace palpate::bindings;
     const auto submodule = [&](const char* name, const char* doc, auto... bind) {
         pybind11::module_ made = module.def_submodule(name, doc);
-        // `from palpate._core.model import ...` reads sys.modules first
+        // the import `from palpate._core.model import ...` finds the submodule in sys.modules
         pybind11::module_::import("sys").attr("modules")[made.attr("__name__")] = made;
         (bind(made), ...);
     };
-    submodule("status", "Results of steps.", bind_status);
+    submodule("status", "Status of a tick of the control loop or of a solver.", bind_status);
     submodule("model", "Force laws and their proved bounds.", bind_wavelet, bind_model);
     submodule("dynamics", "Transfer functions and the filters of the paper.", bind_dynamics);
     submodule("device", "Profiles of devices, and the packets of USB devices.", bind_device, bind_wire);

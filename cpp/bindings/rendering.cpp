@@ -23,29 +23,29 @@ void bind_rendering(py::module_& module) {
     module.attr("most_prediction_taps") = most_prediction_taps;
     module.attr("compensated_share") = compensated_share;
     py::class_<Scheme> type(module, "Scheme",
-                            "Structure that renders a model, with its numbers in SI units.");
+                            "Structure that renders a model, with the numbers of the structure in SI units.");
     bind_fields(type);
     type.def_property_readonly(
             "has_coupling", [](const Scheme& s) { return has_coupling(s.structure); },
-            "True if the object is behind a virtual coupling.")
+            "True if the structure has a virtual coupling between device and object.")
         .def_property_readonly(
             "has_mass", [](const Scheme& s) { return has_mass(s.structure); },
-            "True if the object has mass and damping.")
+            "True if the virtual object of the structure has mass and damping.")
         .def(
             "validate",
             [](const Scheme& s, const ForceModel& model, std::optional<double> period_s) {
                 period_s ? validate(s, model, *period_s) : validate(s, model);
             },
             "model"_a, "period_s"_a = py::none(),
-            "Raises ValueError with the field, its value and the bound for this model. With a period it "
-            "also\n"
-            "refuses a scheme that diverges at this period.")
+            "Checks that the scheme can render a model. Raises ValueError with the wrong field, its\n"
+            "value and its bound. With period_s also raises ValueError if the scheme diverges at this\n"
+            "period.")
         .def(
             "steepest_slope",
             [](const Scheme& s, const ForceModel& model) { return steepest_slope(s, model); }, "model"_a,
-            "Returns the largest slope of the model in the structure, at least 0. It includes h / r, the "
-            "slope\n"
-            "that a hysteresis model adds while it sticks.");
+            "Returns the largest slope of the rendered force, at least 0 [N/m or N*m/rad]. For a\n"
+            "hysteresis model it includes h / r (hysteresis by play radius), the slope that is added\n"
+            "after a reversal.");
 
     module.def(
         "explicit_slope_limit",
@@ -55,11 +55,12 @@ void bind_rendering(py::module_& module) {
                                         period_s);
         },
         "scheme"_a, "period_s"_a, py::kw_only(), "coupled"_a = true,
-        "Returns the slope of the model below which the explicit structure is stable at a held device, or,\n"
-        "with coupled=False, driven by a force.");
+        "Returns the slope limit of a model: below it the explicit structure is stable while the device\n"
+        "is held still, or, with coupled=False, while a force drives the object without coupling.");
 
-    module.def("default_play_radius", &default_play_radius, "model"_a, "encoder_step"_a,
-               "Returns the default play radius of a model that does not define one; otherwise 0.");
+    module.def(
+        "default_play_radius", &default_play_radius, "model"_a, "encoder_step"_a,
+        "Returns the default play radius for a hysteresis model that does not define one; otherwise 0.");
     module.attr("fewest_encoder_steps_in_play") = fewest_encoder_steps_in_play;
 
     module.def(
@@ -70,9 +71,9 @@ void bind_rendering(py::module_& module) {
             return name ? std::optional<std::string>{*name} : std::nullopt;
         },
         "model"_a, "scheme"_a, "period_s"_a,
-        "Returns the method that solves the load line: 'table' if certified tables are used at least in "
-        "part,\n"
-        "otherwise 'newton'; None for a structure without a load line.");
+        "Returns the method that solves the load line of a scheme: 'table' if a table of solutions is\n"
+        "used for at least a part of the positions, otherwise 'newton'; None for a structure without a\n"
+        "load line.");
 }
 
 }  // namespace palpate::bindings

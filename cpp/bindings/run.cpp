@@ -26,9 +26,9 @@ using namespace py::literals;
 
 namespace {
 
-/// Calls Python while a session runs without the interpreter's lock: its signal handlers, and ten times a second
-/// `progress(ticks, position, force, lost)`. An exception ends the session and is raised after it; Ctrl-C only ends the
-/// session.
+/// Calls Python functions while a run continues without the lock of the Python interpreter: the signal handlers, and
+/// ten times a second `progress(ticks, position, force, lost)`. An exception in `progress` ends the run and is raised
+/// after the run; Ctrl-C only ends the run.
 class Watcher {
   public:
     Watcher(const std::optional<py::function>& progress, std::atomic<double> LoopProgress::* force)
@@ -107,7 +107,7 @@ py::object python_of(const NamedValues& fields) {
     return dict;
 }
 
-/// Returns one field of all ticks as an array.
+/// Returns one field of the records of all ticks as a numpy array.
 template <class Value>
 py::array_t<Value> column(const std::vector<TickRecord>& ticks, Value TickRecord::* field) {
     py::array_t<Value> values(static_cast<py::ssize_t>(ticks.size()));
@@ -118,7 +118,7 @@ py::array_t<Value> column(const std::vector<TickRecord>& ticks, Value TickRecord
     return values;
 }
 
-/// Sets the options from keywords and checks those that other functions do not check.
+/// Sets the options of a run from Python keywords, and checks the option wait_s.
 template <class T>
 void set_options(T& options, const py::kwargs& given) {
     set_fields(options, given);
@@ -127,7 +127,7 @@ void set_options(T& options, const py::kwargs& given) {
                     "wait_s is " + readable(options.wait_s.value_or(0.0)) + ", must be > 0 and at most 10");
 }
 
-/// Renders a model and returns the fields of the summary.
+/// Renders a model on a device and returns the values of the summary as a dict.
 py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& plan,
                           const std::optional<ForceModel>& limited,
                           const std::optional<Certificate>& certificate, const std::string& position_unit,
@@ -151,7 +151,7 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
     return result;
 }
 
-/// Measures an object and returns the fields of the summary.
+/// Measures an object on a device and returns the values of the summary as a dict.
 py::dict measure_in_python(const std::optional<ForceModel>& object, const std::string& position_unit,
                            const std::string& force_unit, const std::optional<py::function>& progress,
                            const py::kwargs& given) {
@@ -192,7 +192,7 @@ void bind_run(py::module_& module) {
     module.attr("tolerated_change") = detail::tolerated_change;
     module.attr("smallest_domain_share") = detail::smallest_domain_share;
     module.attr("usual_telemetry_hz") = Telemetry::usual_hz;
-    py::class_<LoopSettings>(module, "LoopSettings", "Default rate, duration and limits of a session.")
+    py::class_<LoopSettings>(module, "LoopSettings", "Default rate, duration and least rate of a run.")
         .def(py::init<>())
         .def_readonly("rate_hz", &LoopSettings::rate_hz)
         .def_readonly("duration_s", &LoopSettings::duration_s)
@@ -202,23 +202,27 @@ void bind_run(py::module_& module) {
         "limited"_a = py::none(), "certificate"_a = py::none(), "position_unit"_a = "rad",
         "force_unit"_a = "N*m", "model_name"_a = "", "progress"_a = py::none(),
         "Renders a model in real time on a device: the loop of palpate-control.\n\n"
-        "`plan`, `limited` and `certificate` are those of the model. Without a plan the default scheme is\n"
-        "used. Options are keywords, None for the default:\n\n"
+        "`plan`, `limited` and `certificate` are read from the model file; `limited` is the model that the "
+        "plan\n"
+        "renders instead. Without a plan the default scheme is used. Options are keywords, None for the "
+        "default:\n\n"
         "- device (simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]), wait_s, uncertified, faults.\n"
         "- rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.\n"
         "- force_limit and the fields of a scheme.\n"
         "- record, force, telemetry_port, telemetry_hz.\n\n"
-        "`record` names the recording, which grows as record.part. An existing one is refused, or replaced "
-        "with\n"
-        "`force`. Calls progress(ticks, position, force, lost) ten times a second.\n\n"
-        "Returns the summary by name, and its text under `lines`. Raises InputError if it is refused before\n"
-        "anything moves.");
+        "`record` is the name of the recording, which is written as record.part and renamed at the end. If "
+        "the\n"
+        "recording exists, it is replaced with `force`, otherwise the call is refused. Calls\n"
+        "progress(ticks, position, force, lost) ten times a second.\n\n"
+        "Returns the values of the summary by name, and the text of the summary under `lines`. Raises "
+        "InputError\n"
+        "if the rendering is refused, before the device moves.");
     module.def(
         "measure", &measure_in_python, py::kw_only(), "object"_a = py::none(), "position_unit"_a = "rad",
         "force_unit"_a = "N*m", "progress"_a = py::none(),
         "Measures a real object in real time; on the simulated device the model `object` is mounted.\n\n"
         "A hand moves the handle. With `probe` the device moves it slowly between `lower` and `upper`. With\n"
-        "`push` the device gives short pushes of that force to either side. Options are keywords, None for\n"
+        "`push` the device gives short pushes of this force to either side. Options are keywords, None for\n"
         "the default:\n\n"
         "- device (simulated or usb[:SERIAL]), wait_s.\n"
         "- rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.\n"
@@ -226,8 +230,8 @@ void bind_run(py::module_& module) {
         "- record, force, keep.\n"
         "- transducer, friction_share (Coulomb friction of the simulated device / its force limit).\n\n"
         "Calls progress(ticks, position, force, lost) ten times a second.\n\n"
-        "Returns the summary by name; with `keep` it contains the ticks. Raises InputError if it is refused\n"
-        "before anything moves.");
+        "Returns the values of the summary by name; with `keep` the columns of all ticks are under `kept`.\n"
+        "Raises InputError if the measurement is refused, before the device moves.");
 }
 
 }  // namespace palpate::bindings

@@ -13,7 +13,7 @@
 
 namespace palpate::bindings {
 
-/// Returns the value of a keyword for a field of type V; an enumeration is a str in Python.
+/// Converts the Python value of a keyword argument to the type V of a struct field; an enumeration is a str in Python.
 template <class V>
 [[nodiscard]] V value_of(const pybind11::handle& given, const char* field) {
     if constexpr (requires(V value) { requires HasWords<typename V::value_type>; }) {
@@ -23,8 +23,8 @@ template <class V>
     }
 }
 
-/// Sets the fields of a settings struct by the keywords in its table; None keeps the default. Raises TypeError for an
-/// unknown keyword and InputError for a value of a wrong type.
+/// Sets the fields of a settings struct from Python keyword arguments with the names of the fields; None keeps the
+/// default. Raises TypeError for an unknown keyword and InputError for a value of a wrong type.
 template <HasFields T>
 void set_fields(T& settings, const pybind11::kwargs& given) {
     namespace py = pybind11;

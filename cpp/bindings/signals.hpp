@@ -8,8 +8,9 @@
 
 namespace palpate::bindings {
 
-/// Makes long work without the interpreter's lock interruptible by Ctrl-C. It is called once for each step, runs
-/// Python's signal handlers, and calls `progress(step)` ten times a second. Their exceptions are thrown.
+/// Lets Ctrl-C interrupt long work that runs without the lock of the Python interpreter. The work calls it once for
+/// each step. Ten times a second it runs Python's signal handlers and calls `progress(step)`; an exception of them ends
+/// the work.
 class Interruptible {
   public:
     explicit Interruptible(const pybind11::function* progress = nullptr) : progress_{progress} {}

@@ -34,7 +34,7 @@ std::vector<std::int8_t> numbered(const std::vector<Status>& statuses) {
     return numbers;
 }
 
-/// Simulates a rendering and returns its columns.
+/// Simulates the rendering of a model and returns the columns of the simulated ticks as numpy arrays by name.
 py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
                             const Hand& hand, double duration_s, int substeps, double start_position,
                             const std::optional<py::function>& progress) {
@@ -59,7 +59,8 @@ py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const
         "extrapolated"_a = moved(std::move(trace.extrapolated)));
 }
 
-/// Returns the columns of `render(samples, each)` along a recording (n,).
+/// Calls `render(samples, each)` with the positions or forces of a recording (n,). Returns the columns of the rendered
+/// ticks as numpy arrays by name.
 template <class Render>
 py::dict rendered_along(const Array& samples, const char* name, double period_s, Render render) {
     require_vector(samples, name);
@@ -86,12 +87,12 @@ py::dict rendered_along(const Array& samples, const char* name, double period_s,
 }  // namespace
 
 void bind_simulation(py::module_& module) {
-    py::class_<Hand> hand(
-        module, "Hand",
-        "Simulated hand: a spring to a target that moves between lower and upper, and a damper to ground.");
+    py::class_<Hand> hand(module, "Hand",
+                          "Simulated hand: a spring to a target that moves between lower and upper, and\n"
+                          "a damper between handle and ground.");
     bind_fields(hand);
 
-    py::class_<TestRig> rig(module, "TestRig", "Simulated device and hand scaled to a model.");
+    py::class_<TestRig> rig(module, "TestRig", "Simulated device and hand, scaled to a model.");
     bind_fields<TestRig, 2>(rig);
     rig.def(
         "scheme",
@@ -101,19 +102,18 @@ void bind_simulation(py::module_& module) {
             return self.scheme(model, chosen);
         },
         "model"_a,
-        "Returns the scheme with the given fields of Scheme, in the model's units. None: the default at the\n"
-        "model's scale.");
+        "Returns a scheme with the given fields of Scheme, in the model's units. Other fields, and fields\n"
+        "with the value None, have the default, multiplied by the scale of the model.");
     module.def(
         "rig_for", &rig_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
-        "Returns the test rig for a model of position, or of position and velocity. An angle is rendered on\n"
-        "the default knob. For any other unit its lengths and forces are scaled to the travel and the "
-        "largest\n"
-        "force of the model.");
+        "Returns the test rig for a model of position, or of position and velocity. With is_angle\n"
+        "(positions in rad) it is the default knob. For any other unit, lengths and forces of the knob\n"
+        "and its hand are scaled to the travel and the largest force of the model.");
 
     module.def(
         "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
         "substeps"_a = usual_substeps, "start_position"_a = 0.0, "progress"_a = py::none(),
-        "Renders a model on a simulated device with a simulated hand, in virtual time.\n\n"
+        "Renders a model on a simulated device with a simulated hand, in simulated time.\n\n"
         "The handle starts at rest at start_position. Calls progress(ticks) about ten times a second.\n"
         "Ctrl-C raises KeyboardInterrupt. Raises ValueError for more than 3 600 000 ticks.\n\n"
         "Returns arrays (n,) by name:\n\n"
@@ -144,11 +144,10 @@ void bind_simulation(py::module_& module) {
         },
         "model"_a, "play_radius"_a, py::kw_only(), "start"_a, "middle"_a, "end"_a, "applied"_a,
         "mean_applied"_a, "period_s"_a,
-        "Returns errors of a simulated rendering against a model, by name. RMS [N or N*m]: at the end of "
-        "the\n"
-        "tick, at its sampling instant, of the mean over the tick, and of the mean below 50 Hz. Also the "
-        "work\n"
-        "of the error [J]. Takes arrays (n,) from simulate; play_radius 0 is that of the model.");
+        "Returns errors of the force of a simulated rendering, compared with a model, by name. RMS\n"
+        "errors [N or N*m]: `end`, at the end of each tick; `instant`, at the time of the sample;\n"
+        "`mean`, mean error over a tick; `band`, mean error below 50 Hz. `work` is the work of the error\n"
+        "[J]. The arrays (n,) are those of simulate(); play_radius 0 means the play radius of the model.");
     module.def(
         "motion_driven",
         [](const ForceModel& model, const Scheme& s, const Array& position, double period_s) {
@@ -157,7 +156,7 @@ void bind_simulation(py::module_& module) {
             });
         },
         "model"_a, "scheme"_a, "position"_a, "period_s"_a,
-        "Returns the force that is rendered while a recorded motion (n,) moves the device.\n"
+        "Returns the force that a scheme renders while the device follows a recorded motion (n,).\n"
         "Arrays (n,) by name: force, environment_position, evaluations, status.");
     module.def(
         "force_driven",
@@ -168,8 +167,9 @@ void bind_simulation(py::module_& module) {
             });
         },
         "model"_a, "scheme"_a, "force"_a, "period_s"_a, "start_position"_a = 0.0,
-        "Returns the motion of the environment alone under a recorded force (n,) (paper figures 12 and 14).\n"
-        "Arrays (n,) by name: force, environment_position, evaluations, status.");
+        "Returns the motion of the virtual object, without device and coupling, when a recorded force\n"
+        "(n,) drives the object (paper figures 12 and 14). Arrays (n,) by name: force,\n"
+        "environment_position, evaluations, status.");
 }
 
 }  // namespace palpate::bindings

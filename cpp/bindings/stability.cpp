@@ -24,20 +24,20 @@ namespace {
 void bind_bounds(py::module_& module) {
     py::class_<ForceBounds> type(
         module, "ForceBounds",
-        "Proved bounds of a force over all positions, continuations included.\n\n"
-        "With hysteresis, f = g + s h with a play of radius r, the slope of a path is g' + s h'. While it\n"
-        "sticks, h / r is added.");
+        "Proved bounds of a model's force and slope at all positions, inside and outside the domain.\n\n"
+        "With hysteresis the force is f = g + s h: the mean force g of press and release, the hysteresis\n"
+        "h and the direction state s. During a stroke the slope is g' + s h'; after a reversal h / r is\n"
+        "added, with the play radius r.");
     bind_fields<ForceBounds, 4>(type);
     constexpr double none = std::numeric_limits<double>::infinity();
     module.def(
         "force_bounds", &force_bounds, "model"_a, "play_radius"_a = 0.0, "force_limit"_a = none,
-        "Returns proved bounds of a model of one position, or of position and velocity, on a device with a\n"
-        "force limit. A play_radius above 0 replaces the model's own.");
-    module.def(
-        "passive_shift", py::overload_cast<const ForceModel&, double>(&passive_shift), "model"_a,
-        "force_limit"_a,
-        "Returns the shift of a periodic force for which the mean of the limited force is not active; 0\n"
-        "for other models. Add it to the bias of the network.");
+        "Returns proved bounds of the force of a model of position, or of position and velocity, limited to\n"
+        "force_limit. A play_radius above 0 replaces the play radius of the model.");
+    module.def("passive_shift", py::overload_cast<const ForceModel&, double>(&passive_shift), "model"_a,
+               "force_limit"_a,
+               "Returns the force to add to the bias of a periodic model, so that its force, limited to\n"
+               "force_limit, gives no energy over a period [N or N*m]; 0 for other models.");
     module.def(
         "renderable_slopes",
         [](const DeviceProfile& device, double stick, double rising, double falling) {
@@ -45,24 +45,25 @@ void bind_bounds(py::module_& module) {
             return std::pair{slopes.lower, slopes.upper};
         },
         "device"_a, "stick"_a = 0.0, py::kw_only(), "rising"_a = none, "falling"_a = none,
-        "Returns the (lowest, highest) slope for which direct rendering is certified; infinite without a\n"
-        "limit.\n\n"
-        "First finds the largest k for which slopes of -k and k are certified together, limited to "
-        "`falling`\n"
-        "and `rising`. Then finds the largest falling slope, and after that the largest rising one. With\n"
-        "hysteresis these are slopes while sliding; sticking adds h / r = `stick`.");
+        "Returns the (lowest, highest) slope of a model for which direct rendering on a device is\n"
+        "certified; infinite if every slope is certified.\n\n"
+        "First finds the largest k for which slopes from -k to k are certified, with at most `falling`\n"
+        "and `rising`. Then finds the steepest falling slope, and after that the steepest rising slope.\n"
+        "With hysteresis these are slopes during a stroke; after a reversal h / r = `stick` is added\n"
+        "(hysteresis by play radius).");
     module.def("steepest_stick", &steepest_stick, "device"_a,
-               "Returns the slope h / r that leaves half of the device's largest slope for sliding.");
-    module.def(
-        "narrowest_play", &narrowest_play, "sliding"_a, "device"_a, "least"_a, "most"_a,
-        "Returns the narrowest play radius from `least` to `most` for which hysteresis is certified;\n"
-        "infinite without one. `sliding` are bounds of the model with a play so wide that sticking adds\n"
-        "no slope.");
+               "Returns the largest slope h / r (hysteresis by play radius) for which half of the\n"
+               "largest slope that the device can render remains for the model's strokes.");
+    module.def("narrowest_play", &narrowest_play, "sliding"_a, "device"_a, "least"_a, "most"_a,
+               "Returns the smallest play radius from `least` to `most` for which a hysteresis model is\n"
+               "certified; infinity if there is none. `sliding` are bounds of the model's force with a play\n"
+               "radius so large that a reversal adds no slope.");
 }
 
 void bind_inequality(py::module_& module) {
-    py::class_<Inequality> type(module, "Inequality",
-                                "One line of a certificate: left >= right, or left > right if it is strict.");
+    py::class_<Inequality> type(
+        module, "Inequality",
+        "One inequality of a certificate: left >= right, or left > right if `strict` is true.");
     bind_fields<Inequality, 3>(type, false);
     type.def_property_readonly("margin", &Inequality::margin, "left - right")
         .def_property_readonly("holds", &Inequality::holds);
@@ -77,15 +78,16 @@ void bind_inequality(py::module_& module) {
 void bind_stability(py::module_& module) {
     bind_bounds(module);
     bind_inequality(module);
-    py::class_<Certificate> type(module, "Certificate",
-                                 "Proved properties of a model that a scheme renders on a device.");
+    py::class_<Certificate> type(
+        module, "Certificate",
+        "Proved inequalities and verdict for a model that a scheme renders on a device.");
     bind_fields<Certificate, 8>(type, false);
     type.def_property_readonly("certified", &Certificate::certified)
         .def_property_readonly(
             "refused", [](const Certificate& certificate) { return certificate.verdict == Verdict::Refused; })
         .def("check", &checked, "model"_a,
-             "Computes the certificate again and returns the result. ValueError names the first field that "
-             "differs.");
+             "Computes the certificate again from the model and returns it. Raises ValueError with the first "
+             "field that differs.");
     type.def("__repr__", [](const Certificate& certificate) {
         return "<Certificate for " + certificate.device.id + ": " +
                std::string(name_of(certificate.verdict)) + "; " + certificate.reason + ">";
@@ -97,21 +99,22 @@ void bind_stability(py::module_& module) {
             return certify(model, scheme, device);
         },
         "model"_a, "scheme"_a, "device"_a,
-        "Certifies a model that a scheme renders on a device. A refusal is a result with a reason; an\n"
-        "impossible scheme or device raises ValueError.");
+        "Returns the certificate of a model that a scheme renders on a device. If stability is not\n"
+        "proved, the certificate states the reason. Raises ValueError for an invalid scheme or device.");
     module.def(
         "certify_bounds",
         [](const ForceBounds& bounds, const Scheme& scheme, const DeviceProfile& device) {
             return certify(bounds, scheme, device);
         },
-        "bounds"_a, "scheme"_a, "device"_a, "Certifies any force within bounds.");
-    module.def("stiffest_coupling", &stiffest_coupling, py::kw_only(), "coupling_damping"_a, "falling"_a,
-               "device"_a, "share"_a = usual_coupling_share,
-               "Returns the largest coupling stiffness K_c for which a share of the device's damping is "
-               "sufficient; 0\n"
-               "if no stiffness is certified. `coupling_damping` is B_c; `falling` is the steepest falling "
-               "slope of\n"
-               "the object's force.");
+        "bounds"_a, "scheme"_a, "device"_a,
+        "Returns the certificate of every force within the bounds, rendered by "
+        "a scheme on a device.");
+    module.def(
+        "stiffest_coupling", &stiffest_coupling, py::kw_only(), "coupling_damping"_a, "falling"_a, "device"_a,
+        "share"_a = usual_coupling_share,
+        "Returns the largest coupling stiffness K_c that is certified with only the given share of the\n"
+        "device's damping; 0 if no stiffness is certified. `coupling_damping` is B_c; `falling` is the\n"
+        "steepest falling slope of the object's force.");
     module.attr("usual_coupling_share") = usual_coupling_share;
     module.def(
         "explicit_scheme",
@@ -121,16 +124,18 @@ void bind_stability(py::module_& module) {
             return explicit_scheme(bounds, device, chosen);
         },
         "bounds"_a, "device"_a,
-        "Returns the explicit structure with the stiffest coupling, then the least object damping, for "
-        "which\n"
-        "it is stable; otherwise the last one tried. Keywords: mass, object_damping, coupling_stiffness,\n"
-        "coupling_damping and play_radius; None: chosen by the search.");
+        "Searches the explicit structure with the stiffest coupling, then the least object damping, for\n"
+        "which the structure is stable, and returns its scheme. If none is stable, returns the last\n"
+        "scheme that was tried. Keywords: mass, object_damping, coupling_stiffness, coupling_damping and\n"
+        "play_radius; None: the search chooses the value.");
+    module.def("device_difference", &device_difference, "certified"_a, "device"_a,
+               "Returns a sentence about the first field in which a device profile differs from the "
+               "certified profile;\n"
+               "empty without a difference.");
     module.def(
-        "device_difference", &device_difference, "certified"_a, "device"_a,
-        "Returns a sentence about the first field in which a device differs from the certified one; empty\n"
-        "without a difference.");
-    module.def("slope_behind_coupling", &slope_behind_coupling, "slope"_a, "coupling_stiffness"_a,
-               "Returns K_c k / (K_c + k), the slope of an object of slope k > -K_c behind a coupling.");
+        "slope_behind_coupling", &slope_behind_coupling, "slope"_a, "coupling_stiffness"_a,
+        "Returns K_c k / (K_c + k), the slope that the device feels for an object of slope k > -K_c behind a "
+        "coupling\nof stiffness K_c.");
 }
 
 }  // namespace palpate::bindings

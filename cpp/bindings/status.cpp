@@ -8,7 +8,9 @@ namespace palpate::bindings {
 namespace py = pybind11;
 
 void bind_status(py::module_& module) {
-    py::enum_<Status> status(module, "Status", "Result of a step; the same words in C++ and in records.");
+    py::enum_<Status> status(
+        module, "Status",
+        "Result of one step of the control loop or of a solver. C++ and recordings use the same words.");
     py::dict meanings;
     for (std::size_t k = 0; k < status_texts.size(); ++k) {
         status.value(status_texts[k].word, static_cast<Status>(k), status_texts[k].meaning);

@@ -22,11 +22,12 @@ using namespace py::literals;
 
 namespace {
 
-/// One radial hat at a block of samples, computed from the squares of u.
+/// Values of one radial wavelet psi(u) at a block of up to 64 samples, computed from the squares u . u of the scaled
+/// distance u = alpha o (x - beta) to the wavelet's centre.
 struct Hats {
     static constexpr std::size_t block = 64;
 
-    double inputs = 1.0;  ///< number of inputs
+    double inputs = 1.0;  ///< number of inputs d of the wavelet
     std::size_t first = 0, size = 0;
     std::array<double, block> square{}, gaussian{};
 
@@ -35,10 +36,11 @@ struct Hats {
     }
 };
 
-/// Samples and wavelets of one call: X (n, d), alpha and beta (N, d). One-dimensional arrays mean d = 1.
+/// Samples X (n, d) and the dilations alpha and translations beta (N, d) of N wavelets of d inputs. One-dimensional
+/// arrays mean d = 1.
 struct Frame {
     std::size_t samples, wavelets, dimension;
-    std::vector<double> inputs;  ///< X, input by input
+    std::vector<double> inputs;  ///< X, all samples of the first input first
     const double *alpha, *beta;
 
     Frame(const Array& x_array, const Array& alpha_array, const Array& beta_array) {
@@ -68,18 +70,19 @@ struct Frame {
         beta = beta_array.data();
     }
 
-    /// Returns u_j of wavelet i at sample k.
+    /// Returns u_j = alpha_ij (x_kj - beta_ij), the scaled distance of sample k to wavelet i along input j.
     [[nodiscard]] double scaled(std::size_t i, std::size_t k, std::size_t j) const noexcept {
         return alpha[i * dimension + j] * (inputs[j * samples + k] - beta[i * dimension + j]);
     }
 
-    /// Returns u_j for products with a hat, limited to the reach of a hat. A distant hat is zero even if u is infinite.
+    /// Returns the scaled distance u_j, limited to the largest |u| at which a wavelet is not zero, so that the product
+    /// of u_j with a wavelet that is zero is never infinity times zero.
     [[nodiscard]] double clamped(std::size_t i, std::size_t k, std::size_t j) const noexcept {
         return std::clamp(scaled(i, k, j), -detail::hat_reach, detail::hat_reach);
     }
 
-    /// Calls visit(hats) with the radial hats of wavelet i for every block of samples. Each step is a loop over a block
-    /// that the compiler vectorises. A block beyond the reach of the wavelet needs no exponentials.
+    /// Calls visit(hats) with the values of wavelet i for every block of samples. Each step is a loop over a block that
+    /// the compiler vectorises. A block so far from the wavelet that all its values are 0 needs no exponentials.
     template <class Visitor>
     void radial(std::size_t i, Visitor visit) const {
         // exp(-80) is 2e-35. Products of smaller numbers are denormal, which makes linear algebra ten times as slow.
@@ -117,14 +120,15 @@ struct Frame {
     }
 };
 
-/// An (n, N) array stored column by column, the order that linear algebra requires.
+/// A numpy array (n, N) that is stored column by column, the order that linear algebra routines need.
 using Columns = py::array_t<double, py::array::f_style>;
 
 [[nodiscard]] Columns columns(std::size_t samples, std::size_t wavelets) {
     return Columns({static_cast<py::ssize_t>(samples), static_cast<py::ssize_t>(wavelets)});
 }
 
-/// Returns value(hats, wavelet, k in its block) at every sample and wavelet.
+/// Returns the array (n, N) of value(hats, i, k) for every wavelet i and every sample, where k is the index of the
+/// sample in its block.
 template <class Value>
 Columns filled(const Frame& frame, Value value) {
     auto result = columns(frame.samples, frame.wavelets);
@@ -245,22 +249,26 @@ Columns wavelet_slope_columns(const Array& x, const Array& alpha, const Array& b
 }  // namespace
 
 void bind_wavelet(py::module_& module) {
-    module.def("wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a,
-               "Returns psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in "
-               "memory.\n\n"
-               "x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.");
-    module.def("wavelet_jacobian", &wavelet_jacobian, "x"_a, "alpha"_a, "beta"_a,
-               "Returns the wavelet columns and their derivatives by the dilations and the translations:\n"
-               "(value, by_alpha, by_beta), value (n, N), the others lists of d arrays (n, N).");
-    module.def("wavelet_steps", &wavelet_steps, "x"_a, "alpha"_a, "beta"_a,
-               "Returns the derivatives of the wavelet columns by steps without a unit, d log(alpha) and "
-               "alpha d(beta):\n"
-               "(n, 2 d N), ordered (quantity, input, wavelet), column by column in memory.");
+    module.def(
+        "wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a,
+        "Returns the values psi(alpha_i o (x_k - beta_i)) of N wavelets (radial Mexican hats) at n samples: "
+        "(n, N),\ncolumn by column in memory.\n\n"
+        "x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.");
+    module.def(
+        "wavelet_jacobian", &wavelet_jacobian, "x"_a, "alpha"_a, "beta"_a,
+        "Returns the values of the wavelets (n, N), and their derivatives by the dilations alpha and by the\n"
+        "translations beta, each as a list of d arrays (n, N): (value, by_alpha, by_beta).");
+    module.def(
+        "wavelet_steps", &wavelet_steps, "x"_a, "alpha"_a, "beta"_a,
+        "Returns the derivatives of the wavelets' values by changes without a unit, d log(alpha) of the\n"
+        "dilations and alpha d(beta) of the translations: (n, 2 d N), columns ordered by quantity,\n"
+        "input, wavelet.");
     module.def(
         "wavelet_curvature_columns", &wavelet_curvature_columns, "x"_a, "alpha"_a, "beta"_a,
-        "Returns the second derivatives of the wavelet columns along each input: a list of d arrays (n, N).");
-    module.def("wavelet_slope_columns", &wavelet_slope_columns, "x"_a, "alpha"_a, "beta"_a,
-               "Returns d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).");
+        "Returns the second derivatives of the wavelets' values by each input: a list of d arrays (n, N).");
+    module.def(
+        "wavelet_slope_columns", &wavelet_slope_columns, "x"_a, "alpha"_a, "beta"_a,
+        "Returns the derivatives d psi(alpha_i (x_k - beta_i)) / dx of wavelets of one input: (n, N).");
 }
 
 }  // namespace palpate::bindings

@@ -32,14 +32,16 @@ py::dict decode_info(const py::bytes& data) {
 }  // namespace
 
 void bind_wire(py::module_& module) {
-    module.def(
-        "decode_info", &decode_info, "data"_a,
-        "Returns the properties in a USB device's answer to GET_INFO. InputError names the wrong field.\n\n"
-        "firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms, "
-        "transducer,\nmeasures_velocity, uid.");
+    module.def("decode_info", &decode_info, "data"_a,
+               "Returns the properties in a USB device's answer to the request GET_INFO, by name. Raises\n"
+               "InputError with the wrong field.\n\n"
+               "firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms,\n"
+               "transducer, measures_velocity, uid.");
     module.def("usb_cause", &wire::usb_cause, "code"_a,
-               "Returns cause and cure for an error code of libusb; empty for a code without a known cause.");
-    py::enum_<wire::Request>(module, "UsbRequest", "bRequest of a control transfer.")
+               "Returns cause and cure for an error code of libusb; empty for a code without a text.");
+    py::enum_<wire::Request>(
+        module, "UsbRequest",
+        "Numbers of the control requests to a USB device (field bRequest of a control transfer).")
         .value("GetInfo", wire::Request::GetInfo)
         .value("Enable", wire::Request::Enable)
         .value("Zero", wire::Request::Zero)

@@ -25,13 +25,14 @@ namespace palpate::control {
 namespace {
 
 std::atomic<bool> stop_requested{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets stop_requested");
 
 void request_stop(int /*signal*/) {
     stop_requested.store(true, std::memory_order_relaxed);
 }
 
-/// Installs handlers: Ctrl-C and a termination request stop the loop, a closed pipe and a full file do not.
+/// Installs signal handlers: Ctrl-C and a termination request end the control loop; a closed output pipe and the file
+/// size limit do not.
 void handle_signals() {
     struct sigaction stop{};
     stop.sa_handler = request_stop;
@@ -45,8 +46,8 @@ void handle_signals() {
     }
 }
 
-/// Gives each closed standard stream an unusable descriptor. Otherwise a file opened later would get its number, and
-/// the summary would be written into the recording.
+/// Opens /dev/null in place of each closed standard stream. Otherwise the recording could get the file number of
+/// standard output, and the summary would be written into the recording.
 void occupy_closed_streams() {
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
         if (fcntl(stream, F_GETFD) < 0) {
@@ -55,7 +56,7 @@ void occupy_closed_streams() {
     }
 }
 
-/// Flushes standard output and returns the exit code; 1 if the output could not be written.
+/// Writes all buffered text to standard output. Returns `code`, or 1 if standard output could not be written.
 int exit_code_after_output(int code) {
     errno = 0;
     if (std::cout.flush()) {
@@ -70,7 +71,7 @@ int exit_code_after_output(int code) {
     ModelFile file = load_model_file(name);
     if (file.inputs.size() != 1 && file.model.velocity() == nullptr) {
         refuse(name + " has " + std::to_string(file.inputs.size()) +
-               " inputs: a model of the position, or of position and velocity, can be rendered");
+               " inputs: only a model of position, or of position and velocity, can be rendered");
     }
     return {name,
             std::move(file.model),

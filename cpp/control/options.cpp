@@ -22,15 +22,16 @@ namespace {
 
 constexpr const char* epilogue =
     "Ctrl-C ends a run normally. Exit code: 0 the duration ended, or Ctrl-C;\n"
-    "1 stopped by a guard, a fault or a rate too low;\n"
-    "2 refused before anything moved.\n\n"
-    "\"scaled\": the value for the default knob, scaled to the model's travel and force.\n\n"
+    "1 a guard, a fault of the device or a low rate ended the run;\n"
+    "2 the run was refused before the device moved.\n\n"
+    "[...]: default value. \"scaled\": multiplied by the model's travel and force,\n"
+    "relative to those of the default knob.\n\n"
     "Example: palpate-control press.json --duration-s 10 --record felt.csv";
 
 constexpr double least_positive = std::numeric_limits<double>::min();
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-/// Returns a validator for a number within bounds, with a message in words.
+/// Returns a check that the value of an option is a number from `low` to `high`, with an error message in words.
 CLI::Validator number_between(double low, double high) {
     CLI::Validator validator;
     validator.operation([low, high](std::string& text) -> std::string {
@@ -64,7 +65,7 @@ CLI::Validator structure_word() {
     return validator;
 }
 
-/// Formats the help for a terminal of 80 columns, without programming terms.
+/// Formats the help text for a terminal of 80 columns; shows NUMBER instead of type names such as FLOAT.
 class Help : public CLI::Formatter {
   public:
     Help() {
@@ -102,17 +103,20 @@ void add_rendering(CLI::App& app, RenderOptions& options) {
               [&scheme](const std::string& name) {
                   scheme.structure = named<StructureKind>(name, "structure");
               },
-              "One of " + either(structure_names)))
+              "Structure, one of " + either(structure_names)))
         ->check(structure_word())
         ->type_name("NAME")
         ->default_str(std::string(name_of(Scheme{}.structure)));
-    group(app.add_flag("--compensated", scheme.compensated,
-                       "Subtract the compliance of the coupling's spring from the model"));
-    group(app.add_option("--coupling-stiffness", scheme.coupling_stiffness,
-                         "K_c, force per position" + scaled(usual.coupling.stiffness, "N*m/rad")))
+    group(
+        app.add_flag("--compensated", scheme.compensated,
+                     "Make the model stiffer, so that model and coupling in series give the recorded force"));
+    group(app.add_option(
+              "--coupling-stiffness", scheme.coupling_stiffness,
+              "Coupling stiffness K_c, force per position" + scaled(usual.coupling.stiffness, "N*m/rad")))
         ->check(positive());
-    group(app.add_option("--coupling-damping", scheme.coupling_damping,
-                         "B_c, force per velocity" + scaled(usual.coupling.damping, "N*m*s/rad")))
+    group(app.add_option(
+              "--coupling-damping", scheme.coupling_damping,
+              "Coupling damping B_c, force per velocity" + scaled(usual.coupling.damping, "N*m*s/rad")))
         ->check(not_negative());
     group(app.add_option("--mass", scheme.mass,
                          "Object mass, for structures with mass" + scaled(usual.inertia.mass, "kg*m^2")))
@@ -122,10 +126,12 @@ void add_rendering(CLI::App& app, RenderOptions& options) {
               "Object damping, for structures with mass" + scaled(usual.inertia.damping, "N*m*s/rad")))
         ->check(not_negative());
     group(app.add_option("--play-radius", scheme.play_radius,
-                         "r of a model with hysteresis [the model's, or 1 % of its travel]"))
+                         "Play radius r of a model with hysteresis [the model's, or 1 % of its travel]"))
         ->check(positive());
-    group(app.add_option("--predict", scheme.predict,
-                         "Samples used to predict the position half a sample ahead, direct only; 0 = none"))
+    group(
+        app.add_option("--predict", scheme.predict,
+                       "Samples that predict the position half a period ahead, direct structure only; 0 = no "
+                       "prediction"))
         ->check(CLI::Range(0, most_prediction_taps))
         ->type_name("M")
         ->default_str(std::to_string(usual.predict));
@@ -137,19 +143,23 @@ void add_guards(CLI::App& app, RenderOptions& options) {
                          "Largest force, in the model's unit [the device's: " +
                              readable(DeviceProfile{}.force_limit) + " N*m, scaled]"))
         ->check(positive());
-    group(app.add_option("--slew-s", options.slew_s,
-                         "Least time from zero force to the limit, 0 = no slew limit"))
+    group(app.add_option(
+              "--slew-s", options.slew_s,
+              "Least time in s in which the force may rise from zero to the force limit, 0 = no slew limit"))
         ->check(not_negative())
         ->default_str(readable(GuardSettings{}.slew_s));
-    group(app.add_option("--ramp-s", options.ramp_s, "Time from zero to full force at the start"))
+    group(app.add_option("--ramp-s", options.ramp_s,
+                         "Time in s in which the force rises from zero to full force after the start"))
         ->check(not_negative())
         ->capture_default_str();
     group(app.add_option("--largest-speed", options.largest_speed,
-                         "Largest speed; a faster motion is an encoder fault [" +
+                         "Largest speed of the handle; a faster motion counts as an encoder fault [" +
                              readable(GuardSettings{}.largest_speed) + " rad/s, scaled]"))
         ->check(positive());
-    group(app.add_option("--frozen-s", options.frozen_s,
-                         "Longest rest after a sudden stop; a longer one is an encoder fault, 0 = no check"))
+    group(app.add_option(
+              "--frozen-s", options.frozen_s,
+              "Longest time in s without motion after a sudden stop; a longer time counts as an encoder "
+              "fault, 0 = no check"))
         ->check(not_negative())
         ->capture_default_str();
     group(app.add_flag("!--no-energy-tank", options.energy_tank,
@@ -158,8 +168,9 @@ void add_guards(CLI::App& app, RenderOptions& options) {
                          "Consecutive ticks without a valid sample that are tolerated"))
         ->check(number_between(0, 1e6))
         ->default_str(std::to_string(LoopSettings{}.tolerated));
-    group(app.add_option("--lowest-rate-share", options.loop.lowest_rate_share,
-                         "Least share of the rate; less for half a second ends the run, 0 = no limit"))
+    group(
+        app.add_option("--lowest-rate-share", options.loop.lowest_rate_share,
+                       "Least share of --rate-hz; a lower rate for half a second ends the run, 0 = no limit"))
         ->check(number_between(0.0, 1.0))
         ->capture_default_str();
 }
@@ -174,48 +185,49 @@ void add_running(CLI::App& app, RenderOptions& options) {
 #endif
         ->type_name("NAME")
         ->capture_default_str();
-    app.add_option("--rate-hz", options.loop.rate_hz, "Ticks a second")
+    app.add_option("--rate-hz", options.loop.rate_hz, "Ticks of the control loop a second")
         ->check(number_between(lowest_rate_hz, highest_rate_hz))
         ->capture_default_str();
-    app.add_option("--duration-s", options.loop.duration_s, "Duration, or inf")
+    app.add_option("--duration-s", options.loop.duration_s, "Duration of the run in s, or inf")
         ->check(positive())
         ->capture_default_str();
     app.add_option("--record", options.record, "Write every tick to this CSV file; it grows as OUT.csv.part")
         ->type_name("OUT.csv");
     app.add_flag("--force", options.force, "Replace an existing recording");
     app.add_option("--telemetry-port", options.telemetry_port,
-                   "Send JSON lines over UDP to this port of this machine (PlotJuggler: 9870)")
+                   "Send ticks as JSON lines over UDP to this port of this machine (PlotJuggler: 9870)")
         ->check(number_between(1, 65535));
-    app.add_option("--telemetry-hz", options.telemetry_hz, "Lines a second")
+    app.add_option("--telemetry-hz", options.telemetry_hz, "Telemetry lines a second")
         ->check(number_between(0.1, highest_rate_hz))
         ->capture_default_str();
     app.add_flag("--uncertified", options.uncertified,
                  "Render without a valid certificate; stability is not proved");
     app.add_option_function<double>(
            "--wait-ms", [&options](double wait_ms) { options.wait_s = 1e-3 * wait_ms; },
-           "Longest wait for the device [5 for a USB packet, 20 for an answer of an Inverse3]")
+           "Longest wait in ms for the device [5 for a USB packet, 20 for an answer of an Inverse3]")
         ->check(number_between(0.1, 10'000.0));
     app.add_option("--priority", options.real_time.priority,
-                   "Priority of SCHED_FIFO, 0 = ordinary scheduling")
+                   "Real-time priority (SCHED_FIFO) of the loop, 0 = ordinary scheduling")
         ->check(number_between(0, 99))
         ->capture_default_str();
-    app.add_option("--cpu", options.real_time.cpu, "Core of the loop, -1 = the last allowed, -2 = any")
+    app.add_option("--cpu", options.real_time.cpu,
+                   "Processor core of the loop, -1 = the last allowed core, -2 = any core")
         ->check(number_between(-2, 1023))
         ->capture_default_str();
     app.add_option(
            "--fault", options.faults,
-           "For tests, repeatable: KIND@SECONDS or KIND@SECONDSxSAMPLES of late, lost, repeated, nan, "
-           "frozen, jump, saturated, gone")
+           "Simulated fault for tests, repeatable: KIND@SECONDS or KIND@SECONDSxSAMPLES, with KIND one of "
+           "late, lost, repeated, nan, frozen, jump, saturated, gone")
         ->type_name("FAULT");
 }
 
-/// Returns the message of a parser error, in the style of the other messages.
+/// Returns the message for an error in the command line, worded like the other messages of the program.
 std::string sentence_of(const CLI::ParseError& error) {
     const std::string message = error.what();
     if (error.get_name() == "ArgumentMismatch") {
         return message.substr(0, message.find(':')) + " needs a value";
     }
-    if (error.get_name() == "ConversionError") {  // "Could not convert: --cpu = 0.5"
+    if (error.get_name() == "ConversionError") {  // such as "Could not convert: --cpu = 0.5"
         const std::size_t name = message.find("--");
         const std::size_t value = message.find(" = ", name);
         if (value != std::string::npos) {
@@ -231,7 +243,8 @@ std::string sentence_of(const CLI::ParseError& error) {
 std::optional<int> read_options(int count, char** arguments, Options& options) {
     CLI::App app{
         "Render a model on a haptic device, tick by tick.\n\n"
-        "A rendering can be recorded; its recording is identified and verified like any other.",
+        "A rendering can be recorded with --record; 'palpate identify' and 'palpate verify' read the "
+        "recording.",
         "palpate-control"};
     app.formatter(std::make_shared<Help>());
     app.footer(epilogue);

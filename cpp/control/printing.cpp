@@ -23,7 +23,7 @@ namespace palpate::control {
 namespace {
 
 constexpr std::size_t shown_ticks = 8;
-constexpr int calls_a_line = 5;  ///< the live line changes ten times a second
+constexpr int calls_a_line = 5;  ///< calls of show() for each update of the line, ten updates a second
 
 nlohmann::json json_of(const NamedValues& fields);
 
@@ -40,7 +40,7 @@ nlohmann::json json_of(const std::vector<NamedValues>& list) {
 }
 
 template <class T>
-nlohmann::json json_of(const T& value) {  // a number that is not finite becomes null
+nlohmann::json json_of(const T& value) {  // dump() writes null for a number that is not finite
     return value;
 }
 
@@ -52,7 +52,8 @@ nlohmann::json json_of(const NamedValues& fields) {
     return object;
 }
 
-/// Returns the first parts that fit on one line of the terminal, because a longer line is not overwritten completely.
+/// Joins as many of the first parts as fit on one line of the terminal. A longer line could not be overwritten
+/// completely.
 std::string fitting(const std::vector<std::string>& parts) {
     constexpr std::size_t usual_columns = 80;
     winsize size{};

@@ -10,7 +10,8 @@
 
 namespace palpate::control {
 
-/// Prints warnings of a running session on standard error, and on a terminal one line that is overwritten.
+/// Prints warnings of a run on standard error while the run continues. On a terminal it also shows time, position,
+/// force and rate on one line that is overwritten ten times a second.
 class LiveView {
   public:
     LiveView(const LoopSettings& settings, RecordUnits units);
@@ -30,8 +31,8 @@ class LiveView {
     int calls_ = 0;
 };
 
-/// Prints the verdict and the summary on standard output, as lines or as one JSON object. Before them prints warnings
-/// and, after a fault, the last ticks on standard error.
+/// Prints warnings and, after a fault, the last ticks on standard error. Then prints the verdict and the summary of a
+/// run on standard output, as lines or as one JSON object.
 void print_summary(const Summary& summary, bool as_json);
 
 }  // namespace palpate::control

@@ -143,7 +143,7 @@ TEST(UsbDevice, IsUsedByOneProgramAtATime) {
     UsbDevice second = patient();
     const std::string reason = second.open().reason;
     EXPECT_NE(reason.find("emulated knob EMU-1"), std::string::npos) << reason;
-    EXPECT_NE(reason.find("another program uses it"), std::string::npos) << reason;
+    EXPECT_NE(reason.find("another program uses the device"), std::string::npos) << reason;
     EXPECT_EQ(settled(first).status, Status::Ok);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// All headers that need no third-party library. The headers listed here include all others.
+/// Includes all headers of palpate that need no third-party library.
 
 #include "palpate/device/packet_stream.hpp"
 #include "palpate/dynamics/filters.hpp"

@@ -43,22 +43,22 @@ class ForceBounds:
     @property
     def loss_max(self) -> float:
         """
-        Largest h; 0 without hysteresis.
+        Largest hysteresis h [N]; 0 for a force without hysteresis.
         """
     @property
     def loss_min(self) -> float:
         """
-        Smallest h; 0 without hysteresis.
+        Smallest hysteresis h [N]; 0 for a force without hysteresis.
         """
     @property
     def loss_per_play(self) -> float:
         """
-        max h/r
+        Largest slope h/r that the play operator adds, max h/r [N/m].
         """
     @property
     def mean_force(self) -> float:
         """
-        Mean of a limited periodic force in excess of its hysteresis.
+        Mean of a limited periodic force above its hysteresis [N]; 0: passive.
         """
     @property
     def sliding(self) -> float:
@@ -68,17 +68,17 @@ class ForceBounds:
     @property
     def slope_max(self) -> float:
         """
-        Largest slope of any path: max f', or max(g' + |h'| + h/r).
+        Largest slope of the force [N/m]: max f', or max(g' + |h'| + h/r).
         """
     @property
     def slope_min(self) -> float:
         """
-        Smallest slope of any path: min f', or min(g' - |h'|).
+        Smallest slope of the force [N/m]: min f', or min(g' - |h'|).
         """
     @property
     def steepest(self) -> float:
         """
-        L = max |f'|, or max(|g'| + |h'| + h/r).
+        Steepest slope [N/m]: L = max |f'|, or max(|g'| + |h'| + h/r).
         """
 class Inequality:
     """
@@ -114,12 +114,12 @@ class Inequality:
     @property
     def id(self) -> str:
         """
-        Stable name, compared when a certificate is checked; texts are not.
+        Name that never changes. A check of a certificate compares it, not the texts.
         """
     @property
     def left(self) -> float:
         """
-        Left side: the available value.
+        Left side of the inequality: the available value.
         """
     @property
     def margin(self) -> float:
@@ -129,12 +129,12 @@ class Inequality:
     @property
     def name(self) -> str:
         """
-        Subject in words.
+        Subject of the inequality in words.
         """
     @property
     def right(self) -> float:
         """
-        Right side: the required value.
+        Right side of the inequality: the required value.
         """
     @property
     def source(self) -> str:
@@ -144,7 +144,7 @@ class Inequality:
     @property
     def strict(self) -> bool:
         """
-        True if both sides must differ.
+        True if the left side must be larger than the right side.
         """
 class Certificate:
     """
@@ -179,7 +179,7 @@ class Certificate:
     @property
     def device(self) -> palpate._core.device.DeviceProfile:
         """
-        Device for which it holds.
+        Device for which the certificate holds.
         """
     @property
     def fingerprint(self) -> str:

@@ -11,7 +11,7 @@ from importlib import import_module
 import click
 
 from .exit_status import INTERRUPTED, exit_status_of
-from .printing import Verbs, drop_what_cannot_be_written, prepare_streams, print_line
+from .printing import TERMS, Verbs, drop_what_cannot_be_written, prepare_streams, print_line
 
 _VERBS = {
     "identify": "Identify a model from recordings.",
@@ -57,7 +57,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, wanted: bool) -> 
     cls=_LazyVerbs,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
-    epilog="Example: palpate identify press.csv -o press.json\n\nTerms: docs/glossary.md",
+    epilog=f"Example: palpate identify press.csv -o press.json\n\n{TERMS}",
 )
 @click.option(
     "--version",

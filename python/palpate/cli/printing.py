@@ -24,6 +24,9 @@ import click
 
 from ..verdict import Verdict
 
+TERMS = "Terms: docs/glossary.md"
+"""Last line of each help."""
+
 WIDEST = 80
 """Largest width to which printed text is wrapped [columns]."""
 

@@ -16,12 +16,9 @@ from .._core.rendering import Scheme, most_prediction_taps, structure_names
 from ..errors import InputError
 from ..recording import Recording, read_recording
 from .exit_status import interrupted_at_once
-from .printing import Option, Verb, talk
+from .printing import TERMS, Option, Verb, talk
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-TERMS = "Terms: docs/glossary.md"
-"""Last line of each help."""
 
 PATH = click.Path(path_type=Path)
 

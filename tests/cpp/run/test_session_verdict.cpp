@@ -59,14 +59,14 @@ TEST(SessionVerdict, ReportsMissedDeadlinesAboveOneInAThousand) {
     EXPECT_EQ(one.text(), "good");
     Judged two;
     two.tick(1'002'000'000, 2);
-    expect(two, "usable: 2 of 1003 (0.1994 %) deadlines were missed: close other programs",
+    expect(two, "usable: 2 of 1003 (0.1994 %) deadlines of the loop were missed: close other programs",
            "real-time priority");
 }
 
 TEST(SessionVerdict, ReportsALowRateOfADeviceThatPacesTheLoop) {
     Judged slow;
     slow.settings.rate_hz = 1100.0;
-    expect(slow, "usable: the rate was 1000 Hz of 1100 Hz", "choose a lower rate");
+    expect(slow, "usable: the rate of the loop was 1000 Hz of 1100 Hz", "choose a lower rate");
 }
 
 TEST(SessionVerdict, ReportsLostSamplesAndLostRows) {
@@ -80,7 +80,7 @@ TEST(SessionVerdict, ReportsLostSamplesAndLostRows) {
 
 TEST(SessionVerdict, ReportsTicksWithChangedForcesAboveOnePercent) {
     for (const auto& [status, sentence] :
-         {std::pair{Status::Limited, "clipped the force to its limit: raise the limit"},
+         {std::pair{Status::Limited, "clipped the force to the force limit: raise the force limit"},
           {Status::EnergyLimited, "reduced the force, because the rendering gave energy"},
           {Status::LimitCycleScaled, "reduced the force, because the rendering gave energy"},
           {Status::MaxIterations, "did not solve the load line"},
@@ -94,29 +94,29 @@ TEST(SessionVerdict, ReportsTicksWithChangedForcesAboveOnePercent) {
     }
     Judged outside;
     outside.sinks.extrapolated = 300;
-    expect(outside, "usable: 300 of 1000 (30 %) ticks lay outside the model's data, from 0 to 1 rad",
-           "stay within");
+    expect(outside, "usable: 300 of 1000 (30 %) ticks had a position outside the model's domain, 0 to 1 rad",
+           "only within the domain");
     Judged ramp;
     ramp.set_ticks(Status::Ramp, 1000);
-    expect(ramp, "usable: all 1000 ticks lay within the ramp at the start", "run for a longer time");
+    expect(ramp, "usable: all 1000 ticks were part of the start ramp", "run for a longer time");
 }
 
 TEST(SessionVerdict, RefusesASessionWithoutForce) {
     Judged none;
     none.sinks.forces = {0.0, 0.0};
     expect(none, "no: every force was zero: the handle did not touch the object between 0 and 1 rad",
-           "move it");
+           "move the handle");
 }
 
 TEST(SessionVerdict, RefusesARecordingWithoutMotion) {
     Judged still;
     still.sinks.positions = {0.5, 0.5015};  // fewer than two encoder steps
-    expect(still, "usable: the handle covered 0.0015 rad", "move it over the whole object");
+    expect(still, "usable: the handle covered 0.0015 rad", "move the handle over the whole object");
     still.expected.recorded = true;
     expect(still, "no: ", "so the force over position is unknown");
     still.sinks.positions = {0.5, 0.5021};
     still.expected.recorded = false;
-    expect(still, "usable: the handle covered 0.0021 rad, 0.21 % of the model's domain", "move it");
+    expect(still, "usable: the handle covered 0.0021 rad, 0.21 % of the model's domain", "move the handle");
 }
 
 TEST(SessionVerdict, ReportsARealObjectMeasuredAtFewPositions) {
@@ -124,8 +124,8 @@ TEST(SessionVerdict, ReportsARealObjectMeasuredAtFewPositions) {
     object.expected.domain = {};
     EXPECT_EQ(object.text(), "good");
     object.sinks.positions = {0.0, 0.049};
-    expect(object, "usable: the handle covered 0.049 rad, 49 steps of the encoder",
-           "move it over the whole object");
+    expect(object, "usable: the handle covered 0.049 rad, 49 encoder steps",
+           "move the handle over the whole object");
 }
 
 TEST(SessionVerdict, RefusesARecordingWithoutUsableRows) {
@@ -162,10 +162,12 @@ TEST(EnergyText, StatesTheEnergyOfTheRampSeparately) {
     report.given = 0.25;
     report.most_stored = 0.5;
     EXPECT_EQ(energy_text(report),
-              "given 0.0125 J during the ramp, 0.25 J after it; the object stored at most 0.5 J");
+              "the motor gave 0.0125 J during the start ramp and 0.25 J after the ramp; the object stored at "
+              "most 0.5 J");
     report.most_stored = std::numeric_limits<double>::infinity();
     EXPECT_EQ(energy_text(report),
-              "given 0.0125 J during the ramp, 0.25 J after it; no bound of the stored energy is known");
+              "the motor gave 0.0125 J during the start ramp and 0.25 J after the ramp; no bound of the "
+              "stored energy is known");
 }
 
 }  // namespace

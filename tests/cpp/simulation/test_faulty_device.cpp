@@ -181,9 +181,9 @@ TEST(Faults, TickLaterThanCertifiedEndsTheRunWithZeroForceAndAReason) {
     EXPECT_FALSE(is_orderly(late.report->exit_reason));
     ASSERT_EQ(late.ticks.size(), 400U) << "the late tick makes no force";
     EXPECT_GT(late.ticks.back().force, 0.1);
-    EXPECT_EQ(
-        exit_text(*late.report, settings),
-        "stopped because a tick came 1.501 ms after the one before: the certificate holds up to 1.5 ms");
+    EXPECT_EQ(exit_text(*late.report, settings),
+              "stopped because a tick started 1.501 ms after the previous tick: the certificate holds for at "
+              "most 1.5 ms");
 }
 
 struct Expected {

@@ -232,8 +232,9 @@ TEST(Certificate, CouplingAndDampingLimitTheFallingSlope) {
         const Certificate refused = certify(slopes(-400.1, 5.0), implicit, smooth(1.0));
         EXPECT_EQ(refused.verdict, Verdict::Refused);
         EXPECT_EQ(refused.reason,
-                  "no bound is known: falling force of a force-limited object with mass: known for s_ <= 2 "
-                  "B_o / T = 400, and it is 400.1; use the energy-consistent structure");
+                  "no bound is known: falling force on a virtual object with mass, with a force limit: "
+                  "proved only for s_ <= 2 B_o / T = 400, but the value is 400.1; use the energy-consistent "
+                  "structure");
     }
     const Scheme consistent = scheme_of(StructureKind::EnergyConsistent, {100.0, 0.02}, {0.01, 0.2});
     EXPECT_TRUE(certify(slopes(-5000.0, 5.0), consistent, smooth(1.0)).certified());

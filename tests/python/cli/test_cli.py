@@ -39,10 +39,11 @@ def test_missing_arguments_print_help_and_exit_with_code_2(
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_help_ends_with_one_example(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_ends_with_one_example_and_the_glossary(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([verb, "--help"]) == 0
-    last_paragraph = capsys.readouterr().out.strip().split("\n\n")[-1]
-    assert " ".join(last_paragraph.split()).startswith(f"Example: palpate {verb}")
+    *_, example, terms = capsys.readouterr().out.strip().split("\n\n")
+    assert " ".join(example.split()).startswith(f"Example: palpate {verb}")
+    assert terms.strip() == "Terms: docs/glossary.md"
 
 
 @pytest.mark.parametrize("verb", VERBS)

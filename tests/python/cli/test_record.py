@@ -121,7 +121,7 @@ def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], 
     [
         ([], ["--no-transducer"], "EMU-1 has no force transducer"),
         (["--probe"], [], "a probe on a real device needs upper"),
-        (["--probe", "--upper", 0.3, "--force-limit", 6], [], "force_limit is 6, the device makes 5"),
+        (["--probe", "--upper", 0.3, "--force-limit", 6], [], "force_limit is 6: must be at most 5"),
         (["--object", OBJECT], [], "object needs device simulated; usb has a real object"),
         ([], ["--no-device"], "no USB device 1209:0001 with this protocol is connected"),
     ],
@@ -206,7 +206,7 @@ def test_a_handle_without_motion_gives_the_verdict_no(tmp_path: Path) -> None:
     assert completed.returncode == 1
     verdict = json.loads(completed.stdout)["verdict"]
     assert verdict.startswith("no: ")
-    assert "so the force over position is unknown: move it over the whole object" in verdict
+    assert "so the force over position is unknown: move the handle over the whole object" in verdict
 
 
 def test_a_recording_without_object_or_force_measurement_is_refused(tmp_path: Path) -> None:

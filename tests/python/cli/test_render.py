@@ -41,7 +41,7 @@ def test_energy_given_during_the_ramp_is_reported_separately() -> None:
     assert 0.0 <= energy["given_in_ramp_J"] <= energy["most_stored_J"]
     assert 0.0 <= energy["given_J"] <= 1.1 * energy["most_stored_J"]
     assert energy["sentence"].startswith("given ")
-    assert "J during the ramp" in energy["sentence"]
+    assert "J during the start ramp" in energy["sentence"]
 
 
 def test_each_recorded_force_equals_the_simulated_force_at_its_position(tmp_path: Path) -> None:

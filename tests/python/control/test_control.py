@@ -89,7 +89,7 @@ def test_the_version_equals_the_version_of_the_package() -> None:
         ([MODEL, "--rate-hz"], "--rate-hz needs a value"),
         (["--rate-hz", "1000"], "MODEL.json is required"),
         ([MODEL, "--structure", "direct", "--compensated"], "direct structure, which has no coupling"),
-        ([MODEL, "--force-limit", "9"], "force_limit is 9, the device makes 5"),
+        ([MODEL, "--force-limit", "9"], "force_limit is 9: must be at most 5"),
         ([MODEL, "--force-limit", "0"], "--force-limit: must be a number above 0, not 0"),
         ([MODEL, "--ramp-s", "1e300"], "ramp_s is 1e+300, must be 0 to 3600"),
         ([MODEL, "--frozen-s", "inf"], "frozen_s is inf, must be 0 to 3600"),

@@ -127,7 +127,7 @@ def test_a_fault_ends_the_run_with_a_record(
 @pytest.mark.parametrize(
     ("service", "reason"),
     [
-        (Service(devices=0), "detects no Inverse3: plug it in"),
+        (Service(devices=0), "detects no Inverse3: plug the Inverse3 in"),
         (Service(calibrated=False), "Inverse3 049D is not calibrated"),
     ],
     ids=["no device", "not calibrated"],

@@ -254,9 +254,9 @@ def test_a_full_standard_output_exits_with_code_1_and_one_sentence(arguments: li
     ("arguments", "level", "sentence", "code"),
     [
         (["--structure", "direct", "--duration-s", 1.2], "good", "", 0),
-        (["--duration-s", 0.1], "usable", "ticks lay within the ramp at the start: run for a longer time", 0),
+        (["--duration-s", 0.1], "usable", "ticks were part of the start ramp", 0),
         (["--duration-s", 0.1, "--record", "rendered.csv"], "no", "the recording has no usable row", 0),
-        (["--force-limit", 0.2, "--duration-s", 1.2], "usable", "clipped the force to its limit", 0),
+        (["--force-limit", 0.2, "--duration-s", 1.2], "usable", "clipped the force to the force limit", 0),
         (["--fault", "nan@0.8x30"], "no", "stopped by a guard: NonFinite", 1),
         (["--fault", "lost@0.5x4", "--fault", "lost@0.7x4"], "usable", "samples of the device were lost", 0),
     ],

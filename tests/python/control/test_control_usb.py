@@ -120,7 +120,7 @@ def test_a_certified_run_has_the_certified_force_limit_and_no_slew_limit(tmp_pat
         ({"id": "EMU-2"}, "is certified for the device EMU-2, not for EMU-1"),
         ({"period_s": 2e-3}, "is certified for a period of 2 ms"),
         ({"encoder_step": 1e-5}, "is certified for an encoder step of 1e-05"),
-        ({"force_limit": 6.0}, "is certified for 6 N*m, the device makes 5"),
+        ({"force_limit": 6.0}, "is certified for a force limit of 6 N*m, the device makes at most 5"),
     ],
 )
 def test_a_certificate_of_another_device_is_refused(
@@ -160,8 +160,8 @@ def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: P
         ([], ["--info-bytes", "31"], "the answer to GET_INFO has 31 bytes, must have 32"),
         ([], ["--info-bytes", "33"], "the answer to GET_INFO has 33 bytes, must have 32"),
         ([], ["--denied"], "sudo palpate devices --install-udev-rule"),
-        (["--rate-hz", "500"], [], "sends 1000 packets a second and paces the loop: must be 1000"),
-        (["--force-limit", "6"], [], "force_limit is 6, the device makes 5"),
+        (["--rate-hz", "500"], [], "sends 1000 packets a second and sets the rate of the loop: must be 1000"),
+        (["--force-limit", "6"], [], "force_limit is 6: must be at most 5"),
         (["--fault", "late@1"], [], "faults is set: must be empty for a real device"),
     ],
 )

@@ -173,7 +173,7 @@ def test_play_state_follows_the_motion() -> None:
         ({"weight": [1.0, float("nan"), 0.0]}, r"weight\[1\] is not a finite number"),
         ({"beta": [[0.5]]}, "beta has 1 values, must have 3"),
         ({"below": "open"}, "below is 'open', must be linear or free"),
-        ({"play_radius": 0.1}, "play_radius is given for a model without hysteresis"),
+        ({"play_radius": 0.1}, "play_radius is given, but the model has no hysteresis"),
         ({"bias_hysteresis": 0.1}, "must be given together"),
     ],
     ids=["negative-dilation", "nan-weight", "short-beta", "unknown-side", "radius-alone", "half-a-loss"],

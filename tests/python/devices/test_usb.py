@@ -77,7 +77,7 @@ def test_force_is_enabled_and_disabled(reported: dict[str, Any]) -> None:
 
 
 def test_after_an_emergency_stop_enabling_stalls_until_the_fault_is_cleared(reported: dict[str, Any]) -> None:
-    assert "enabling its force: it refused a request" in reported["enabled after an emergency stop"]
+    assert "enabling its force: the device refused a request" in reported["enabled after an emergency stop"]
     assert reported["enabled after it was cleared"]
 
 
@@ -90,7 +90,9 @@ def test_a_halted_endpoint_stalls_until_it_is_cleared(reported: dict[str, Any]) 
 def test_an_unplugged_device_is_not_found_until_it_is_plugged_in_again(
     reported: dict[str, Any],
 ) -> None:
-    assert reported["unplugged"].endswith("reading its identity: it was unplugged; plug it in and try again")
+    assert reported["unplugged"].endswith(
+        "reading its identity: the device was unplugged; plug it in and try again"
+    )
     assert reported["found without it"] == 0
     assert reported["opened without it"].startswith("no haptic USB device is plugged in")
     assert reported["found again"] == "EMU-1"
@@ -142,8 +144,8 @@ def test_without_permission_the_message_names_the_command() -> None:
             -3,
             "knob, zeroing it: permission denied; run 'sudo palpate devices --install-udev-rule' once",
         ),
-        (-6, "knob, zeroing it: another program uses it; end that program, then try again"),
-        (-7, "knob, zeroing it: it does not answer; unplug it and plug it in again"),
+        (-6, "knob, zeroing it: another program uses the device; end that program, then try again"),
+        (-7, "knob, zeroing it: the device does not answer; unplug it and plug it in again"),
         (-1, "knob, zeroing it: the transfer failed on the bus; try another cable or port"),
         (None, "knob, zeroing it: Other error; plug it in again"),
     ],

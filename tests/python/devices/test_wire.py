@@ -54,7 +54,7 @@ def test_an_answer_of_another_size_is_refused(size: int) -> None:
         ({"out_size": 0}, "out_size is 0, must be 16"),
         ({"dof": 3}, "dof is 3, must be 1"),
         ({"reserved": 1}, "the reserved byte is 1, must be 0"),
-        ({"capabilities": 4}, "capabilities beyond bits 0 and 1 is 4, must be 0"),
+        ({"capabilities": 4}, "the value of undefined capability bits is 4, must be 0"),
         ({"counts": 0}, "counts_per_rev is 0, must be > 0"),
         ({"torque": -1}, "max_torque_uNm is -1, must be > 0"),
         ({"rate": 0}, "rate_hz is 0, must be > 0"),

@@ -103,7 +103,7 @@ def test_a_bad_file_is_refused_with_its_name_and_field(name: str, tmp_path: Path
         ("alpha_negative", "network.alpha[0][0] is -1.0: must be > 0"),
         ("alpha_text", 'network.alpha[0][0] is "40": must be a number'),
         ("missing_network_weight", "network.weight is missing"),
-        ("unknown_key", "colour is not a key of this format (free keys go under notes)"),
+        ("unknown_key", "colour is not a key of this format; put keys of your own under notes"),
         ("version_2", "version is 2: must be 1, the version that this palpate reads"),
         ("beta_too_short", "network.beta has 1 values: must have 2, one for each wavelet of alpha"),
         ("unknown_position_unit", "units.position is \"mm\": must be 'rad', 'm', 'count' or ''"),

@@ -19,22 +19,23 @@ struct Command {
 /// One sample of a device.
 struct Reading {
     double position = 0.0;  ///< measured [m or rad]
-    double velocity = 0.0;  ///< measured, or a difference quotient
-    double applied = 0.0;   ///< current force, with the sign of `Command`
-    double measured = std::numeric_limits<double>::quiet_NaN();  ///< of the force transducer; NaN without one
+    double velocity = 0.0;  ///< measured, or a difference quotient of positions [m/s or rad/s]
+    double applied = 0.0;   ///< force that the device applies, sign as in `Command` [N or N*m]
+    double measured = std::numeric_limits<double>::quiet_NaN();  ///< force of the transducer; NaN without one
     double device_time = 0.0;                                    ///< clock of the device [s]
-    std::uint64_t sequence = 0;                                  ///< number of the device's sample
+    std::uint64_t sequence = 0;  ///< number of this sample, counted by the device
     Status status = Status::Ok;
 };
 
-/// Result of opening a device: `reason` is empty if it is open, otherwise one sentence with the likely cure.
+/// Result of opening a device: `reason` is empty if the device is open, otherwise one sentence with the likely
+/// cure.
 struct Opened {
     std::string reason;
     [[nodiscard]] explicit operator bool() const noexcept { return reason.empty(); }
 };
 
-/// A haptic device of one degree of freedom. `exchange` sends the command and returns the next sample. It waits if the
-/// device paces the host, and returns at once if the host paces the device.
+/// A haptic device of one degree of freedom. `exchange` sends a force command and returns the next sample. It waits for
+/// the sample if the device's clock sets the rate of the loop, and returns at once if the host's clock sets the rate.
 template <class D>
 concept Device = requires(D& device, const Command& command) {
     { device.open() } -> std::same_as<Opened>;
@@ -42,8 +43,9 @@ concept Device = requires(D& device, const Command& command) {
     { device.close() } noexcept;
 };
 
-/// True if a device paces the host: its exchange waits for the next sample of the device's clock. Such a device has a
-/// member of this name. Other devices return at once, and the host's clock paces both.
+/// True if the device's clock sets the rate of the control loop: `exchange` waits for the device's next sample. Such a
+/// device class has a member `paces_host`. With other devices `exchange` returns at once, and the host's clock sets the
+/// rate.
 template <Device D>
 inline constexpr bool paces_host = [] {
     if constexpr (requires { D::paces_host; }) {

@@ -25,42 +25,44 @@
 
 namespace palpate {
 
-/// Address of an Inverse3, and the direction that is used as handle.
+/// Address of the service of an Inverse3, and the axis along which its handle is used.
 struct Inverse3Settings {
     std::string host = "127.0.0.1";
     std::uint16_t port = 10001;
     int axis = 2;                                  ///< 0 = x, 1 = y, 2 = z
     double direction = 1.0;                        ///< +1 or -1: sign of the direction into the object
-    std::chrono::milliseconds step_timeout{2000};  ///< for each step of opening
-    std::chrono::milliseconds answer_timeout{20};  ///< then the exchange is a Timeout
+    std::chrono::milliseconds step_timeout{2000};  ///< longest wait in each step of opening
+    std::chrono::milliseconds answer_timeout{20};  ///< longest wait for a state
 };
 
-/// Properties of the device that the service stated on opening.
+/// Properties of the Inverse3 that its service sent when the device was opened.
 struct Inverse3Info {
     std::string id;           ///< short identifier, such as 049D
     std::string type;         ///< inverse3, inverse3x, minverse
-    double force_gate = 0.0;  ///< service's reduction of forces during oscillation: gain [-]
-    double damping = 0.0;     ///< damping that the service adds: scalar
+    double force_gate = 0.0;  ///< gain of the service's reduction of forces during oscillation [-]
+    double damping = 0.0;     ///< damping that the service adds to forces, without unit
 };
 
 /// One direction of a Haply Inverse3, Inverse3x or Minverse, through the Inverse Service of its maker: JSON over a
-/// local WebSocket. It was never tried on hardware; a test server that uses these messages replaces the service.
+/// local WebSocket. This class was never tried on hardware; the tests replace the service by a server that uses the
+/// same messages.
 ///
 /// The documentation of version 3.5 defines (docs.haply.co/inverseSDK/service: "WebSocket Protocol", "Control
 /// Commands", "Common Types", "JSON Conventions", "Filters", tutorials 01 and 05):
 /// - ws://localhost:10001. On connection the service sends every device with config, state and status. After that it
-///   sends one message of states for each message that it receives, so the host paces the device.
+///   sends one message with the device's state for each received message, so the host sets the rate of the loop.
 /// - inverse3[].device_id; state.cursor_position in m, cursor_velocity in m/s, current_cursor_force in N, each {x, y,
 ///   z} of a right-handed frame; status.calibrated.
-/// - inverse3[].commands.set_cursor_force.vector in N. It acts once, so a silent host gets an idle device.
+/// - inverse3[].commands.set_cursor_force.vector in N. Each command acts once; if the host sends no more
+///   commands, the device makes no force.
 ///   session.configure.profile.name is in the first message only.
-/// - config.filters.force_gate.gain and .damping.scalar. Forces pass both filters and a global scale.
+/// - config.filters.force_gate.gain and .damping.scalar. The service applies both filters and a global scale to forces.
 ///
-/// Older versions name the vector `values` and ignore unknown keys. If the state never shows an effect of a force, the
-/// exchange therefore ends in a Fault.
+/// Older versions of the service name the vector `values` and ignore unknown keys. If the received state never shows a
+/// force after force commands, the exchange therefore returns the status Fault.
 ///
 /// Position 0 is the position of the handle on opening. The service does not send its time, so device_time is the
-/// host's time at the answer. An exchange parses JSON and therefore allocates memory.
+/// host's time when the answer arrives. An exchange parses JSON and therefore allocates memory.
 class Inverse3Device {
   public:
     explicit Inverse3Device(Inverse3Settings settings = {}) : settings_{std::move(settings)} {}
@@ -84,8 +86,8 @@ class Inverse3Device {
         return {};
     }
 
-    /// Sends the command and waits for the state that answers it. A late answer is read by the next exchange, together
-    /// with the next one.
+    /// Sends the force command and waits for the device's state that answers the command. If an answer is late, the
+    /// next exchange reads it together with the answer to its command.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         if (!link_ || link_->disconnected) {
             last_.status = Status::Fault;
@@ -101,7 +103,7 @@ class Inverse3Device {
         return last_;
     }
 
-    /// Closes the connection.
+    /// Closes the connection to the service.
     void close() noexcept {
         if (!link_) {
             return;
@@ -115,7 +117,7 @@ class Inverse3Device {
             }
         } catch (const std::exception&) {
             link_->disconnected =
-                true;  // the force command ended before: the service sets a device without messages to idle
+                true;  // no zero force is needed: the service stops the force of a device without commands
         }
         link_.reset();
     }
@@ -127,26 +129,28 @@ class Inverse3Device {
     using Json = nlohmann::json;
     using Error = boost::system::error_code;
 
-    /// A connection and its pending operations. Its address must not change, because handlers store it.
+    /// A connection to the service and its unfinished operations. The address of a Link must not change, because
+    /// handlers store the address.
     struct Link {
         boost::asio::io_context context;
         boost::beast::websocket::stream<boost::beast::tcp_stream> stream{context};
         boost::beast::flat_buffer buffer;
-        std::string message;       ///< in transmission
-        std::string command_head;  ///< of every message after the first, up to the numbers
+        std::string message;       ///< text that is being sent
+        std::string command_head;  ///< start of each command, up to the force
         bool sending = false;
         bool reading = false;
         bool disconnected = false;
-        int unanswered = 0;     ///< messages without a state so far
-        double position = 0.0;  ///< of the axis, as the service states it [m]
-        double origin = 0.0;
+        int unanswered = 0;     ///< sent messages that the service has not answered
+        double position = 0.0;  ///< position along the axis, from the service [m]
+        double origin = 0.0;    ///< position along the axis on opening [m]
         double velocity = 0.0;
-        double echoed = 0.0;  ///< current force along the axis, as the service states it [N]
+        double echoed = 0.0;  ///< current force along the axis, from the service [N]
         std::uint64_t sequence = 0;
-        int states_without_effect = 0;  ///< consecutive states without an effect of the force
+        int states_without_effect = 0;  ///< consecutive states with zero force after a force command
         std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 
-        /// Runs handlers, which run only here. Returns true if `done` became true in time.
+        /// Runs the handlers of network operations, until `done` returns true or the time `within` has passed. Returns
+        /// the last result of `done`.
         template <class Done>
         bool run(std::chrono::milliseconds within, Done done) {
             const auto until = std::chrono::steady_clock::now() + within;
@@ -157,10 +161,10 @@ class Inverse3Device {
         }
     };
 
-    static constexpr double least_visible_force = 0.05;  ///< least force whose effect the state must show [N]
+    static constexpr double least_visible_force = 0.05;  ///< least force that a state must show [N]
     static constexpr int most_states_without_effect = 200;
 
-    /// Connects to the service. Throws with the likely cure.
+    /// Connects to the service. Throws an error with the likely cure if no service answers.
     void connect(const std::string& service) {
         const auto refuse = [&](const std::string& reason) {
             throw std::runtime_error("no Haply Inverse Service answers at " + service + " (" + reason +
@@ -194,7 +198,7 @@ class Inverse3Device {
         await();
     }
 
-    /// Returns the next message during opening.
+    /// Returns the next message of the service while the device is being opened.
     [[nodiscard]] std::string received(const std::string& service, const char* failure) {
         bool done = false;
         Error error;
@@ -211,13 +215,15 @@ class Inverse3Device {
         return text;
     }
 
-    /// Reads the first device of the first message. Throws if there is none or it is not calibrated.
+    /// Reads the properties of the first device in the service's first message. Throws if the message contains no
+    /// device, or the device is not calibrated.
     void read_inventory(const Json& inventory, const std::string& service) {
         const Json none = Json::array();
         const Json& devices = inventory.contains("inverse3") ? inventory.at("inverse3") : none;
         if (devices.empty()) {
-            throw std::runtime_error("the Haply Inverse Service at " + service +
-                                     " detects no Inverse3: plug it in, and check that Haply Hub shows it");
+            throw std::runtime_error(
+                "the Haply Inverse Service at " + service +
+                " detects no Inverse3: plug the Inverse3 in, and check that Haply Hub shows it");
         }
         const Json& device = devices.at(0);
         info_.id = device.at("device_id").get<std::string>();
@@ -235,8 +241,8 @@ class Inverse3Device {
                               R"(,"commands":{"set_cursor_force":{"vector":{)";
     }
 
-    /// Sends the first message, which names the program and has zero force. Its answer contains the position of the
-    /// handle.
+    /// Sends the first message: the name of this program and a command of zero force. Takes the start position of the
+    /// handle from the answer.
     void begin_session(const std::string& service) {
         write_message(0.0, R"({"session":{"configure":{"profile":{"name":"palpate"}}},)");
         Error error;
@@ -247,7 +253,7 @@ class Inverse3Device {
         last_.sequence = link_->sequence;
     }
 
-    /// Writes a command into the message that is sent next.
+    /// Writes a force command into the text of the next message.
     void write_message(double force, const char* head) {
         std::string& text = link_->message;
         text.assign(head).append(link_->command_head);
@@ -262,7 +268,7 @@ class Inverse3Device {
         text += "}}}}]}";
     }
 
-    /// Sends a command and waits for its state. Returns the status of the exchange.
+    /// Sends a force command and waits for the device's state that answers it. Returns the status of the exchange.
     [[nodiscard]] Status exchanged(double force) {
         Link& link = *link_;
         if (!link.sending) {  // at most one command in transmission
@@ -296,7 +302,7 @@ class Inverse3Device {
         return answered ? Status::Ok : Status::Timeout;
     }
 
-    /// Starts reading the next message, until all messages have their state.
+    /// Reads messages of the service until every sent message has been answered.
     void read_next() {
         Link& link = *link_;
         if (link.reading || link.disconnected || link.unanswered == 0) {
@@ -316,7 +322,8 @@ class Inverse3Device {
         });
     }
 
-    /// Reads a state. Throws if the message differs from the documentation, or does not contain this device.
+    /// Reads position, velocity and force from a message of the service. Throws if the message differs from the
+    /// service's documentation, or does not contain this device.
     void take_state(const std::string& text) {
         const Json message = Json::parse(text);
         for (const Json& device : message.at("inverse3")) {
@@ -330,7 +337,7 @@ class Inverse3Device {
                 return;
             }
         }
-        throw std::runtime_error("Inverse3 " + info_.id + " is missing in the state");
+        throw std::runtime_error("Inverse3 " + info_.id + " is missing in the service's message");
     }
 
     static constexpr std::string_view axis_names = "xyz";

@@ -14,34 +14,35 @@
 
 namespace palpate {
 
-/// Counters of a stream of packets since it was opened.
+/// Counters of the packets from and to a device since the device was opened.
 struct StreamHealth {
-    std::uint64_t packets = 0;         ///< valid
+    std::uint64_t packets = 0;         ///< valid packets
     std::uint64_t lost = 0;            ///< samples of the device that did not arrive
-    std::uint64_t repeated = 0;        ///< samples that came again or late
-    std::uint64_t malformed = 0;       ///< wrong size, magic or version
-    std::uint64_t late_echoes = 0;     ///< of earlier OUT packets
-    std::uint64_t watchdog_trips = 0;  ///< torques that it ended
+    std::uint64_t repeated = 0;        ///< samples that arrived twice or out of order
+    std::uint64_t malformed = 0;       ///< packets of a wrong size, first byte or version
+    std::uint64_t late_echoes = 0;     ///< packets that confirm a command of another session
+    std::uint64_t watchdog_trips = 0;  ///< torques that the device's watchdog ended
 
-    std::uint64_t refused_commands =
-        0;  ///< packets with the message that the device did not understand an OUT packet
-    std::uint64_t late_commands = 0;  ///< that took longer than allowed
-    DurationHistogram round_trip;     ///< from an OUT packet to its echo, host clock [ns]
-    DurationHistogram delay;          ///< from a sample to its force, device clock [ns]
+    std::uint64_t refused_commands = 0;  ///< packets that report a command that the device did not understand
+    std::uint64_t late_commands = 0;     ///< commands whose delay was longer than allowed
+    DurationHistogram round_trip;        ///< from sending a command to its confirmation, host clock [ns]
+    DurationHistogram delay;             ///< from a sample to the force computed from it, device clock [ns]
 };
 
-/// Converts the packets of one device to readings: counters become unwrapped, counts become SI units, status bits
-/// become a Status, and echoes give the delay of commands.
+/// Converts the packets of one device to readings. Counters no longer restart at 0, encoder counts become SI units, and
+/// status bits become a Status. Each packet contains the number of the last accepted command (its echo), which gives
+/// the delay of commands.
 ///
-/// The delay needs only the clock of the device. A command computed from the sample latched at t_k is echoed by a
-/// packet latched at t_m, `out_age` after it was accepted. It came t_m - out_age - t_k after its sample.
+/// The delay is computed from the device's clock only. A command is computed from the sample of time t_k. A packet of
+/// time t_m states that the command was accepted `out_age` before t_m. The delay is then t_m - out_age - t_k.
 class PacketStream {
   public:
     PacketStream() = default;
     explicit PacketStream(const wire::Info& info, Nanoseconds longest_delay) noexcept
         : info_{info}, longest_delay_{longest_delay} {}
 
-    /// Takes a packet that arrived at `now` of the host's clock. Returns false if it is not a packet of this protocol.
+    /// Reads a packet that arrived at the time `now` of the host's clock. Returns false if it is not a packet of this
+    /// protocol.
     [[nodiscard]] bool take(std::span<const std::uint8_t> bytes, Nanoseconds now) noexcept {
         wire::InPacket packet;
         if (!wire::decode(bytes, packet)) {
@@ -67,19 +68,19 @@ class PacketStream {
         return true;
     }
 
-    /// Marks that packets were discarded: the next packet does not follow the last, and commands before it have no
-    /// sample.
+    /// Marks that packets were discarded. The step to the next packet then does not count lost samples, and commands
+    /// sent before the next packet have no delay.
     void pause() noexcept { follows_ = false; }
-    /// Returns true if the next packet follows the last one taken.
+    /// Returns true if no packet was discarded after the last packet that was read.
     [[nodiscard]] bool follows() const noexcept { return follows_; }
 
-    /// Returns the next command, to be sent at `now`.
+    /// Returns the packet of the next command, to be sent at the time `now`.
     [[nodiscard]] wire::OutPacket next_command(double force, std::uint16_t time_to_live_ms,
                                                Nanoseconds now) const noexcept {
         return {static_cast<std::uint16_t>(sent_ + 1), wire::torque_of(force, info_.max_torque_uNm),
                 time_to_live_ms, static_cast<std::uint32_t>(now / 1000)};
     }
-    /// Stores a command that was sent.
+    /// Stores a command that was sent, to compute its delay later.
     void sent(const wire::OutPacket& command, Nanoseconds now) noexcept {
         has_sent_ = true;
         sent_ = command.sequence;
@@ -93,16 +94,16 @@ class PacketStream {
     [[nodiscard]] std::uint16_t status_bits() const noexcept { return status_bits_; }
 
   private:
-    /// A command that was sent, with the time of its sample.
+    /// A command that was sent, with the time of the sample from which it was computed.
     struct SentCommand {
         std::uint16_t sequence = 0;
         Nanoseconds sent = 0;
-        std::int64_t sample_us =
-            std::numeric_limits<std::int64_t>::min();  ///< device clock; least value: no flight
+        /// Time of the sample by the device's clock [us]; the least value if the command has no sample.
+        std::int64_t sample_us = std::numeric_limits<std::int64_t>::min();
     };
 
-    /// Matches an echo with its command. The numbers of commands start after the first echo, so that an echo of an
-    /// earlier session is recognised.
+    /// Finds the command that a packet confirms, and measures its delay. The numbers of commands start after the first
+    /// confirmed number, so that a confirmation of an earlier session's command is recognised.
     void follow_echo(const wire::InPacket& packet, Nanoseconds now) noexcept {
         const auto ahead = static_cast<std::int16_t>(packet.out_sequence - echoed_);
         const auto unsent = static_cast<std::int16_t>(packet.out_sequence - sent_);
@@ -129,7 +130,7 @@ class PacketStream {
         }
     }
 
-    /// Computes the reading of a packet.
+    /// Converts a packet to a reading in SI units.
     void read(const wire::InPacket& packet, bool first, std::int64_t step) noexcept {
         Reading now;
         now.position = wire::position_of(count_.value(), info_.counts_per_rev);
@@ -144,7 +145,8 @@ class PacketStream {
         reading_ = now;
     }
 
-    /// Returns the velocity of the device, or a difference quotient of positions without a loss.
+    /// Returns the velocity that the device measured. If the device does not measure velocity, returns the difference
+    /// quotient of the last two positions.
     [[nodiscard]] double velocity(const wire::InPacket& packet, const Reading& now, bool first,
                                   std::int64_t step) const noexcept {
         if ((info_.capabilities & wire::measures_velocity) != 0) {
@@ -155,9 +157,9 @@ class PacketStream {
         return follows ? (now.position - reading_.position) / elapsed : first ? 0.0 : reading_.velocity;
     }
 
-    /// Returns the status of a packet. The watchdog counts only after this session's commands have reached the device,
-    /// because earlier trips belong to earlier sessions. If the torque is disabled after it was enabled, the device has
-    /// restarted.
+    /// Returns the status of a packet. A report of the watchdog counts only after a command of this session has reached
+    /// the device, because earlier reports belong to earlier sessions. If the torque is disabled after it was enabled,
+    /// the device has restarted.
     [[nodiscard]] Status status_of(std::uint16_t bits) noexcept {
         const bool tripped = (bits & wire::watchdog_tripped) != 0 && is_acknowledged_;
         const bool refused = (bits & wire::bad_packet) != 0 && is_acknowledged_;
@@ -186,9 +188,9 @@ class PacketStream {
     std::uint16_t sent_ = 0;
     std::uint16_t echoed_ = 0;
     bool is_acknowledged_ = false;
-    bool is_late_ = false;  ///< of the command that the last packet echoed
+    bool is_late_ = false;  ///< true if the command confirmed by the last packet was late
     bool was_enabled_ = false;
-    bool follows_ = false;  ///< true if the next packet follows the last one taken
+    bool follows_ = false;  ///< true if no packet was discarded after the last one
     std::uint16_t status_bits_ = 0;
     std::array<SentCommand, 64> sent_commands_{};
     Reading reading_;

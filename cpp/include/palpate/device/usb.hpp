@@ -20,41 +20,41 @@ namespace palpate {
 
 /// Settings of the connection to a USB device.
 struct UsbOptions {
-    std::string serial;                     ///< empty: the only device
+    std::string serial;                     ///< serial number; empty: the only connected device
     std::chrono::microseconds wait{5'000};  ///< longest wait of an exchange for a packet
     std::uint16_t time_to_live_ms = 10;     ///< time after which a torque ends without a new packet
-    double longest_delay_s = std::numeric_limits<double>::infinity();  ///< from a sample to its force [s]
+    double longest_delay_s = std::numeric_limits<double>::infinity();  ///< allowed delay [s]
     bool makes_force = true;  ///< false: the device is never enabled, only read
 };
 
-/// Counters of packets and transfers.
+/// Counters of the packets and USB transfers of a device.
 struct UsbHealth {
     StreamHealth stream;
-    std::uint64_t skipped_commands =
-        0;  ///< not sent, because the last one was in flight or a newer sample had arrived
-    std::uint64_t lost_commands = 0;  ///< that did not arrive
+    /// Commands not sent, because the previous command was in flight or a newer sample had arrived.
+    std::uint64_t skipped_commands = 0;
+    std::uint64_t lost_commands = 0;  ///< commands that did not arrive at the device
     std::uint64_t timeouts = 0;       ///< exchanges without a packet
-    std::uint64_t discarded = 0;      ///< packets that waited too long
-    std::uint64_t stalls = 0;         ///< endpoints that halted and were cleared
+    std::uint64_t discarded = 0;      ///< received packets that the host did not process in time
+    std::uint64_t stalls = 0;         ///< halts of a USB endpoint, which were cleared
     std::uint64_t bus_errors = 0;     ///< transfers that failed on the bus
 };
 
 /// A haptic device of one degree of freedom over USB; device/wire.hpp defines packets and signs.
 ///
-/// The device paces the host. An exchange sends its command at once and waits for the next packet, in the order of the
-/// samples, at most `UsbOptions::wait`. A host that is late by one or two packets processes them without a loss, and
-/// sends only the command of the last one. Packets that waited longer are discarded. The first exchange of a new or
-/// restarted stream only reads, so that every command follows a packet at once. The exchange neither allocates nor
-/// throws; libusb uses its locks, and the wait is a futex.
+/// The packets of the device set the rate of the control loop. An exchange sends its command at once, then waits for
+/// the next packet, at most `UsbOptions::wait`. If the host is late by one or two packets, it processes all of them,
+/// and sends only the command for the last packet. If more than 4 packets wait, the host discards them. After opening
+/// and after discarded packets, the first exchange only reads, so that every command is sent directly after a packet.
+/// An exchange neither allocates nor throws; libusb uses its own locks, and the wait uses a futex.
 ///
 /// Reading::status:
-/// - Timeout: no packet came, the device's watchdog ended the torque, or a command took longer than
+/// - Timeout: no packet arrived, the device's watchdog ended the torque, or a command took longer than
 ///   `UsbOptions::longest_delay_s`.
-/// - Fault: the device reported a fault, was disabled or is gone. This status is permanent.
-/// - Lost: a command did not arrive or was not understood.
-/// - Limited: the device clipped a command.
+/// - Fault: the device reported a fault, was disabled or was unplugged. This status is permanent.
+/// - Lost: a command did not arrive, or the device did not understand it.
+/// - Limited: the device limited the torque of a command.
 ///
-/// Lost and repeated samples are visible in Reading::sequence.
+/// Reading::sequence, the number of the sample, shows lost and repeated samples.
 class UsbDevice {
   public:
     static constexpr bool paces_host = true;
@@ -64,8 +64,8 @@ class UsbDevice {
     UsbDevice& operator=(UsbDevice&&) = delete;
     ~UsbDevice() { close(); }
 
-    /// Finds the device, starts its packets and enables it if it makes force. The torque is zero until the first
-    /// exchange.
+    /// Finds the device and starts its packets. Enables the device's torque if `UsbOptions::makes_force` is set. The
+    /// torque is zero until the first exchange.
     Opened open() {
         close();
         open_ = std::make_unique<OpenDevice>();
@@ -84,14 +84,14 @@ class UsbDevice {
         return {reason};
     }
 
-    /// Sends the command and waits for the next sample.
+    /// Sends the force command and waits for the device's next sample.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         if (open_ == nullptr) {
             return failed(Status::Fault);
         }
         const Nanoseconds deadline = monotonic_now() + std::chrono::nanoseconds{options_.wait}.count();
-        // A restarted stream is not a reference for a command. The exchange still sends one if no packet comes, because
-        // a device may be silent until the first command.
+        // After discarded packets no command is sent before the next packet. If no packet arrives, the exchange still
+        // sends a command, because a device may send no packets until the first command.
         const bool is_reference = restarted() && next_packet(monotonic_now() + 2 * open_->frame);
         if (!is_reference) {
             send_or_skip(command.force, deadline);
@@ -109,8 +109,8 @@ class UsbDevice {
         return failed(Status::Timeout);
     }
 
-    /// Sends zero torque, disables the device, ends all transfers and releases it, in this order, as far as the device
-    /// responds.
+    /// Sends zero torque, disables the device, ends all USB transfers and releases the device, in this order. Steps to
+    /// which the device does not respond are skipped.
     void close() noexcept {
         if (open_ == nullptr) {
             return;
@@ -127,7 +127,7 @@ class UsbDevice {
         open_.reset();
     }
 
-    // The next three functions describe the open device, or the last one that was open.
+    // name(), info() and health() describe the open device, or the device that was open last.
     [[nodiscard]] const UsbName& name() const noexcept {
         return open_ == nullptr ? last_name_ : open_->connection.name();
     }
@@ -150,12 +150,13 @@ class UsbDevice {
         }
         return health;
     }
-    /// Returns the number of transfers that the system has not returned.
+    /// Returns the number of USB transfers that have not ended.
     [[nodiscard]] int in_flight() const noexcept {
         return open_ == nullptr || open_->transfers == nullptr ? 0 : open_->transfers->in_flight();
     }
 
-    /// Returns the properties that the device reports as a profile. It does not report its mechanics.
+    /// Returns a device profile from the properties that the device reports. Its inertia has the default value, and
+    /// damping and friction are 0, because a device does not report them.
     [[nodiscard]] DeviceProfile profile() const {
         DeviceProfile profile = unmeasured({});
         profile.id = name().serial.empty() ? name().product : name().serial;
@@ -167,21 +168,21 @@ class UsbDevice {
     }
 
   private:
-    static constexpr std::size_t most_waiting_packets = 4;  ///< packets; a later host restarts the stream
-    static constexpr int most_kept_packets =
-        2;  ///< packets that a device may have kept from an earlier session, with another state
+    static constexpr std::size_t most_waiting_packets = 4;  ///< with more packets, the host discards all
+    static constexpr int most_kept_packets = 2;  ///< old packets that a device may still send after opening
     static constexpr Nanoseconds first_packet_timeout = nanoseconds_a_second;
     static constexpr Nanoseconds write_timeout = nanoseconds_a_second / 50;
 
-    static constexpr const char* clear_cure = "run 'palpate devices --clear', then try again";
+    static constexpr const char* clear_cure =
+        "run 'palpate devices --clear' to clear the fault of the device, then try again";
 
-    /// The state of an open device.
+    /// The connection, packets and counters of an open device.
     struct OpenDevice {
         detail::UsbConnection connection;
         PacketStream stream;
         std::unique_ptr<detail::UsbTransfers> transfers;
         Nanoseconds frame = 0;
-        Nanoseconds arrived = 0;  ///< time of the last packet
+        Nanoseconds arrived = 0;  ///< arrival time of the last packet [ns]
         bool skipped_last = false;
         bool sent_last = true;
         bool reading_is_valid = true;  ///< true if the last reading was valid
@@ -191,7 +192,7 @@ class UsbDevice {
         std::uint64_t discarded = 0;
     };
 
-    /// Starts the stream. Returns "" or a sentence with the missing response and the cure.
+    /// Starts the packets of the device and enables its torque. Returns "", or a sentence with the reason and the cure.
     [[nodiscard]] std::string start() {
         detail::UsbConnection& connection = open_->connection;
         open_->stream = PacketStream{connection.info(), longest_delay()};
@@ -207,18 +208,18 @@ class UsbDevice {
         if (!discard_packets(most_kept_packets, deadline) || !next_packet(deadline)) {
             return open_->transfers->has_failed()
                        ? "does not stream: " + detail::usb_reason(open_->transfers->error())
-                       : "sends no packets; unplug it and plug it in again";
+                       : "sends no packets; unplug the device and plug it in again";
         }
         if ((open_->stream.status_bits() & wire::fault_bits) != 0) {
-            return "reports " + fault_text(open_->stream.status_bits()) + "; remove the cause, then " +
-                   clear_cure;
+            return "reports " + fault_text(open_->stream.status_bits()) +
+                   "; remove the cause of the fault, then " + clear_cure;
         }
         if (!options_.makes_force) {
             return "";
         }
         if (const int code = open_->transfers->request(wire::Request::Enable, 1); code != 0) {
             return "cannot be enabled: " + (code == LIBUSB_ERROR_PIPE
-                                                ? std::string("it refuses the request; ") + clear_cure
+                                                ? std::string("the device refuses the request; ") + clear_cure
                                                 : detail::usb_reason(code));
         }
         while ((open_->stream.status_bits() & wire::enabled) == 0) {
@@ -243,7 +244,7 @@ class UsbDevice {
                                                       : "a fault of its encoder";
     }
 
-    /// Takes the next valid packet. Returns false if none came before the deadline.
+    /// Reads the next valid packet. Returns false if no valid packet arrived before the deadline.
     [[nodiscard]] bool next_packet(Nanoseconds deadline) noexcept {
         detail::UsbArrival arrival;
         while (open_->transfers->wait_for_arrival(deadline)) {
@@ -255,7 +256,7 @@ class UsbDevice {
         return false;
     }
 
-    /// Discards packets. Returns false if they did not come before the deadline.
+    /// Discards the next `packets` packets. Returns false if fewer packets arrived before the deadline.
     [[nodiscard]] bool discard_packets(int packets, Nanoseconds deadline) noexcept {
         detail::UsbArrival old;
         for (int k = 0; k < packets; ++k) {
@@ -267,7 +268,8 @@ class UsbDevice {
         return true;
     }
 
-    /// Returns true if the stream restarts: a packet was missing, or too many wait and are discarded.
+    /// Discards all waiting packets and returns true, if there are too many of them or if packets were discarded
+    /// before.
     [[nodiscard]] bool restarted() noexcept {
         if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting_packets) {
             return false;
@@ -281,8 +283,9 @@ class UsbDevice {
         return true;
     }
 
-    /// Sends the command for the last packet. A late host skips it, takes the waiting packet first, and sends the next
-    /// one. It does not skip twice in a row, and never after a reading without force.
+    /// Sends the command for the last packet. If a newer packet has already arrived, the command is skipped, and the
+    /// command for the newer packet is sent instead. Two consecutive commands are never both skipped, and the command
+    /// after an invalid reading is never skipped for a newer packet.
     void send_or_skip(double force, Nanoseconds deadline) noexcept {
         const bool ended = wait_for_last_write(deadline);
         const bool behind = !ended || (open_->reading_is_valid && open_->transfers->arrived() > 0);
@@ -295,9 +298,10 @@ class UsbDevice {
         }
     }
 
-    /// Waits for the end of the last command. Its end and the packet that wakes the host come in the same frame, in any
-    /// order. A command that ends much later has missed its frame and ends in the next one, close to a newer packet.
-    /// Waiting for that packet keeps this and all later commands from being a frame late.
+    /// Waits until the last command has been sent. Returns true if it has. The end of a command and the packet that
+    /// wakes the host come in the same USB frame (1 ms), in any order. A command that ends much later was sent in the
+    /// next frame, close to a newer packet. Waiting for the newer packet prevents this command and all later commands
+    /// from being one frame late.
     [[nodiscard]] bool wait_for_last_write(Nanoseconds deadline) noexcept {
         detail::UsbTransfers& transfers = *open_->transfers;
         if (!transfers.writes()) {
@@ -312,7 +316,7 @@ class UsbDevice {
         return ended;
     }
 
-    /// Sends a command, unless the last one is still in flight.
+    /// Sends a force command, unless the previous command is still in flight.
     void send(double force) noexcept {
         const Nanoseconds now = monotonic_now();
         const wire::OutPacket packet = open_->stream.next_command(force, options_.time_to_live_ms, now);
@@ -329,10 +333,12 @@ class UsbDevice {
         (void)open_->transfers->wait_for_write(monotonic_now() + write_timeout);
         send(0.0);
         (void)open_->transfers->wait_for_write(monotonic_now() + write_timeout);
-        (void)open_->transfers->request(wire::Request::Enable, 0);  // otherwise the watchdog ends the torque
+        (void)open_->transfers->request(wire::Request::Enable,
+                                        0);  // if this request fails, the device's watchdog ends the torque
     }
 
-    /// Sets the status Lost if a command was not sent or was lost, because an older force acts then.
+    /// Sets the status of a reading to Lost if the last command was not sent or did not arrive, because the device then
+    /// still applies an older force.
     [[nodiscard]] Reading with_loss_status(Reading reading) noexcept {
         const std::uint64_t lost = open_->transfers->lost_writes();
         const bool arrived = std::exchange(open_->lost_commands, lost) == lost && open_->sent_last;
@@ -342,7 +348,7 @@ class UsbDevice {
         return reading;
     }
 
-    /// Returns the last reading with this status. Only its position is valid.
+    /// Returns the last reading with `status` as its status. Only the position of this reading is valid.
     [[nodiscard]] Reading failed(Status status) const noexcept {
         Reading reading = open_ == nullptr ? Reading{} : open_->stream.reading();
         reading.status = status;

@@ -15,44 +15,46 @@
 #include <tuple>
 #include <utility>
 
-/// Packets between a USB device and its host, version 1: fixed size, little endian, packed. A wrong size, magic or
-/// version is an error.
+/// Packets between a USB device and its host, version 1: fixed size, little endian, without padding. A packet with
+/// a wrong size, first byte or version is an error.
 ///
 /// Signs: position = 2 pi count / counts_per_rev; a torque > 0 in a packet accelerates the handle towards larger
-/// counts. A force of this library is that of the object against the handle, so it is -1e-6 times the torque.
+/// counts. A force in this library is the force of the object against the handle, so it is -1e-6 times the
+/// packet's torque [N*m].
 namespace palpate::wire {
 
-inline constexpr std::uint16_t vendor_id = 0x1209;   ///< identification of the device, with product_id
-inline constexpr std::uint16_t product_id = 0x0001;  ///< of pid.codes' test pair: for development only
+inline constexpr std::uint16_t vendor_id = 0x1209;  ///< USB vendor number of the device
+inline constexpr std::uint16_t product_id =
+    0x0001;  ///< test product number of pid.codes, only for development
 inline constexpr std::uint8_t interface_number = 0;
 inline constexpr std::array<std::uint8_t, 3> interface_kind{0xFF, 0x01, 0x01};  ///< class, subclass, protocol
-inline constexpr std::uint8_t in_endpoint = 0x81;   ///< interrupt IN endpoint: packets of the device
-inline constexpr std::uint8_t out_endpoint = 0x01;  ///< interrupt OUT endpoint: commands
+inline constexpr std::uint8_t in_endpoint = 0x81;   ///< interrupt IN endpoint: packets from the device
+inline constexpr std::uint8_t out_endpoint = 0x01;  ///< interrupt OUT endpoint: commands to the device
 inline constexpr std::uint8_t protocol_version = 1;
 
 inline constexpr std::uint8_t request_to_host = 0xC1;  ///< bmRequestType: vendor, interface
 inline constexpr std::uint8_t request_to_device = 0x41;
 
-/// bRequest of a control transfer.
+/// Numbers of the control requests to the device (the field bRequest of a control transfer).
 enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
 
-/// Returns cause and cure for an error code of libusb; empty for a code without a known cause.
+/// Returns cause and cure for an error code of libusb; empty for a code without a text.
 [[nodiscard]] constexpr std::string_view usb_cause(int code) noexcept {
     switch (code) {
         case -1:  // LIBUSB_ERROR_IO
             return "the transfer failed on the bus; try another cable or port";
         case -3:  // LIBUSB_ERROR_ACCESS
-            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug it in "
-                   "again";
+            return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug the "
+                   "device in again";
         case -4:  // LIBUSB_ERROR_NO_DEVICE
         case -5:  // LIBUSB_ERROR_NOT_FOUND
-            return "it was unplugged; plug it in and try again";
+            return "the device was unplugged; plug it in and try again";
         case -6:  // LIBUSB_ERROR_BUSY
-            return "another program uses it; end that program, then try again";
+            return "another program uses the device; end that program, then try again";
         case -7:  // LIBUSB_ERROR_TIMEOUT
-            return "it does not answer; unplug it and plug it in again";
+            return "the device does not answer; unplug it and plug it in again";
         case -9:  // LIBUSB_ERROR_PIPE
-            return "it refused a request; the version of its firmware may differ";
+            return "the device refused a request; the version of its firmware may differ";
         case -11:  // LIBUSB_ERROR_NO_MEM
             return "the system has no memory left for USB; see "
                    "/sys/module/usbcore/parameters/usbfs_memory_mb";
@@ -61,7 +63,7 @@ enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog 
     }
 }
 
-/// Bits of InPacket::status.
+/// Bits of the status in a packet of the device (InPacket::status).
 inline constexpr unsigned enabled = 1;
 inline constexpr unsigned watchdog_tripped = 2;
 inline constexpr unsigned torque_saturated = 4;
@@ -69,45 +71,45 @@ inline constexpr unsigned bad_packet = 8;
 inline constexpr unsigned encoder_fault = 16;
 inline constexpr unsigned over_temperature = 32;
 inline constexpr unsigned emergency_stop = 64;
-/// Bits after which the device and its packets are not reliable.
+/// Status bits that report a fault; after one of them the device and its packets are not reliable.
 inline constexpr unsigned fault_bits = encoder_fault | over_temperature | emergency_stop;
 
-/// Bits of Info::capabilities.
+/// Bits that state which sensors the device has (Info::capabilities).
 inline constexpr std::uint32_t has_transducer = 1;
 inline constexpr std::uint32_t measures_velocity = 2;
 
-/// Range of the time for which the device makes force without a command [ms].
+/// Least and largest setting of the watchdog: the time for which the device makes force without a new command [ms].
 inline constexpr int shortest_watchdog_ms = 2;
 inline constexpr int longest_watchdog_ms = 1000;
 
-inline constexpr std::size_t largest_packet = 64;  ///< of a full-speed interrupt endpoint [bytes]
+inline constexpr std::size_t largest_packet = 64;  ///< limit of a full-speed interrupt endpoint [bytes]
 inline constexpr std::size_t in_size = 32;
 inline constexpr std::size_t out_size = 16;
 inline constexpr std::size_t info_size = 32;
 
-/// Packet from the device, once every frame.
+/// Packet that the device sends once in each USB frame of 1 ms.
 struct InPacket {
     std::uint16_t sequence = 0;
-    std::uint32_t clock_us = 0;      ///< of the device at the encoder latch; wraps after 71 minutes
-    std::int32_t count = 0;          ///< position of the encoder
-    std::int32_t velocity_cps = 0;   ///< counts a second; 0 if it is not measured
+    std::uint32_t clock_us = 0;  ///< device clock when the position was read; restarts at 0 after 71 minutes
+    std::int32_t count = 0;      ///< position of the encoder
+    std::int32_t velocity_cps = 0;   ///< velocity [counts/s]; 0 if not measured
     std::int32_t torque_uNm = 0;     ///< applied torque
     std::uint16_t status = 0;        ///< status bits
-    std::uint16_t out_sequence = 0;  ///< of the last accepted OUT packet
-    std::uint16_t out_age_us = 0;    ///< since it was accepted; saturates
+    std::uint16_t out_sequence = 0;  ///< number of the last accepted command
+    std::uint16_t out_age_us = 0;    ///< time since that command was accepted, at most 65535
     std::uint16_t temperature_dC = 0;
-    std::int32_t sensor_uNm = 0;  ///< of the force transducer; 0 without one
+    std::int32_t sensor_uNm = 0;  ///< torque at the transducer; 0 without a transducer
 };
 
-/// Packet to the device.
+/// Command packet to the device.
 struct OutPacket {
     std::uint16_t sequence = 0;
     std::int32_t torque_uNm = 0;
-    std::uint16_t time_to_live_ms = 10;  ///< the torque ends after this time without a packet
+    std::uint16_t time_to_live_ms = 10;  ///< the torque ends after this time without a new command
     std::uint32_t host_us = 0;
 };
 
-/// Properties that a device reports.
+/// Properties that a USB device reports about itself.
 struct Info {
     std::uint16_t firmware = 0;
     std::uint32_t counts_per_rev = 0;
@@ -169,7 +171,7 @@ class ByteWriter {
 
 }  // namespace detail
 
-/// Reads a packet. Returns false if the bytes are not a packet of this protocol.
+/// Reads a packet of the device from bytes. Returns false if the bytes are not a packet of this protocol.
 [[nodiscard]] inline bool decode(std::span<const std::uint8_t> bytes, InPacket& packet) noexcept {
     if (bytes.size() != in_size || bytes[0] != 'H' || bytes[1] != protocol_version) {
         return false;
@@ -180,7 +182,8 @@ class ByteWriter {
     return true;
 }
 
-/// Reads the answer to GET_INFO. Returns "", or a sentence with the invalid field, its value and the right one.
+/// Reads the answer to GET_INFO. Returns "", or a sentence with the invalid field, its value and the required
+/// value.
 [[nodiscard]] inline std::string decode(std::span<const std::uint8_t> bytes, Info& info) {
     using Number = std::int64_t;
     const std::string answer = "the answer to GET_INFO";
@@ -211,8 +214,8 @@ class ByteWriter {
              {"out_size", out_bytes, out_size},
              {"dof", degrees_of_freedom, 1},
              {"the reserved byte", reserved, 0},
-             {"capabilities beyond bits 0 and 1", info.capabilities & ~(has_transducer | measures_velocity),
-              0}}) {
+             {"the value of undefined capability bits",
+              info.capabilities & ~(has_transducer | measures_velocity), 0}}) {
         if (value != required) {
             return refusal(field, value, std::to_string(required));
         }
@@ -229,7 +232,7 @@ class ByteWriter {
     return "";
 }
 
-/// Returns the bytes of a packet.
+/// Returns the bytes of a command packet.
 [[nodiscard]] inline std::array<std::uint8_t, out_size> encode(const OutPacket& packet) noexcept {
     constexpr std::uint16_t flags = 0;
     std::array<std::uint8_t, out_size> bytes{};
@@ -238,17 +241,17 @@ class ByteWriter {
     return bytes;
 }
 
-/// Returns the position of a count [rad].
+/// Converts an encoder count to a position [rad].
 [[nodiscard]] inline double position_of(std::int64_t count, std::uint32_t counts_per_rev) noexcept {
     return 2.0 * std::numbers::pi * static_cast<double>(count) / static_cast<double>(counts_per_rev);
 }
 
-/// Returns the force of the object against the handle for a torque of a packet [N*m].
+/// Converts the torque of a packet to the force of the object against the handle [N*m].
 [[nodiscard]] inline double force_of(std::int32_t torque_uNm) noexcept {
     return 0.0 - 1e-6 * static_cast<double>(torque_uNm);
 }
 
-/// Returns the torque of a packet for a force, limited to the device's largest; 0 for NaN.
+/// Converts a force of the object to the torque of a packet, limited to the device's largest torque; 0 for NaN.
 [[nodiscard]] inline std::int32_t torque_of(double force, std::int32_t max_torque_uNm) noexcept {
     if (std::isnan(force)) {
         return 0;
@@ -257,11 +260,12 @@ class ByteWriter {
     return static_cast<std::int32_t>(std::lround(std::clamp(-1e6 * force, -largest, largest)));
 }
 
-/// Extends a counter that wraps to one that does not. A step of more than half the range counts as negative.
+/// Extends a counter that restarts at 0 after its largest value to a 64-bit counter that does not restart. A step of
+/// more than half the counter's range counts as a negative step.
 template <std::integral Counter>
 class Unwrapped {
   public:
-    /// Takes the next reading. Returns the step from the last one, 0 for the first.
+    /// Takes the next reading of the counter. Returns the step since the previous reading, 0 for the first reading.
     std::int64_t follow(Counter reading) noexcept {
         using Unsigned = std::make_unsigned_t<Counter>;
         const auto ahead =

@@ -16,12 +16,13 @@ struct VirtualCoupling {
     double stiffness = 100.0;  ///< K_c [N/m]
     double damping = 0.02;     ///< B_c [N*s/m]
 
-    /// Returns F for differences of position and velocity [N].
+    /// Returns the force of the coupling [N] for a difference of the positions and of the velocities of device and
+    /// virtual object.
     [[nodiscard]] constexpr double force(double position_error, double velocity_error) const noexcept {
         return stiffness * position_error + damping * velocity_error;
     }
 
-    /// Returns K_c + B_c / T, the coupling's part of the slope of a load line.
+    /// Returns K_c + B_c / T [N/m], the part of the coupling in the slope of a load line.
     [[nodiscard]] constexpr double load_line_slope(double period_s) const noexcept {
         return stiffness + damping / period_s;
     }
@@ -34,18 +35,20 @@ inline constexpr auto fields_of<VirtualCoupling> =
                Field<&VirtualCoupling::damping>{
                    "damping", "B_c, damping of the coupling [N*s/m or N*m*s/rad].", Rule::NotNegative}};
 
-/// Mass and damping of the virtual object. The paper needs a mass so that the environment has a position as its output;
-/// it uses these two values for its spring and wall.
+/// Mass and damping of the virtual object. The paper adds a mass so that the virtual object has a position; the paper's
+/// spring and wall use the two default values.
 struct Inertia {
     double mass = 0.001;   ///< m [kg]
     double damping = 0.5;  ///< B_o [N*s/m]
 
-    /// Returns m / T^2 + B_o / T, their part of the slope of a load line by backward Euler.
+    /// Returns m / T^2 + B_o / T [N/m], the part of mass and damping in the slope of a load line with the backward
+    /// Euler method.
     [[nodiscard]] constexpr double load_line_slope(double period_s) const noexcept {
         return mass / (period_s * period_s) + damping / period_s;
     }
 
-    /// Returns 2 m / T^2 + B_o / T, the same part by the midpoint rule.
+    /// Returns 2 m / T^2 + B_o / T [N/m], the part of mass and damping in the slope of a load line with the midpoint
+    /// rule.
     [[nodiscard]] constexpr double midpoint_slope(double period_s) const noexcept {
         return 2.0 * mass / (period_s * period_s) + damping / period_s;
     }

@@ -10,16 +10,16 @@
 
 namespace palpate {
 
-/// Sample time for which the paper's differentiators are designed [s].
+/// Time between two samples for which the differentiators of the paper are designed [s].
 inline constexpr double paper_sample_time = 1e-3;
 
-/// The paper's two choices of integrators and differentiators (its section 4.3).
+/// The two sets of integrators and differentiators of the paper (section 4.3).
 enum class FilterPair : std::uint8_t { Implicit, Explicit };
 
-/// Gain of the differentiators.
+/// Gain of the differentiators G. I is the integrator that G must invert, so G I should be 1.
 enum class FilterDesign : std::uint8_t {
-    Paper,    ///< as published: G I is 1.0032 (14.8379) and 1.048 (31) at low frequency
-    Matched,  ///< G I is exactly 1 at low frequency
+    Paper,    ///< gains of the paper: at low frequency G I is 1.0032 (gain 14.8379) and 1.048 (gain 31)
+    Matched,  ///< gains for which G I is exactly 1 at low frequency
 };
 
 template <>
@@ -27,8 +27,8 @@ inline constexpr auto words_of<FilterPair> = std::array<std::string_view, 2>{"im
 template <>
 inline constexpr auto words_of<FilterDesign> = std::array<std::string_view, 2>{"paper", "matched"};
 
-/// The integrators I1 (force to velocity) and I2 (velocity to position) of the environment, and the differentiators G1
-/// and G2 that replace their inverses in identification (paper figures 10 to 14).
+/// The integrators I1 (force to velocity) and I2 (velocity to position) of a virtual object with mass, and the
+/// differentiators G1 and G2 that approximate the inverses of I1 and I2 in identification (paper figures 10 to 14).
 struct EnvironmentFilters {
     TransferFunction i1;
     TransferFunction i2;
@@ -36,9 +36,10 @@ struct EnvironmentFilters {
     TransferFunction g2;
 };
 
-/// Returns the paper's filters. Both differentiators have the poles of z^2 - 1.6556 z + 0.68518 (0.836 and 0.819: 179
-/// and 199 rad/s), so G I is about 0.8 at 100 rad/s. With c = 1 - 1.6556 + 0.68518, the gain for which G I = 1 at z = 1
-/// is c / (2T) for z^2 - 1 and c / T for z - 1.
+/// Returns the integrators and differentiators of the paper. Both differentiators G have the denominator z^2 - 1.6556 z
+/// + 0.68518 with the poles 0.836 and 0.819 (179 and 199 rad/s), so G I with the integrator I is about 0.8 at 100
+/// rad/s. With c = 1 - 1.6556 + 0.68518 and the sample time T, the gain for which G I = 1 at frequency 0 (z = 1) is c /
+/// (2T) for the numerator z^2 - 1 and c / T for z - 1.
 [[nodiscard]] constexpr EnvironmentFilters environment_filters(FilterPair pair,
                                                                FilterDesign design = FilterDesign::Paper) {
     constexpr double period = paper_sample_time;

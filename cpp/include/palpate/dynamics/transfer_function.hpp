@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// A discrete transfer function of order at most two, with its state,
+/// A discrete transfer function of order at most two, with its state s1, s2,
 ///
 ///     H(z) = (b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2),
 ///
@@ -26,7 +26,7 @@ class TransferFunction {
     [[nodiscard]] constexpr const std::array<double, 3>& numerator() const noexcept { return numerator_; }
     [[nodiscard]] constexpr const std::array<double, 3>& denominator() const noexcept { return denominator_; }
 
-    /// Returns the output for the next input.
+    /// Updates the state with the next input u and returns the output y.
     [[nodiscard]] constexpr double step(double input) noexcept {
         const double output = numerator_[0] * input + state_[0];
         state_[0] = numerator_[1] * input - denominator_[1] * output + state_[1];
@@ -36,13 +36,13 @@ class TransferFunction {
 
     constexpr void reset() noexcept { state_ = {}; }
 
-    /// Returns H(z) at any z, for instance e^{j omega T}.
+    /// Returns the transfer function H(z) at any complex z, for example e^{j omega T} for the frequency omega.
     [[nodiscard]] std::complex<double> at(std::complex<double> z) const noexcept {
         return ((numerator_[0] * z + numerator_[1]) * z + numerator_[2]) /
                ((z + denominator_[1]) * z + denominator_[2]);
     }
 
-    /// Returns the roots of the denominator.
+    /// Returns the poles, the two roots of the denominator.
     [[nodiscard]] std::array<std::complex<double>, 2> poles() const noexcept {
         const double middle = -0.5 * denominator_[1];
         const std::complex<double> half = std::sqrt(std::complex<double>{middle * middle - denominator_[2]});

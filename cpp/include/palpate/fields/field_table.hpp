@@ -15,33 +15,33 @@
 
 #include "palpate/fields/readable.hpp"
 
-// One table for each struct with name, member, meaning and rule of every field. Checks, files, fingerprints,
-// comparisons and Python classes use it.
+// Tables that describe the fields of a struct: name, member, meaning and rule of every field, one table for each
+// struct. Checks, files, fingerprints, comparisons and Python classes use these tables.
 namespace palpate {
 
-/// Rule for a number.
+/// Rule that the number in a field must satisfy.
 enum class Rule : std::uint8_t { Any, Finite, NotNegative, Positive };
 
-/// Returns the rule in words.
+/// Returns the rule as text for an error message, for example "> 0".
 [[nodiscard]] constexpr const char* text(Rule rule) noexcept {
     constexpr const char* texts[]{"a number", "a finite number", ">= 0", "> 0"};
     return texts[static_cast<std::size_t>(rule)];
 }
 
-/// Returns true if a value satisfies a rule.
+/// Returns true if the number `value` satisfies `rule`.
 [[nodiscard]] inline bool satisfies(double value, Rule rule) noexcept {
     return rule == Rule::Any || (std::isfinite(value) && (rule == Rule::Finite || value > 0.0 ||
                                                           (rule == Rule::NotNegative && value == 0.0)));
 }
 
-/// A field at the end of a path of members.
+/// Description of one field of a struct. `path` lists the members that lead from the struct to the field.
 template <auto... path>
 struct Field {
     const char* name = "";
-    const char* doc = "";  ///< meaning and unit
+    const char* doc = "";  ///< meaning and unit of the field
     Rule rule = Rule::Any;
-    bool stored = true;  ///< false: not written to files, because it can be computed
-    std::span<const std::string_view> words = {};  ///< allowed texts; empty = any
+    bool stored = true;  ///< false: files do not contain the field, because it can be computed
+    std::span<const std::string_view> words = {};  ///< allowed texts of the field; empty = any text
 
     template <class S>
     [[nodiscard]] static constexpr auto& of(S& object) noexcept {
@@ -49,26 +49,27 @@ struct Field {
     }
 };
 
-/// Returns the same field of a struct that contains it as `outer`.
+/// Returns the description of the same field for a larger struct whose member `outer` contains the field, under the
+/// name `name`.
 template <auto outer, auto... path>
 [[nodiscard]] constexpr Field<outer, path...> within(const Field<path...>& field, const char* name) noexcept {
     return {name, field.doc, field.rule, field.stored, field.words};
 }
 
-/// Returns all fields of a table for a struct that contains theirs as `outer`.
+/// Returns the descriptions `fields` of a struct for a larger struct whose member `outer` is this struct.
 template <auto outer, class... Fields>
 [[nodiscard]] constexpr auto all_within(const std::tuple<Fields...>& fields) noexcept {
     return std::apply([](const auto&... field) { return std::tuple{within<outer>(field, field.name)...}; },
                       fields);
 }
 
-/// True for an optional field, which a file may omit.
+/// True for the type of an optional field, which a file may omit.
 template <class V>
 inline constexpr bool is_optional = false;
 template <class V>
 inline constexpr bool is_optional<std::optional<V>> = true;
 
-/// Tuple of `Field`; each struct specialises it.
+/// Table of the fields of the struct S: a tuple of `Field`. Each struct with a table specialises this variable.
 template <class S>
 inline constexpr auto fields_of = nullptr;
 
@@ -82,21 +83,22 @@ constexpr void for_each_field(Visit visit) {
     std::apply([&](const auto&... field) { (visit(field), ...); }, fields_of<S>);
 }
 
-/// Words of an enumeration in the order of its values; each enumeration specialises it.
+/// Names of the values of an enumeration as they appear in files and messages, in the order of the values. Each
+/// enumeration with names specialises this variable.
 template <class Enum>
 inline constexpr auto words_of = nullptr;
 
-/// True for an enumeration with words.
+/// True for an enumeration whose values have names (`words_of`).
 template <class Enum>
 concept HasWords = !std::is_null_pointer_v<std::remove_cv_t<decltype(words_of<Enum>)>>;
 
-/// Returns the word of a value.
+/// Returns the name of a value of an enumeration, as it appears in files and messages.
 template <HasWords Enum>
 [[nodiscard]] constexpr std::string_view name_of(Enum value) noexcept {
     return words_of<Enum>[static_cast<std::size_t>(value)];
 }
 
-/// Returns a text such as "direct, massless or implicit".
+/// Returns the words joined to a text such as "direct, massless or implicit".
 [[nodiscard]] inline std::string either(std::span<const std::string_view> words) {
     std::string text;
     for (std::size_t k = 0; k < words.size(); ++k) {
@@ -105,7 +107,8 @@ template <HasWords Enum>
     return text;
 }
 
-/// Returns the value of a word. Throws std::invalid_argument with the name of the field.
+/// Returns the value of an enumeration that has the name `word`. If no value has this name, throws
+/// std::invalid_argument with the name of the field, the word and the allowed names.
 template <HasWords Enum>
 [[nodiscard]] Enum named(std::string_view word, const char* field) {
     for (std::size_t k = 0; k < words_of<Enum>.size(); ++k) {
@@ -117,14 +120,16 @@ template <HasWords Enum>
                                 either(words_of<Enum>));
 }
 
-/// Throws std::invalid_argument with the field, its value and the rule unless `holds`.
+/// Throws std::invalid_argument unless `holds` is true. The message contains the name of the field, its value and the
+/// rule `right`.
 inline void require_field(bool holds, const std::string& field, double value, const std::string& right) {
     if (!holds) {
         throw std::invalid_argument(field + " is " + readable(value) + ", must be " + right);
     }
 }
 
-/// Checks a number or a word by the rule of its field; accepts other values.
+/// Throws std::invalid_argument if a number does not satisfy the rule of its field or a text is not an allowed text of
+/// its field. Accepts values of other types.
 template <class F, class V>
 void check_value(const F& field, const V& value, const std::string& prefix) {
     if constexpr (is_optional<V>) {
@@ -143,8 +148,8 @@ void check_value(const F& field, const V& value, const std::string& prefix) {
     }
 }
 
-/// Checks the numbers and words of one object. Throws std::invalid_argument with the field, its value and the rule. The
-/// message has `prefix` before each name.
+/// Checks the numbers and texts in all fields of one object. If a value is not allowed, throws std::invalid_argument
+/// with the name of the field, its value and the rule. In the message `prefix` precedes the name.
 template <HasFields S>
 void check_fields(const S& object, const std::string& prefix = "") {
     for_each_field<S>([&](const auto& field) { check_value(field, field.of(object), prefix); });

@@ -9,7 +9,8 @@
 
 namespace palpate {
 
-/// Returns a number as text with four significant digits, and without an exponent if digits are shorter.
+/// Returns a number as text with four significant digits. Numbers from 1000 to 10^7 are written as integers, without an
+/// exponent.
 [[nodiscard]] inline std::string readable(double value) {
     std::array<char, 32> digits{};
     char* const first = digits.data();

@@ -10,11 +10,11 @@
 namespace palpate {
 
 struct NamedValue;
-/// Values of a report, in their order.
+/// Named values of a report, in the order in which the report contains them.
 using NamedValues = std::vector<NamedValue>;
 
-/// Value of a report, which becomes JSON or a Python object. An empty value and a number that is not finite become
-/// null.
+/// One value of a report, which is converted to JSON or to a Python object. An empty value and a number that is not
+/// finite become null.
 using Value = std::variant<std::monostate, bool, std::uint64_t, double, std::string, std::vector<double>,
                            std::vector<std::string>, NamedValues, std::vector<NamedValues>>;
 
@@ -24,7 +24,7 @@ struct NamedValue {
     Value value;
 };
 
-/// Lines of a report for the terminal: title and text.
+/// Lines of a report for the terminal, each with a title and a text.
 using Lines = std::vector<std::pair<std::string, std::string>>;
 
 }  // namespace palpate

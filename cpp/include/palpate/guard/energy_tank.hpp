@@ -10,41 +10,46 @@
 
 namespace palpate {
 
-/// Energy and losses that an energy tank may use.
+/// Settings of an energy tank: bounds of the stored energy, and losses of the device that the tank counts.
 struct TankSettings {
-    StoredEnergySettings stored;     ///< bounds of the object's energy
-    double device_damping = 0.0;     ///< credited b of the device [N*s/m or N*m*s/rad]
-    double device_friction = 0.0;    ///< credited f_c of the device [N or N*m]
-    double uncredited_motion = 0.0;  ///< part of each motion without credit [m or rad]
-    double period_s = 1e-3;          ///< sample time [s]
+    StoredEnergySettings stored;     ///< numbers that bound the energy that the rendering stores
+    double device_damping = 0.0;     ///< device damping b that the tank counts [N*s/m or N*m*s/rad]
+    double device_friction = 0.0;    ///< Coulomb friction f_c that the tank counts [N or N*m]
+    double uncredited_motion = 0.0;  ///< part of each motion without counted losses [m or rad]
+    double period_s = 1e-3;          ///< time between two samples [s]
 };
 
-/// Limits the energy that a rendering may give. The energy that it has given since the tank was last full is
+/// Limits the energy that a rendering gives to the handle. The energy given since the last tick with G = 0, less the
+/// losses in the device, is
 ///
 ///     G_k = max(0, G_{k-1} - F u - b d^2 / T - f_c d),   d = max(0, |u| - unsure),
 ///
-/// where F is the force that acted, u the motion that was read, and b and f_c the credited damping and friction of the
-/// device. If G exceeds W, the bound of the stored energy, all forces decrease over a reserve of W / 4. This includes
-/// forces against the handle, because a force that is held too long reverses the handle and then gives energy. The
-/// energy given beyond the credited losses is at most W plus the reserve.
+/// where F is the force that acted, u the measured motion of the handle, `unsure` the part of u without counted losses,
+/// b the counted device damping and f_c the counted friction. W is the bound of the stored energy (`StoredEnergy`). If
+/// G exceeds W, the tank reduces all forces, to zero at G = W + W / 4 (W of the domain). This includes forces against
+/// the motion of the handle, because a force that is held too long reverses the handle and then gives energy. The given
+/// energy minus the counted losses is at most W plus this reserve of W / 4.
 ///
-/// In a certified run u is the motion that the readings prove (`ReadMotion`), and everything is credited. u is the
-/// motion of a handle that the encoder can have read in this way. The certificate holds for every motion, so also for
-/// this one: without delay no interval of it gives more than was stored at its start, which is at most W. The tank then
-/// never acts. With delay this holds if the forces that are pending at the start of the interval add less than W
-/// leaves.
+/// In a run with a certificate, u is the motion that the encoder readings prove (`ReadMotion`), and the tank counts all
+/// damping and friction of the device. A handle with the motion u can have caused the same readings. The certificate
+/// holds for every motion, so also for u: without delay the rendering gives in no time interval more energy than it
+/// stored at the start of the interval, which is at most W. The tank then never reduces a force. With delay this is
+/// also true, if the forces computed before the interval but applied within it give less energy than W minus the energy
+/// stored at the start.
 ///
-/// In an uncertified run u is the change of the reading, and nine tenths of the energy that the device certainly
-/// dissipated are credited, because a steady limit cycle gives exactly the energy that the device dissipates. A slow
-/// motion then gets no credit for its single counts. A force that is below its friction because of the encoder's errors
-/// is not treated as passive.
+/// In a run without a certificate, u is the change of the measured position, and the tank counts nine tenths of the
+/// energy that the device certainly dissipated. With all of it the tank would not stop a steady limit cycle, which
+/// gives exactly the energy that the device dissipates. A slow motion has no counted losses while the position changes
+/// by single encoder steps. Force errors from encoder steps are not treated as passive, even if they are smaller than
+/// the friction of the device.
 class EnergyTank {
   public:
     EnergyTank() = default;
     explicit EnergyTank(const TankSettings& settings) noexcept
         : settings_{settings}, stored_{settings.stored}, reserve_{0.25 * settings.stored.within} {}
 
-    /// Adds the work of `applied` over the motion `moved` of the handle.
+    /// Adds the energy that the force `applied` gave during the motion `moved` of the handle, and subtracts the counted
+    /// losses.
     void book(double applied, double moved) noexcept {
         const double credited = std::max(0.0, std::abs(moved) - settings_.uncredited_motion);
         const double dissipated =
@@ -52,10 +57,10 @@ class EnergyTank {
         given_ = std::max(0.0, given_ - applied * moved - dissipated);
         most_given_ = std::max(most_given_, given_);
     }
-    /// Updates the stored energy with the positions of handle and object.
+    /// Updates the bound of the stored energy with the positions of handle and virtual object.
     void visit(double handle, double object) noexcept { stored_.visit(handle, object); }
 
-    /// Scales the force down if the energy is used up.
+    /// Reduces the force if the given energy exceeds the bound of the stored energy.
     [[nodiscard]] Status apply(double& force) const noexcept {
         const double excess = given_ - stored_.most();
         if (!(excess > 0.0) || force == 0.0) {
@@ -65,7 +70,7 @@ class EnergyTank {
         return Status::EnergyLimited;
     }
 
-    /// Return G now, and its largest value so far [J].
+    /// Return the given energy G of the last tick, and its largest value since the start [J].
     [[nodiscard]] double given() const noexcept { return given_; }
     [[nodiscard]] double most_given() const noexcept { return most_given_; }
     [[nodiscard]] const StoredEnergy& stored() const noexcept { return stored_; }

@@ -14,31 +14,35 @@
 
 namespace palpate {
 
-/// Settings of the guards of a live rendering, with times in seconds instead of ticks.
+/// Settings of the guards for a rendering on a device, with times in seconds.
 struct GuardSettings {
-    double force_limit = 5.0;      ///< largest force [N or N*m]
-    double slew_s = 0.005;         ///< from zero force to the limit; 0 = no limit [s]
-    double ramp_s = 0.2;           ///< from zero to the full force at the start [s]
-    double largest_speed = 100.0;  ///< of the handle; faster is a jump [m/s or rad/s]
-    double frozen_speed = 0.3;     ///< a faster handle cannot stop at once [m/s or rad/s]
-    double frozen_s = 0.05;        ///< longest apparent rest; 0 = no check [s]
-    bool energy_tank = true;       ///< true: an energy tank limits the energy
+    double force_limit = 5.0;  ///< largest force [N or N*m]
+    double slew_s = 0.005;     ///< shortest time from zero force to the force limit; 0 = no slew limit [s]
+    double ramp_s = 0.2;       ///< duration of the start ramp from zero force to the full force [s]
+    double largest_speed = 100.0;  ///< handle speed above which a reading is a fault (jump) [m/s or rad/s]
+    double frozen_speed = 0.3;     ///< speed from which a handle cannot stop within one sample [m/s or rad/s]
+    double frozen_s =
+        0.05;  ///< time without change of position after which the encoder is frozen; 0 = no check [s]
+    bool energy_tank = true;  ///< true: an energy tank limits the energy
     double limit_cycle_force =
-        0.05;  ///< least force swing of a fast oscillation that is a limit cycle; 0 = no check [N or N*m]
-    double device_damping = 0.0;   ///< known b [N*s/m or N*m*s/rad]
-    double device_friction = 0.0;  ///< known f_c [N or N*m]
-    double encoder_step = 0.0;     ///< [m or rad]
-    /// true: a certificate holds for this run. The energy tank then uses the motion that readings prove, all of the
-    /// device's damping and friction, and the energy that the object stores outside its domain.
+        0.05;  ///< smallest change of force in each swing of a limit cycle; 0 = no check [N or N*m]
+    double device_damping = 0.0;   ///< device damping b [N*s/m or N*m*s/rad]
+    double device_friction = 0.0;  ///< Coulomb friction f_c of the device [N or N*m]
+    double encoder_step = 0.0;     ///< encoder step of the device [m or rad]
+    /// true: a certificate holds for this run. The energy tank then uses the motion that encoder readings prove, counts
+    /// all damping and friction of the device, and includes the energy that the virtual object stores outside the
+    /// domain.
     bool certified = false;
 };
 
-/// Returns the default guards for a device, at a model's scale.
+/// Returns the default guard settings for a device. Speeds and the force of a limit cycle are scaled by the length and
+/// the stiffness of the model.
 [[nodiscard]] inline GuardSettings guards_for(const ModelScale& scale, const DeviceProfile& device) noexcept {
     GuardSettings guards;
     guards.force_limit = device.force_limit;
     guards.largest_speed *= scale.length;
-    // A slower motion can stay within one encoder step.
+    // Below a speed of a few encoder steps per sample, a moving handle can give equal readings, so it is not a frozen
+    // encoder.
     guards.frozen_speed =
         std::max(guards.frozen_speed * scale.length, 3.0 * device.encoder_step / device.period_s);
     guards.limit_cycle_force *= scale.length * scale.stiffness();
@@ -49,15 +53,16 @@ struct GuardSettings {
 }
 
 inline constexpr double longest_guard_s =
-    3600.0;  ///< largest ramp_s and frozen_s; whole samples must fit an integer [s]
+    3600.0;  ///< largest ramp_s and frozen_s, so that their number of samples fits an integer [s]
 
-/// Share of the device's damping and friction that the energy tank credits without a certificate.
+/// Share of the damping and friction of the device that the energy tank counts in a run without a certificate.
 inline constexpr double uncertified_credit = 0.9;
 
 /// Frequency above which an oscillation cannot come from a hand [Hz].
 inline constexpr double lowest_limit_cycle_hz = 20.0;
 
-/// Throws std::invalid_argument with the field, its value and the rule.
+/// Throws std::invalid_argument if a guard setting is not allowed, with the name of the setting, its value and the
+/// rule.
 inline void validate(const GuardSettings& settings) {
     const auto require_rule = [](const char* field, double value, Rule rule) {
         require_field(satisfies(value, rule), field, value, text(rule));
@@ -78,7 +83,7 @@ inline void validate(const GuardSettings& settings) {
     require_rule("encoder_step", settings.encoder_step, Rule::NotNegative);
 }
 
-/// Least number of equal samples that count as a frozen encoder.
+/// Smallest number of equal position samples after which an encoder can count as frozen.
 inline constexpr std::uint64_t fewest_frozen_samples = 5;
 
 [[nodiscard]] inline ForceLimit force_limit(const GuardSettings& settings) noexcept {

@@ -19,28 +19,29 @@
 
 namespace palpate {
 
-/// Checks of each sample before it is used, and limits of each force before it is sent. With the force limit alone
-/// these are the guards of a simulation, because other faults cannot occur there.
+/// Checks of each position sample before the rendering uses the sample, and limits of each force before it is sent. A
+/// simulation uses only the force limit, because other faults cannot occur in a simulation.
 struct Guards {
-    ReadingGuard reading{};             ///< check of each sample
-    ForceLimit limit{};                 ///< first limit
+    ReadingGuard reading{};             ///< checks each position sample
+    ForceLimit limit{};                 ///< limits the computed force, before all other limits
     LimitCycleDetector limit_cycle{};   ///< scales all forces down after a limit cycle
-    ForceRamp ramp{};                   ///< increase at the start
-    SlewLimit slew{};                   ///< change of the force
-    EnergyTank tank{};                  ///< energy that may be given
-    ReadMotion motion{};                ///< motion that the readings prove
-    PassivityObserver ramp_observer{};  ///< observes during the ramp
-    PassivityObserver observer{};       ///< observes after the ramp
+    ForceRamp ramp{};                   ///< increases the force from zero at the start
+    SlewLimit slew{};                   ///< limits the change of the force in a tick
+    EnergyTank tank{};                  ///< limits the energy that the rendering may give
+    ReadMotion motion{};                ///< computes the motion that the encoder readings prove
+    PassivityObserver ramp_observer{};  ///< energy that the rendering absorbed during the start ramp
+    PassivityObserver observer{};       ///< energy that the rendering absorbed after the start ramp
 };
 
-/// Returns an upper bound of the energy that a rendering stores within the domain of its model, at rest [J]. It is
-/// infinite for an active model, which gains energy with every turn.
+/// Returns an upper bound of the energy that a rendering stores while handle and virtual object do not move and are
+/// inside the domain of the model [J]. The bound is infinite for an active model, which gives energy in every period.
 ///
-/// The device receives the clipped force c(f). Its object stores C = int c(f) dx, with hysteresis at most r max h / 2
-/// more (`energy_range`). The coupling stores P = K_c e^2 / 2 at a stretch e <= F / K_c, where F is the largest clipped
-/// force. Its force is c(f), and K_c e_k + (B_c/T) (e_k - e_{k-1}) = c(f) with e_0 = 0 gives |e_k| <= F / K_c for every
-/// k. A compensated object stores at y = x - f/K_c the energy C(x) - c(f)^2 / 2 K_c, so its minimum can be lower by
-/// F^2 / 2 K_c. `StoredEnergy` adds positions and speeds outside this range when they occur.
+/// The device receives c(f), the force f of the model limited to the force limit. The virtual object stores C = int
+/// c(f) dx, with hysteresis at most r max h / 2 more (`energy_range`). A virtual coupling stores P = K_c e^2 / 2 at a
+/// stretch e <= F / K_c, where F is the largest |c(f)|. The coupling's force is c(f), and K_c e_k + (B_c/T) (e_k -
+/// e_{k-1}) = c(f) with e_0 = 0 gives |e_k| <= F / K_c in every tick k. A compensated object stores at its position y =
+/// x - f/K_c the energy C(x) - c(f)^2 / 2 K_c, so the minimum of this energy can be lower by F^2 / 2 K_c.
+/// `StoredEnergy` adds the energy of positions outside the domain and of the object's speed when they occur.
 [[nodiscard]] inline double largest_stored_energy(const ForceModel& given, const Scheme& scheme,
                                                   double force_limit) {
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
@@ -57,7 +58,8 @@ struct Guards {
     return object_energy + (scheme.compensated ? 2.0 : 1.0) * coupling_energy;
 }
 
-/// Returns the numbers that bound the energy of a certified rendering at all positions.
+/// Returns the numbers that bound the stored energy of a certified rendering at all positions, inside and outside the
+/// domain.
 [[nodiscard]] inline StoredEnergySettings stored_energy(const ForceModel& model, const Scheme& scheme,
                                                         double force_limit, double period_s) {
     StoredEnergySettings stored;
@@ -76,7 +78,7 @@ struct Guards {
     return stored;
 }
 
-/// Returns all guards of a live rendering.
+/// Returns all guards for the rendering of a model on a device.
 [[nodiscard]] inline Guards guards_of(const GuardSettings& settings, const ForceModel& model,
                                       const Scheme& scheme, double period_s) {
     const auto longest_swing =

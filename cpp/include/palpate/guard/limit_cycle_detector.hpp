@@ -10,28 +10,29 @@
 
 namespace palpate {
 
-/// Criteria of a limit cycle.
+/// Criteria by which an oscillation of the handle is a limit cycle. A swing is the motion between two reversals of the
+/// handle.
 struct LimitCycleSettings {
     double force_swing =
-        std::numeric_limits<double>::infinity();  ///< least change of force between two reversals [N or N*m]
-    std::uint64_t longest_swing = 25;             ///< between two reversals [ticks]; hands stay below 20 Hz
-    double encoder_step = 0.0;  ///< a motion back of at most this length is not a reversal [m or rad]
+        std::numeric_limits<double>::infinity();  ///< smallest change of force in a swing [N or N*m]
+    std::uint64_t longest_swing = 25;  ///< longest duration of a swing [ticks]; hands oscillate below 20 Hz
+    double encoder_step = 0.0;  ///< a backward motion of at most this length is not a reversal [m or rad]
 };
 
 /// Detects a limit cycle of the handle and scales all forces down. A limit cycle is ten consecutive swings between
-/// reversals of the handle. Each is fast and has a large change of force, and they do not decay: the longest of the
-/// last five is at least 0.8 of the longest of the first five. A knob turned over its detents makes forces of the same
-/// frequency, but does not reverse.
+/// reversals of the handle. Each swing is short in time and has a large change of force, and the swings do not decay:
+/// the longest of the last five is at least 0.8 of the longest of the first five. Turning a knob over its detents
+/// causes forces of the same frequency, but the knob does not reverse.
 ///
-/// The detector then scales all forces by 0.7, which scales stiffness, coupling and damping of the object equally. It
-/// does so again at every further limit cycle. It never scales them up, because that would give energy and a new limit
-/// cycle.
+/// After a limit cycle the detector multiplies all forces by 0.7, which reduces stiffness, coupling and damping of the
+/// virtual object equally. It does this again after every further limit cycle. It never increases the factor, because
+/// an increase would give energy and cause a new limit cycle.
 class LimitCycleDetector {
   public:
     LimitCycleDetector() = default;
     explicit LimitCycleDetector(const LimitCycleSettings& settings) noexcept : settings_{settings} {}
 
-    /// Takes the position and the force of a tick.
+    /// Updates the swing in progress with the position and the force of a tick, and detects a limit cycle.
     void watch(double position, double force) noexcept {
         ++ticks_;
         least_force_ = std::min(least_force_, force);
@@ -46,22 +47,22 @@ class LimitCycleDetector {
         }
     }
 
-    /// Scales the force; returns `LimitCycleScaled` if the scale is below 1.
+    /// Multiplies the force by the factor of the detector; returns `LimitCycleScaled` if the factor is below 1.
     [[nodiscard]] Status apply(double& force) const noexcept {
         force *= scale_;
         return scale_ < 1.0 ? Status::LimitCycleScaled : Status::Ok;
     }
 
-    /// Returns the factor of all forces.
+    /// Returns the factor by which all forces are multiplied, 1 before the first limit cycle.
     [[nodiscard]] double scale() const noexcept { return scale_; }
-    /// Returns the number of limit cycles detected.
+    /// Returns the number of limit cycles detected since the start.
     [[nodiscard]] std::uint64_t limit_cycles() const noexcept { return limit_cycles_; }
 
   private:
     static constexpr std::uint64_t swings_in_half = 5;  ///< swings in each half of a limit cycle
     static constexpr double least_last_to_first =
-        0.8;                                     ///< longest swing of the second half / of the first half
-    static constexpr double force_factor = 0.7;  ///< of all forces, after each limit cycle
+        0.8;  ///< smallest longest swing of the second half / longest swing of the first half
+    static constexpr double force_factor = 0.7;  ///< factor of all forces after each limit cycle
 
     void end_swing() noexcept {
         const double swing = std::abs(extreme_ - last_reversal_);
@@ -93,14 +94,14 @@ class LimitCycleDetector {
     double scale_ = 1.0;
     std::uint64_t limit_cycles_ = 0;
     double direction_ = 1.0;
-    double extreme_ = std::numeric_limits<double>::quiet_NaN();  ///< of the current swing
+    double extreme_ = std::numeric_limits<double>::quiet_NaN();  ///< farthest position of the current swing
     double last_reversal_ = 0.0;
-    double least_force_ = std::numeric_limits<double>::infinity();  ///< of the current swing
-    double largest_force_ = -std::numeric_limits<double>::infinity();
-    double first_ = 0.0;  ///< longest of the first five swings
-    double last_ = 0.0;   ///< longest of the next five swings
+    double least_force_ = std::numeric_limits<double>::infinity();  ///< smallest force in the current swing
+    double largest_force_ = -std::numeric_limits<double>::infinity();  ///< largest force in the current swing
+    double first_ = 0.0;  ///< longest of the first five swings [m or rad]
+    double last_ = 0.0;   ///< longest of the next five swings [m or rad]
     std::uint64_t swings_ = 0;
-    std::uint64_t ticks_ = 0;  ///< since the last reversal
+    std::uint64_t ticks_ = 0;  ///< ticks since the last reversal
 };
 
 }  // namespace palpate

@@ -10,12 +10,13 @@
 
 namespace palpate {
 
-/// Replaces a force that is not finite by zero, and clips a larger one to `largest`. This limit comes first, because
-/// the energy of an object is that of its clipped force; all scaling comes later.
+/// Replaces a force that is not finite by zero, and limits any other force to +-`largest`. This guard is applied before
+/// the guards that scale the force, because the stored energy of an object is computed from its limited, unscaled
+/// force.
 struct ForceLimit {
-    double largest = 5.0;  ///< [N or N*m], > 0
+    double largest = 5.0;  ///< force limit [N or N*m], > 0
 
-    /// Limits the force.
+    /// Limits the force and returns `Limited` if the force has changed.
     [[nodiscard]] Status apply(double& force) const noexcept {
         if (!std::isfinite(force)) {
             force = 0.0;
@@ -27,31 +28,33 @@ struct ForceLimit {
     }
 };
 
-/// Limits the change of the force between two ticks. Zero, the safe command, is always possible.
+/// Limits the change of the force between two ticks. Force zero, which is sent after a fault, can always be sent at
+/// once.
 struct SlewLimit {
-    double largest_step = std::numeric_limits<double>::infinity();  ///< change in a tick [N or N*m], > 0
-    double last = 0.0;                                              ///< force sent before [N or N*m]
+    double largest_step =
+        std::numeric_limits<double>::infinity();  ///< largest change of force in a tick [N or N*m], > 0
+    double last = 0.0;                            ///< force that was sent in the last tick [N or N*m]
 
-    /// Limits the force.
+    /// Limits the force and returns `Limited` if the force has changed.
     [[nodiscard]] Status apply(double& force) noexcept {
         const double unlimited = force;
         force = std::clamp(force, last - largest_step, last + largest_step);
         return force == unlimited ? Status::Ok : Status::Limited;
     }
 
-    /// Sets the force that was sent, after all guards.
+    /// Stores the force that was sent to the device, after all guards, for the next tick.
     void sent(double force) noexcept { last = force; }
 };
 
-/// Increases the force from zero at the start: scales the first `ticks` forces by 0, 1/ticks, 2/ticks, ...
+/// Increases the force from zero after the start: multiplies the first `ticks` forces by 0, 1/ticks, 2/ticks, ...
 struct ForceRamp {
-    std::uint64_t ticks = 0;  ///< length of the ramp
-    std::uint64_t done = 0;   ///< ticks so far
+    std::uint64_t ticks = 0;  ///< length of the start ramp [ticks]
+    std::uint64_t done = 0;   ///< ticks since the start, at most `ticks`
 
-    /// Returns true after the last scaled force.
+    /// Returns true if the start ramp has ended, so that forces are not scaled.
     [[nodiscard]] bool is_over() const noexcept { return done >= ticks; }
 
-    /// Scales the force.
+    /// Multiplies the force by the factor of the start ramp for this tick.
     [[nodiscard]] Status apply(double& force) noexcept {
         if (is_over()) {
             return Status::Ok;

@@ -7,21 +7,23 @@ namespace palpate {
 
 /// Observes the energy that a rendering has absorbed at the motor since its start,
 ///
-///     E_k = E_{k-1} + F (x_k - x_{k-1}),   F the force that acted meanwhile.
+///     E_k = E_{k-1} + F (x_k - x_{k-1}),   F the force that acted during the motion.
 ///
-/// It is exact for a held force, up to the encoder step. It never changes a force.
+/// x_k is the handle position of sample k. For a held force the computed energy is exact except for the effect of
+/// encoder steps. The observer never changes a force.
 class PassivityObserver {
   public:
-    /// Adds the work of `applied` over the motion `moved` of the handle.
+    /// Adds the energy that the force `applied` absorbed during the motion `moved` of the handle.
     void book(double applied, double moved) noexcept {
         energy_ += applied * moved;
         least_ = std::min(least_, energy_);
     }
 
-    /// Returns E_k [J].
+    /// Returns the energy E_k that the rendering has absorbed since the start [J].
     [[nodiscard]] double energy() const noexcept { return energy_; }
-    /// Returns the least E_k so far [J]. If it is below minus the energy that the object stored at the start, energy
-    /// was generated; the device's damping may have dissipated it.
+    /// Returns the smallest energy E_k since the start [J]. If it is less than minus the energy that the virtual object
+    /// stored at the start, the rendering has generated energy; the damping of the device may have dissipated this
+    /// energy.
     [[nodiscard]] double least() const noexcept { return least_; }
 
   private:

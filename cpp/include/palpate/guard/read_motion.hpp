@@ -8,27 +8,28 @@
 
 namespace palpate {
 
-/// Computes the motion that readings of an encoder of step Delta prove: a play of radius Delta / 2 on the read
-/// position,
+/// Computes the motion of the handle that the readings x_k of an encoder with the step Delta prove: a play operator pi
+/// with the radius Delta / 2 follows the readings,
 ///
 ///     pi_k = min(x_k + Delta/2, max(x_k - Delta/2, pi_{k-1})).
 ///
-/// It is the motion of a handle that can have been read as x_k. Every such handle travels at least this distance minus
-/// Delta / 2 in a whole run, because |pi_{k+1} - x| <= |pi_k - x'| + |x - x'| - |pi_{k+1} - pi_k| for true positions x'
-/// and x. A reading that flickers between two counts moves pi at most once. A slow handle is at pi_k when the reading
-/// changes, so the work of a held force over pi is exact there.
+/// A handle at the positions pi_k gives the readings x_k. Every handle that gives these readings travels in a whole run
+/// at least the distance that pi travels minus Delta / 2. The reason is |pi_{k+1} - x| <= |pi_k - x'| + |x - x'| -
+/// |pi_{k+1} - pi_k| for the true positions x' and x of the handle in ticks k and k + 1. A reading that alternates
+/// between two adjacent encoder positions moves pi at most once. If the handle is slow, it is at pi_k when the reading
+/// changes, so the work of a held force computed with pi is exact at this time.
 class ReadMotion {
   public:
     ReadMotion() = default;
     explicit ReadMotion(double encoder_step) noexcept : radius_{0.5 * encoder_step} {}
 
-    /// Returns the motion since the last reading [m or rad]; NaN for the first one.
+    /// Returns the proved motion of the handle since the last reading [m or rad]; NaN for the first reading.
     [[nodiscard]] double to(double reading) noexcept {
         const double before = position_;
         position_ = std::isnan(before) ? reading : play(reading, before, radius_);
         return position_ - before;
     }
-    /// Marks that the next reading does not follow from this one.
+    /// Forgets the last reading, so that no motion is computed between it and the next reading.
     void interrupt() noexcept { position_ = std::numeric_limits<double>::quiet_NaN(); }
 
   private:

@@ -10,27 +10,29 @@
 
 namespace palpate {
 
-/// Checks a device's sample: its status, its sequence number, its position.
+/// Checks status, sequence number and position of each sample from a device.
 ///
-/// The sequence number must increase by one with each exchange. A larger step means lost samples; an equal number means
-/// a repeated sample. An exchange that ended in a timeout also counts, because its sample may arrive late.
+/// The sequence number must increase by one with each exchange. A larger increase means lost samples; an equal number
+/// means a repeated sample. An exchange that ended in a timeout is counted as an exchange, because its sample may
+/// arrive late.
 ///
 /// A handle slows down before it stops. If a position moves by `frozen_step` or more in one sample and then repeats
 /// exactly for `frozen_samples`, the encoder has failed. A failure while the handle rests cannot be detected.
 class ReadingGuard {
   public:
-    /// Limits of a reading.
+    /// Limits for the change of position between two samples.
     struct Limits {
-        double largest_step =
-            std::numeric_limits<double>::infinity();  ///< of the position in a sample [m or rad]
-        double frozen_step = 0.0;                     ///< least motion before a frozen encoder [m or rad]
-        std::uint64_t frozen_samples = 0;             ///< number of equal samples after it; 0 = no check
+        double largest_step = std::numeric_limits<
+            double>::infinity();  ///< largest change of position between two samples [m or rad]
+        double frozen_step =
+            0.0;  ///< smallest change of position in one sample before an encoder can be frozen [m or rad]
+        std::uint64_t frozen_samples = 0;  ///< number of equal samples of a frozen encoder; 0 = no check
     };
 
     ReadingGuard() = default;
     explicit ReadingGuard(const Limits& limits) noexcept : limits_{limits} {}
 
-    /// Returns the status of a sample.
+    /// Returns the status of a sample: `reported` by the device, or a fault of its sequence number or position.
     [[nodiscard]] Status check(double position, std::uint64_t sequence, Status reported) noexcept {
         ++exchanges_;
         if (!sends_force(reported)) {
@@ -63,7 +65,7 @@ class ReadingGuard {
 
   private:
     static constexpr std::uint64_t most_late_samples =
-        2;  ///< samples that may arrive later than their exchange
+        2;  ///< number of samples that may arrive after their exchange has ended
 
     [[nodiscard]] Status motion_status(double position, double samples) noexcept {
         const double step = std::isnan(last_position_) ? 0.0 : std::abs(position - last_position_);
@@ -86,8 +88,8 @@ class ReadingGuard {
     bool started_ = false;
     bool was_fast_ = false;
     std::uint64_t last_sequence_ = 0;
-    std::uint64_t exchanges_ = 0;        ///< exchanges without a sample so far
-    std::uint64_t resting_samples_ = 0;  ///< samples without motion
+    std::uint64_t exchanges_ = 0;        ///< exchanges since the last sample
+    std::uint64_t resting_samples_ = 0;  ///< consecutive samples with equal position
     std::uint64_t lost_ = 0;
     std::uint64_t repeated_ = 0;
     double last_position_ = std::numeric_limits<double>::quiet_NaN();

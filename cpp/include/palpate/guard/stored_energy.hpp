@@ -7,25 +7,29 @@
 
 namespace palpate {
 
-/// Numbers that bound the energy that a rendering stores.
+/// Numbers from which the upper bound of the energy that a rendering stores is computed.
 struct StoredEnergySettings {
-    /// Largest energy of the object within its domain, and of its coupling at the force limit [J]
+    /// Largest energy of the virtual object inside its domain plus the largest energy of its virtual coupling at the
+    /// force limit [J]
     double within = std::numeric_limits<double>::infinity();
     double lower = -std::numeric_limits<double>::infinity();  ///< lower end of the domain [m or rad]
     double upper = std::numeric_limits<double>::infinity();   ///< upper end of the domain [m or rad]
-    double force_limit = 0.0;                                 ///< F_max [N or N*m]
-    double stiffness = 0.0;                                   ///< K_c; 0: no coupling [N/m or N*m/rad]
-    double mass = 0.0;                                        ///< m of the object [kg or kg*m^2]
-    double period_s = 1e-3;                                   ///< period T [s]
+    double force_limit = 0.0;                                 ///< force limit F_max [N or N*m]
+    double stiffness = 0.0;  ///< coupling stiffness K_c; 0: no coupling [N/m or N*m/rad]
+    double mass = 0.0;       ///< mass m of the virtual object [kg or kg*m^2]
+    double period_s = 1e-3;  ///< period T [s]
 };
 
-/// Upper bound of the energy that a rendering has stored so far above its least,
+/// Upper bound W of the stored energy of a rendering minus its smallest stored energy, for all positions since the
+/// start,
 ///
 ///     W <= W_domain + F_max (l_below + l_above + l_stretch) + m v^2 / 2,
 ///
-/// with the largest distances of the handle or the object beyond either end of the domain, the largest stretch of the
-/// coupling beyond F_max / K_c, and the object's largest speed. Outside the domain the limited force stores at most
-/// F_max per length; so does the coupling, whose limited force is F_max there.
+/// where W_domain is the largest energy inside the domain, F_max the force limit, and v the largest speed of the
+/// virtual object. The lengths l_below and l_above are the largest distances of handle or virtual object from the
+/// domain, below and above it. The length l_stretch is the largest amount by which the stretch of the coupling exceeded
+/// F_max / K_c. Outside the domain the limited force stores at most the energy F_max for each unit of length. The same
+/// is true for a coupling with a stretch above F_max / K_c, because its limited force is F_max.
 class StoredEnergy {
   public:
     StoredEnergy() = default;
@@ -34,7 +38,8 @@ class StoredEnergy {
           stretch_{settings.stiffness > 0.0 ? settings.force_limit / settings.stiffness
                                             : std::numeric_limits<double>::infinity()} {}
 
-    /// Updates the bound with the read position of the handle and the position of the object, once a tick.
+    /// Updates the bound of the stored energy with the measured position of the handle and the position of the virtual
+    /// object, once in each tick.
     void visit(double handle, double object) noexcept {
         if (!std::isfinite(handle) || !std::isfinite(object)) {
             return;
@@ -47,12 +52,12 @@ class StoredEnergy {
         last_ = object;
     }
 
-    /// Returns W [J].
+    /// Returns W, the upper bound of the stored energy [J].
     [[nodiscard]] double most() const noexcept {
         return settings_.within + settings_.force_limit * (below_ + above_ + stretched_) +
                0.5 * settings_.mass * fastest_ * fastest_;
     }
-    /// Returns the part within the domain, at rest [J].
+    /// Returns the part of the bound for positions inside the domain and speed zero [J].
     [[nodiscard]] double within() const noexcept { return settings_.within; }
 
   private:

@@ -20,7 +20,7 @@ namespace palpate {
 
 namespace detail {
 
-/// Renames a file unless the new name exists (EEXIST). Returns 0 or an errno.
+/// Renames a file unless a file with the new name exists. Returns 0, or the error number (EEXIST if it exists).
 [[nodiscard]] inline int rename_to_free_name(const std::string& from, const std::string& to) noexcept {
     if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) {
         return 0;
@@ -35,7 +35,7 @@ namespace detail {
     return ::unlink(from.c_str()) == 0 ? 0 : errno;
 }
 
-/// Returns true if the path is that of the open file.
+/// Returns true if the file at `path` is the open file of `descriptor`, not another file of the same name.
 [[nodiscard]] inline bool is_path_of(const std::string& path, int descriptor) noexcept {
     struct stat named{};
     struct stat open{};
@@ -43,18 +43,18 @@ namespace detail {
            named.st_dev == open.st_dev && named.st_ino == open.st_ino;
 }
 
-/// Returns the text of an errno.
+/// Returns the text of a system error number (errno).
 [[nodiscard]] inline std::string reason_of(int error) {
     return std::generic_category().message(error);
 }
 
 }  // namespace detail
 
-/// A text file that grows as NAME.part, whole lines at a time, and is renamed to NAME when it is finished.
+/// A text file that is written as NAME.part, whole lines at a time, and is renamed to NAME when it is finished.
 ///
 /// The writer holds a lock on NAME.part; a second writer of the same name is refused. Without `force` an existing file
-/// is not replaced. Written lines stay readable even if the program ends abnormally. If the disk is full, the file is
-/// cut back to its last whole line, writing stops, and the reason is stored.
+/// is not replaced. Written lines stay readable even if the program ends abnormally. If the disk is full, the
+/// incomplete last line is removed from the file, writing stops, and the error number is stored.
 class GrowingFile {
   public:
     GrowingFile() = default;
@@ -62,9 +62,10 @@ class GrowingFile {
     GrowingFile(const GrowingFile&) = delete;
     GrowingFile& operator=(const GrowingFile&) = delete;
 
-    /// Opens NAME.part. Returns the reason if that is not possible. A NAME.part without a writer is the only copy of an
-    /// interrupted recording; it is renamed to the first free name of NAME.1.part, NAME.2.part, ... With `force` an
-    /// existing NAME is replaced at the end; of a symbolic link the target is replaced.
+    /// Creates NAME.part. Returns the reason if the file cannot be created, otherwise "". An existing NAME.part without
+    /// a writer is the only copy of an interrupted recording; it is renamed to the first free name of NAME.1.part,
+    /// NAME.2.part, ... With `force` an existing NAME is replaced when the new file is finished; if NAME is a symbolic
+    /// link, the target of the link is replaced.
     [[nodiscard]] std::string open(const std::string& name, bool force = false) {
         force_ = force;
         name_ = name;
@@ -78,7 +79,7 @@ class GrowingFile {
         if (std::string reason = name_conflict(); !reason.empty()) {
             return reason;
         }
-        // If another run finishes its recording meanwhile, the second try succeeds.
+        // If another run finishes its recording between the two tries, the second try to create NAME.part succeeds.
         for (int retries = 2; descriptor_ < 0; --retries) {
             descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
             if (descriptor_ < 0 && (errno != EEXIST || retries == 0)) {
@@ -90,8 +91,8 @@ class GrowingFile {
                 }
             }
         }
-        // Waits at most for a program that only reads the new file. Without locks (some network file systems) no other
-        // program writes the recording, because O_EXCL created it.
+        // Locks NAME.part. Only a program that reads the new file can delay the lock. On a file system without locks
+        // (some network file systems) no other program writes the recording either, because O_EXCL created a new file.
         (void)::flock(descriptor_, LOCK_EX);
         std::string reason = name_conflict();
         if (!reason.empty()) {
@@ -103,13 +104,14 @@ class GrowingFile {
     [[nodiscard]] bool is_open() const noexcept { return descriptor_ >= 0; }
     /// Returns NAME.part.
     [[nodiscard]] std::string part() const { return name_ + ".part"; }
-    /// Returns the new name of an interrupted recording; empty without one.
+    /// Returns the new name of an interrupted recording that open() renamed; empty if there was none.
     [[nodiscard]] const std::string& interrupted_name() const noexcept { return interrupted_name_; }
-    /// Returns 0, or the errno of the write after which writing stopped. Any thread may call it.
+    /// Returns 0, or the error number of the write that failed and ended all writing. Any thread may call this
+    /// function.
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_relaxed); }
 
-    /// Appends whole lines. Returns the number of bytes in the file. Fewer than all means that the disk is full or
-    /// failed, and that writing has stopped.
+    /// Appends whole lines to the file. Returns the number of bytes of `lines` that were written. If not all bytes were
+    /// written, the disk is full or failed, and writing has stopped.
     std::size_t append(std::string_view lines) noexcept {
         if (descriptor_ < 0 || error() != 0) {
             return 0;
@@ -133,16 +135,16 @@ class GrowingFile {
         return done;
     }
 
-    /// Replaces text in the file by text of the same length.
+    /// Replaces the text at the offset `place` of the file by a text of the same length.
     void overwrite(off_t place, std::string_view text) noexcept {
         if (descriptor_ >= 0 && place + static_cast<off_t>(text.size()) <= size_) {
-            // A failure keeps the old text, which is equally readable.
+            // If this write fails, the file keeps its old text, which is also valid.
             (void)!::pwrite(descriptor_, text.data(), text.size(), place);
         }
     }
 
-    /// Writes all data to the disk and renames NAME.part to NAME. Returns a sentence if that is not possible; the
-    /// recording then keeps the name NAME.part.
+    /// Writes all data to the disk and renames NAME.part to NAME. Returns "", or the reason why the file could not be
+    /// renamed; the recording then keeps the name NAME.part.
     [[nodiscard]] std::string finish() {
         (void)::fsync(descriptor_);
         std::string reason;
@@ -157,11 +159,11 @@ class GrowingFile {
         } else {
             sync_folder();
         }
-        close();  // at the end, because the lock must hold until the file has its name
+        close();  // the lock on the file ends here, after the file has its final name
         return reason;
     }
 
-    /// Removes NAME.part.
+    /// Deletes NAME.part and closes the file.
     void discard() noexcept {
         if (detail::is_path_of(part(), descriptor_)) {
             (void)std::remove(part().c_str());
@@ -193,7 +195,7 @@ class GrowingFile {
         }
     }
 
-    /// Returns the reason why NAME must not be used; empty if it may.
+    /// Returns the reason why a recording must not be written to NAME; empty if NAME is allowed.
     [[nodiscard]] std::string name_conflict() const {
         struct stat there{};
         if (::lstat(name_.c_str(), &there) != 0) {
@@ -205,13 +207,14 @@ class GrowingFile {
         return force_ ? "" : name_ + " exists already; choose another name, or set force to replace it";
     }
 
-    /// Returns the length of the whole lines.
+    /// Returns the number of bytes up to the end of the last whole line in a text.
     [[nodiscard]] static std::size_t whole_lines(std::string_view written) noexcept {
         const std::size_t end = written.rfind('\n');
         return end == std::string_view::npos ? 0 : end + 1;
     }
 
-    /// Renames a NAME.part without a writer to a free name. Returns the reason if that is not allowed or not possible.
+    /// Renames a NAME.part that no program is writing to a free name. Returns the reason if NAME.part cannot be renamed
+    /// or may belong to another run.
     [[nodiscard]] std::string rename_interrupted() {
         const int there = ::open(part().c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
         if (there < 0) {
@@ -226,7 +229,8 @@ class GrowingFile {
                     : part() +
                           " may belong to another run, because this file system has no locks; choose "
                           "another name, or rename it";
-        } else if (detail::is_path_of(part(), there)) {  // else its writer has just renamed it
+        } else if (detail::is_path_of(part(),
+                                      there)) {  // otherwise another run has just renamed its finished file
             if (::fstat(there, &about) == 0 && about.st_size == 0) {
                 reason =
                     part() +
@@ -239,7 +243,7 @@ class GrowingFile {
         return reason;
     }
 
-    /// Renames NAME.part to the first free name.
+    /// Renames NAME.part to the first free name of NAME.1.part, NAME.2.part, ... Returns the reason if that fails.
     [[nodiscard]] std::string rename_to_first_free_name() {
         int error = EEXIST;
         for (int k = 1; error == EEXIST; ++k) {

@@ -18,13 +18,14 @@
 
 namespace palpate::detail {
 
-/// A value of a JSON file with its path. It returns the requested type, or throws std::invalid_argument with path,
-/// value and rule.
+/// A value of a JSON file with its path, the keys that lead to the value. Its functions return the value as the
+/// requested type, or throw std::invalid_argument with the path, the value and the required values.
 class JsonField {
   public:
     JsonField(const Json& value, std::string path) : value_{value}, path_{std::move(path)} {}
 
-    /// Throws std::invalid_argument with path, value and rule.
+    /// Throws std::invalid_argument with the path of this value, the value and `right`, the description of valid
+    /// values.
     [[noreturn]] void refuse(const std::string& right) const {
         std::string shown = value_.is_number_float() && !std::isfinite(value_.get<double>())
                                 ? readable(value_.get<double>())  // not valid JSON
@@ -33,7 +34,7 @@ class JsonField {
         throw std::invalid_argument((path_.empty() ? "the file contains " : path_ + " is ") + shown +
                                     ": must be " + right);
     }
-    /// Throws unless the condition holds.
+    /// Refuses the value unless the condition `holds` is true; `right` describes valid values.
     void require(bool holds, const std::string& right) const {
         if (!holds) {
             refuse(right);
@@ -49,7 +50,7 @@ class JsonField {
 
     [[nodiscard]] bool is_null() const { return value_.is_null(); }
 
-    /// Returns a member of an object.
+    /// Returns the value of a key of this object. Throws if the key is missing.
     [[nodiscard]] JsonField operator[](const char* key) const {
         const std::string path = path_.empty() ? key : path_ + "." + key;
         require(value_.is_object(), "an object");
@@ -59,7 +60,7 @@ class JsonField {
         }
         return {*found, path};
     }
-    /// Throws if an object has another key.
+    /// Throws if this object has a key that is not in `keys`.
     void require_keys(const std::vector<std::string_view>& keys, const char* cure = "") const {
         require(value_.is_object(), "an object");
         for (const auto& item : value_.items()) {
@@ -71,7 +72,7 @@ class JsonField {
             }
         }
     }
-    /// Returns the elements of a list.
+    /// Returns the elements of this list, each with its path.
     [[nodiscard]] std::vector<JsonField> items() const {
         require(value_.is_array(), "a list");
         std::vector<JsonField> fields;
@@ -82,7 +83,7 @@ class JsonField {
         return fields;
     }
 
-    /// Returns a number that satisfies a rule.
+    /// Returns this value as a finite number. Throws if the number does not satisfy the rule.
     [[nodiscard]] double number(Rule rule = Rule::Finite) const {
         require(value_.is_number(), "a number");
         const auto number = value_.get<double>();
@@ -92,23 +93,23 @@ class JsonField {
     }
     [[nodiscard]] double positive() const { return number(Rule::Positive); }
     [[nodiscard]] double not_negative() const { return number(Rule::NotNegative); }
-    /// Returns an integer of at least `least`.
+    /// Returns this value as an integer. Throws if the integer is smaller than `least`.
     [[nodiscard]] std::uint64_t count(std::uint64_t least) const {
         require(value_.is_number_integer(), "a whole number");
         require(number() >= static_cast<double>(least), ">= " + std::to_string(least));
         return value_.get<std::uint64_t>();
     }
-    /// Returns a boolean.
+    /// Returns this value as true or false. Throws if it is not a boolean.
     [[nodiscard]] bool flag() const {
         require(value_.is_boolean(), "true or false");
         return value_.get<bool>();
     }
-    /// Returns a text.
+    /// Returns this value as a text. Throws if it is not a text.
     [[nodiscard]] std::string string() const {
         require(value_.is_string(), "text");
         return value_.get<std::string>();
     }
-    /// Returns the index of a text among `choices`.
+    /// Returns the index of this text in the list `choices`. Throws if the text is not in the list.
     [[nodiscard]] std::size_t one_of(std::span<const std::string_view> choices) const {
         std::string right;
         for (std::size_t k = 0; k < choices.size(); ++k) {
@@ -122,11 +123,11 @@ class JsonField {
         }
         refuse(right);
     }
-    /// Returns a text among `choices`.
+    /// Returns this text. Throws if the text is not in the list `choices`.
     [[nodiscard]] std::string one_of(const std::vector<std::string_view>& choices) const {
         return std::string(choices[one_of(std::span{choices})]);
     }
-    /// Returns a list of finite numbers.
+    /// Returns this list of numbers. Throws if an element is not a finite number.
     [[nodiscard]] std::vector<double> numbers() const {
         std::vector<double> values;
         for (const JsonField& item : items()) {
@@ -138,7 +139,7 @@ class JsonField {
     void require_object() const { require(value_.is_object(), "an object"); }
     [[nodiscard]] const Json& value() const { return value_; }
 
-    /// Throws if free content contains a number that is not finite, because JSON cannot store it.
+    /// Throws if this value contains a number that is not finite at any depth, because JSON cannot store such a number.
     void require_finite() const {
         if (value_.is_object()) {
             for (const auto& item : value_.items()) {
@@ -153,8 +154,8 @@ class JsonField {
         }
     }
 
-    /// Returns a value of the type of a field, with its rule. A struct is an object with exactly its stored fields, of
-    /// which only optional ones may be missing.
+    /// Returns this value as the C++ type T, after checking the rule. For a struct, this value must be an object with a
+    /// key for each stored field of the struct and no other key; only optional fields may be missing.
     template <class T>
     [[nodiscard]] T as(Rule rule = Rule::Any, std::span<const std::string_view> choices = {}) const {
         if constexpr (HasFields<T>) {

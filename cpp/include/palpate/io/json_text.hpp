@@ -16,14 +16,14 @@
 
 namespace palpate {
 
-/// JSON in which the keys of an object keep their order.
+/// JSON value whose objects keep their keys in the order of the file.
 using Json = nlohmann::ordered_json;
 
-inline constexpr int deepest_json = 100;  ///< depth of nested lists and objects
+inline constexpr int deepest_json = 100;  ///< largest allowed depth of nested lists and objects
 
 /// Parses JSON by RFC 8259, and refuses content that other readers interpret differently: a byte order mark, NUL bytes,
 /// repeated keys, unpaired surrogates, numbers too large for a double, more than `deepest_json` levels. Throws
-/// std::invalid_argument with one sentence.
+/// std::invalid_argument with the reason in one sentence.
 [[nodiscard]] inline Json parse_json(std::string_view text) {
     if (text.starts_with("\xEF\xBB\xBF")) {
         throw std::invalid_argument("the file begins with a byte order mark: save it as UTF-8 without one");
@@ -55,7 +55,7 @@ inline constexpr int deepest_json = 100;  ///< depth of nested lists and objects
     } catch (const Json::exception& error) {
         const std::string reason = error.what();
         const std::size_t begin = reason.find("] ") + 2;
-        // The rest of the message quotes raw bytes of the file, which must not reach a terminal.
+        // The end of the parser's message is cut off: it quotes raw bytes of the file, which must not reach a terminal.
         throw std::invalid_argument(
             "this is not JSON: " + reason.substr(begin, reason.find("; last read") - begin) +
             "; a model is a .json file that palpate identify writes");
@@ -66,7 +66,8 @@ inline constexpr int deepest_json = 100;  ///< depth of nested lists and objects
 [[nodiscard]] inline Json read_json(const std::string& path) {
     std::error_code none;
     std::ifstream stream;
-    if (std::filesystem::is_regular_file(path, none)) {  // a pipe without a writer would block
+    if (std::filesystem::is_regular_file(path,
+                                         none)) {  // opening a pipe that no program writes to would block
         stream.open(path, std::ios::binary);
     }
     if (!stream.is_open()) {

@@ -16,15 +16,15 @@
 
 namespace palpate {
 
-/// Content of a model file that a rendering uses.
+/// The part of the content of a model file that a rendering uses.
 struct ModelFile {
     ForceModel model;                        ///< the identified model
     std::string position_unit;               ///< rad, m, count or "" (not stated)
     std::string force_unit;                  ///< N*m, N, A or ""
-    std::vector<std::string> inputs;         ///< one name for each input
-    std::optional<Scheme> plan;              ///< how to render the model
-    std::optional<ForceModel> limited;       ///< replaces `model` in the plan
-    std::optional<Certificate> certificate;  ///< of the plan; recomputed
+    std::vector<std::string> inputs;         ///< names of the model's inputs
+    std::optional<Scheme> plan;              ///< structure and coupling for the model
+    std::optional<ForceModel> limited;       ///< model that the plan renders instead
+    std::optional<Certificate> certificate;  ///< certificate of the plan, recomputed on reading
 
     /// Returns the model that the plan renders.
     [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }
@@ -32,7 +32,7 @@ struct ModelFile {
 
 namespace detail {
 
-/// Returns N rows of d numbers, one after the other.
+/// Reads a list of N lists of d numbers. Returns the N * d numbers row by row; with `positive` each must be > 0.
 [[nodiscard]] inline std::vector<double> matrix(const JsonField& field, std::size_t d, bool positive) {
     std::vector<double> values;
     for (const JsonField& row : field.items()) {
@@ -44,7 +44,7 @@ namespace detail {
     return values;
 }
 
-/// Checks the member `fit`.
+/// Checks the value of the key `fit` of a model file: how the model was identified.
 inline void check_fit(const JsonField& fit, std::size_t wavelets) {
     fit.require_keys({"model_class", "stop_reason", "nrmse", "n_wavelets", "n_parameters", "path"});
     (void)fit["model_class"].string();
@@ -62,7 +62,7 @@ inline void check_fit(const JsonField& fit, std::size_t wavelets) {
                               std::to_string(wavelets) + ", the wavelets of the network");
 }
 
-/// Checks the member `data`.
+/// Checks the value of the key `data` of a model file: the recording from which the model was identified.
 inline void check_data(const JsonField& data) {
     data.require_keys({"sha256", "files", "rows", "columns"});
     (void)data["sha256"].string();
@@ -76,7 +76,7 @@ inline void check_data(const JsonField& data) {
     }
 }
 
-/// Returns the domain of a file with its continuation.
+/// Reads the domain of the model in a model file, and the continuation of the force outside the domain.
 inline Domain read_domain(const JsonField& file, std::size_t d) {
     const JsonField domain = file["domain"];
     domain.require_keys({"lower", "upper"});
@@ -100,7 +100,8 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
     return read;
 }
 
-/// Returns the network at `network`, which is that of the file or of its plan, with the domain and kind of the file.
+/// Returns the model with the wavelet network at `network`, which is the identified network or the network of the plan.
+/// Domain and kind of the model are those in `file`.
 inline ForceModel read_network(const JsonField& network, const JsonField& file) {
     network.require_keys({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear", "bias",
                           "linear_hysteresis", "bias_hysteresis"});
@@ -119,8 +120,8 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
     const JsonField hysteresis = network["weight_hysteresis"];
     for (const char* name : {"linear_hysteresis", "bias_hysteresis"}) {
         network[name].require(network[name].is_null() == hysteresis.is_null(),
-                              hysteresis.is_null() ? "null, because weight_hysteresis is"
-                                                   : "given, because weight_hysteresis is");
+                              hysteresis.is_null() ? "null, because weight_hysteresis is null"
+                                                   : "given, because weight_hysteresis is given");
     }
     const std::string kind = file["kind"].one_of({"position", "hysteresis", "position_velocity", "general"});
     file["kind"].require(kind != "hysteresis" || !hysteresis.is_null(),
@@ -145,38 +146,39 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
         read, {hysteresis.numbers(), linear[0], network["bias_hysteresis"].number()}, domain, play_radius};
 }
 
-/// Returns the network that a plan renders instead of the identified one. It has the same inputs and the same
-/// hysteresis.
+/// Returns the model that a plan renders instead of the identified model; nothing if the plan renders the identified
+/// model. Both models must have the same number of inputs, and both or neither must have hysteresis.
 inline std::optional<ForceModel> read_limited(const JsonField& file) {
     if (file["plan"].is_null() || file["plan"]["network"].is_null()) {
         return std::nullopt;
     }
     const JsonField network = file["plan"]["network"];
     const JsonField identified = file["network"];
-    network["dimension"].require(network["dimension"].value() == identified["dimension"].value(),
-                                 identified["dimension"].value().dump() + ", that of network");
+    network["dimension"].require(
+        network["dimension"].value() == identified["dimension"].value(),
+        identified["dimension"].value().dump() + ", the dimension of the identified network");
     const bool hysteresis = !identified["weight_hysteresis"].is_null();
-    network["weight_hysteresis"].require(
-        !network["weight_hysteresis"].is_null() == hysteresis,
-        hysteresis ? "given, because that of network is" : "null, because that of network is");
+    network["weight_hysteresis"].require(!network["weight_hysteresis"].is_null() == hysteresis,
+                                         hysteresis ? "given, because network.weight_hysteresis is given"
+                                                    : "null, because network.weight_hysteresis is null");
     return read_network(network, file);
 }
 
 }  // namespace detail
 
-/// Returns the model in the text of a model file. Throws std::invalid_argument with the path of the field, its value
-/// and the rule.
+/// Returns the content of a model file that a rendering uses, and checks the whole file. Throws std::invalid_argument
+/// with the path of the first wrong field, its value and the rule.
 [[nodiscard]] inline ModelFile parse_model(const Json& content) {
     const detail::JsonField file{content, ""};
     file.require_object();
-    // Checked first, because every other field of another version may differ.
+    // The version is checked first, because in a file of another version every other field may differ.
     const detail::JsonField version = file["version"];
     version.require(version.value().is_number_integer() && version.number() == 1.0,
                     "1, the version that this palpate reads");
     file.require_keys(
         {"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius", "mass",
          "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan", "certificate", "notes"},
-        " (free keys go under notes)");
+        "; put keys of your own under notes");
     (void)file["format"].one_of({"palpate-model"});
     (void)file["created_by"].string();
     const detail::JsonField units = file["units"];

@@ -16,16 +16,16 @@
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/stability/certificate_check.hpp"
 
-// The two parts of a model file about its rendering: the plan and its certificate.
+// Readers for the two parts of a model file that describe its rendering: the plan and the certificate of the plan.
 namespace palpate::detail {
 
-/// Throws unless the field is given exactly if the structure uses it, otherwise null.
+/// Throws if the structure uses the field and the field is null, or if the structure does not use it and it is given.
 inline void require_given(const JsonField& field, bool used, const char* structure_has) {
     field.require(field.is_null() != used, (used ? "given: " : "null: ") + std::string("the structure has ") +
                                                (used ? "" : "no ") + structure_has);
 }
 
-/// Returns the scheme of a plan; nothing for null.
+/// Reads the structure and its numbers from the plan of a model file; nothing if the plan is null.
 [[nodiscard]] inline std::optional<Scheme> read_plan(const JsonField& plan) {
     if (plan.is_null()) {
         return std::nullopt;
@@ -63,7 +63,8 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     return scheme;
 }
 
-/// Returns the certificate of a plan, recomputed from the rendered model and the device. Throws if it differs.
+/// Reads the certificate of a plan and computes it again from the rendered model and the device. Throws if the stored
+/// certificate differs from the computed certificate.
 [[nodiscard]] inline std::optional<Certificate> read_certificate(const JsonField& file,
                                                                  const std::optional<Scheme>& plan,
                                                                  const ForceModel& model,
@@ -73,12 +74,13 @@ inline void require_given(const JsonField& field, bool used, const char* structu
     }
     file.require_keys({"fingerprint", "model", "structure", "device", "bounds", "inequalities", "verdict",
                        "longest_period_s"});
-    file.require(plan.has_value(), "null, because plan is");
+    file.require(plan.has_value(), "null, because plan is null");
     Certificate read;
     read.scheme = *plan;
     read.fingerprint = file["fingerprint"].string();
     read.model = file["model"].string();
-    file["structure"].require(file["structure"].as<StructureKind>() == plan->structure, "that of the plan");
+    file["structure"].require(file["structure"].as<StructureKind>() == plan->structure,
+                              "the structure of the plan");
     const JsonField device = file["device"];
     read.device = device.as<DeviceProfile>();
     const double longest = longest_delay_s(read.device.period_s);

@@ -16,15 +16,16 @@
 
 namespace palpate {
 
-/// Lines of metadata: key and text.
+/// Metadata at the start of a recording: pairs of key and text.
 using Metadata = std::vector<std::pair<std::string, std::string>>;
 
 /// A flight record: a CSV recording with `#` lines of metadata, a header of names that end in a unit, and one row for
-/// each tick. Its head reserves space for the end and the timing of the run, which are known only at the end.
+/// each tick. The start of the file reserves space for the exit reason and the timing of the run, which are
+/// written at the end of the run.
 class RecordingFile {
   public:
-    /// Opens NAME.part and writes its head. Returns the reason if that is not possible. An existing recording is
-    /// refused, or replaced at the end with `force`.
+    /// Creates NAME.part and writes metadata and column names. Returns the reason if that is not possible. If the
+    /// recording NAME exists, it is replaced at the end of the run with `force`, otherwise opening is refused.
     [[nodiscard]] std::string open(const std::string& name, RecordUnits units, const Metadata& metadata,
                                    bool force = false) {
         units_ = std::move(units);
@@ -51,7 +52,7 @@ class RecordingFile {
         return "";
     }
 
-    /// Appends one row for each tick. Only one thread may call it at a time.
+    /// Appends one row for each tick. Only one thread at a time may call this function.
     void take(std::span<const TickRecord> ticks) noexcept {
         rows_.clear();
         for (const TickRecord& tick : ticks) {
@@ -64,7 +65,8 @@ class RecordingFile {
         refused_ += ticks.size() - whole;
     }
 
-    /// Writes the end of the run and renames the file. Returns a sentence if that is not possible.
+    /// Writes the exit reason and the timing of the run, and renames the file to its final name. Returns "", or the
+    /// reason why the file could not be renamed.
     [[nodiscard]] std::string finish(const std::string& ended, const std::string& timing) {
         file_.overwrite(ended_offset_, padded(line("ended", ended)));
         file_.overwrite(timing_offset_, padded(line("timing", timing)));
@@ -72,7 +74,8 @@ class RecordingFile {
     }
 
     [[nodiscard]] const GrowingFile& file() const noexcept { return file_; }
-    /// Returns the errno of the write after which writing stopped, otherwise 0. Any thread may call it.
+    /// Returns 0, or the error number of the write that failed and ended all writing. Any thread may call this
+    /// function.
     [[nodiscard]] int error() const noexcept { return file_.error(); }
     [[nodiscard]] bool is_open() const noexcept { return file_.is_open(); }
     /// Returns the number of rows written.
@@ -81,7 +84,7 @@ class RecordingFile {
     [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
   private:
-    static constexpr std::size_t reserved_bytes = 512;  ///< bytes for each line that is written at the end
+    static constexpr std::size_t reserved_bytes = 512;  ///< space for each line written at the end [bytes]
 
     [[nodiscard]] static std::string line(const std::string& key, std::string value) {
         for (char& letter : value) {

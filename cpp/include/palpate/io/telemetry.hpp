@@ -18,10 +18,10 @@
 namespace palpate {
 
 /// Sends some of the ticks as JSON lines over UDP to this machine, in the format of PlotJuggler's UDP server. A
-/// datagram that the system does not accept at once is dropped and counted.
+/// UDP packet that the operating system does not accept at once is dropped and counted.
 class Telemetry {
   public:
-    static constexpr double usual_hz = 50.0;  ///< ticks a second
+    static constexpr double usual_hz = 50.0;  ///< default number of sent ticks a second
 
     Telemetry() = default;
     ~Telemetry() {
@@ -32,8 +32,8 @@ class Telemetry {
     Telemetry(const Telemetry&) = delete;
     Telemetry& operator=(const Telemetry&) = delete;
 
-    /// Starts to send `rate_hz` ticks a second to a port of the loopback interface. Returns the reason if that is not
-    /// possible.
+    /// Starts to send `rate_hz` ticks a second to a UDP port of this machine. Returns "", or the reason why sending is
+    /// not possible.
     [[nodiscard]] std::string open(std::uint16_t port, double rate_hz, RecordUnits units) {
         socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
         if (socket_ < 0) {
@@ -47,7 +47,7 @@ class Telemetry {
         return "";
     }
 
-    /// Sends the ticks that are due.
+    /// Sends the first tick after each sending time, and ignores all other ticks.
     void take(std::span<const TickRecord> ticks) noexcept {
         if (socket_ < 0) {
             return;
@@ -75,7 +75,7 @@ class Telemetry {
 
     int socket_ = -1;
     sockaddr_in target_{};
-    double interval_ = 0.0;  ///< [s]
+    double interval_ = 0.0;  ///< time between two sent ticks [s]
     double due_ = 0.0;       ///< time of the next tick to send [s]
     RecordUnits units_;
     std::string line_;

@@ -13,37 +13,37 @@
 
 namespace palpate {
 
-/// One tick as it is recorded and sent: numbers in SI units.
+/// Record of one tick for recordings and telemetry, in SI units.
 struct TickRecord {
-    double time = 0.0;      ///< of the wake-up, since the first one [s]
-    double position = 0.0;  ///< measured [m or rad]
-    double force = 0.0;     ///< after the guards, positive out of the object [N or N*m]
-    double applied = 0.0;   ///< of the device at the sample, same sign
-    double measured =
-        std::numeric_limits<double>::quiet_NaN();  ///< of the transducer, same sign; NaN without one
-    double environment_position = 0.0;             ///< position y of the object [m or rad]
-    double velocity = 0.0;                         ///< of the device [m/s or rad/s]
-    double device_time = 0.0;                      ///< the device's clock [s]
-    double lateness = 0.0;                         ///< of the wake-up [s]
-    std::uint64_t sequence = 0;                    ///< of the device's sample
-    std::int32_t evaluations = 0;                  ///< of the environment
+    double time = 0.0;      ///< time of the wake-up since the first wake-up [s]
+    double position = 0.0;  ///< measured position of the handle [m or rad]
+    double force = 0.0;     ///< sent force after all guards, positive out of the object [N or N*m]
+    double applied = 0.0;   ///< force that the device applied at the sample, same sign [N or N*m]
+    /// Force of the transducer, same sign [N or N*m]; NaN without a transducer.
+    double measured = std::numeric_limits<double>::quiet_NaN();
+    double environment_position = 0.0;  ///< position y of the virtual object [m or rad]
+    double velocity = 0.0;              ///< velocity of the handle [m/s or rad/s]
+    double device_time = 0.0;           ///< time by the device's clock [s]
+    double lateness = 0.0;              ///< wake-up minus its planned time [s]
+    std::uint64_t sequence = 0;         ///< number of the device's sample
+    std::int32_t evaluations = 0;       ///< evaluations of the model in this tick
     Status status = Status::Ok;
-    bool extrapolated = false;  ///< the object was evaluated outside its data
+    bool extrapolated = false;  ///< true if the model was evaluated outside its domain
 };
 
-/// Returns the force of a real object against the handle. Without a transducer it is the force that the motor holds
-/// against the object, which is valid for slow motion and includes the friction of the device.
+/// Returns the force of a real object against the handle. If the device has no transducer, returns the opposite of the
+/// motor's force, which equals the object's force in slow motion and includes the friction of the device.
 [[nodiscard]] inline double object_force(const TickRecord& tick) noexcept {
     return std::isnan(tick.measured) ? -tick.applied : tick.measured;
 }
 
-/// Units of a model at the end of the column names; empty without a unit.
+/// Units of position and force that end the column names of a recording; empty for a model without a unit.
 struct RecordUnits {
     std::string position = "rad";
     std::string force = "Nm";
 };
 
-/// Returns the units of a recording from those of a model, which has torques in N*m.
+/// Converts the units of a model to those of a recording: the unit "N*m" of a model is "Nm" in a column name.
 [[nodiscard]] inline RecordUnits record_units(const std::string& position, const std::string& force) {
     return {position, force == "N*m" ? "Nm" : force};
 }
@@ -55,14 +55,14 @@ struct RecordUnits {
 
 namespace detail {
 
-/// Appends the shortest text from which the same number is read.
+/// Appends a number as the shortest text from which exactly the same number is read again.
 inline void append_number(std::string& text, double value) {
     std::array<char, 32> digits{};
     const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
     text.append(digits.data(), end);
 }
 
-/// Appends a time to the nanosecond, which is its resolution.
+/// Appends a time [s] with nine decimals, because the clock counts nanoseconds.
 inline void append_nanoseconds(std::string& text, double seconds) {
     std::array<char, 32> digits{};
     const auto end =
@@ -72,9 +72,9 @@ inline void append_nanoseconds(std::string& text, double seconds) {
 
 }  // namespace detail
 
-/// Returns the column names: a stem, and the unit after the last underscore. Position and force come first with plain
-/// stems, so that a reader chooses them without a hint. The table of units does not contain velocities; `radps` keeps a
-/// velocity from being read as another quantity.
+/// Returns the column names of a recording: name of the quantity, underscore, unit. The columns `position` and `force`
+/// come first, so that a reader of recordings chooses them without options. The unit `radps` of the velocity is not in
+/// the reader's table of units, so that a reader does not take the velocity for another quantity.
 [[nodiscard]] inline std::string column_names(const RecordUnits& units) {
     const std::string position = suffix_of(units.position);
     const std::string force = suffix_of(units.force);
@@ -83,7 +83,7 @@ inline void append_nanoseconds(std::string& text, double seconds) {
            ",sequence,device_clock_s,lateness_s,evaluations,extrapolated,status";
 }
 
-/// Appends the columns as one line of numbers.
+/// Appends the record of a tick as one row of a CSV file.
 inline void append_row(std::string& text, const TickRecord& tick) {
     detail::append_nanoseconds(text, tick.time);
     for (const double value :
@@ -100,7 +100,7 @@ inline void append_row(std::string& text, const TickRecord& tick) {
     text += '\n';
 }
 
-/// Appends the columns as one JSON object; a number that is not finite becomes null.
+/// Appends the record of a tick as one line of JSON for telemetry; a number that is not finite becomes null.
 inline void append_json(std::string& text, const TickRecord& tick, const RecordUnits& units) {
     const auto field = [&](const std::string& name, double value) {
         text += '"' + name + "\":";

@@ -13,14 +13,14 @@
 
 namespace palpate {
 
-/// A closed interval.
+/// A closed interval of numbers, from `lower` to `upper`.
 struct Interval {
     double lower = 0.0;
     double upper = 0.0;
 
-    /// Returns the largest absolute value.
+    /// Returns the largest absolute value of a number in the interval.
     [[nodiscard]] double largest() const noexcept { return std::max(std::abs(lower), std::abs(upper)); }
-    /// Returns the smallest interval that contains both.
+    /// Returns the smallest interval that contains this interval and the interval `other`.
     [[nodiscard]] Interval with(Interval other) const noexcept {
         return {std::min(lower, other.lower), std::max(upper, other.upper)};
     }
@@ -28,29 +28,31 @@ struct Interval {
 
 namespace detail {
 
-/// Encloses g over a cell, from its value and three derivatives at both ends. The distance of g from the polynomial of
-/// degree 7 through them is at most max|g^(8)| h^8 / (256 * 8!), and that polynomial lies between its Bernstein
-/// coefficients. For wavelets that cancel to a millionth, cells of a fifth of a wavelet are sufficient; sums of ranges
-/// would need thousands of cells.
+/// Lower and upper bound of a function g over a cell of width h, from the value and three derivatives of g at both ends
+/// of the cell. The polynomial of degree 7 with these values differs from g by at most max|g^(8)| h^8 / (256 * 8!). The
+/// polynomial lies between its smallest and its largest Bernstein coefficient. For wavelets that cancel to a millionth,
+/// cells of a fifth of a wavelet's width are sufficient; a sum of the bounds of each wavelet would need thousands of
+/// cells.
 struct BoundedCell {
     double from, to;
     Jet at_from, at_to;
     Interval range;
 
-    /// Makes a cell. `remainder` bounds the error of the polynomial and of rounding.
+    /// Makes a cell. `remainder` is an upper bound of the polynomial's distance from g plus the rounding error.
     BoundedCell(double left, double right, const Jet& at_left, const Jet& at_right, double remainder) noexcept
         : from{left}, to{right}, at_from{at_left}, at_to{at_right} {
         const Interval both = coefficients(at_from, to - from).with(coefficients(at_to, from - to));
         range = {both.lower - remainder, both.upper + remainder};
     }
 
-    /// Orders the search: cells with the largest possible value come first.
+    /// Orders the queue of cells: the cell with the largest possible |g| comes first.
     [[nodiscard]] bool operator<(const BoundedCell& other) const noexcept {
         return range.largest() < other.range.largest();
     }
 
   private:
-    /// Returns the range of the four coefficients on one side.
+    /// Returns the smallest and the largest of the four Bernstein coefficients that one end of the cell defines; h is
+    /// the signed width of the cell.
     [[nodiscard]] static Interval coefficients(const Jet& end, double h) noexcept {
         const double first = h / 7.0 * end[1];
         const double second = h * h / 42.0 * end[2];
@@ -61,15 +63,15 @@ struct BoundedCell {
     }
 };
 
-/// Derivative of this order of a network, as one term of the enclosed sum.
+/// One term of a sum whose bounds `enclose` computes: the derivative of order `order` of a network.
 struct Term {
     const NetworkParameters& network;
-    std::size_t order;  ///< 0 or 1
+    std::size_t order;  ///< 0: value of the network, 1: first derivative
 };
 
-/// Encloses g, the sum of the terms, over [from, to] by bisection. A cell is finished if it cannot raise the largest or
-/// lower the smallest sampled value by more than `relative` times the largest sampled |g|. Cells that are too coarse at
-/// the end of the budget only widen the result.
+/// Returns proved lower and upper bounds of g, the sum of the terms, over [from, to] by bisection into cells. A cell is
+/// finished if g in this cell cannot exceed the sampled values of g by more than `relative` times the largest sampled
+/// |g|. The number of cells is limited; cells that are still too wide at this limit only make the bounds wider.
 template <std::size_t terms>
 [[nodiscard]] Interval enclose(const std::array<Term, terms>& sum, double from, double to, double relative) {
     constexpr int first_cells = 16;
@@ -102,7 +104,8 @@ template <std::size_t terms>
             eighth += derivative_bounds(network, left, right)[order + 8];
         }
         double remainder = eighth * std::pow(h, 8) / (256.0 * 40320.0);
-        // The factors of `coefficients`, and some units more for its sums.
+        // Factors of value and derivatives in the Bernstein coefficients. The 8 epsilon below cover the rounding of
+        // their sums.
         const Jet factors{1.0, 3.0 / 7.0 * h, 3.0 / 42.0 * h * h, h * h * h / 210.0};
         for (std::size_t d = 0; d < factors.size(); ++d) {
             const double size = std::max(std::abs(at_left[d]), std::abs(at_right[d]));
@@ -141,14 +144,15 @@ template <std::size_t terms>
 
 }  // namespace detail
 
-/// Returns proved bounds of f over [from, to] for a network of one input, rounding included. They are at most
-/// `relative` times max|f| wider than the true range.
+/// Returns a proved lower and upper bound of the value f of a network of one input over [from, to], rounding included.
+/// The bounds lie outside the true minimum and maximum of f by at most `relative` times max|f|.
 [[nodiscard]] inline Interval value_bounds(const NetworkParameters& network, double from, double to,
                                            double relative = 0.01) {
     return detail::enclose(std::array{detail::Term{network, 0}}, from, to, relative);
 }
 
-/// Returns proved bounds of f' over [from, to], at most `relative` times max|f'| wider than the true range.
+/// Returns a proved lower and upper bound of the slope f' of a network of one input over [from, to]. The bounds lie
+/// outside the true minimum and maximum of f' by at most `relative` times max|f'|.
 [[nodiscard]] inline Interval slope_bounds(const NetworkParameters& network, double from, double to,
                                            double relative = 0.01) {
     return detail::enclose(std::array{detail::Term{network, 1}}, from, to, relative);

@@ -18,32 +18,34 @@
 
 namespace palpate {
 
-/// Required accuracy and largest size of a compiled curve.
+/// Required accuracy and largest size of the table of polynomials that replaces a wavelet network.
 struct CompileOptions {
-    double relative_error = 1e-12;  ///< largest error, divided by max|f| over the domain; includes rounding
-    std::size_t largest_table = 8192;  ///< largest number of cells of 80 bytes
-    std::size_t fewest_wavelets = 2;   ///< below this number, eq. 4 itself is equally fast
+    double relative_error = 1e-12;     ///< largest force error / max|f| over the domain; includes rounding
+    std::size_t largest_table = 8192;  ///< largest number of table cells of 80 bytes
+    std::size_t fewest_wavelets = 2;   ///< with fewer wavelets the sum of eq. 4 is as fast as a table
 };
 
 namespace detail {
 
-/// Largest change of a cell's polynomial, and of its slope by t, for a unit error of each derivative by t at both
-/// borders. These are suprema of the sums of absolute Hermite basis functions.
+/// Largest change of the value and of the slope of a cell's polynomial for an error of 1 in its value or one of three
+/// derivatives at both borders. Derivatives are by t, the position in the cell divided by the cell's width. The numbers
+/// are suprema of the sums of absolute Hermite basis functions.
 inline constexpr Jet hermite_value{1.0, 11.0 / 32.0, 3.0 / 64.0, 1.0 / 384.0};
 inline constexpr Jet hermite_slope{4.375, 1.1875, 0.1468, 0.008945};
 
 }  // namespace detail
 
-/// Compiles a network of one input, with its continuations, to polynomials of degree 7. The cost of an evaluation does
-/// not depend on the number of wavelets.
+/// Replaces a wavelet network f of one input, with its continuations, by a table of polynomials p of degree 7. The
+/// computing time of an evaluation then does not depend on the number of wavelets.
 ///
-/// The error is certified when the table is built. If f and three derivatives agree at both borders of a cell of width
-/// h,
+/// The error of the table is proved when the table is built. If p has the value and three derivatives of f at both
+/// borders of a cell of width h,
 ///
 ///     |f - p| <= max|f^(8)| h^8 / (256 * 8!),   |f' - p'| <= max|f^(8)| h^7 / (64 * 6!).
 ///
-/// `derivative_bounds` gives max|f^(8)|; the error of rounding is bounded term by term and added. The curve stays
-/// uncompiled if this error exceeds the required one, the table is too large, or there are too few wavelets.
+/// `derivative_bounds` gives max|f^(8)|; a bound of the rounding error is added. The class evaluates the network
+/// itself, without a table, if the proved error exceeds the required error, the table is too large, or the network has
+/// too few wavelets.
 class CompiledCurve {
   public:
     explicit CompiledCurve(NetworkCurve curve, const CompileOptions& options = {})
@@ -51,17 +53,19 @@ class CompiledCurve {
         build(options);
     }
 
-    /// Returns the curve that was compiled.
+    /// Returns the network with its continuations from which the table was computed.
     [[nodiscard]] const NetworkCurve& curve() const noexcept { return curve_; }
-    /// Returns true if the table is used.
+    /// Returns true if the polynomials of the table are used, false if the network itself is evaluated.
     [[nodiscard]] bool compiled() const noexcept { return !table_.empty(); }
     /// Returns the number of cells of the table.
     [[nodiscard]] std::size_t cells() const noexcept { return table_.size(); }
-    /// Return proved bounds of |p - f| and |p' - f'| inside the domain; 0 if the curve is not compiled.
+    /// Return proved bounds of the errors of the table inside the domain, |p - f| for the force and |p' - f'| for the
+    /// slope; 0 without a table.
     [[nodiscard]] double value_error() const noexcept { return value_error_; }
     [[nodiscard]] double slope_error() const noexcept { return slope_error_; }
 
-    /// Returns the curve at x. Inlined, so that the compiler drops the parts that a caller does not use.
+    /// Returns force, slope and antiderivatives at position x. Inlined, so that the compiler drops the results that a
+    /// caller does not use.
     [[nodiscard, gnu::always_inline]] inline Curve at(double x) const noexcept {
         if (x >= table_from_ && x <= table_to_) {
             return table_.at(x);
@@ -69,22 +73,24 @@ class CompiledCurve {
         return outside_table(x);
     }
 
-    /// Returns true if x lies outside the domain of a curve that does not repeat.
+    /// Returns true if position x lies outside the domain and the force is not periodic.
     [[nodiscard]] bool extrapolated(double x) const noexcept { return curve_.extrapolated(x); }
 
   private:
-    /// Evaluates positions outside the domain, and every position if the curve is not compiled.
+    /// Returns force, slope and antiderivatives at a position outside the domain, or at any position if there is no
+    /// table.
     [[nodiscard, gnu::noinline]] Curve outside_table(double x) const noexcept {
         if (!compiled() || !std::isfinite(x)) {
             return curve_.at(x);
         }
-        // Rounding in the wrapping of a distant position can place it just outside the domain.
+        // A periodic force moves a distant position x by whole periods; rounding can place the result just outside the
+        // domain.
         return curve_.continued(x, [this](double within) noexcept {
             return table_.at(within > lower_ ? std::min(within, upper_) : lower_);
         });
     }
 
-    /// Builds the table, and keeps it only if its proved error is at most the required one.
+    /// Builds the table of polynomials, and keeps the table only if its proved error is at most the required error.
     void build(const CompileOptions& options) {
         const NetworkParameters& network = curve_.parameters();
         if (network.weight.size() < options.fewest_wavelets) {
@@ -93,17 +99,19 @@ class CompiledCurve {
         const double reach = 2.0 * std::max(std::abs(lower_), std::abs(upper_));
         const double largest_error = options.relative_error * largest_force();
         const double eighth = largest_eighth_derivative();
-        // The polynomials may use a tenth of the required error; the rest is for rounding.
+        // The distance of the polynomials from f may be a tenth of the required error; nine tenths are reserved for
+        // rounding.
         const double width = std::pow(0.1 * largest_error * 256.0 * 40320.0 / eighth, 0.125);
         const double widest = (upper_ - lower_) / 32.0;
         const int fineness = -static_cast<int>(std::floor(std::log2(std::min(width, widest))));
-        // With more than 2^40 cells from zero to x, rounding of x removes its place in the cell.
+        // If position x is more than 2^40 cell widths from zero, rounding of x is too large compared with the cell
+        // width.
         const double h = std::ldexp(1.0, -fineness);
         if (!((upper_ - lower_) / h + 4.0 <= static_cast<double>(options.largest_table) &&
               reach / h < 0x1p40 && PiecewiseSeptic::is_sound(h))) {
             return;
         }
-        // One more cell on either side, because rounding can place a wrapped position just outside an edge.
+        // One additional cell on each side, because rounding can place a position just outside an edge of the domain.
         PiecewiseSeptic table{PiecewiseSeptic::cell(lower_, h) - 1, PiecewiseSeptic::cell(upper_, h) + 1, h,
                               [&](double x) noexcept { return jet(network, x); }};
         certify(table, eighth, jet_rounding(network, reach));
@@ -122,7 +130,8 @@ class CompiledCurve {
         }
     }
 
-    /// Returns the largest |f| at 65 positions. It is at most the true maximum, so the error is not underestimated.
+    /// Returns the largest |f| at 65 positions of the domain [N]. It is at most the true maximum, so the relative error
+    /// computed with it is never too small.
     [[nodiscard]] double largest_force() const noexcept {
         constexpr int places = 64;
         double largest = 0.0;
@@ -133,8 +142,8 @@ class CompiledCurve {
         return largest;
     }
 
-    /// Bounds |f^(8)| over the domain and the parts of the outermost cells beyond it. The domain is cut into pieces,
-    /// because few wavelets are large everywhere.
+    /// Returns an upper bound of the eighth derivative |f^(8)| over the domain and the parts of the outermost cells
+    /// outside the domain. The domain is divided into 256 pieces, because few wavelets are large in all of them.
     [[nodiscard]] double largest_eighth_derivative() const noexcept {
         constexpr int cuts = 256;
         const double beyond = (upper_ - lower_) / 16.0;
@@ -147,7 +156,8 @@ class CompiledCurve {
         return largest;
     }
 
-    /// Adds the errors of the polynomials, of their coefficients and of their evaluation.
+    /// Computes the proved errors of value and slope: the distance of the polynomials from f plus the rounding errors
+    /// of the coefficients and of the evaluation. `eighth` is a bound of |f^(8)|.
     void certify(const PiecewiseSeptic& table, double eighth, const Jet& rounding) noexcept {
         const double h = table.width();
         value_error_ = eighth * std::pow(h, 8) / (256.0 * 40320.0);
@@ -171,15 +181,15 @@ class CompiledCurve {
     PiecewiseSeptic table_;
     double lower_;
     double upper_;
-    // Limits within which only the table is used. The range is empty without a table, and for a periodic curve, whose
-    // energy changes with each period.
+    // Lowest and highest position at which only the table is used. The interval is empty without a table, and for a
+    // periodic force, whose energy changes with each period.
     double table_from_ = std::numeric_limits<double>::infinity();
     double table_to_ = -std::numeric_limits<double>::infinity();
     double value_error_ = 0.0;
     double slope_error_ = 0.0;
 };
 
-/// A `WaveletNetwork` with its continuations, compiled.
+/// A `WaveletNetwork` with its continuations, evaluated from a table of polynomials (`CompiledCurve`).
 class CompiledNetwork {
   public:
     using State = Stateless;
@@ -187,7 +197,7 @@ class CompiledNetwork {
     explicit CompiledNetwork(const WaveletNetwork& network, const CompileOptions& options = {})
         : curve_{network.curve(), options} {}
 
-    /// Returns the compiled curve.
+    /// Returns the table of polynomials that replaces the network.
     [[nodiscard]] const CompiledCurve& curve() const noexcept { return curve_; }
 
     /// Returns force, slope and energy at x.
@@ -205,7 +215,7 @@ class CompiledNetwork {
 
 static_assert(Environment<CompiledNetwork>);
 
-/// A `HysteresisNetwork` with both curves compiled.
+/// A `HysteresisNetwork` whose mean force and hysteresis are evaluated from tables of polynomials (`CompiledCurve`).
 class CompiledHysteresis : public HysteresisPair<CompiledCurve> {
   public:
     explicit CompiledHysteresis(const HysteresisNetwork& network, const CompileOptions& options = {})

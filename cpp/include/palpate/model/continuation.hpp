@@ -12,32 +12,33 @@
 
 namespace palpate {
 
-/// A function of position with its slope and the antiderivatives that energy accounts use.
+/// Value, slope and two antiderivatives of a function f at one position x. The antiderivatives give stored energy.
 struct Curve {
     double value = 0.0;            ///< f(x)
     double slope = 0.0;            ///< f'(x)
-    double integral = 0.0;         ///< an antiderivative of f
-    double double_integral = 0.0;  ///< an antiderivative of `integral`
+    double integral = 0.0;         ///< antiderivative of f at x
+    double double_integral = 0.0;  ///< antiderivative of `integral` at x
 };
 
-/// Continuation of a force outside the data. A fitted network changes direction just outside its last sample, so it is
-/// never evaluated there.
+/// Kind of force outside the positions of the recording. The network is never evaluated there, because the force of a
+/// fitted network can change its direction just outside the last recorded position.
 enum class Continuation : std::uint8_t {
-    Linear,  ///< a straight line of non-negative slope through the edge
-    Free,    ///< the same line until the force is zero, then zero: contact is lost
+    Linear,  ///< a straight line of slope >= 0 through the force at the edge
+    Free,    ///< a straight line to zero force, then zero: the tool has lost contact
 };
 
 template <>
 inline constexpr auto words_of<Continuation> = std::array<std::string_view, 2>{"linear", "free"};
 
-/// A curve beyond one edge of its domain: a straight line through the edge that ends `reach` away from it. The force is
-/// continuous at the edge and at the end; the slope is not.
+/// Force outside one edge of the domain: a straight line that starts with the force at the edge and ends with zero
+/// force at the distance `reach` from the edge. The force is continuous at the start and at the end of the line; the
+/// slope is not.
 struct EdgeLine {
-    double edge = 0.0;                                       ///< position of the edge [m]
-    Curve at_edge;                                           ///< value at the edge, and slope of the line
+    double edge = 0.0;  ///< position of the edge [m]
+    Curve at_edge;      ///< force at the edge, and slope of the straight line
     double reach = std::numeric_limits<double>::infinity();  ///< distance from the edge to zero force [m]
 
-    /// Returns value, slope and antiderivatives at x, beyond the edge.
+    /// Returns force, slope and antiderivatives at a position x outside the domain, on the side of this edge.
     [[nodiscard]] Curve at(double x) const noexcept {
         const double distance = x - edge;
         const double inside = std::clamp(distance, -reach, reach);
@@ -53,18 +54,19 @@ struct EdgeLine {
     }
 };
 
-/// Properties of a whole curve on which its edge lines depend.
+/// Properties of a force inside its domain that define the straight lines outside the domain.
 struct CurveExtent {
-    double travel = 0.0;         ///< upper - lower [m]
+    double travel = 0.0;         ///< length of the domain, upper - lower [m]
     double largest_force = 0.0;  ///< max |f| over the domain [N]
     double slope_cap = 0.0;      ///< max f' over the domain without its outer 2 %, at least 0 [N/m]
 };
 
-/// Returns the line that continues a force beyond `edge`. `outward` is -1 below the domain and +1 above it.
+/// Returns the straight line that continues a force outside the edge `edge` of the domain. `outward` is -1 for the
+/// lower edge and +1 for the upper edge.
 ///
-/// The slope is clip(f'(edge), 0, slope_cap). If the force at the edge pushes the tool outward, the slope is at least
-/// max|f| / travel, so that the stored energy stays bounded below. With `Free`, a force that pulls the tool back at the
-/// edge decreases to zero with that same slope max|f| / travel.
+/// The slope of the line is the slope f'(edge), limited to 0 to slope_cap. If the force at the edge pushes the tool out
+/// of the domain, the slope is at least max|f| / travel, so that the stored energy has a minimum. With `Free`, a force
+/// that pulls the tool back into the domain decreases to zero with the slope max|f| / travel.
 [[nodiscard]] inline EdgeLine continue_force(double edge, const Curve& at_edge, double outward,
                                              Continuation continuation, const CurveExtent& extent) noexcept {
     EdgeLine line{edge, at_edge};
@@ -83,8 +85,9 @@ struct CurveExtent {
     return line;
 }
 
-/// Returns the line that continues a dissipated force h >= 0 beyond an edge. It is constant, or with `Free` it falls to
-/// zero over `reach`. It never becomes negative, so no loop beyond the edge generates energy.
+/// Returns the line that continues the hysteresis h >= 0 outside an edge of the domain. The line is constant, or with
+/// `Free` it falls to zero over the distance `reach`. It never becomes negative, so no closed motion of the tool
+/// outside the domain generates energy.
 [[nodiscard]] inline EdgeLine continue_hysteresis(double edge, const Curve& at_edge, double outward,
                                                   Continuation continuation, double reach) noexcept {
     EdgeLine line{edge, at_edge};

@@ -18,7 +18,7 @@ using Jet = std::array<double, 4>;
 /// Value and first four derivatives of a function at one position.
 using Derivatives = std::array<double, 5>;
 
-/// Returns the derivatives of a network of one input, without continuation.
+/// Returns value and first four derivatives of a network of one input at x, without continuation.
 [[nodiscard]] inline Derivatives derivatives(const NetworkParameters& network, double x) noexcept {
     const double c = network.linear[0];
     Derivatives sum{c * x + network.bias, c, 0.0, 0.0, 0.0};
@@ -36,37 +36,41 @@ using Derivatives = std::array<double, 5>;
     return sum;
 }
 
-/// Returns value and first three derivatives.
+/// Returns value and first three derivatives of a network of one input at x, without continuation.
 [[nodiscard]] inline Jet jet(const NetworkParameters& network, double x) noexcept {
     const Derivatives f = derivatives(network, x);
     return {f[0], f[1], f[2], f[3]};
 }
 
-/// Highest derivative of f in `derivative_bounds`.
+/// Order of the highest derivative that `derivative_bounds` bounds.
 inline constexpr std::size_t highest_derivative = 9;
 
-/// Bounds of |f|, |f'|, ... of a network of one input over [from, to].
+/// Upper bounds of |f|, |f'|, ..., |f^(9)| of a network f of one input over an interval of positions.
 using DerivativeBounds = std::array<double, highest_derivative + 1>;
 
 namespace detail {
 
-/// Suprema of |psi^(n)|, rounded up. psi^(n) = He_{n+2} E up to its sign, so for even n they are at 0.
+/// Suprema of the derivatives |psi^(n)| of the Mexican hat, rounded up. Apart from the sign psi^(n) is He_{n+2}(u)
+/// e^{-u^2/2} with the Hermite polynomial He, so for even n the supremum is at u = 0.
 inline constexpr DerivativeBounds hat_suprema{1.0,    1.3801190462, 3.0,     5.7831, 15.0,
                                               35.539, 105.0,        288.492, 945.0,  2913.41};
 
-/// Factors of e^{-u^2/4} that bound psi^(n) away from its centre, from Cramer's inequality |He_n(u)|
-/// e^{-u^2/4} <= 1.0865 sqrt(n!).
+/// Factors a_n for which |psi^(n)(u)| <= a_n e^{-u^2/4}, the decay of the Mexican hat's derivative n with the distance
+/// u from its centre. They follow from Cramer's inequality |He_n(u)| e^{-u^2/4} <= 1.0865 sqrt(n!) for Hermite
+/// polynomials He_n.
 inline constexpr DerivativeBounds hat_tails{1.5366,  2.6614,   5.3228,   11.9021,   29.1540,
                                             77.1341, 218.1682, 654.5044, 2069.7211, 6864.48};
 
-/// Rounding error of f^(n)(x), in units of epsilon times the sum of |w| alpha^n. The polynomial in u, the exponent
-/// u^2/2 and u itself have errors of a few units each. Suprema over u of ((n + 6 + u^2) P_n + 1.5 |u| P_{n+1}) E, with
-/// P_n the polynomial of psi^(n) with absolute coefficients.
+/// Rounding error of the derivative f^(n)(x) of a network, divided by epsilon and by the sum of |weight| dilation^n.
+/// The polynomial of the Mexican hat psi, the exponent u^2/2 and u itself have errors of a few epsilon each. The
+/// numbers are suprema over u of ((n + 6 + u^2) P_n + 1.5 |u| P_{n+1}) e^{-u^2/2}, where P_n is the polynomial of
+/// psi^(n) with absolute coefficients.
 inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
 
 }  // namespace detail
 
-/// Returns bounds of the rounding errors of `derivatives` in [-reach, reach].
+/// Returns bounds of the rounding errors of value and four derivatives from `derivatives` for positions in [-reach,
+/// reach].
 [[nodiscard]] inline Derivatives derivatives_rounding(const NetworkParameters& network,
                                                       double reach) noexcept {
     const double c = std::abs(network.linear[0]);
@@ -85,14 +89,15 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
     return sum;
 }
 
-/// Returns bounds of the rounding errors of `jet` in [-reach, reach].
+/// Returns bounds of the rounding errors of value and three derivatives from `jet` for positions in [-reach, reach].
 [[nodiscard]] inline Jet jet_rounding(const NetworkParameters& network, double reach) noexcept {
     const Derivatives f = derivatives_rounding(network, reach);
     return {f[0], f[1], f[2], f[3]};
 }
 
-/// Returns proved bounds of f and its first nine derivatives over [from, to]: the sum of the largest contributions of
-/// the wavelets at their distances. They are wider than `value_bounds` and `slope_bounds`, but need no search.
+/// Returns proved upper bounds of the absolute value of a network f and of its first nine derivatives over [from, to].
+/// Each bound is the sum of the largest contributions of all wavelets at their distance from [from, to]. The bounds are
+/// wider than those of `value_bounds` and `slope_bounds`, but need no search.
 [[nodiscard]] inline DerivativeBounds derivative_bounds(const NetworkParameters& network, double from,
                                                         double to) noexcept {
     const double c = std::abs(network.linear[0]);
@@ -109,7 +114,7 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
         }
     }
     for (double& bound : bounds) {
-        bound *= 1.0 + 1e-9;  // rounding of the sum of absolute terms
+        bound *= 1.0 + 1e-9;  // covers the rounding of the sum over the wavelets
     }
     return bounds;
 }

@@ -11,11 +11,12 @@
 
 namespace palpate {
 
-/// Range of the energy that a virtual object can store.
+/// Smallest and largest energy that a virtual object can store.
 struct EnergyRange {
-    double least = 0.0;  ///< minimum over all positions, with continuation; -infinity for an active model [J]
-    double largest = 0.0;  ///< maximum over its domain, with hysteresis [J]
-    double missed = 0.0;   ///< upper bound of the energy between samples that the range misses [J]
+    double least =
+        0.0;  ///< minimum over all positions, continuation included; -infinity for an active model [J]
+    double largest = 0.0;  ///< maximum over the domain, hysteresis included [J]
+    double missed = 0.0;   ///< upper bound of the error of both, from positions between the samples [J]
 
     /// Returns an upper bound of the energy that the object can give from any position in its domain [J].
     [[nodiscard]] double span() const noexcept { return largest - least + missed; }
@@ -23,8 +24,9 @@ struct EnergyRange {
 
 namespace detail {
 
-/// Returns the integral of f - c(f) between two positions, where c limits a force to +-`limit`. `at(x)` is the curve of
-/// f. Halves the interval until both ends are within the limit, or both beyond it on one side.
+/// Returns the energy that a force limit removes between two positions [J]: the integral of f - c(f), where c(f) is the
+/// force f limited to +-`limit`. `at(x)` returns force and antiderivative at x. The interval is halved until |f| is at
+/// most `limit` at both ends, or exceeds `limit` with the same sign at both ends.
 template <class At>
 [[nodiscard]] double work_beyond(const At& at, double from, const Curve& at_from, double to,
                                  const Curve& at_to, double limit, int halvings = 40) noexcept {
@@ -39,7 +41,8 @@ template <class At>
            work_beyond(at, middle, at_middle, to, at_to, limit, halvings - 1);
 }
 
-/// Finds by bisection the position between two others at which f changes from negative to positive.
+/// Finds by bisection the position between `below` and `above` at which the force f changes from negative to positive:
+/// the position of smallest energy.
 template <class At>
 [[nodiscard]] double rest_between(const At& at, double below, double above) noexcept {
     constexpr int halvings = 60;
@@ -50,8 +53,9 @@ template <class At>
     return below;
 }
 
-/// Returns the decrease of the energy of c(f) beyond an edge [J]. It is the work of a force that pushes the tool
-/// outward, until the force has become zero along the edge line.
+/// Returns the decrease of the stored energy of the limited force outside an edge of the domain [J]. It is the work of
+/// a force that pushes the tool out of the domain, up to the position at which the straight line of the force reaches
+/// zero.
 [[nodiscard]] inline double decrease_beyond(const EdgeLine& line, double outward, double limit) noexcept {
     const double force = std::abs(line.at_edge.value);
     if (!(-outward * line.at_edge.value > 0.0)) {
@@ -61,18 +65,19 @@ template <class At>
     return (force - 0.5 * within) * within / std::abs(line.at_edge.slope);
 }
 
-/// Range of the energy of c(f) over a domain, and its values at the ends [J].
+/// Smallest and largest energy of a limited force over a domain, and the energy at both ends of the domain [J].
 struct LimitedEnergy {
     EnergyRange range;
     double at_lower = 0.0;
     double at_upper = 0.0;
 };
 
-/// Computes the energy of the limited force: the energy of f minus the work beyond the limit. f is sampled at the
-/// borders of cells of width w; L is the largest |f'|. In a cell whose ends are both within the limit, or both beyond
-/// it on one side, f can cross the limit between the samples only if one end is within L w / 2 of it. That changes the
-/// work by at most L w^2 / 4. Within a cell the energy leaves the range of its ends and of the rest position by less
-/// than that.
+/// Computes the stored energy of a limited force over a domain: the energy of the force f minus the energy that the
+/// force limit removes. f is sampled at the borders of cells of width w; L is the largest |f'|. Let |f| be below the
+/// force limit at both ends of a cell, or above it with the same sign. Then f can cross the force limit between the
+/// samples only if f at one end differs from it by at most L w / 2. Such a crossing changes the energy by at most L w^2
+/// / 4. Between the ends of a cell and the position of zero force, the energy lies outside its sampled values by less
+/// than L w^2 / 4.
 template <class At>
 [[nodiscard]] LimitedEnergy limited_energy(const At& at, double lower, double upper, std::size_t cells,
                                            double steepest, double limit) noexcept {
@@ -107,7 +112,7 @@ template <class At>
     return energy;
 }
 
-/// Returns the number of cells for a curve: 16 for its finest width, at least 1024.
+/// Returns the number of cells for the energy of a model: 16 for each width of the finest wavelet, at least 1024.
 [[nodiscard]] inline std::size_t energy_cells(double travel, double finest_width) noexcept {
     constexpr double fewest = 1024.0;
     constexpr double most = 1e6;
@@ -116,8 +121,8 @@ template <class At>
 
 }  // namespace detail
 
-/// Returns the energy range of a force of position and velocity, at velocity zero. Uses Simpson's rule, because this
-/// force does not have a closed antiderivative.
+/// Returns the smallest and largest stored energy of a force of position and velocity, at velocity zero and with a
+/// force limit [N]. Uses Simpson's rule, because this force does not have a closed antiderivative.
 [[nodiscard]] inline EnergyRange energy_range(const VelocityNetwork& force, double force_limit) {
     const auto at = [&](double x) noexcept {
         return Curve{std::clamp(force.force(x, 0.0), -force_limit, force_limit), 0.0, 0.0, 0.0};
@@ -149,7 +154,8 @@ template <class At>
     return range;
 }
 
-/// Returns the energy range of a model of position, or of position and velocity, whose force a device limits.
+/// Returns the smallest and largest stored energy of a model of position, or of position and velocity, whose force is
+/// limited to +-`force_limit` [N].
 [[nodiscard]] inline EnergyRange energy_range(const ForceModel& model,
                                               double force_limit = std::numeric_limits<double>::infinity()) {
     require_renderable(model);
@@ -164,7 +170,8 @@ template <class At>
                                force.upper(), cells, force.slope_bounds().largest(), force_limit);
     EnergyRange range = energy.range;
     if (pair != nullptr) {
-        // S - C(x) is the work of c(g + (xi - pi) h / r) - c(g) from pi to x, and |x - pi| <= r.
+        // With hysteresis the object stores more by at most r max h / 2: the work of the hysteresis force s h while the
+        // direction state s grows from 0 to 1 over the play radius r.
         range.largest +=
             0.5 * pair->play_radius() * std::max(0.0, pair->hysteresis_force().value_bounds().upper);
     }

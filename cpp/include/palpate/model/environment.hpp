@@ -6,20 +6,21 @@
 
 namespace palpate {
 
-/// State of a virtual object at one position. Force is the force of the object against the tool: a pressed spring gives
-/// force > 0 for position > 0.
+/// Force, slope and energy of a virtual object at one position x. The force is that of the object against the tool: a
+/// pressed spring gives force > 0 for position > 0.
 struct EnvironmentSample {
     double force = 0.0;         ///< f(x) [N or N*m]
     double slope = 0.0;         ///< df/dx, the local stiffness [N/m]
-    double energy = 0.0;        ///< stored energy [J], up to a constant
+    double energy = 0.0;        ///< stored energy [J] plus a constant
     bool extrapolated = false;  ///< true if x lies outside the data from which the model was identified
 };
 
-/// State of an environment without memory.
+/// Empty state of a virtual object without memory, that is without hysteresis.
 struct Stateless {};
 
-/// A virtual object of one degree of freedom. `at` evaluates a trial position and changes nothing. `advance` commits
-/// the rendered position. `start` returns the state of an object at rest at x.
+/// A virtual object of one degree of freedom. `at` computes the force at a trial position x and does not change the
+/// state. `advance` updates the state (the play operator of a hysteresis) with the rendered position. `start` returns
+/// the state of an object at rest at position x.
 template <class E>
 concept Environment = requires(const E& environment, double x, const typename E::State& state,
                                typename E::State& mutable_state) {

@@ -13,10 +13,10 @@ namespace palpate {
 
 namespace detail {
 
-/// Computes FNV-1a over the bits of numbers. A changed number gives another value.
+/// Computes the FNV-1a hash of the bits of numbers and texts. If one number changes, the hash changes.
 class NumberHash {
   public:
-    /// Adds the bits of a number.
+    /// Adds the 64 bits of a number to the hash.
     void add(std::uint64_t bits) noexcept {
         for (unsigned byte = 0; byte < 8U; ++byte) {
             value_ = (value_ ^ ((bits >> (8U * byte)) & 0xFFU)) * 0x100000001B3U;
@@ -35,7 +35,7 @@ class NumberHash {
             add(static_cast<std::uint64_t>(static_cast<unsigned char>(letter)));
         }
     }
-    /// Returns 16 hexadecimal digits.
+    /// Returns the hash as 16 hexadecimal digits.
     [[nodiscard]] std::string text() const {
         constexpr std::string_view digits{"0123456789abcdef"};
         std::string text;
@@ -52,7 +52,7 @@ class NumberHash {
 }  // namespace detail
 
 /// Returns 16 hexadecimal digits that change with every number of a model's force: network, domain, continuation, play
-/// radius. They distinguish an edited model from the certified one; they are not a signature.
+/// radius. The digits distinguish an edited model from the certified model; they are not a signature.
 [[nodiscard]] inline std::string fingerprint(const ForceModel& model) {
     detail::NumberHash hash;
     const NetworkParameters& network = model.parameters();

@@ -16,10 +16,10 @@
 
 namespace palpate {
 
-/// An identified environment of any kind that a model file can hold.
+/// An identified force law of any kind that a model file can hold.
 ///
 /// A hysteresis model identified from separate press and release strokes does not have a play radius. The rendering
-/// then chooses one with `with_play_radius`.
+/// then sets a play radius with `with_play_radius`.
 class ForceModel {
   public:
     using Kind = std::variant<WaveletNetwork, HysteresisNetwork, RadialNetwork, VelocityNetwork>;
@@ -31,30 +31,30 @@ class ForceModel {
                std::optional<double> play_radius)
         : kind_{make_hysteresis(network, hysteresis, domain, play_radius)}, play_radius_{play_radius} {}
 
-    /// Makes a force whose second input is the velocity of the first.
+    /// Makes a force of position and velocity: the second input of the network is the velocity.
     [[nodiscard]] static ForceModel of_velocity(NetworkParameters network, Domain domain) {
         return ForceModel{VelocityNetwork{std::move(network), std::move(domain)}};
     }
 
-    /// Returns the environment as a variant of all kinds.
+    /// Returns the force law as a variant of all kinds of networks.
     [[nodiscard]] const Kind& kind() const noexcept { return kind_; }
-    /// Returns the wavelet network, or null for another kind.
+    /// Returns the wavelet network of one input, or null if the model is of another kind.
     [[nodiscard]] const WaveletNetwork* network() const noexcept {
         return std::get_if<WaveletNetwork>(&kind_);
     }
-    /// Returns the hysteresis network, or null for another kind.
+    /// Returns the hysteresis network, or null if the model is of another kind.
     [[nodiscard]] const HysteresisNetwork* hysteresis() const noexcept {
         return std::get_if<HysteresisNetwork>(&kind_);
     }
-    /// Returns the force of position and velocity, or null for another kind.
+    /// Returns the force of position and velocity, or null if the model is of another kind.
     [[nodiscard]] const VelocityNetwork* velocity() const noexcept {
         return std::get_if<VelocityNetwork>(&kind_);
     }
-    /// Returns the network of several inputs, with or without velocity, or null for another kind.
+    /// Returns the network of several inputs, with or without velocity, or null if the model is of another kind.
     [[nodiscard]] const RadialNetwork* radial() const noexcept {
         return velocity() != nullptr ? &velocity()->network() : std::get_if<RadialNetwork>(&kind_);
     }
-    /// Returns the play radius [m], if the model was identified with one.
+    /// Returns the play radius [m], or nothing if the model was identified without a play radius.
     [[nodiscard]] std::optional<double> play_radius() const noexcept { return play_radius_; }
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept {
@@ -70,8 +70,9 @@ class ForceModel {
         return hysteresis() != nullptr ? hysteresis()->domain() : radial()->domain();
     }
 
-    /// Returns proved bounds of the slope inside the domain, at rest or while sliding in either direction. With a play
-    /// radius r they also hold while the play operator sticks, which adds h / r.
+    /// Returns proved bounds of the slope of the force inside the domain [N/m], for press and release, and at velocity
+    /// zero. With a play radius r, the bounds also hold during the motion after a reversal that changes press force to
+    /// release force, which adds h / r (hysteresis / play radius) to the slope.
     [[nodiscard]] Interval slope_bounds(std::optional<double> radius = std::nullopt) const {
         if (const WaveletNetwork* single = network()) {
             return single->curve().slope_bounds();
@@ -86,8 +87,9 @@ class ForceModel {
         return {common.lower - hysteresis_slope, common.upper + hysteresis_slope + sticking_slope};
     }
 
-    /// Throws std::invalid_argument if stored bounds are narrower than the slopes of this model. Another release may
-    /// have used wider bounds, by at most 1 % of the steepest slope.
+    /// Throws std::invalid_argument if the slope bounds stored in a model file do not contain the slopes of this
+    /// network. A difference of 1 % of the steepest slope is accepted, because two releases of the program may compute
+    /// bounds that differ by this amount.
     void require_slopes_within(Interval stored) const {
         if (parameters().dimension != 1) {
             return;
@@ -104,14 +106,15 @@ class ForceModel {
                         sentence("max", stored.upper, "at least", slopes.upper));
     }
 
-    /// Returns the narrowest width 1 / alpha of the wavelets [m]; the travel if there are none (d = 1).
+    /// Returns the smallest width of the wavelets, 1 / dilation [m]; the length of the domain if the network has no
+    /// wavelets or only wider ones. For networks of one input.
     [[nodiscard]] double finest_width() const noexcept {
         const auto& alpha = parameters().alpha;
         const double travel = domain().upper[0] - domain().lower[0];
         return alpha.empty() ? travel : std::min(travel, 1.0 / *std::max_element(alpha.begin(), alpha.end()));
     }
 
-    /// Returns the model with this play radius [m]; unchanged without hysteresis.
+    /// Returns a copy of the model with this play radius [m]. A model without hysteresis is copied unchanged.
     [[nodiscard]] ForceModel with_play_radius(double radius) const {
         const HysteresisNetwork* both = hysteresis();
         if (both == nullptr) {
@@ -145,8 +148,8 @@ class ForceModel {
     std::optional<double> play_radius_;
 };
 
-/// Throws unless the model is a force of the position, with or without hysteresis or velocity. Only these can be
-/// rendered.
+/// Throws std::invalid_argument unless the model is a force of position, with or without hysteresis or velocity. Models
+/// with other inputs cannot be rendered.
 inline void require_renderable(const ForceModel& model) {
     if (model.velocity() == nullptr) {
         require_one_input(model.parameters());

@@ -18,7 +18,8 @@ namespace palpate {
 
 namespace detail {
 
-/// Coefficients of a polynomial for e^r, |r| <= ln 2 / 2, interpolated at the Chebyshev nodes; error 2e-17.
+/// Coefficients of a polynomial that approximates e^r for |r| <= ln 2 / 2, interpolated at the Chebyshev nodes; largest
+/// error 2e-17.
 inline constexpr std::array<double, 12> exponential{
     0x1.0000000000000p+0,  0x1.0000000000000p+0,  0x1.0000000000011p-1,  0x1.555555555555ap-3,
     0x1.555555554f0bap-5,  0x1.111111110f21ep-7,  0x1.6c16c1880029fp-10, 0x1.a01a01b1461c5p-13,
@@ -52,7 +53,8 @@ inline constexpr std::array<double, 12> exponential{
 
 #endif
 
-/// Returns every kernel that this machine can run, the widest last.
+/// Returns the functions for sums of wavelets of every instruction set that this processor supports, in the order of
+/// the register width; the widest is last.
 [[nodiscard]] inline std::vector<HatKernel> usable_hat_kernels() {
     std::vector<HatKernel> kernels{plain::kernel()};
 #if defined(__GNUC__) && defined(__x86_64__)
@@ -69,7 +71,7 @@ inline constexpr std::array<double, 12> exponential{
     return kernels;
 }
 
-/// Returns the widest kernel of this machine, chosen once.
+/// Returns the functions for sums of wavelets with the widest registers of this processor. The choice is made once.
 [[nodiscard]] inline const HatKernel& hat_kernel() {
     static const HatKernel kernel = usable_hat_kernels().back();
     return kernel;
@@ -78,8 +80,8 @@ inline constexpr std::array<double, 12> exponential{
 }  // namespace detail
 
 /// The sum of the wavelets of a network of one input, w_i psi(alpha_i (x - beta_i)), with its derivative and
-/// antiderivatives. Computes one vectorised exponential for each wavelet, with the widest instructions of the machine.
-/// Any x is safe: a distant hat is below 1e-300, and NaN gives NaN.
+/// antiderivatives. Computes one vectorised exponential for each wavelet, with the widest registers of the processor.
+/// Any position x is allowed: a distant wavelet adds less than 1e-300, and NaN gives NaN.
 class HatSum {
   public:
     explicit HatSum(const NetworkParameters& network, const detail::HatKernel& kernel = detail::hat_kernel())
@@ -97,10 +99,11 @@ class HatSum {
         }
     }
 
-    /// Adds the sums at x.
+    /// Adds the wavelets' value, derivative and antiderivatives at position x to `sum`.
     void add(double x, Curve& sum) const noexcept { kernel_.at(columns(), x, sum); }
 
-    /// Adds one quantity at every x; both spans have the same size.
+    /// Adds the wavelets' value, derivative or antiderivative at every position in `x` to the element of `sum` with the
+    /// same index. Both spans have the same size.
     void add(HatQuantity quantity, std::span<const double> x, std::span<double> sum) const noexcept {
         kernel_.batch[static_cast<std::size_t>(quantity)](columns(), x.data(), x.size(), sum.data());
     }

@@ -14,36 +14,40 @@
 
 namespace palpate {
 
-/// Second set of weights of a hysteresis network: h uses the wavelets of g.
+/// Weights of the hysteresis h in a hysteresis network. The hysteresis h and the mean force g use the same wavelets.
 struct HysteresisParameters {
-    std::vector<double> weight;  ///< weights [N]
-    double linear = 0.0;         ///< slope [N/m]
-    double bias = 0.0;           ///< constant [N]
+    std::vector<double> weight;  ///< weights of the wavelets in h [N]
+    double linear = 0.0;         ///< slope of the straight line in h [N/m]
+    double bias = 0.0;           ///< constant in h [N]
 };
 
-/// Returns the play operator of radius r: the position of a slot of width 2r that the motion moves,
+/// Returns the new position of the play operator of radius r, a slot of width 2r that the position x moves with its
+/// edges,
 ///
 ///     play_k = min(x_k + r, max(x_k - r, play_{k-1})).
 [[nodiscard]] inline double play(double position, double previous, double radius) noexcept {
     return std::min(position + radius, std::max(position - radius, previous));
 }
 
-/// Shares of the usual play radius: 1 % of the travel, and at least 4 encoder steps, so that the hand changes the
-/// direction state and encoder noise does not.
+/// The usual play radius is 1 % of the length of the domain, and at least 4 encoder steps, so that a motion of the hand
+/// changes the direction state and encoder noise does not.
 inline constexpr double play_share_of_travel = 0.01;
 inline constexpr double fewest_encoder_steps_in_play = 4.0;
 
-/// Returns the play radius of a model that does not define one [m].
+/// Returns the play radius for a model without its own play radius [m], from the length of its domain and the encoder
+/// step of the device [m].
 [[nodiscard]] inline double usual_play_radius(double travel, double encoder_step = 0.0) noexcept {
     return std::max(fewest_encoder_steps_in_play * encoder_step, play_share_of_travel * travel);
 }
 
-/// A force that differs between press and release,
+/// A force with hysteresis: mean force g, hysteresis h and direction state s,
 ///
 ///     f(x, s) = g(x) + s h(x),   s = (x - play) / r in [-1, 1].
 ///
-/// While h >= 0 no loop generates energy. With the stored energy G(x) + (1/r) int_play^x (xi - play) h(xi) dxi,
-/// sticking (|s| < 1) loses no energy and sliding dissipates. `C` is the type of the curves g and h.
+/// While h >= 0 no closed motion generates energy. The stored energy is G(x) + (1/r) int_play^x (xi - play) h(xi) dxi
+/// with the antiderivative G of g. With it, a motion that leaves the play operator at its position (|s| < 1, sticking)
+/// dissipates no energy, and a motion that moves the play operator (|s| = 1, sliding) dissipates energy. `C` is the
+/// type of the functions g and h.
 template <class C>
 class HysteresisPair {
   public:
@@ -57,19 +61,20 @@ class HysteresisPair {
     /// Returns the play radius [m].
     [[nodiscard]] double play_radius() const noexcept { return play_radius_; }
 
-    /// Returns g, the mean of press and release force.
+    /// Returns the function g, the mean of press force and release force.
     [[nodiscard]] const C& force() const noexcept { return force_; }
-    /// Returns h, half the difference between press and release force.
+    /// Returns the function h, half the difference between press force and release force.
     [[nodiscard]] const C& hysteresis_force() const noexcept { return hysteresis_force_; }
 
-    /// Returns force, slope and energy at x for a given s: +1 press, -1 release.
+    /// Returns force, slope and energy at position x for a direction state s that does not change: +1 press, -1
+    /// release.
     [[nodiscard]] EnvironmentSample sliding(double x, double s) const noexcept {
         const Curve g = force_.at(x);
         const Curve h = hysteresis_force_.at(x);
         return {g.value + s * h.value, g.slope + s * h.slope, g.integral, force_.extrapolated(x)};
     }
 
-    /// Returns force, slope and energy at x after a motion from `state`.
+    /// Returns force, slope and energy after a motion to position x that starts with the play operator in `state`.
     [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
         const double play = palpate::play(x, state.play, play_radius_);
         const double s = (x - play) / play_radius_;
@@ -83,12 +88,12 @@ class HysteresisPair {
                 g.integral + stored / play_radius_, force_.extrapolated(x)};
     }
 
-    /// Moves the play operator to x.
+    /// Updates the play operator in `state` for a motion to position x.
     void advance(double x, State& state) const noexcept {
         state.play = palpate::play(x, state.play, play_radius_);
     }
 
-    /// Returns the state of an object at rest: s = 0, without hysteresis force.
+    /// Returns the state of an object at rest at position x: direction state s = 0, so the hysteresis adds no force.
     [[nodiscard]] State start(double x) const noexcept { return {x}; }
 
   private:
@@ -97,7 +102,7 @@ class HysteresisPair {
     double play_radius_;
 };
 
-/// The hysteresis pair of two networks that share their wavelets and their domain.
+/// A force with hysteresis whose mean force and hysteresis are networks with the same wavelets and the same domain.
 class HysteresisNetwork : public HysteresisPair<NetworkCurve> {
   public:
     HysteresisNetwork(const NetworkParameters& network, const HysteresisParameters& hysteresis,
@@ -136,7 +141,8 @@ class HysteresisNetwork : public HysteresisPair<NetworkCurve> {
         h.bias = hysteresis.bias;
         NetworkCurve curve{h, domain};
         const double travel = domain.upper[0] - domain.lower[0];
-        // h decreases to zero together with g, but over at least 2 % of the travel, without a jump or a steep flank.
+        // With a free continuation the hysteresis h decreases to zero over the same distance as the mean force g. This
+        // distance is at least 2 % of the length of the domain, so that h has neither a jump nor a steep slope.
         const auto line = [&](const EdgeLine& g, const EdgeLine& edge, double outward,
                               Continuation continuation) {
             return continue_hysteresis(edge.edge, edge.at_edge, outward, continuation,

@@ -9,9 +9,9 @@
 
 namespace palpate {
 
-/// Limits the force of an environment to +-`force_limit`: c(f(x)), c(u) = clip(u, +-F_max).
+/// A virtual object whose force f(x) is limited to +-`force_limit` [N].
 ///
-/// While the limit is active the slope is 0. The energy is NaN, because the limited force does not have a closed
+/// While the force limit is active, the slope is 0. The energy is NaN, because the limited force does not have a closed
 /// integral.
 template <Environment E>
 class LimitedEnvironment {
@@ -21,11 +21,11 @@ class LimitedEnvironment {
     LimitedEnvironment(E environment, double force_limit)
         : environment_{std::move(environment)}, force_limit_{force_limit} {}
 
-    /// Returns the environment without the limit.
+    /// Returns the virtual object without the force limit.
     [[nodiscard]] const E& unlimited() const noexcept { return environment_; }
     [[nodiscard]] double force_limit() const noexcept { return force_limit_; }
 
-    /// Returns force and slope at x.
+    /// Returns limited force and slope at position x.
     [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
         const EnvironmentSample sample = environment_.at(x, state);
         const double force = std::clamp(sample.force, -force_limit_, force_limit_);

@@ -10,7 +10,8 @@
 
 namespace palpate {
 
-/// Returns a single-valued force of one position: the network with its domain and its continuations.
+/// Returns the force of a network of one input over all positions: the network inside the domain, and its continuations
+/// outside the domain.
 [[nodiscard]] inline NetworkCurve continued_force(const NetworkParameters& network, const Domain& domain) {
     NetworkCurve curve{network, domain};
     const CurveExtent extent = curve.extent();
@@ -23,7 +24,7 @@ namespace palpate {
 ///
 ///     f(x) = sum_i w_i psi(alpha_i (x - beta_i)) + c x + b,
 ///
-/// continued outside the domain as `Domain` defines. `RadialNetwork` has more inputs.
+/// continued outside the domain as `Domain` defines. For networks with several inputs see `RadialNetwork`.
 class WaveletNetwork {
   public:
     using State = Stateless;
@@ -33,10 +34,10 @@ class WaveletNetwork {
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept { return curve_.parameters(); }
     [[nodiscard]] const Domain& domain() const noexcept { return domain_; }
-    /// Returns the force as a curve with continuations.
+    /// Returns the force over all positions, continuations included.
     [[nodiscard]] const NetworkCurve& curve() const noexcept { return curve_; }
 
-    /// Returns force, slope and energy at x.
+    /// Returns force, slope and energy at position x.
     [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
         const Curve curve = curve_.at(x);
         return {curve.value, curve.slope, curve.integral, curve_.extrapolated(x)};

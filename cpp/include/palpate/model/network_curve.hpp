@@ -14,8 +14,8 @@
 
 namespace palpate {
 
-/// A wavelet network of one input as a curve over all positions: eq. 4 inside the domain, and outside it an edge line
-/// on either side or the same period repeated.
+/// The force of a wavelet network of one input over all positions: the sum of eq. 4 inside the domain, and outside the
+/// domain either a straight line on each side or, for a periodic force, the force inside the domain repeated.
 class NetworkCurve {
   public:
     NetworkCurve(const NetworkParameters& network, const Domain& domain)
@@ -30,7 +30,7 @@ class NetworkCurve {
         continue_with({lower_, inside(lower_)}, {upper_, inside(upper_)});
     }
 
-    /// Sets the lines below and above the domain.
+    /// Sets the straight lines that continue the force below and above the domain.
     void continue_with(const EdgeLine& below, const EdgeLine& above) noexcept {
         below_ = below;
         above_ = above;
@@ -43,12 +43,13 @@ class NetworkCurve {
     [[nodiscard]] const EdgeLine& below() const noexcept { return below_; }
     [[nodiscard]] const EdgeLine& above() const noexcept { return above_; }
 
-    /// Returns the curve at any x, continuation included.
+    /// Returns force, slope and antiderivatives at any position x, continuation included.
     [[nodiscard]] Curve at(double x) const noexcept {
         return continued(x, [this](double within) noexcept { return inside(within); });
     }
 
-    /// Returns the curve with `inside` instead of eq. 4 within the domain. A position that is not finite gives NaN.
+    /// Returns force, slope and antiderivatives at any position x, continuation included. Inside the domain they are
+    /// computed by `inside` instead of eq. 4. A position that is not finite gives NaN.
     template <class Inside>
     [[nodiscard]] Curve continued(double x, Inside inside) const noexcept {
         if (!periodic_ && x >= lower_ && x <= upper_) {
@@ -61,12 +62,13 @@ class NetworkCurve {
         return periodic_ ? wrapped(x, inside) : x < lower_ ? below_.at(x) : above_.at(x);
     }
 
-    /// Returns true if x lies outside the domain and the curve does not repeat.
+    /// Returns true if position x lies outside the domain and the force is not periodic.
     [[nodiscard]] bool extrapolated(double x) const noexcept {
         return periodic_ ? !std::isfinite(x) : !(x >= lower_ && x <= upper_);
     }
 
-    /// Returns eq. 4 without continuation: value, slope and antiderivatives from one exponential for each wavelet.
+    /// Returns force, slope and antiderivatives by eq. 4 without continuation. Computes one exponential for each
+    /// wavelet.
     [[nodiscard]] Curve inside(double x) const noexcept {
         const double c = network_.linear[0];
         const double b = network_.bias;
@@ -75,7 +77,8 @@ class NetworkCurve {
         return sum;
     }
 
-    /// Computes one quantity at many positions, continuation included; both spans have the same size.
+    /// Computes force, slope or antiderivative at every position in `x`, continuation included. `result` has the same
+    /// size as `x`.
     void at(HatQuantity quantity, std::span<const double> x, std::span<double> result) const noexcept {
         const double c = network_.linear[0];
         const double b = network_.bias;
@@ -95,21 +98,24 @@ class NetworkCurve {
         }
     }
 
-    /// Return proved bounds inside the domain, within 1 % of their largest.
+    /// Return proved lower and upper bounds of the force and of its slope inside the domain, wider than the true ones
+    /// by at most 1 % of the largest absolute value.
     [[nodiscard]] Interval value_bounds() const { return palpate::value_bounds(network_, lower_, upper_); }
     [[nodiscard]] Interval slope_bounds() const { return palpate::slope_bounds(network_, lower_, upper_); }
 
-    /// Returns the properties of the curve on which its edge lines depend.
+    /// Returns the properties of the force inside the domain that define its straight lines outside the domain.
     [[nodiscard]] CurveExtent extent() const {
         const double travel = upper_ - lower_;
-        // Without the outer 2 %, because the slope of a fit is least certain at the ends of its data.
+        // The largest slope is computed without the outer 2 % of the domain, because the slope of a fitted network is
+        // least certain at the ends of the recorded positions.
         const double margin = 0.02 * travel;
         const double steepest = palpate::slope_bounds(network_, lower_ + margin, upper_ - margin).upper;
         return {travel, value_bounds().largest(), std::max(0.0, steepest)};
     }
 
   private:
-    /// Returns the curve of a periodic force. Value and slope repeat; the antiderivatives grow with each period.
+    /// Returns force, slope and antiderivatives of a periodic force. Force and slope repeat; the antiderivatives grow
+    /// with each period.
     template <class Inside>
     [[nodiscard]] Curve wrapped(double x, Inside inside) const noexcept {
         const double period = upper_ - lower_;
@@ -126,8 +132,9 @@ class NetworkCurve {
         return curve;
     }
 
-    /// Makes a periodic force continuous: spreads the jump between the two ends of a period over it as a ramp. A jump
-    /// of rounding size is ignored, so that a network that is already continuous keeps its numbers.
+    /// Makes a periodic force continuous: subtracts a straight line from the force so that both ends of a period have
+    /// the same force. A difference of rounding size is ignored, so that a network that is already continuous keeps its
+    /// parameters.
     void remove_jump_between_ends() noexcept {
         double size = std::abs(network_.bias) +
                       std::abs(network_.linear[0]) * std::max(std::abs(lower_), std::abs(upper_));

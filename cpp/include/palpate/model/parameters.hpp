@@ -12,17 +12,18 @@
 
 namespace palpate {
 
-/// Parameters of a wavelet network of N wavelets over d inputs, matrices row by row.
+/// Parameters of a network of N wavelets with d inputs. Matrices are stored row by row, one row for each wavelet.
 struct NetworkParameters {
     std::size_t dimension = 1;      ///< number of inputs d
     std::vector<double> alpha;      ///< N x d dilations, > 0 [1/m]
     std::vector<double> beta;       ///< N x d translations [m]
     std::vector<double> weight;     ///< N weights [N]
     std::vector<double> linear{0};  ///< d slopes of the straight line [N/m]
-    double bias = 0.0;              ///< constant [N]
+    double bias = 0.0;              ///< constant b of the network [N]
 };
 
-/// The box of the data from which a network was identified, and its continuation outside.
+/// Smallest and largest value of each input in the recording from which a network was identified, and the kind of force
+/// outside these values.
 struct Domain {
     std::vector<double> lower{0.0};             ///< smallest values of the d inputs
     std::vector<double> upper{1.0};             ///< largest values of the d inputs
@@ -33,14 +34,14 @@ struct Domain {
 
 namespace detail {
 
-/// Throws std::invalid_argument with the sentence unless the condition holds.
+/// Throws std::invalid_argument with the message `sentence` unless `holds` is true.
 inline void require(bool holds, const std::string& sentence) {
     if (!holds) {
         throw std::invalid_argument(sentence);
     }
 }
 
-/// Throws unless all values are finite.
+/// Throws std::invalid_argument with the name `field` and the index of the first value that is not finite.
 inline void require_finite(const std::vector<double>& values, const char* field) {
     for (std::size_t i = 0; i < values.size(); ++i) {
         require(std::isfinite(values[i]),
@@ -48,7 +49,7 @@ inline void require_finite(const std::vector<double>& values, const char* field)
     }
 }
 
-/// Throws unless the number of values is right.
+/// Throws std::invalid_argument with the name `field` unless `values` has `size` elements.
 inline void require_size(const std::vector<double>& values, std::size_t size, const char* field) {
     require(values.size() == size, std::string(field) + " has " + std::to_string(values.size()) +
                                        " values, must have " + std::to_string(size));
@@ -56,7 +57,8 @@ inline void require_size(const std::vector<double>& values, std::size_t size, co
 
 }  // namespace detail
 
-/// Throws std::invalid_argument with the field, its value and the rule, if a parameter is invalid.
+/// Throws std::invalid_argument if a parameter of the network or its domain is invalid. The message states the name of
+/// the parameter, its value and the rule.
 inline void validate(const NetworkParameters& network, const Domain& domain) {
     using detail::require;
     const std::size_t d = network.dimension;
@@ -92,7 +94,7 @@ inline void validate(const NetworkParameters& network, const Domain& domain) {
     }
 }
 
-/// Throws unless the network has one input.
+/// Throws std::invalid_argument unless the network has one input.
 inline void require_one_input(const NetworkParameters& network) {
     detail::require(network.dimension == 1,
                     "the network has " + std::to_string(network.dimension) + " inputs, must have 1");

@@ -15,17 +15,19 @@
 
 namespace palpate {
 
-/// A function as polynomials of degree 7 on cells of equal width h, a power of two. An evaluation costs one look-up,
-/// one cache line and a few multiplications. Value and first three derivatives are continuous.
+/// A function of x as a table of polynomials of degree 7, one for each cell. All cells have the same width h, a power
+/// of two. An evaluation needs one look-up of a cell, one cache line and a few multiplications. Value and first three
+/// derivatives are continuous.
 ///
-/// The centre of cell k is x = k h; its polynomial is in u = x - k h, which is exact. In the sums, the terms with the
-/// longest dependence on x come last, because the depth of these trees limits the speed of a step.
+/// The centre of cell k is x = k h. The variable of its polynomial is u = x - k h, which is computed without rounding
+/// error. In the sums, the terms that need the most multiplications of u come last, because the longest chain of
+/// dependent operations limits the speed of a step.
 class PiecewiseSeptic {
   public:
     PiecewiseSeptic() = default;
 
-    /// Builds the cells `first` to `last`. `jet(x)` gives the derivatives at their borders x = (k +- 1/2) h, from the
-    /// left to the right.
+    /// Builds the cells `first` to `last`. `jet(x)` is called at the borders x = (k +- 1/2) h from left to right and
+    /// returns value and first three derivatives.
     template <class Function>
     PiecewiseSeptic(std::int64_t first, std::int64_t last, double width, Function jet)
         : width_{width}, rounder_{rounder * width}, origin_{std::bit_cast<std::int64_t>(rounder_) + first} {
@@ -38,7 +40,7 @@ class PiecewiseSeptic {
         }
     }
 
-    /// Returns the index of the cell that holds x.
+    /// Returns the index of the cell that contains x, for cells of this width.
     [[nodiscard]] static std::int64_t cell(double x, double width) noexcept {
         return std::bit_cast<std::int64_t>(x / width + rounder) - std::bit_cast<std::int64_t>(rounder);
     }
@@ -46,13 +48,14 @@ class PiecewiseSeptic {
     [[nodiscard]] bool empty() const noexcept { return pieces_.empty(); }
     [[nodiscard]] std::size_t size() const noexcept { return pieces_.size(); }
     [[nodiscard]] double width() const noexcept { return width_; }
-    /// Returns the centre of cell k.
+    /// Returns the position x of the centre of the cell with index k in the table.
     [[nodiscard]] double middle(std::size_t k) const noexcept {
         return static_cast<double>(origin_ + static_cast<std::int64_t>(k) -
                                    std::bit_cast<std::int64_t>(rounder_)) *
                width_;
     }
-    /// Returns the coefficients of cell k for the powers of t = u / h, which is in [-1/2, 1/2].
+    /// Returns the polynomial coefficients of cell k for the powers of t = u / h: the distance from the cell's centre
+    /// divided by the cell's width, between -1/2 and 1/2.
     [[nodiscard]] std::array<double, 8> coefficients(std::size_t k) const noexcept {
         std::array<double, 8> c = pieces_[k].c;
         double power = 1.0;
@@ -62,17 +65,17 @@ class PiecewiseSeptic {
         }
         return c;
     }
-    /// Returns true if the powers of the width neither overflow nor lose digits.
+    /// Returns true if the powers of a cell width h up to h^7 neither overflow nor lose digits.
     [[nodiscard]] static bool is_sound(double width) noexcept { return width > 0x1p-100 && width < 0x1p100; }
 
-    /// Keeps only `count` cells, from index `first` on.
+    /// Keeps `count` cells from index `first` on, and removes all others from the table.
     void keep(std::size_t first, std::size_t count) {
         const auto begin = pieces_.begin() + static_cast<std::ptrdiff_t>(first);
         pieces_ = std::vector<Piece>(begin, begin + static_cast<std::ptrdiff_t>(count));
         origin_ += static_cast<std::int64_t>(first);
     }
 
-    /// Returns the value at x.
+    /// Returns the value of the function at x.
     [[nodiscard, gnu::always_inline]] inline double value(double x) const noexcept {
         const Place at = place(x);
         const auto& c = pieces_[at.piece].c;
@@ -83,7 +86,8 @@ class PiecewiseSeptic {
                ((c[4] + c[5] * u) * u4 + (c[6] + c[7] * u) * (u2 * u4));
     }
 
-    /// Returns value, slope and both antiderivatives from one look-up; call `integrate` first.
+    /// Returns value, slope and both antiderivatives of the function at x from one look-up of the cell; call
+    /// `integrate` first.
     [[nodiscard, gnu::always_inline]] inline Curve at(double x) const noexcept {
         const Place at = place(x);
         const auto& c = pieces_[at.piece].c;
@@ -103,7 +107,7 @@ class PiecewiseSeptic {
         return {both[0], both[1], first + u * once, second + u * (first + u * twice)};
     }
 
-    /// Stores the antiderivatives at the middle of every cell, from `antiderivatives(x)`.
+    /// Stores the two antiderivatives of the function at the centre of every cell, computed by `antiderivatives(x)`.
     template <class Function>
     void integrate(Function antiderivatives) {
         integrals_.reserve(size());
@@ -112,11 +116,12 @@ class PiecewiseSeptic {
         }
     }
 
-    /// Bounds the rounding error of value and slope of cell k, in its coefficients and its evaluation. It sums the
-    /// absolute terms of `piece`; the coefficients bound the derivatives.
+    /// Returns bounds of the rounding errors of value and slope in cell k, from the computation of the coefficients and
+    /// from the evaluation of the polynomial. They are sums of the absolute terms of `piece`; the coefficients give
+    /// bounds of the derivatives.
     [[nodiscard]] std::array<double, 2> rounding(std::size_t k) const noexcept {
         const auto c = coefficients(k);
-        Jet bounds{std::abs(c[0]), 0.0, 0.0, 0.0};  // of the derivatives by t
+        Jet bounds{std::abs(c[0]), 0.0, 0.0, 0.0};  // bounds of value and derivatives by t
         for (std::size_t j = 1; j < c.size(); ++j) {
             double term = std::ldexp(std::abs(c[j]), -static_cast<int>(j));
             for (std::size_t d = 1; d <= std::min<std::size_t>(j, 3); ++d) {
@@ -130,33 +135,34 @@ class PiecewiseSeptic {
     }
 
   private:
-    /// Coefficients of one cell, in one cache line.
+    /// Polynomial coefficients of one cell, in one cache line.
     struct alignas(64) Piece {
         std::array<double, 8> c;
     };
 
-    /// Constant that rounds a double to an integer when added; the low bits then hold the integer. Multiplied by h, it
-    /// rounds to a multiple of h.
+    /// Constant that rounds a double to an integer when it is added to the double; the low bits of the sum then contain
+    /// the integer. The constant times h rounds a double to a multiple of h.
     static constexpr double rounder = 0x1.8p52;
 
-    /// Index of a cell and the distance from its centre.
+    /// Index of the cell that contains x, and the distance u of x from the centre of this cell.
     struct Place {
         std::size_t piece;
         double u;
     };
 
-    /// Returns the cell of x and the distance from its centre.
+    /// Returns the index of the cell that contains x, and the distance of x from the centre of this cell.
     [[nodiscard, gnu::always_inline]] inline Place place(double x) const noexcept {
         const double rounded = x + rounder_;
         return {static_cast<std::size_t>(std::bit_cast<std::int64_t>(rounded) - origin_),
                 x - (rounded - rounder_)};
     }
 
-    /// Two lanes of one register, on every processor and compiler that this library supports.
+    /// Two doubles in one vector register, available on every processor and compiler that this library supports.
     using Pair = double __attribute__((vector_size(16)));
 
-    /// Returns value and slope. Both sums have the same form, with (j + 1) c[j + 1] instead of c[j], so that both cost
-    /// as much as one. The factors of j are in the powers of u, which are known before the coefficients.
+    /// Returns value and slope of a polynomial with the coefficients c at u. The sum for the slope has the coefficients
+    /// (j + 1) c[j + 1] instead of c[j], so both sums are computed together in one register, in the time of one. The
+    /// factors j + 1 multiply the powers of u, which are computed while the coefficients are loaded.
     [[nodiscard, gnu::always_inline]] static inline Pair value_and_slope(const std::array<double, 8>& c,
                                                                          double u) noexcept {
         const auto at = [&c](std::size_t j) {
@@ -173,7 +179,7 @@ class PiecewiseSeptic {
                 (at(6) + Pair{c[7], 0.0} * u1) * (u2 * Pair{1.0, 7.0} * u4));
     }
 
-    /// Converts powers of t to powers of u.
+    /// Converts the coefficients of a polynomial from powers of t = u / h to powers of u.
     [[nodiscard]] Piece by_x(const Piece& piece) const noexcept {
         Piece scaled = piece;
         double power = 1.0;
@@ -184,13 +190,13 @@ class PiecewiseSeptic {
         return scaled;
     }
 
-    /// Converts derivatives by x to derivatives by t.
+    /// Converts value and derivatives by x to value and derivatives by t = x / h.
     [[nodiscard]] Jet by_t(const Jet& jet) const noexcept {
         return {jet[0], jet[1] * width_, jet[2] * (width_ * width_), jet[3] * (width_ * width_ * width_)};
     }
 
-    /// Returns the polynomial of degree 7 with these derivatives at t = -1/2 and 1/2, from even and odd powers
-    /// separately.
+    /// Returns the coefficients of the polynomial of degree 7 in t that has the value and three derivatives `left` at t
+    /// = -1/2 and `right` at t = 1/2. The even and the odd powers are computed separately.
     [[nodiscard]] static Piece piece(const Jet& left, const Jet& right) noexcept {
         Jet even;
         Jet odd;

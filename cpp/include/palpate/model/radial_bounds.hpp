@@ -15,16 +15,17 @@
 
 namespace palpate {
 
-/// Bounds of the value and the gradient of a network of d inputs over a box.
+/// Lower and upper bounds of value and gradient of a network of d inputs over a box of inputs.
 struct RadialBounds {
     Interval value;
-    std::vector<Interval> gradient;  ///< bounds of each component
+    std::vector<Interval> gradient;  ///< bounds of each component of the gradient
 };
 
 namespace detail {
 
-/// Returns the range of c + b't + t'A t / 2 for |t_j| <= 1, plus a remainder. The terms of each t_j and its square are
-/// exact, products of two inputs are bounded by their absolute value.
+/// Returns a lower and an upper bound of the quadratic function c + b't + t'A t / 2 plus a remainder of at most `rest`,
+/// for all vectors t with |t_j| <= 1. The bounds of the terms of t_j and t_j^2 are exact; a product of two components
+/// is replaced by the absolute value of its coefficient.
 [[nodiscard]] inline Interval quadratic_range(std::size_t d, double c, const double* b, const double* a,
                                               double rest) noexcept {
     Interval range{c - rest, c + rest};
@@ -45,8 +46,8 @@ namespace detail {
     return range;
 }
 
-/// Ranges of value and gradient over a box by Taylor's formula about its middle. The fourth derivative is bounded
-/// wavelet by wavelet at the least distance.
+/// Computes bounds of value and gradient of a network over a box of inputs by Taylor's formula about the middle of the
+/// box. The bound of the fourth derivative is a sum over the wavelets, each at its smallest distance from the box.
 class RadialEnclosure {
   public:
     RadialEnclosure(const NetworkParameters& network, const RadialSum& hats)
@@ -59,12 +60,13 @@ class RadialEnclosure {
         ranges.gradient.resize(network.dimension);
     }
 
-    /// Computes the ranges over a box.
+    /// Computes bounds of value and gradient over the box from `lower` to `upper`.
     void over(const double* lower, const double* upper) noexcept {
         const std::size_t d = network_.dimension;
         for (std::size_t j = 0; j < d; ++j) {
             middle_[j] = 0.5 * (lower[j] + upper[j]);
-            // Rounded up, and above 0, because the gradient is divided by it.
+            // Half the width of the box along input j. It is rounded up and above 0, because the gradient is divided by
+            // it.
             radius_[j] = std::max(upper[j] - middle_[j], middle_[j] - lower[j]) * (1.0 + 1e-15) + 1e-200;
         }
         hats_.expand(middle_.data(), radius_.data(), sums_);
@@ -73,8 +75,8 @@ class RadialEnclosure {
         for (const double component : sums_.third_derivative) {
             third_derivatives += std::abs(component);
         }
-        // The factor covers the rounding of the remainder. If a box is wide for a wavelet, it also covers the rounding
-        // of all its terms.
+        // The factor covers the rounding errors of the remainder, and of all terms of a wavelet that is narrow compared
+        // with the box.
         constexpr double rounded_up = 1.0 + 1e-9;
         const double fourth = rounded_up * std::reduce(sums_.rest.begin(), sums_.rest.end());
         for (std::size_t j = 0; j < d; ++j) {
@@ -90,7 +92,7 @@ class RadialEnclosure {
                                        third_derivatives / 6.0 + fourth / 24.0);
     }
 
-    /// Returns the input along which the value can change most.
+    /// Returns the index of the input along which the value of the network can change most in the box.
     [[nodiscard]] std::size_t widest() const noexcept {
         std::size_t widest = 0;
         double largest_change = 0.0;
@@ -104,8 +106,8 @@ class RadialEnclosure {
         return widest;
     }
 
-    double value = 0.0;            ///< in the middle
-    std::vector<double> gradient;  ///< in the middle
+    double value = 0.0;            ///< value of the network in the middle of the box
+    std::vector<double> gradient;  ///< gradient of the network in the middle of the box
     RadialBounds ranges;
 
   private:
@@ -116,19 +118,21 @@ class RadialEnclosure {
     std::vector<double> radius_;
 };
 
-/// Largest and smallest sampled value, and the test for finished cells.
+/// Smallest and largest sampled value of a function, and the test for finished cells.
 struct SampledRange {
     Interval range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
 
     void add(double value) noexcept { range = range.with({value, value}); }
-    /// Returns true if a cell with this range cannot change the sampled range by more than `slack`.
+    /// Returns true if a cell with the bounds `possible` cannot contain a value that exceeds the sampled values by more
+    /// than `slack`.
     [[nodiscard]] bool is_finished(Interval possible, double slack) const noexcept {
         return possible.upper <= range.upper + slack && possible.lower >= range.lower - slack;
     }
 };
 
-/// Bounds of the rounding errors of value and gradient in a box: 64 (N + 8) units of the sums of absolute terms, with
-/// |psi| <= d, |grad psi| and its terms <= d + 4.
+/// Bounds of the rounding errors of value and gradient of a network of N wavelets and d inputs in a box: 64 (N + 8)
+/// epsilon times the sums of absolute terms. The sums use |psi| <= d, and |grad psi| and its terms <= d + 4, for the
+/// radial Mexican hat psi.
 struct RadialRounding {
     double value;
     std::vector<double> gradient;
@@ -157,7 +161,8 @@ struct RadialRounding {
     }
 };
 
-/// Calls visit(x) at likely positions of the largest value or gradient: at the wavelets' centres and on their flanks.
+/// Calls visit(x) at inputs x at which the value or the gradient of the network is probably large: at the centre of
+/// each wavelet and on its flanks.
 template <class Visitor>
 void visit_steep_positions(const NetworkParameters& network, std::span<const double> lower,
                            std::span<const double> upper, Visitor visit) {
@@ -182,9 +187,10 @@ void visit_steep_positions(const NetworkParameters& network, std::span<const dou
 
 }  // namespace detail
 
-/// Returns proved bounds over the box [lower, upper] of a network of any number of inputs without continuation, by
-/// bisection of the box. They are at most `relative` times the largest |f| and |df/dx_j| wider than the true ranges.
-/// Boxes that are too coarse at the end of the budget only widen the result.
+/// Returns proved bounds of value and gradient of a network of any number of inputs, without continuation, over the box
+/// from `lower` to `upper`, by bisection of the box. The bounds are wider than the true minimum and maximum by at most
+/// `relative` times the largest |f| and |df/dx_j|. `budget` limits the number of boxes; boxes that are still too wide
+/// at this limit only make the bounds wider.
 [[nodiscard]] inline RadialBounds radial_bounds(const NetworkParameters& network,
                                                 std::span<const double> lower, std::span<const double> upper,
                                                 double relative = 0.01, std::size_t budget = 50'000,
@@ -200,7 +206,7 @@ void visit_steep_positions(const NetworkParameters& network, std::span<const dou
             gradient[j].add(slopes[j]);
         }
     };
-    // Likely positions of the largest values come first, because known large values finish the other boxes sooner.
+    // Inputs with probably large values are sampled first, because large sampled values finish other boxes sooner.
     std::vector<double> slopes(d);
     detail::visit_steep_positions(network, lower, upper, [&](const std::vector<double>& x) {
         slopes = network.linear;
@@ -218,8 +224,8 @@ void visit_steep_positions(const NetworkParameters& network, std::span<const dou
     };
     detail::RadialEnclosure box{network, hats};
     RadialBounds bounds;
-    // The edges of all boxes, 2 d numbers each, wide boxes first, so that all are equally coarse at the end of the
-    // budget.
+    // The edges of all boxes, 2 d numbers for each box. Wide boxes come first, so that all boxes have similar widths
+    // when the largest number of boxes is reached.
     std::vector<double> edges{lower.begin(), lower.end()};
     edges.insert(edges.end(), upper.begin(), upper.end());
     edges.reserve(4096);

@@ -19,9 +19,9 @@ namespace palpate {
 ///
 ///     f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b,
 ///
-/// where psi is the radial Mexican hat and o is the product component by component. Outside the box of its data it is
-/// the value at the projection onto the box plus the gradient there times the distance. Each component of the gradient
-/// is clipped to [0, the largest inside].
+/// where psi is the radial Mexican hat and o is the product component by component. Outside the domain, f is the value
+/// at the nearest point of the domain plus the gradient at this point times the distance from this point. Each
+/// component of that gradient is limited to values from 0 to its largest value inside the domain.
 class RadialNetwork {
   public:
     RadialNetwork(NetworkParameters network, Domain domain,
@@ -37,7 +37,7 @@ class RadialNetwork {
     [[nodiscard]] std::size_t dimension() const noexcept { return network_.dimension; }
     [[nodiscard]] std::size_t size() const noexcept { return network_.weight.size(); }
 
-    /// Returns true if x (d values) lies outside the data.
+    /// Returns true if the input x (d values) lies outside the domain.
     [[nodiscard]] bool extrapolated(std::span<const double> x) const noexcept {
         for (std::size_t j = 0; j < dimension(); ++j) {
             if (x[j] != projected(x, j)) {
@@ -47,7 +47,7 @@ class RadialNetwork {
         return false;
     }
 
-    /// Returns the value at x (d values), continuation included.
+    /// Returns the value of the network at the input x (d values), continuation included.
     [[nodiscard]] double value(std::span<const double> x) const noexcept {
         double sum = network_.bias;
         for (std::size_t j = 0; j < dimension(); ++j) {
@@ -61,8 +61,8 @@ class RadialNetwork {
         return sum;
     }
 
-    /// Returns the value at x and writes the gradient to `gradient` (d values each), in one pass, continuation
-    /// included.
+    /// Returns the value of the network at the input x, and writes its gradient to `gradient` (d values each),
+    /// continuation included.
     [[nodiscard]] double at(std::span<const double> x, std::span<double> gradient) const noexcept {
         double sum = network_.bias;
         for (std::size_t j = 0; j < dimension(); ++j) {
@@ -80,8 +80,8 @@ class RadialNetwork {
         return sum;
     }
 
-    /// Returns proved bounds of the value inside the domain and of the gradient anywhere. Outside, the components of
-    /// the gradient are those at the projection, or are clipped towards zero.
+    /// Returns proved bounds of the value inside the domain, and of the gradient inside and outside the domain. Outside
+    /// the domain each component of the gradient is that at the nearest point of the domain, or is nearer to zero.
     [[nodiscard]] RadialBounds bounds(double relative = 0.01) const {
         RadialBounds bounds = radial_bounds(network_, domain_.lower, domain_.upper, relative);
         for (Interval& component : bounds.gradient) {
@@ -105,7 +105,7 @@ class RadialNetwork {
         return network_.alpha[k] * (projected(x, j) - network_.beta[k]);
     }
 
-    /// Returns df/dx_j at the projection of x.
+    /// Returns df/dx_j, component j of the gradient, at the point of the domain that is nearest to x.
     [[nodiscard]] double partial(std::span<const double> x, std::size_t j) const noexcept {
         double sum = network_.linear[j];
         for (std::size_t i = 0; i < size(); ++i) {
@@ -124,8 +124,9 @@ class RadialNetwork {
         return std::clamp(partial(x, j), 0.0, gradient_cap_[j]);
     }
 
-    /// Returns the largest partial derivatives, at least 0, over the wavelets' centres and 1024 points that are spread
-    /// evenly over the box. The points are an additive recurrence: multiples of the powers of 1/g, g^(d+1) = g + 1.
+    /// Returns the largest partial derivative by each input, at least 0, over the wavelets' centres and 1024 points
+    /// that are distributed evenly over the domain. The points are an additive recurrence: multiples of the powers of
+    /// 1/g, where g solves g^(d+1) = g + 1.
     [[nodiscard]] std::vector<double> largest_gradient() const {
         const std::size_t d = dimension();
         std::vector<double> largest(d, 0.0);

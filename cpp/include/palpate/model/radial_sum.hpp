@@ -14,14 +14,16 @@ namespace palpate {
 
 namespace detail {
 
-/// Bound of (|D^5 psi| max(r, 1) + 4 |D^4 psi|) e^{0.24 r^2}, divided by `fourth_derivative_supremum`.
+/// Bound of (|D^5 psi| max(r, 1) + 4 |D^4 psi|) e^{0.24 r^2} divided by `fourth_derivative_supremum`, where D^n psi is
+/// derivative n of the radial Mexican hat psi at the distance r from its centre.
 inline constexpr double fourth_derivative_change = 16.8;
 
-/// Returns the numbers that replace |w_i| in bounds of fourth derivatives. Two wavelets of opposite sign that almost
-/// coincide cancel, except for their distance delta: the largest relative difference of their dilations plus the sum of
-/// alpha |difference of their translations|. From one wavelet to the other, D^4 psi(t, t, t, t) changes by at most
-/// (|D^5 psi| max(r, 1) + 4 |D^4 psi|) |t|^4 delta. The changes of r, t and the dilations add at most a tenth for
-/// delta <= 0.02, with the decay e^{-0.22 r^2}.
+/// Returns the numbers that replace the absolute weights |w_i| of the wavelets in bounds of fourth derivatives. Two
+/// wavelets with weights of opposite sign and almost equal shape cancel each other almost completely. The remainder
+/// depends on their difference delta: the largest relative difference of their dilations plus the sum of dilation
+/// |difference of their translations|. From one wavelet to the other, the fourth derivative D^4 psi(t, t, t, t) along a
+/// vector t changes by at most (|D^5 psi| max(r, 1) + 4 |D^4 psi|) |t|^4 delta, at the distance r from the centre. For
+/// delta <= 0.02 the changes of r, t and the dilations add at most a tenth, with the decay e^{-0.22 r^2}.
 [[nodiscard]] inline std::vector<double> uncancelled_weights(const NetworkParameters& network) {
     constexpr double near = 0.02;
     constexpr double change = 1.11 * fourth_derivative_change;
@@ -64,8 +66,8 @@ inline constexpr double fourth_derivative_change = 16.8;
 
 }  // namespace detail
 
-/// The sum of the wavelets of a network of any number of inputs, at projections onto a box. Computes one vectorised
-/// exponential for each wavelet, with the widest instructions of the machine.
+/// The sum of the wavelets of a network of any number of inputs, evaluated at the point of a box that is nearest to the
+/// input. Computes one vectorised exponential for each wavelet, with the widest registers of the processor.
 class RadialSum {
   public:
     RadialSum(const NetworkParameters& network, std::span<const double> lower, std::span<const double> upper,
@@ -90,17 +92,19 @@ class RadialSum {
                   columns_.end() - static_cast<std::ptrdiff_t>(size_));
     }
 
-    /// Adds the sum at the projection of x to `value`, and its gradient to `gradient` unless that is null.
+    /// Adds the sum of the wavelets, at the point of the box nearest to x, to `value`, and the gradient of the sum to
+    /// `gradient` unless `gradient` is null.
     void add(const double* x, double& value, double* gradient) const noexcept {
         kernel_.radial(columns(), x, value, gradient);
     }
 
-    /// Computes Taylor's formula about the middle of a box.
+    /// Computes value, derivatives and remainder of the sum of the wavelets for Taylor's formula about the middle of a
+    /// box.
     void expand(const double* middle, const double* radius, detail::RadialExpansion& sums) const noexcept {
         kernel_.expansion(columns(), middle, radius, sums);
     }
 
-    /// Returns an expansion with memory for `expand`.
+    /// Returns an empty expansion with enough memory for the results of `expand`.
     [[nodiscard]] detail::RadialExpansion expansion() const { return {dimension_, size_}; }
 
   private:
@@ -120,7 +124,7 @@ class RadialSum {
     std::size_t dimension_;
     std::size_t size_;
     std::vector<double> columns_;
-    std::vector<double> box_;  ///< lower edges, then upper edges
+    std::vector<double> box_;  ///< lower edges of the box, then upper edges
 };
 
 }  // namespace palpate

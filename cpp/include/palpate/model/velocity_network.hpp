@@ -15,13 +15,14 @@
 
 namespace palpate {
 
-/// A force of position and velocity as it is rendered: the network N of eq. 4 within the box of its data,
+/// A force of position x and velocity v, as it is rendered: the network N of eq. 4 inside its domain of positions and
+/// velocities,
 ///
 ///     f(x, v) = N(clip x, clip v) + s (x - clip x).
 ///
-/// Outside the box the velocity is clipped to the data. Beyond an edge of the positions the force continues with the
-/// slope s of the object at rest there, at every velocity. (Outside its box the slope of `RadialNetwork` is not bounded
-/// like this.)
+/// clip limits position and velocity to their values in the domain. Outside the domain of positions the force continues
+/// as a straight line. At every velocity the slope s of this line is that for velocity zero. (`RadialNetwork` does not
+/// limit the slope outside its domain in this way.)
 class VelocityNetwork {
   public:
     VelocityNetwork(NetworkParameters network, Domain domain)
@@ -36,11 +37,12 @@ class VelocityNetwork {
     [[nodiscard]] double lower() const noexcept { return network_.domain().lower[0]; }
     [[nodiscard]] double upper() const noexcept { return network_.domain().upper[0]; }
     [[nodiscard]] double travel() const noexcept { return upper() - lower(); }
-    /// Return the continuation of the force at rest, without the antiderivative.
+    /// Return the straight lines that continue the force at velocity zero outside the domain. Their antiderivatives are
+    /// not computed.
     [[nodiscard]] const EdgeLine& below() const noexcept { return below_; }
     [[nodiscard]] const EdgeLine& above() const noexcept { return above_; }
 
-    /// Returns the force [N], continuation included.
+    /// Returns the force at a position and a velocity [N], continuation included.
     [[nodiscard]] double force(double position, double velocity) const noexcept {
         const double inside = std::clamp(position, lower(), upper());
         const double slope = (position < inside ? below_ : above_).at_edge.slope;
@@ -51,7 +53,8 @@ class VelocityNetwork {
         return network_.extrapolated(std::array{position, velocity});
     }
 
-    /// Returns the narrowest width of a wavelet along the positions [m]; the travel if there is none.
+    /// Returns the smallest width of a wavelet along the position, 1 / dilation [m]; the length of the domain of
+    /// positions if the network has no wavelets or only wider ones.
     [[nodiscard]] double finest_width() const noexcept {
         const std::vector<double>& alpha = network_.parameters().alpha;
         double finest = travel();
@@ -61,13 +64,14 @@ class VelocityNetwork {
         return finest;
     }
 
-    /// Returns proved bounds of N and its gradient over the box, within `relative` of their largest.
+    /// Returns proved bounds of the force and its gradient over the domain of positions and velocities, wider than the
+    /// true ones by at most `relative` times their largest absolute values.
     [[nodiscard]] RadialBounds moving_bounds(double relative) const {
         return radial_bounds(network_.parameters(), network_.domain().lower, network_.domain().upper,
                              relative);
     }
 
-    /// Returns proved bounds of N and its gradient over the positions at rest.
+    /// Returns proved bounds of the force and its gradient over the domain of positions, at velocity zero.
     [[nodiscard]] RadialBounds resting_bounds(double relative) const {
         const double rest = clipped(0.0);
         return radial_bounds(network_.parameters(), std::array{lower(), rest}, std::array{upper(), rest},
@@ -85,7 +89,7 @@ class VelocityNetwork {
         return std::clamp(velocity, network_.domain().lower[1], network_.domain().upper[1]);
     }
 
-    /// Returns value and slope at velocity zero.
+    /// Returns the force and its slope by position, at velocity zero.
     [[nodiscard]] Curve resting(double position) const noexcept {
         std::array<double, 2> gradient{};
         const double value = network_.at(std::array{position, clipped(0.0)}, gradient);

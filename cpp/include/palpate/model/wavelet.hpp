@@ -6,12 +6,12 @@
 
 namespace palpate {
 
-/// |u| from which every function of the Mexican hat is zero in double precision. Clamping to it keeps u^2 finite for
-/// any finite u; NaN stays NaN.
+/// Distance |u| from the centre above which the Mexican hat, its derivatives and its antiderivatives are zero in double
+/// precision. Limiting u to this distance keeps u^2 finite for any finite u; NaN stays NaN.
 inline constexpr double wavelet_reach = 40.0;
 
-/// The Mexican hat psi(u) = (u^2 - 1) e^{-u^2/2}, its derivative and its first two antiderivatives from one
-/// exponential. It is the second derivative of a Gaussian (paper eq. 5 with zeta = 1/2).
+/// The Mexican hat psi(u) = (u^2 - 1) E with E = e^{-u^2/2}, its derivative and its first two antiderivatives, from one
+/// exponential. psi is the second derivative of the Gaussian E (paper eq. 5 with zeta = 1/2).
 struct MexicanHat {
     double value;            ///< (u^2 - 1) E
     double slope;            ///< (3u - u^3) E
@@ -19,7 +19,7 @@ struct MexicanHat {
     double double_integral;  ///< E
 };
 
-/// Returns the Mexican hat at u.
+/// Returns the Mexican hat, its derivative and its antiderivatives at u.
 [[nodiscard]] inline MexicanHat mexican_hat(double u) noexcept {
     u = std::clamp(u, -wavelet_reach, wavelet_reach);
     const double square = u * u;
@@ -27,32 +27,34 @@ struct MexicanHat {
     return {(square - 1.0) * gaussian, (3.0 - square) * u * gaussian, -u * gaussian, gaussian};
 }
 
-/// Returns psi''(u) = (u^4 - 6u^2 + 3) E.
+/// Returns the second derivative of the Mexican hat, psi''(u) = (u^4 - 6u^2 + 3) e^{-u^2/2}.
 [[nodiscard]] inline double mexican_hat_curvature(double u) noexcept {
     u = std::clamp(u, -wavelet_reach, wavelet_reach);
     const double square = u * u;
     return ((square - 6.0) * square + 3.0) * std::exp(-0.5 * square);
 }
 
-/// Returns psi'''(u) = (-u^5 + 10u^3 - 15u) E.
+/// Returns the third derivative of the Mexican hat, psi'''(u) = (-u^5 + 10u^3 - 15u) e^{-u^2/2}.
 [[nodiscard]] inline double mexican_hat_jerk(double u) noexcept {
     u = std::clamp(u, -wavelet_reach, wavelet_reach);
     const double square = u * u;
     return ((10.0 - square) * square - 15.0) * u * std::exp(-0.5 * square);
 }
 
-/// The radial Mexican hat of d inputs, psi(u) = (|u|^2 - d) e^{-|u|^2/2}, as functions of r^2 = |u|^2.
+/// The radial Mexican hat of d inputs, psi(u) = (r^2 - d) E with r^2 = |u|^2 and E = e^{-r^2/2}, and the factor of its
+/// gradient.
 struct RadialMexicanHat {
     double value;            ///< (r^2 - d) E
     double gradient_over_u;  ///< (d + 2 - r^2) E; the gradient is this times u
 
-    /// Returns d^2 psi / du_j^2 for a component u_j of u (2 E is the sum of the two members above).
+    /// Returns the second derivative d^2 psi / du_j^2 for a component u_j = `u` (2 E is `value` + `gradient_over_u`).
     [[nodiscard]] double curvature(double u) const noexcept {
         return gradient_over_u - u * u * (2.0 * gradient_over_u + value);
     }
 };
 
-/// Returns the radial Mexican hat at r^2 = `square`.
+/// Returns the radial Mexican hat and the factor of its gradient at the squared distance r^2 = `square` from the
+/// centre.
 [[nodiscard]] inline RadialMexicanHat radial_mexican_hat(double square, double dimension) noexcept {
     square = std::min(square, wavelet_reach * wavelet_reach);
     const double gaussian = std::exp(-0.5 * square);

@@ -14,18 +14,19 @@
 
 namespace palpate {
 
-/// Consumer of records: a file, a network connection, a figure. It may be slow and must not throw.
+/// A class that processes records of ticks, for example writes them to a file. Its take() may be slow and must not
+/// throw.
 template <class C, class Record>
 concept RecordConsumer = requires(C& consumer, std::span<const Record> records) {
     { consumer.take(records) } noexcept;
 };
 
-/// Moves records out of a real-time loop. The loop pushes into a ring buffer; a separate thread passes the records to
-/// the consumer every few milliseconds. Records that do not fit into the ring are lost and counted.
+/// Moves records out of a real-time loop. The loop adds records to a ring buffer; a separate thread passes the records
+/// to the consumer every few milliseconds. Records that do not fit into the ring buffer are lost and counted.
 template <class Record, RecordConsumer<Record> Consumer>
 class FlightRecorder {
   public:
-    /// Starts the thread, which passes records on at the interval `every`.
+    /// Starts the thread, which passes records to the consumer at the interval `every`.
     FlightRecorder(Consumer& consumer, std::size_t capacity, std::chrono::milliseconds every)
         : ring_{capacity}, consumer_{consumer}, every_{every}, batch_(4096) {
         writer_ = std::thread{[this] { write_until_stopped(); }};
@@ -34,14 +35,14 @@ class FlightRecorder {
     FlightRecorder(const FlightRecorder&) = delete;
     FlightRecorder& operator=(const FlightRecorder&) = delete;
 
-    /// Adds a record; called by the loop.
+    /// Adds a record to the ring buffer. Only the real-time loop calls this function.
     void push(const Record& record) noexcept {
         if (!ring_.push(record)) {
             lost_.fetch_add(1, std::memory_order_relaxed);
         }
     }
 
-    /// Stops the thread. All records pushed before have then reached the consumer.
+    /// Stops the thread after it has passed all records to the consumer.
     void stop() noexcept {
         if (writer_.joinable()) {
             stopping_.store(true, std::memory_order_release);
@@ -49,7 +50,7 @@ class FlightRecorder {
         }
     }
 
-    /// Returns the number of records lost because the ring was full.
+    /// Returns the number of records lost because the ring buffer was full.
     [[nodiscard]] std::uint64_t lost() const noexcept { return lost_.load(std::memory_order_relaxed); }
 
   private:
@@ -76,16 +77,16 @@ class FlightRecorder {
     std::thread writer_;
 };
 
-/// Stores the last records of a loop, without a thread, for the report of a fault.
+/// Stores the last records of a loop in memory, for the report of a fault.
 template <class Record>
 class LastRecords {
   public:
     explicit LastRecords(std::size_t capacity) : records_(capacity) {}
 
-    /// Adds a record in place of the oldest one.
+    /// Stores a record; if the memory is full, the record replaces the oldest stored record.
     void push(const Record& record) noexcept { records_[count_++ % records_.size()] = record; }
 
-    /// Returns the records, oldest first. Allocates, so the loop must not call it.
+    /// Returns the stored records, oldest first. It allocates memory, so a running real-time loop must not call it.
     [[nodiscard]] std::vector<Record> in_order() const {
         const std::size_t size = records_.size();
         const std::size_t first = count_ > size ? count_ - size : 0;

@@ -14,27 +14,27 @@ using Nanoseconds = std::int64_t;
 
 inline constexpr Nanoseconds nanoseconds_a_second = 1'000'000'000;
 
-/// Returns the time of the clock of all deadlines, which never jumps.
+/// Returns the time of the monotonic system clock, which never jumps [ns]. All deadlines are times of this clock.
 [[nodiscard]] inline Nanoseconds monotonic_now() noexcept {
     timespec now{};
     clock_gettime(CLOCK_MONOTONIC, &now);
     return now.tv_sec * nanoseconds_a_second + now.tv_nsec;
 }
 
-/// One wake-up.
+/// One wake-up of a control loop.
 struct Wake {
-    Nanoseconds deadline = 0;   ///< planned time
-    Nanoseconds now = 0;        ///< actual time
-    std::uint64_t skipped = 0;  ///< later deadlines that had also passed; they are without a tick
+    Nanoseconds deadline = 0;   ///< planned time of the wake-up
+    Nanoseconds now = 0;        ///< actual time of the wake-up
+    std::uint64_t skipped = 0;  ///< later deadlines that have also passed; they get no tick
 };
 
-/// Wakes up at absolute deadlines t_0 + k T, so that a late tick does not delay later ones. Deadlines that have passed
-/// are skipped and counted; missed ticks are not repeated.
+/// Wakes up a loop at the fixed times (deadlines) t_0 + k T, with period T, so that a late tick does not delay later
+/// ticks. Deadlines that have already passed are skipped and counted; their ticks are not run later.
 class Periodic {
   public:
     explicit Periodic(Nanoseconds period) noexcept : period_{period} {}
 
-    /// Sets the first deadline one period from now.
+    /// Sets the first deadline to one period after the present time.
     void start() noexcept { next_ = monotonic_now() + period_; }
 
     /// Sleeps until the next deadline.
@@ -54,16 +54,17 @@ class Periodic {
     Nanoseconds next_ = 0;
 };
 
-/// Clock of a loop that its device paces. A tick is due one period after the last one, and waits in the device for its
-/// sample. It does not skip deadlines; a sample that the device did not deliver is missing in its sequence.
+/// Clock of a control loop whose rate the device sets. Each tick is planned one period after the previous tick, and
+/// waits for the device's sample in `exchange`. Deadlines are not skipped; a lost sample shows as a gap in the numbers
+/// of the device's samples.
 class PacedByDevice {
   public:
     explicit PacedByDevice(Nanoseconds period) noexcept : period_{period} {}
 
-    /// Sets the first tick to now.
+    /// Plans the first tick for the present time.
     void start() noexcept { last_ = monotonic_now() - period_; }
 
-    /// Returns at once; the device exchange waits.
+    /// Returns at once, because `exchange` of the device waits for the sample.
     [[nodiscard]] Wake wait() noexcept {
         const Nanoseconds deadline = last_ + period_;
         last_ = monotonic_now();

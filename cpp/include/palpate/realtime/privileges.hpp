@@ -18,11 +18,11 @@
 
 namespace palpate {
 
-/// Requests of a thread to the operating system that make it punctual. A refused request affects punctuality, not
-/// correctness: it is reported, and the loop runs.
+/// Settings that the control loop's thread requests from the operating system to run without delays. If the system
+/// refuses a request, ticks can be late; the refusal is reported, and the loop runs.
 struct RealTimeOptions {
     int priority = 80;  ///< priority of SCHED_FIFO, 1 to 99; 0 = ordinary scheduling
-    int cpu = -1;       ///< core of the thread; -1 = the last one allowed, -2 = any core
+    int cpu = -1;       ///< processor core of the thread; -1 = the last allowed core, -2 = any core
 };
 
 /// Keeps the memory of the process from being swapped out during the lifetime of this object.
@@ -37,16 +37,17 @@ class LockedMemory {
     LockedMemory(const LockedMemory&) = delete;
     LockedMemory& operator=(const LockedMemory&) = delete;
 
-    /// Returns 0, or the error number if the memory is not locked.
+    /// Returns 0, or the system error number if the memory could not be locked.
     [[nodiscard]] int error() const noexcept { return error_; }
 
   private:
     int error_;
 };
 
-/// Keeps the cores from sleeping deeply during the lifetime of this object. Waking up from a deep sleep takes longer
-/// than the rest of a tick, and on a virtual machine the host's scheduler controls even a shallow one. The kernel keeps
-/// the latency that is written in its file while the file is open (Documentation/power/pm_qos_interface.rst).
+/// Prevents the processor cores from entering a sleep state during the lifetime of this object. Waking up from a deep
+/// sleep state takes longer than the computation of a tick; on a virtual machine the host's scheduler controls also a
+/// light sleep state. The Linux kernel keeps the wake-up latency that is written to /dev/cpu_dma_latency while that
+/// file is open (Documentation/power/pm_qos_interface.rst).
 class SleepInhibitor {
   public:
     SleepInhibitor() noexcept : file_{open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC)} {
@@ -62,7 +63,7 @@ class SleepInhibitor {
     SleepInhibitor(const SleepInhibitor&) = delete;
     SleepInhibitor& operator=(const SleepInhibitor&) = delete;
 
-    /// Returns 0, or the error number if the cores may sleep.
+    /// Returns 0, or the system error number if the cores may still enter a sleep state.
     [[nodiscard]] int error() const noexcept { return error_; }
 
   private:
@@ -72,7 +73,7 @@ class SleepInhibitor {
 
 namespace detail {
 
-/// Returns the largest number of a core that this process may use.
+/// Returns the highest core number among the processor cores that this process may use.
 [[nodiscard]] inline int last_allowed_cpu() noexcept {
     cpu_set_t allowed;
     CPU_ZERO(&allowed);
@@ -84,7 +85,7 @@ namespace detail {
     return last;
 }
 
-/// Touches the stack that a loop may use, so that its pages are present.
+/// Writes to 64 KiB of stack memory, so that its pages are in memory before the loop uses them.
 inline void prefault_stack() noexcept {
     constexpr std::size_t bytes = 65'536;
     std::array<volatile char, bytes> page{};
@@ -95,8 +96,9 @@ inline void prefault_stack() noexcept {
 
 }  // namespace detail
 
-/// Makes the calling thread a real-time thread: only its own fault signals, one core, first-in-first-out scheduling, a
-/// stack in memory. Returns a sentence for each refused request.
+/// Makes the calling thread a real-time thread: it receives only signals of faults of the thread, such as SIGSEGV, runs
+/// on one processor core with first-in-first-out scheduling, and has its stack in memory. Returns one sentence for each
+/// request that the operating system refused.
 [[nodiscard]] inline std::vector<std::string> become_real_time(const RealTimeOptions& options,
                                                                const LockedMemory& memory,
                                                                const SleepInhibitor& inhibitor) {

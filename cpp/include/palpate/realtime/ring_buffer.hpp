@@ -10,17 +10,17 @@
 
 namespace palpate {
 
-/// A queue between one writing and one reading thread. Neither waits for the other: both calls end after a fixed number
-/// of steps. A full queue refuses new elements.
+/// A queue between one writing and one reading thread. No thread waits for the other thread: push() and pop() end after
+/// a bounded number of steps. A full queue refuses new elements.
 template <class T>
     requires std::is_trivially_copyable_v<T>
 // NOLINTNEXTLINE(clang-analyzer-optin.performance.Padding): the padding keeps two cores off one cache line
 class RingBuffer {
   public:
-    /// Allocates all memory, for at least `capacity` elements.
+    /// Allocates the memory of the queue, for at least `capacity` elements.
     explicit RingBuffer(std::size_t capacity) : slots_(std::bit_ceil(capacity)), mask_{slots_.size() - 1} {}
 
-    /// Adds an element; called by the writing thread. Returns false if the queue is full.
+    /// Adds an element to the queue; only the writing thread calls it. Returns false if the queue is full.
     [[nodiscard]] bool push(const T& value) noexcept {
         const std::size_t head = head_.load(std::memory_order_relaxed);
         if (head - tail_.load(std::memory_order_acquire) == slots_.size()) {
@@ -31,7 +31,8 @@ class RingBuffer {
         return true;
     }
 
-    /// Moves elements to `out`, oldest first, and returns their number; called by the reading thread.
+    /// Moves elements from the queue to `out`, oldest first, and returns their number; only the reading thread calls
+    /// it.
     [[nodiscard]] std::size_t pop(std::span<T> out) noexcept {
         const std::size_t tail = tail_.load(std::memory_order_relaxed);
         const std::size_t available = head_.load(std::memory_order_acquire) - tail;
@@ -43,19 +44,19 @@ class RingBuffer {
         return count;
     }
 
-    /// Returns the number of elements in the queue; called by the reading thread.
+    /// Returns the number of elements in the queue; only the reading thread calls it.
     [[nodiscard]] std::size_t size() const noexcept {
         return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_relaxed);
     }
     [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
 
   private:
-    static constexpr std::size_t cache_line = 64;  ///< memory that two cores must not share [bytes]
+    static constexpr std::size_t cache_line = 64;  ///< distance of data that two cores change [bytes]
 
     std::vector<T> slots_;
     std::size_t mask_;
-    alignas(cache_line) std::atomic<std::size_t> head_{0};  ///< number of all elements written
-    alignas(cache_line) std::atomic<std::size_t> tail_{0};  ///< number of all elements read
+    alignas(cache_line) std::atomic<std::size_t> head_{0};  ///< number of elements written so far
+    alignas(cache_line) std::atomic<std::size_t> tail_{0};  ///< number of elements read so far
 };
 
 }  // namespace palpate

@@ -13,8 +13,9 @@
 
 namespace palpate {
 
-/// A histogram of durations with fixed size and without allocation. It is exact to 1/256 of the value from 0 ns to 18
-/// minutes. Each power of two has 128 equal cells; below 256 ns each nanosecond has one cell.
+/// A histogram of durations from 0 ns to 18 minutes, with fixed size and without allocation. Its durations are exact to
+/// 1/256 of their value. From 256 ns on, the durations between two powers of two are divided into 128 equal cells;
+/// below 256 ns each nanosecond has one cell.
 class DurationHistogram {
   public:
     /// Counts a duration.
@@ -25,8 +26,8 @@ class DurationHistogram {
         largest_ = std::max(largest_, static_cast<Nanoseconds>(value));
     }
 
-    /// Returns the duration that a share of all does not exceed [ns]: the middle of its cell, or the exact largest at
-    /// share 1.
+    /// Returns the duration [ns] that the given share of all counted durations does not exceed, for example the median
+    /// for share 0.5: the middle of a cell, or the exact largest duration for share 1.
     [[nodiscard]] double quantile(double share) const noexcept {
         const auto rank = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_)));
         if (rank >= count_) {
@@ -50,7 +51,7 @@ class DurationHistogram {
     static constexpr std::size_t in_octave = std::size_t{1} << bits;
     static constexpr unsigned octaves = 40 - bits;
     static constexpr std::size_t cells = in_octave * (octaves + 1);
-    static constexpr Nanoseconds longest = 1'099'511'627'775;  ///< 2^40 - 1
+    static constexpr Nanoseconds longest = 1'099'511'627'775;  ///< longest duration, 2^40 - 1 [ns]
 
     [[nodiscard]] static std::size_t cell_of(std::uint64_t value) noexcept {
         const auto width = static_cast<unsigned>(std::bit_width(value));
@@ -69,15 +70,15 @@ class DurationHistogram {
     Nanoseconds largest_ = 0;
 };
 
-/// Punctuality of a loop.
+/// Periods and delays of the wake-ups of a control loop.
 struct LoopTiming {
-    DurationHistogram period;    ///< from wake-up to wake-up
-    DurationHistogram lateness;  ///< from deadline to wake-up
+    DurationHistogram period;    ///< time between two wake-ups
+    DurationHistogram lateness;  ///< time from deadline to wake-up
     std::uint64_t missed = 0;    ///< deadlines without a tick
-    Nanoseconds first = 0;       ///< first wake-up
-    Nanoseconds last = 0;        ///< last wake-up
+    Nanoseconds first = 0;       ///< time of the first wake-up
+    Nanoseconds last = 0;        ///< time of the last wake-up
 
-    /// Counts a wake-up.
+    /// Adds a wake-up to the histograms and counters.
     void add(const Wake& wake) noexcept {
         if (lateness.count() == 0) {
             first = wake.now;
@@ -90,19 +91,20 @@ struct LoopTiming {
     }
 
     [[nodiscard]] std::uint64_t ticks() const noexcept { return lateness.count(); }
-    /// Returns the mean rate over the whole run [Hz].
+    /// Returns the mean number of ticks a second over the whole run [Hz].
     [[nodiscard]] double rate_hz() const noexcept {
         return last > first ? static_cast<double>(ticks() - 1) * 1e9 / static_cast<double>(last - first)
                             : 0.0;
     }
 };
 
-/// Measures the rate over each half second, so that a low rate is noticed within a second.
+/// Measures the rate of a loop over consecutive windows of half a second, so that a low rate is noticed within a
+/// second.
 class RateCheck {
   public:
     explicit RateCheck(Nanoseconds window = nanoseconds_a_second / 2) noexcept : window_{window} {}
 
-    /// Counts a tick. Returns true if a window has just ended; `rate_hz` then returns its rate.
+    /// Counts a tick. Returns true if a window of time has just ended; `rate_hz` then returns the rate in that window.
     [[nodiscard]] bool add(Nanoseconds now) noexcept {
         if (start_ == 0) {
             start_ = now;
@@ -119,7 +121,8 @@ class RateCheck {
         return true;
     }
 
-    /// Returns the rate of the last window [Hz]; 0 before the first has ended. Any thread may call it.
+    /// Returns the rate of the loop in the last window of time [Hz]; 0 before the first window has ended. Any thread
+    /// may call this function.
     [[nodiscard]] double rate_hz() const noexcept { return rate_hz_.load(std::memory_order_relaxed); }
 
   private:

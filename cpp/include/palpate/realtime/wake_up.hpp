@@ -13,11 +13,11 @@
 
 namespace palpate {
 
-/// Lets one thread wait for an event in another thread, until a deadline. It neither locks nor allocates. It is the
-/// timed wait that the atomics of the standard library lack.
+/// Lets one thread wait until another thread reports an event, or until a deadline. It neither locks nor allocates. The
+/// atomics of the C++ standard library have no wait with a deadline.
 class WakeUp {
   public:
-    /// Reports an event. The waiting thread sees all memory writes before it.
+    /// Reports an event to the waiting thread, which then sees all memory writes made before the event.
     void notify() noexcept {
         events_.fetch_add(1, std::memory_order_seq_cst);
         if (waits_.load(std::memory_order_seq_cst)) {
@@ -25,15 +25,16 @@ class WakeUp {
         }
     }
 
-    /// Returns the number of events; read it before checking the condition to wait for.
+    /// Returns the number of events so far. A waiting thread reads this number before it checks its condition.
     [[nodiscard]] std::uint32_t events() const noexcept { return events_.load(std::memory_order_seq_cst); }
 
-    /// Waits until there were more than `known` events. Returns false if the deadline passed.
+    /// Waits until the number of events differs from `known`. Returns false if the deadline passed without a new event.
     [[nodiscard]] bool wait(std::uint32_t known, Nanoseconds deadline) noexcept {
         const timespec until{deadline / nanoseconds_a_second, deadline % nanoseconds_a_second};
         waits_.store(true, std::memory_order_seq_cst);
         while (events_.load(std::memory_order_seq_cst) == known && monotonic_now() < deadline) {
-            // Returns at once if an event has happened meanwhile, because the kernel compares again.
+            // The system call returns at once if an event has happened since the check, because the kernel compares
+            // again.
             ::syscall(SYS_futex, word(), FUTEX_WAIT_BITSET_PRIVATE, known, &until, nullptr,
                       FUTEX_BITSET_MATCH_ANY);
         }

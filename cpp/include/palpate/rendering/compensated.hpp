@@ -12,15 +12,15 @@
 
 namespace palpate {
 
-/// An environment with its force multiplied by a factor. It describes the part of f that stays on a load line after f
-/// is subtracted from it.
+/// An environment whose force f is that of another environment multiplied by a factor. `CompensatedResolvent` uses it
+/// with the factor 1 - p/K_c to solve load lines of a compensated model.
 template <Environment E>
 struct Scaled {
     using State = typename E::State;
     const E& environment;
     double factor;
 
-    /// Returns the environment's force and slope, multiplied.
+    /// Returns force, slope and energy of the other environment, multiplied by the factor.
     [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
         const EnvironmentSample sample = environment.at(x, state);
         return {factor * sample.force, factor * sample.slope, factor * sample.energy, sample.extrapolated};
@@ -29,9 +29,10 @@ struct Scaled {
     [[nodiscard]] State start(double x) const noexcept { return environment.start(x); }
 };
 
-/// An environment that feels like `E` through a coupling of stiffness K_c. The compliance of the coupling's spring is
-/// subtracted from the curve: (x - f(x)/K_c, f(x)) replaces (x, f(x)). Its slope is K_c f' / (K_c - f') > -K_c. This
-/// requires f' < K_c everywhere, and a force without memory.
+/// A stiffer environment that, in series with a coupling of stiffness K_c, gives the force f of the environment `E`.
+/// The deflection f(x)/K_c of the coupling's spring is subtracted from the position: the force at the position x -
+/// f(x)/K_c is f(x). The slope of the stiffer force is K_c f' / (K_c - f') > -K_c. This requires a slope f' < K_c
+/// everywhere, and a force without memory.
 template <Environment E>
     requires std::same_as<typename E::State, Stateless>
 class Compensated {
@@ -41,13 +42,13 @@ class Compensated {
     Compensated(E environment, double coupling_stiffness)
         : environment_{std::move(environment)}, stiffness_{coupling_stiffness} {}
 
-    /// Returns the environment that the hand feels.
+    /// Returns the original environment, which the hand feels through the coupling.
     [[nodiscard]] const E& uncompensated() const noexcept { return environment_; }
-    /// Returns K_c [N/m or N*m/rad].
+    /// Returns the stiffness K_c of the coupling [N/m or N*m/rad].
     [[nodiscard]] double stiffness() const noexcept { return stiffness_; }
 
-    /// Returns force and slope at a shifted position. x - f(x)/K_c = shifted is the load line -f(x) + K_c x = K_c
-    /// shifted.
+    /// Returns force and slope of the stiffer environment at the position `shifted`. The equation x - f(x)/K_c =
+    /// shifted for the position x of the original environment is the load line -f(x) + K_c x = K_c shifted.
     [[nodiscard]] EnvironmentSample at(double shifted, const State& state) const noexcept {
         const Solution found = LoadLineSolver{}.solve(Scaled<E>{environment_, -1.0}, state,
                                                       {stiffness_, stiffness_ * shifted}, shifted);
@@ -66,8 +67,9 @@ class Compensated {
     double stiffness_;
 };
 
-/// Solves the load line of a compensated environment, f + p (x - f/K_c) = q. It is a multiple of a load line of f:
-/// (1 - p/K_c) f(x) + p x = q. It rises if f' < K_c: one table, and one evaluation of f.
+/// Solves the load line of a compensated environment, f(x) + p (x - f(x)/K_c) = q, for the position x, with the force f
+/// of the original environment. This equation is a load line of the force multiplied by a factor: (1 - p/K_c) f(x) + p
+/// x = q. Its left side rises with x if f' < K_c, so one table of solutions and one evaluation of f are sufficient.
 class CompensatedResolvent {
   public:
     using Memory = Resolvent::Memory;
@@ -78,15 +80,14 @@ class CompensatedResolvent {
           factor_{1.0 - p / coupling_stiffness},
           resolvent_{scaled(std::move(force), factor_), p, options} {}
 
-    /// Returns true if the load line has a table.
+    /// Returns true if a table of solutions of the load line exists.
     [[nodiscard]] bool tabulated() const noexcept { return resolvent_.tabulated(); }
-    /// Returns true if every load line of this slope is certified to have one solution. f rises with the shifted
-    /// position if it rises with x, because x - f(x)/K_c rises with x.
+    /// Returns true if every load line of slope p is proved to have exactly one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return p == slope_ && resolvent_.unique(p); }
-    /// Returns the search for a force without a certificate.
+    /// Returns the solver that is used for forces without proved slope bounds.
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return resolvent_.uncertified(); }
 
-    /// Solves the load line and updates the memory.
+    /// Solves the load line and stores the solution in `memory` as the start of the next solution.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const Compensated<E>& environment,
                                                             const Stateless& state, LoadLine line,

@@ -12,7 +12,8 @@
 
 namespace palpate {
 
-/// Direct rendering: F = f(x), where x is the measured position. Its only state is that of the environment.
+/// Direct rendering: the force is F = f(x), with the measured position x and the model's force f. The only memory is
+/// that of the environment, for example the play operator of a model with hysteresis.
 template <Environment E>
 class Direct {
   public:
@@ -36,8 +37,8 @@ class Direct {
     typename E::State state_;
 };
 
-/// Direct rendering of a force of position and velocity: F = f(x, v), v = (x_k - x_{k-1}) / T. The velocity is the
-/// difference of two samples, because the proof of the certificate requires it.
+/// Direct rendering of a model f of position x and velocity v: F = f(x, v), v = (x_k - x_{k-1}) / T. The velocity is
+/// computed from the last two samples, because the proof of the certificate requires this velocity.
 class DirectVelocity {
   public:
     DirectVelocity(VelocityNetwork force, double period_s) : force_{std::move(force)}, period_s_{period_s} {}
@@ -64,30 +65,31 @@ class DirectVelocity {
 
 static_assert(Structure<DirectVelocity>);
 
-/// Largest number of samples that a prediction uses.
+/// Largest number of past samples (taps) that the prediction of the position may use.
 inline constexpr int most_prediction_taps = 16;
 
-/// Returns the weight w_j of the step d_{k-j} = x_{k-j+1} - x_{k-j} in the prediction with m taps:
-/// w_j = (m - j + 1) / (m (m + 1)). The sum of w_1 to w_m is 1/2.
+/// Returns the weight w_j of the motion d_{k-j} = x_{k-j+1} - x_{k-j} between two samples, in the prediction with m
+/// taps: w_j = (m - j + 1) / (m (m + 1)). The sum of w_1 to w_m is 1/2.
 [[nodiscard]] constexpr double prediction_weight(int taps, int j) noexcept {
     return static_cast<double>(taps - j + 1) / (taps * (taps + 1.0));
 }
 
-/// Predicts the position half a sample ahead, the mean position while a force is held for a sample:
+/// Predicts the position half a period ahead, which is the mean position while the device holds a force for one period:
 ///
 ///     x_hat = x_k + (x_k - mean(x_{k-1}, ..., x_{k-m})) / (m + 1) = x_k + sum of w_j d_{k-j}.
 ///
-/// It is exact at constant velocity for every m. More taps need less damping and react later (docs/certificate.md).
+/// x_k is the last sample. The prediction is exact at constant velocity for every m. With a larger m, a certificate
+/// needs less device damping, but the prediction reacts later to a change of velocity (docs/certificate.md).
 class HalfSamplePrediction {
   public:
-    /// Makes a prediction with m = `taps`, from 1 to `most_prediction_taps`.
+    /// Makes a prediction from m = `taps` past samples, from 1 to `most_prediction_taps`.
     explicit HalfSamplePrediction(int taps) noexcept
         : taps_{static_cast<std::size_t>(taps)}, share_{1.0 / (taps * (taps + 1.0))} {}
 
-    /// Sets all past positions to the position of an object at rest.
+    /// Sets all past positions to one position, as for a handle at rest.
     void reset(double position) noexcept { past_.fill(position); }
 
-    /// Returns x_hat from a position and the m before it.
+    /// Returns x_hat, the position predicted from the last position and the m positions before the last one.
     [[nodiscard]] double ahead(double position) const noexcept {
         double moved = 0.0;
         for (std::size_t j = 0; j < taps_; ++j) {
@@ -96,7 +98,7 @@ class HalfSamplePrediction {
         return position + share_ * moved;
     }
 
-    /// Adds a position to the past.
+    /// Adds a position to the past positions.
     void advance(double position) noexcept {
         past_[next_] = position;
         next_ = next_ + 1 == taps_ ? 0 : next_ + 1;
@@ -109,9 +111,9 @@ class HalfSamplePrediction {
     std::array<double, most_prediction_taps> past_{};
 };
 
-/// Direct rendering with prediction: F = f(x_hat), where x_hat is the position predicted half a sample ahead. The
-/// environment's memory, such as the play of a hysteresis, follows the measured position. The force is that of a trial
-/// motion from there to x_hat.
+/// Direct rendering with prediction: F = f(x_hat), where x_hat is the position predicted half a period ahead. The
+/// environment's memory, such as the play operator of a hysteresis, follows the measured position. The force is
+/// computed for a motion from the measured position to x_hat, which does not change the memory.
 template <Environment E>
 class PredictedDirect {
   public:
@@ -145,7 +147,7 @@ class PredictedDirect {
     HalfSamplePrediction prediction_;
 };
 
-/// Builds direct rendering: `Direct`, or `PredictedDirect` if the prediction has taps.
+/// Builds the direct structure: `PredictedDirect` if a prediction is chosen, otherwise `Direct`.
 struct DirectStructure {
     static constexpr StructureTraits traits{.name = "direct", .velocity = true, .predicts = true};
 

@@ -12,30 +12,32 @@
 
 namespace palpate {
 
-/// Object with mass behind the coupling, m v' = F_c - f(x) - B_o v, integrated by a step that never generates energy.
-/// The object's force does exactly the work that is stored, D(y) = (V(y) - V(y_{k-1})) / (y - y_{k-1}). With midpoint
-/// kinematics the load line D + p y = q has
+/// Virtual object with mass m behind a virtual coupling, m v' = F_c - f(y) - B_o v, integrated by a step that never
+/// generates energy. F_c is the force of the coupling and V the stored energy of the model's force f. In a step from
+/// y_{k-1} to y the mean force D(y) = (V(y) - V(y_{k-1})) / (y - y_{k-1}) does exactly the work V(y) - V(y_{k-1}). With
+/// the midpoint rule the equation of the step is the load line D(y) + p y = q, with
 ///
 ///     p = 2m/T^2 + B_o/T + K_c + B_c/T,
 ///     q = (2m/T^2 + B_o/T) y_{k-1} + (2m/T) v_{k-1} + K_c x_k + B_c (v_device + y_{k-1}/T).
 ///
-/// The velocity is v_k = 2 (y_k - y_{k-1}) / T - v_{k-1}.
+/// The velocity of the object is v_k = 2 (y_k - y_{k-1}) / T - v_{k-1}.
 ///
-/// D alone oscillates on stiff walls. With `switched` it replaces f(y) only if f(y) would generate energy, which means
-/// (f(y) - D)(y - y_{k-1}) < 0.
+/// A step that always uses D oscillates on stiff walls. With `switched`, D replaces the force f(y) only if f(y) would
+/// generate energy, which means (f(y) - D)(y - y_{k-1}) < 0.
 ///
-/// Every root satisfies the energy account. With f' >= -s, D + p y = q has one root y_D if p > s/2, because D falls by
-/// at most s/2. The switched step has one root if p > s, and up to three between s/2 and s. The step takes y_D if D
-/// replaces f there. Otherwise f + p y - q changes its sign between y_{k-1} and y_D, and the step takes its root
-/// nearest to y_{k-1}. D + p y < q there, so D does not replace f. `Solver` finds that root; a solver that cannot
-/// identify the nearest root may return another one between y_{k-1} and y_D.
+/// Every solution generates no energy. If the slope f' is at least -s, the load line of D has one solution y_D for
+/// p > s/2, because the slope of D is at least -s/2. The switched step has one solution for p > s, and up to three for
+/// s/2 < p < s. The step takes y_D if D replaces f at y_D. Otherwise f(y) + p y - q changes its sign between y_{k-1}
+/// and y_D, and the step takes the zero of this function nearest to y_{k-1}, where D does not replace f. A `Solver`
+/// that cannot identify the nearest zero may return another zero between y_{k-1} and y_D.
 ///
-/// A force limit acts as in `Implicit`: beyond it device and object both receive G = +-F_max.
+/// A force limit F_max acts as in `Implicit`: if the coupling's force exceeds F_max, device and object both receive the
+/// limited force +-F_max.
 template <Environment E, class Solver = LoadLineSolver>
 class EnergyConsistent {
   public:
-    /// Makes the structure. Steps below `shortest` compute D from Gauss points of f, because the quotient loses digits;
-    /// 1e-2 of the finest wavelet's width is suitable.
+    /// Makes the structure. If the object moves less than `shortest` in a step, D is computed from three Gauss points
+    /// of f, because a quotient of small differences loses digits; 1e-2 of the finest wavelet's width is suitable.
     EnergyConsistent(E environment, Inertia inertia, VirtualCoupling coupling, double period,
                      double shortest = 1e-4, bool switched = true,
                      double force_limit = std::numeric_limits<double>::infinity(), Solver solver = {})
@@ -50,13 +52,13 @@ class EnergyConsistent {
         reset(0.0);
     }
 
-    /// Returns p of every step behind the coupling.
+    /// Returns the slope p of the load line of every step behind the coupling.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
         return inertia.midpoint_slope(period) + coupling.load_line_slope(period);
     }
 
-    /// Sets the object at rest at a position.
+    /// Sets the virtual object at rest at a position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
@@ -64,7 +66,8 @@ class EnergyConsistent {
         velocity_ = 0.0;
     }
 
-    /// Returns the force on device and object for the device's measured position.
+    /// Moves the object by one step and returns the force on device and object, for the measured position of the
+    /// device.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double device_velocity = (device - device_) / period_;
         const double driving_force = coupling_.force(device, device_velocity + position_ / period_);
@@ -90,7 +93,7 @@ class EnergyConsistent {
         return moved_to(solution, force);
     }
 
-    /// Moves the object by a given force, without the coupling.
+    /// Moves the object by one step with a given force in place of the coupling.
     [[nodiscard]] Rendered drive(double force) noexcept {
         const Solution solution = solve({0.0, 0.0}, force);
         return solution.status == Status::NonFinite ? detail::refused(position_) : moved_to(solution, force);
@@ -100,7 +103,7 @@ class EnergyConsistent {
     [[nodiscard]] double velocity() const noexcept { return velocity_; }
 
   private:
-    /// f or D as an environment, for the step from `from`.
+    /// The force f(y) or the mean force D(y) of a step from the position `from` to y, as an environment.
     struct Stepped {
         using State = typename E::State;
         const E& environment;
@@ -124,13 +127,13 @@ class EnergyConsistent {
         void advance(double y, State& state) const noexcept { environment.advance(y, state); }
         [[nodiscard]] State start(double y) const noexcept { return environment.start(y); }
 
-        /// Returns true if f would generate energy at y.
+        /// Returns true if a step to y with the force f(y) would generate energy.
         [[nodiscard]] bool generates(double y, const State& state) const noexcept {
             const EnvironmentSample sample = environment.at(y, state);
             return (sample.force - mean(y, sample, state)) * (y - from) < 0.0;
         }
 
-        /// Returns D; near `from` by three Gauss points.
+        /// Returns the mean force D(y); for a y near `from` it is computed from three Gauss points.
         [[nodiscard]] double mean(double y, const EnvironmentSample& at_y,
                                   const State& state) const noexcept {
             if (std::abs(y - from) > shortest) {
@@ -145,20 +148,20 @@ class EnergyConsistent {
         }
     };
 
-    /// Returns the load line. `driving_force` is the force of the coupling on an environment at rest at 0, with the memory of
-    /// its damper.
+    /// Returns the load line of the next step. `driving_force` is the coupling's force on an object at position 0, with
+    /// the damper's part that depends on the last position of the object.
     [[nodiscard]] LoadLine line_of(VirtualCoupling coupling, double driving_force) const noexcept {
         const double memory = load_line_slope(inertia_, {0.0, 0.0}, period_);
         return {load_line_slope(inertia_, coupling, period_),
                 memory * position_ + 2.0 * inertia_.mass / period_ * velocity_ + driving_force};
     }
 
-    /// Returns f or D as the environment of the next step.
+    /// Returns the force of the next step as an environment: D, or f where f does not generate energy if `switched`.
     [[nodiscard]] Stepped stepped(bool switched) const noexcept {
         return {environment_, position_, environment_.at(position_, state_).energy, shortest_, switched};
     }
 
-    /// Returns the first root of the step from `start`.
+    /// Returns the solution of the step that a search from the position `start` finds first.
     [[nodiscard]] Solution search(VirtualCoupling coupling, double driving_force,
                                   double start) const noexcept {
         Solution solution =
@@ -167,7 +170,7 @@ class EnergyConsistent {
         return solution;
     }
 
-    /// Returns the end of the step.
+    /// Returns the solution of the next step: the position of the object at the end of the step.
     [[nodiscard]] Solution solve(VirtualCoupling coupling, double driving_force) const noexcept {
         const LoadLine line = line_of(coupling, driving_force);
         const Stepped quotient = stepped(false);
@@ -190,7 +193,7 @@ class EnergyConsistent {
             if (by_force.status != Status::Ok || !generates(by_force)) {
                 return end(by_force, 0);
             }
-            // The only root of the step is y_D, because it cannot be a root of f.
+            // The solution with f would generate energy, so the only solution of the step is y_D, the solution with D.
             const Solution by_energy =
                 newton.solve(quotient, state_, line, by_force.position, bracket_to(by_force.position));
             return end(by_energy, by_energy.evaluations);
@@ -215,7 +218,7 @@ class EnergyConsistent {
         return generates(any) ? end(by_energy, 0) : end(any, 0);
     }
 
-    /// Moves the object to a solution and returns the result of the tick.
+    /// Moves the object to the solution of a step and returns the result of the tick.
     [[nodiscard]] Rendered moved_to(const Solution& solution, double force) noexcept {
         environment_.advance(solution.position, state_);
         velocity_ = 2.0 * (solution.position - position_) / period_ - velocity_;
@@ -232,12 +235,12 @@ class EnergyConsistent {
     double force_limit_;  ///< F_max [N or N*m]
     Solver solver_;
     typename E::State state_;
-    double device_ = 0.0;    ///< x_{k-1}
-    double position_ = 0.0;  ///< y_{k-1}
-    double velocity_ = 0.0;  ///< v_{k-1}
+    double device_ = 0.0;    ///< x_{k-1}, last position of the device
+    double position_ = 0.0;  ///< y_{k-1}, last position of the object
+    double velocity_ = 0.0;  ///< v_{k-1}, last velocity of the object
 };
 
-/// Builds `EnergyConsistent`.
+/// Builds the energy-consistent structure.
 struct EnergyConsistentStructure {
     static constexpr StructureTraits traits{.name = "energy-consistent",
                                             .coupling = true,

@@ -9,9 +9,9 @@
 
 namespace palpate {
 
-/// Returns the slope of the environment below which the explicit structure is stable at a held device, behind a
-/// coupling or driven by a force (K_c = B_c = 0). Linearised at an equilibrium, its poles stay inside the unit circle
-/// for 0 < K and
+/// Returns the slope of the model below which the explicit structure is stable while the device is held still, behind a
+/// coupling, or driven by a force without a coupling (K_c = B_c = 0). For a model of slope K > 0 at an equilibrium, the
+/// poles of the linearised step are inside the unit circle if
 ///
 ///     K + K_c < (4 m - 2 (B_o + B_c) T) / T^2.
 [[nodiscard]] constexpr double explicit_slope_limit(const Inertia& inertia, const VirtualCoupling& coupling,
@@ -20,7 +20,8 @@ namespace palpate {
     return (4.0 * inertia.mass - 2.0 * damping * period) / (period * period) - coupling.stiffness;
 }
 
-/// Returns the object with B_o = ratio m / T whose slope limit is `limit`: the inverse of `explicit_slope_limit`.
+/// Returns the mass m and the damping B_o = ratio m / T of an object that is stable for model slopes below `limit`: the
+/// inverse of `explicit_slope_limit`.
 [[nodiscard]] constexpr Inertia explicit_object(double limit, const VirtualCoupling& coupling, double ratio,
                                                 double period) noexcept {
     const double mass = ((limit + coupling.stiffness) * period * period + 2.0 * coupling.damping * period) /
@@ -28,8 +29,9 @@ namespace palpate {
     return {mass, ratio * mass / period};
 }
 
-/// Object with mass, m v' = F_c - f(x) - B_o v, with the paper's delayed integrator (figure 14). All terms on the right
-/// are one sample old, so no equation is solved. The step is stable only for slopes below `explicit_slope_limit`:
+/// Virtual object with mass m, m v' = F_c - f(y) - B_o v, with the paper's delayed integrator (figure 14). F_c is the
+/// coupling's force and f the model's force. All terms on the right are one sample old, so no equation is solved. The
+/// step is stable only for model slopes below `explicit_slope_limit`:
 ///
 ///     v_k = v_{k-1} + (T/m)(F_{k-1} - f(y_{k-1}) - B_o v_{k-1}),   y_k = y_{k-1} + T v_k,
 ///     F_k = K_c (x_k - y_k) + B_c (v_device - v_k).
@@ -41,7 +43,7 @@ class Explicit {
         reset(0.0);
     }
 
-    /// Sets the object at rest at a position.
+    /// Sets the virtual object at rest at a position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
@@ -50,7 +52,7 @@ class Explicit {
         force_ = environment_.at(position, state_).force;
     }
 
-    /// Returns the force of the coupling for the device's measured position.
+    /// Moves the object by one step and returns the coupling's force for the measured position of the device.
     [[nodiscard]] Rendered step(double device) noexcept {
         if (!std::isfinite(device)) {
             return detail::refused(position_);
@@ -65,7 +67,7 @@ class Explicit {
         return rendered;
     }
 
-    /// Moves the object by a given force, without the coupling.
+    /// Moves the object by one step with a given force in place of the coupling.
     [[nodiscard]] Rendered drive(double force) noexcept {
         const EnvironmentSample sample = environment_.at(position_, state_);
         const double velocity =
@@ -86,17 +88,17 @@ class Explicit {
     VirtualCoupling coupling_;
     double period_;
     typename E::State state_;
-    double device_ = 0.0;    ///< x_{k-1}
-    double position_ = 0.0;  ///< y_{k-1}
-    double velocity_ = 0.0;  ///< v_{k-1}
-    double force_ = 0.0;     ///< F_{k-1}
+    double device_ = 0.0;    ///< x_{k-1}, last position of the device
+    double position_ = 0.0;  ///< y_{k-1}, last position of the object
+    double velocity_ = 0.0;  ///< v_{k-1}, last velocity of the object
+    double force_ = 0.0;     ///< F_{k-1}, last force of the coupling
 };
 
-/// Builds `Explicit`.
+/// Builds the explicit structure.
 struct ExplicitStructure {
     static constexpr StructureTraits traits{.name = "explicit", .coupling = true, .mass = true};
 
-    /// Returns the slope of the model from which the structure diverges.
+    /// Returns the slope limit: with a model at least as steep as this slope, the explicit structure diverges.
     [[nodiscard]] static double slope_limit(const StructureNumbers& numbers) noexcept {
         return explicit_slope_limit(numbers.inertia, numbers.coupling, numbers.period_s);
     }

@@ -12,18 +12,20 @@
 
 namespace palpate {
 
-/// Object with mass behind the coupling, m v' = F_c - f(x) - B_o v, by backward Euler with the coupling in the same
-/// equation. The load line has
+/// Virtual object with mass m behind a virtual coupling, m v' = F_c - f(y) - B_o v, integrated by backward Euler. F_c
+/// is the coupling's force and f the model's force. The position y at the end of a step solves the load line f(y) + p y
+/// = q, which includes the coupling, with
 ///
 ///     p = m/T^2 + B_o/T + K_c + B_c/T,
 ///     q = m (2 y_{k-1} - y_{k-2}) / T^2 + B_o y_{k-1} / T + K_c x_k + B_c (v_k + y_{k-1} / T),
 ///
-/// then F = K_c (x - y) + B_c (v - (y - y_{k-1}) / T). Without coupling terms it is the paper's implicit equation of
-/// section 4.3, with the damping of figure 14.
+/// where x_k and v_k are position and velocity of the device. The force is F = K_c (x - y) + B_c (v - (y - y_{k-1}) /
+/// T). With K_c = B_c = 0 the load line is the paper's implicit equation of section 4.3, with the damping of figure 14.
 ///
-/// A force limit acts equally on device and object. If |F| > F_max at the solution y*, only G = +-F_max drives the
-/// object: y is the first root of its load line from y* in the direction of -G. There |F(y)| > F_max, because F falls
-/// with y, and the device receives the same G.
+/// A force limit F_max acts equally on device and object. If |F| > F_max at the solution y*, the limited force
+/// G = +-F_max alone drives the object: y is the first solution of the object's load line without coupling, searched
+/// from y* in the direction of -G. At this y also |F(y)| > F_max, because F falls with y. The device receives the same
+/// G.
 template <Environment E, class Solver = LoadLineSolver>
 class Implicit {
   public:
@@ -31,8 +33,8 @@ class Implicit {
              double force_limit = std::numeric_limits<double>::infinity())
         : Implicit{std::move(environment), inertia, coupling, period, solver, force_limit, solver} {}
 
-    /// Makes the structure with two solvers: `solver` for the load line behind the coupling, `uncoupled` for that of the
-    /// object alone.
+    /// Makes the structure with two solvers: `solver` for the load line with the coupling, `uncoupled` for the load
+    /// line of the object without the coupling.
     Implicit(E environment, Inertia inertia, VirtualCoupling coupling, double period, Solver solver,
              double force_limit, Solver uncoupled)
         : environment_{std::move(environment)},
@@ -49,7 +51,7 @@ class Implicit {
         reset(0.0);
     }
 
-    /// Returns p of every step behind the coupling; with a coupling of zeros, p of the object alone.
+    /// Returns the slope p of the load line of every step; for K_c = B_c = 0 the slope without the coupling.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
         return coupling.load_line_slope(period) + inertia.load_line_slope(period);
@@ -57,7 +59,7 @@ class Implicit {
 
     [[nodiscard]] const Solver& solver() const noexcept { return coupled_; }
 
-    /// Sets the object at rest at a position.
+    /// Sets the virtual object at rest at a position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
@@ -66,7 +68,8 @@ class Implicit {
         before_ = position;
     }
 
-    /// Returns the force on device and object for the device's measured position.
+    /// Moves the object by one step and returns the force on device and object, for the measured position of the
+    /// device.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double velocity = (device - device_) / period_;
         const LoadLine line{coupled_slope_, coupling_.force(device, velocity) - inertial_ * before_ +
@@ -91,11 +94,11 @@ class Implicit {
         return moved_to(solution, force, 0);
     }
 
-    /// Moves the object by a given force, without the coupling (paper figure 12).
+    /// Moves the object by one step with a given force in place of the coupling (paper figure 12).
     [[nodiscard]] Rendered drive(double force) noexcept { return drive_from(position_, force, 0); }
 
   private:
-    /// Moves the object by a force alone, to the first root from `start`.
+    /// Moves the object by one step with a force in place of the coupling, to the first solution found from `start`.
     [[nodiscard]] Rendered drive_from(double start, double force, int evaluations) noexcept {
         const LoadLine line{uncoupled_slope_, force - inertial_ * before_ + uncoupled_factor_ * position_};
         typename Solver::Memory from{start};
@@ -121,20 +124,20 @@ class Implicit {
     double period_;
     double force_limit_;       ///< F_max [N or N*m]
     double inertial_;          ///< m/T^2
-    double coupled_slope_;     ///< p behind the coupling
-    double uncoupled_slope_;   ///< p without it
+    double coupled_slope_;     ///< slope p of the load line with the coupling
+    double uncoupled_slope_;   ///< slope p of the load line without the coupling
     double coupled_factor_;    ///< factor of y_{k-1} in q: 2m/T^2 + B_o/T + B_c/T
-    double uncoupled_factor_;  ///< the same without the coupling: 2m/T^2 + B_o/T
+    double uncoupled_factor_;  ///< factor of y_{k-1} in q without the coupling: 2m/T^2 + B_o/T
     Solver coupled_;
     Solver uncoupled_;
     typename E::State state_;
     typename Solver::Memory memory_;
-    double device_ = 0.0;    ///< x_{k-1}
-    double position_ = 0.0;  ///< y_{k-1}
-    double before_ = 0.0;    ///< y_{k-2}
+    double device_ = 0.0;    ///< x_{k-1}, last position of the device
+    double position_ = 0.0;  ///< y_{k-1}, last position of the object
+    double before_ = 0.0;    ///< y_{k-2}, position of the object before the last one
 };
 
-/// Builds `Implicit`.
+/// Builds the implicit structure.
 struct ImplicitStructure {
     static constexpr StructureTraits traits{
         .name = "implicit", .coupling = true, .mass = true, .solved = true};

@@ -13,11 +13,13 @@
 
 namespace palpate {
 
-/// Object without mass and damping behind the coupling. The force of the coupling equals f. The load line has
+/// Virtual object without mass and damping behind a virtual coupling. Its position y is where the coupling's force
+/// equals the model's force f(y): the solution of the load line f(y) + p y = q, with the measured position x_k, the
+/// period T, and
 ///
 ///     p = K_c + B_c / T,   q = K_c x_k + (B_c / T)(x_k - x_{k-1} + y_{k-1});   then F = f(y).
 ///
-/// `LimitedEnvironment` adds a force limit.
+/// If `E` is a `LimitedEnvironment`, the force is limited to the force limit.
 template <Environment E, class Solver = LoadLineSolver>
 class Massless {
   public:
@@ -29,14 +31,14 @@ class Massless {
         reset(0.0);
     }
 
-    /// Returns p of every step.
+    /// Returns the slope p of the load line of every step.
     [[nodiscard]] static double load_line_slope(VirtualCoupling coupling, double period) noexcept {
         return coupling.load_line_slope(period);
     }
 
     [[nodiscard]] const Solver& solver() const noexcept { return solver_; }
 
-    /// Sets the object at rest at a position.
+    /// Sets the virtual object at rest at a position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         device_ = position;
@@ -44,7 +46,7 @@ class Massless {
         memory_ = typename Solver::Memory{position};
     }
 
-    /// Returns the force for the device's measured position.
+    /// Moves the object by one step and returns the force for the measured position of the device.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double damping = coupling_.damping / period_;
         const LoadLine line{
@@ -62,7 +64,7 @@ class Massless {
     }
 
   private:
-    /// Returns true if the environment has a force limit that is active at an exact solution.
+    /// Returns true if the environment has a force limit and the force at an exact solution is at this limit.
     [[nodiscard]] bool limited(const Solution& solution) const noexcept {
         if constexpr (requires { environment_.force_limit(); }) {
             return solution.status == Status::Ok &&
@@ -78,11 +80,11 @@ class Massless {
     Solver solver_;
     typename E::State state_;
     typename Solver::Memory memory_;
-    double device_ = 0.0;    ///< x_{k-1}
-    double position_ = 0.0;  ///< y_{k-1}
+    double device_ = 0.0;    ///< x_{k-1}, last position of the device
+    double position_ = 0.0;  ///< y_{k-1}, last position of the object
 };
 
-/// Builds `Massless`.
+/// Builds the massless structure.
 struct MasslessStructure {
     static constexpr StructureTraits traits{.name = "massless", .coupling = true, .solved = true};
 

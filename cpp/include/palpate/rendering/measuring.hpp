@@ -11,23 +11,24 @@
 #include "palpate/fields/field_table.hpp"
 #include "palpate/rendering/structure.hpp"
 
-// Forces on the device during the measurement of a real object or of the device.
+// Structures that compute the device's force while a real object or the device itself is measured.
 namespace palpate {
 
 /// Renders zero force: the handle moves freely while its motion is recorded.
 class FreeMotion {
   public:
-    /// Does not change any state.
+    /// Does nothing, because free motion has no state.
     void reset(double /*position*/) noexcept {}
 
-    /// Returns zero force.
+    /// Returns zero force for a valid position.
     [[nodiscard]] Rendered step(double position) noexcept {
         return std::isfinite(position) ? Rendered{0.0, position, 0, Status::Ok, false}
                                        : detail::refused(position);
     }
 };
 
-/// Settings of an automatic sweep over a real object.
+/// Settings of an automatic slow motion over a real object: the device moves the handle from `lower` to `upper` and
+/// back.
 struct ProbeSettings {
     double lower = 0.0;
     double upper = 0.5;
@@ -39,18 +40,24 @@ struct ProbeSettings {
 
 template <>
 inline constexpr auto fields_of<ProbeSettings> = std::tuple{
-    Field<&ProbeSettings::lower>{"lower", "Lower reversal point of the sweep [m or rad].", Rule::Finite},
-    Field<&ProbeSettings::upper>{"upper", "Upper reversal point of the sweep [m or rad].", Rule::Finite},
-    Field<&ProbeSettings::speed>{"speed", "Speed of the sweep [m/s or rad/s].", Rule::Positive},
+    Field<&ProbeSettings::lower>{
+        "lower", "Lowest position of the spring's target, where its motion reverses [m or rad].",
+        Rule::Finite},
+    Field<&ProbeSettings::upper>{
+        "upper", "Highest position of the spring's target, where its motion reverses [m or rad].",
+        Rule::Finite},
+    Field<&ProbeSettings::speed>{"speed", "Speed of the spring's target [m/s or rad/s].", Rule::Positive},
     Field<&ProbeSettings::stiffness>{
         "stiffness", "Stiffness of the spring that moves the handle [N/m or N*m/rad].", Rule::Positive},
     Field<&ProbeSettings::damping>{
-        "damping", "Damping of the handle's motion relative to the sweep [N*s/m or N*m*s/rad].",
+        "damping", "Damping of the handle's motion relative to the spring's target [N*s/m or N*m*s/rad].",
         Rule::NotNegative},
-    Field<&ProbeSettings::force_limit>{"force_limit", "Force at which the sweep reverses [N or N*m].",
-                                       Rule::Positive}};
+    Field<&ProbeSettings::force_limit>{
+        "force_limit",
+        "Largest force on the handle; at this force the motion of the spring's target reverses [N or N*m].",
+        Rule::Positive}};
 
-/// Throws std::invalid_argument with the field, its value and the rule.
+/// Checks the settings of a probe. Throws std::invalid_argument with the wrong field, its value and the rule.
 inline void validate(const ProbeSettings& settings) {
     check_fields(settings, "probe: ");
     if (!(settings.upper > settings.lower)) {
@@ -58,19 +65,21 @@ inline void validate(const ProbeSettings& settings) {
     }
 }
 
-/// Sweeps slowly back and forth: a spring pulls the handle along, so that the force of a real object is measured at
-/// every position, also where it falls steeply (the "Haptic Camera" of MacLean, 1996):
+/// Moves the handle slowly back and forth: a spring pulls the handle to a moving target s(t). The force of a
+/// real object is measured at every position, also where the force falls steeply (the "Haptic Camera" of MacLean,
+/// 1996):
 ///
 ///     F = K (x - s(t)) + B (v - ds/dt),  |F| <= force_limit,  s a triangle between lower and upper.
 ///
-/// If the object holds the limit, the sweep reverses at once, so the object can limit the range.
+/// If the spring's force reaches force_limit, because the object stops the handle, the target reverses its motion at
+/// once. The object can therefore shorten the travel.
 class Probe {
   public:
     Probe(const ProbeSettings& settings, double period_s) : settings_{settings}, period_{period_s} {
         validate(settings_);
     }
 
-    /// Starts the sweep at a position.
+    /// Starts the motion of the spring's target at a position.
     void reset(double position) noexcept {
         sweep_ = last_ = position;
         direction_ = 1.0;
@@ -90,7 +99,7 @@ class Probe {
         const double velocity = (position - last_) / period_ - direction_ * settings_.speed;
         last_ = position;
         const double spring = settings_.stiffness * (position - sweep_);
-        if (std::abs(spring) > settings_.force_limit) {  // the object holds the handle
+        if (std::abs(spring) > settings_.force_limit) {  // the object stops the handle
             const double held = std::copysign(settings_.force_limit, spring);
             sweep_ = position - held / settings_.stiffness;
             direction_ = std::copysign(1.0, spring);
@@ -108,18 +117,18 @@ class Probe {
     double direction_ = 1.0;
 };
 
-/// Settings of short small pushes to either side. The pushes show the sign of a device's force, its delay and its
-/// mechanics. Two sizes of push separate friction from damping: both reduce the motion, but only damping grows with
-/// speed.
+/// Settings of short weak pushes of the device on its handle, in alternating directions. The motion after a push shows
+/// the sign of the device's force, its delay, inertia, damping and friction. Pushes of two sizes are needed to separate
+/// friction from damping: both reduce the motion, but only the damping force grows with speed.
 struct PulseSettings {
     double force = 0.02;    ///< force of a push [N or N*m]; the sign alternates
-    double smaller = 0.6;   ///< size of every second three pushes / `force`
-    double push_s = 0.03;   ///< duration [s]
+    double smaller = 0.6;   ///< force of every second group of three pushes / `force`
+    double push_s = 0.03;   ///< duration of a push [s]
     double rest_s = 0.17;   ///< pause after a push [s]
-    double farthest = 0.2;  ///< distance from the start that ends the pushes [m or rad]
+    double farthest = 0.2;  ///< farther than this from the start no push acts [m or rad]
 };
 
-/// Pushes the handle to either side, alternately.
+/// Renders short pushes on the handle, alternately to either side.
 class Pulses {
   public:
     Pulses(const PulseSettings& settings, double period_s) : settings_{settings} {

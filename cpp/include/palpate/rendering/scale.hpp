@@ -12,22 +12,23 @@
 
 namespace palpate {
 
-/// Size of a model relative to a model that suits the default knob. It multiplies default numbers; times do not change.
+/// Size of a model's positions and forces, relative to a model that suits the default simulated knob. Default settings
+/// in m, rad, N or N*m are multiplied by these factors; times do not change.
 struct ModelScale {
-    double length = 1.0;  ///< positions, relative to those of the knob
-    double force = 1.0;   ///< forces, relative to those of the knob
+    double length = 1.0;  ///< factor of positions, relative to the default knob
+    double force = 1.0;   ///< factor of forces, relative to the default knob
 
-    /// Returns force divided by length.
+    /// Returns the factor of stiffnesses: the factor of forces divided by the factor of positions.
     [[nodiscard]] double stiffness() const noexcept { return force / length; }
 };
 
 namespace detail {
 
-inline constexpr double knob_travel = 0.5;     ///< of a model that suits the default knob [rad]
-inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled device / largest force
+inline constexpr double knob_travel = 0.5;     ///< travel of a model that suits the default knob [rad]
+inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled device / model's largest force
 
-/// Returns the force while sliding in a direction, +1 for press and -1 for release. A model of position and velocity
-/// slides at the largest velocity of its data.
+/// Returns the force of a model at a position during a long stroke in a direction, +1 for press and -1 for release. A
+/// model of position and velocity is evaluated at the largest velocity of its domain in that direction.
 [[nodiscard]] inline double sliding_force(const ForceModel& model, double position,
                                           double direction) noexcept {
     if (const VelocityNetwork* force = model.velocity()) {
@@ -38,7 +39,8 @@ inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled devi
                                          : model.network()->at(position, {}).force;
 }
 
-/// Returns the largest of the forces at 1001 positions, in both directions [N or N*m]; 1 without a force.
+/// Returns the largest absolute force of a model at 1001 positions of its domain, in both directions [N or N*m]; 1 if
+/// all forces are 0.
 [[nodiscard]] inline double largest_force(const ForceModel& model) noexcept {
     const double lower = model.domain().lower[0];
     const double step = (model.domain().upper[0] - lower) / 1000.0;
@@ -53,9 +55,9 @@ inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled devi
 
 }  // namespace detail
 
-/// Returns the scale of a model of position, or of position and velocity. If `is_angle`, its positions are in rad and
-/// it suits the knob unchanged. For any other unit (millimetres of a keyswitch, micrometres under an AFM tip) travel
-/// and largest force are compared with those of the knob.
+/// Returns the scale of a model of position, or of position and velocity. If `is_angle`, the model's positions are in
+/// rad, and the scale is 1. For any other unit (millimetres of a keyswitch, micrometres under an AFM tip) the scale is
+/// the model's travel and largest force, relative to those that suit the default knob.
 [[nodiscard]] inline ModelScale scale_of(const ForceModel& model, bool is_angle) {
     require_renderable(model);
     if (is_angle) {
@@ -66,7 +68,7 @@ inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled devi
     return {length, force};
 }
 
-/// Returns the default knob at a model's scale.
+/// Returns the profile of the default simulated knob, with its numbers multiplied by a model's scale.
 [[nodiscard]] inline DeviceProfile scaled_knob(const ModelScale& scale, bool is_angle, double period_s) {
     DeviceProfile device;
     device.period_s = period_s;
@@ -83,7 +85,8 @@ inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled devi
     return device;
 }
 
-/// Fields of a scheme that the user chose, in the units of the model. The others follow the model.
+/// Fields of a scheme that the user chose, in the units of the model. Fields without a value get a default that is
+/// scaled to the model.
 struct SchemeChoices {
     std::optional<StructureKind> structure;
     std::optional<bool> compensated;
@@ -94,7 +97,7 @@ struct SchemeChoices {
     std::optional<double> play_radius;
     std::optional<int> predict;
 
-    /// Returns true if a field is chosen. A flag that is false does not count.
+    /// Returns true if the user chose at least one field. `compensated` counts only if it is true.
     [[nodiscard]] bool any() const noexcept {
         return structure || compensated.value_or(false) || coupling_stiffness || coupling_damping || mass ||
                object_damping || play_radius || predict;
@@ -112,7 +115,7 @@ inline constexpr auto fields_of<SchemeChoices> =
                Field<&SchemeChoices::play_radius>{"play_radius"},
                Field<&SchemeChoices::predict>{"predict"}};
 
-/// Returns the default play radius of a model without one; otherwise 0.
+/// Returns the default play radius for a hysteresis model that does not define one [m or rad]; otherwise 0.
 [[nodiscard]] inline double default_play_radius(const ForceModel& model, double encoder_step) noexcept {
     if (model.hysteresis() == nullptr || model.play_radius()) {
         return 0.0;
@@ -120,7 +123,8 @@ inline constexpr auto fields_of<SchemeChoices> =
     return usual_play_radius(model.domain().upper[0] - model.domain().lower[0], encoder_step);
 }
 
-/// Returns the scheme with the chosen fields; the others have the defaults at the model's scale.
+/// Returns a scheme with the fields that the user chose; the other fields have defaults, multiplied by the model's
+/// scale.
 [[nodiscard]] inline Scheme scheme_for(const ForceModel& model, const ModelScale& scale,
                                        const DeviceProfile& device, const SchemeChoices& chosen = {}) {
     const Scheme standard;

@@ -22,7 +22,8 @@
 
 namespace palpate {
 
-/// The structure that renders a model, and its numbers. A structure ignores fields that it does not use.
+/// The structure that renders a model, and the numbers of the structure. A structure ignores fields that it does not
+/// use.
 struct Scheme {
     StructureKind structure = StructureKind::Massless;
     VirtualCoupling coupling;
@@ -40,14 +41,17 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
     within<&Scheme::inertia>(std::get<0>(fields_of<Inertia>), "mass"),
     within<&Scheme::inertia>(std::get<1>(fields_of<Inertia>), "object_damping"),
     Field<&Scheme::compensated>{
-        "compensated", "True if the compliance of the coupling's spring is subtracted from the model."},
-    Field<&Scheme::play_radius>{"play_radius", "r of a hysteresis model [m or rad]; 0 = that of the model.",
-                                Rule::NotNegative},
+        "compensated",
+        "True if the model is made stiffer, so that model and coupling in series give the recorded force."},
+    Field<&Scheme::play_radius>{
+        "play_radius", "Play radius r of a hysteresis model [m or rad]; 0 = the play radius of the model.",
+        Rule::NotNegative},
     Field<&Scheme::predict>{"predict",
-                            "m: samples used to predict the position half a sample ahead, 0 to 16; 0 = none.",
+                            "m, number of past samples that predict the position half a period ahead, 0 to "
+                            "16; 0 = no prediction.",
                             Rule::NotNegative}};
 
-/// Returns the scheme with standard numbers in the fields that its structure does not use.
+/// Returns the scheme with coupling and object mass set to 0 if the structure does not use them.
 [[nodiscard]] inline Scheme used_part(Scheme scheme) noexcept {
     if (!has_coupling(scheme.structure)) {
         scheme.coupling = {0.0, 0.0};
@@ -58,10 +62,10 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
     return scheme;
 }
 
-/// Steepest slope of a model that can be compensated [share of the coupling's stiffness].
+/// Largest slope of a model that may be compensated, divided by the coupling's stiffness [-].
 inline constexpr double compensated_share = 0.9;
 
-/// Throws std::invalid_argument with the field, its value and the rule.
+/// Checks that a scheme can render a model. Throws std::invalid_argument with the wrong field, its value and the rule.
 inline void validate(const Scheme& scheme, const ForceModel& model) {
     const std::string structure{name_of(scheme.structure)};
     const StructureTraits& traits = traits_of(scheme.structure);
@@ -69,7 +73,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     detail::require(
         model.velocity() == nullptr || traits.velocity,
         "structure is " + structure +
-            ", must be direct: for a force of position and velocity no bound is known in another structure");
+            ", must be direct: only the direct structure can render a force of position and velocity");
     if (traits.coupling) {
         check_fields(scheme.coupling, "coupling_");
     }
@@ -102,8 +106,9 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     }
 }
 
-/// Returns the largest slope in the structure, at least 0. While a hysteresis model sticks, h / r is part of it. A
-/// compensated model has a steeper slope, because the compliance of the coupling's spring is subtracted.
+/// Returns the largest slope of the force that a scheme renders for a model, at least 0 [N/m or N*m/rad]. After a
+/// reversal, the force of a hysteresis model changes from press to release over the play, which adds the slope h / r
+/// (hysteresis by play radius). Compensation makes the model steeper.
 [[nodiscard]] inline double steepest_slope(const Scheme& scheme, const ForceModel& model) {
     const std::optional<double> radius =
         scheme.play_radius > 0.0 ? std::optional{scheme.play_radius} : model.play_radius();
@@ -112,7 +117,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     return scheme.compensated ? stiffness * steepest / (stiffness - steepest) : steepest;
 }
 
-/// Throws std::invalid_argument also for schemes that diverge at this period.
+/// Checks a scheme like validate(scheme, model), and also throws if the scheme diverges at the period `period_s`.
 inline void validate(const Scheme& scheme, const ForceModel& model, double period_s) {
     validate(scheme, model);
     with_kind(scheme.structure, [&](auto structure) {
@@ -128,14 +133,14 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
     });
 }
 
-/// Calls `visit` with the structure of the scheme, built over the model's environment. Only this function prepares a
-/// model for the loop: it compiles curves to certified polynomials and load lines to certified tables, as far as that
-/// can be proved, in a few milliseconds.
+/// Builds the structure of a scheme for a model and calls `visit` with the structure. Only this function prepares a
+/// model for the control loop, in a few milliseconds: it replaces the model's force by polynomials and the solution of
+/// load lines by tables, where the error is proved to be small enough.
 ///
-/// `force_limit` is that of the device [N or N*m], infinity without a limit. Massless objects and objects with mass
-/// include it in their solution, so that object and device receive the same force. The direct and the explicit
-/// structure ignore it: the guards clip their force, and a linear bound of the explicit structure holds only below the
-/// limit.
+/// `force_limit` is the force limit of the device [N or N*m], infinity without a limit. The massless, implicit and
+/// energy-consistent structures include the limit in their solution, so that object and device receive the same force.
+/// The direct and the explicit structure ignore `force_limit`: the guards clip their force, and the stability bound of
+/// the explicit structure holds only for forces below the limit.
 template <class Visitor>
 auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s, double force_limit,
                     Visitor visit) {
@@ -164,8 +169,8 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
     return build(network, [&](double p) { return Resolvent{curve, p}; });
 }
 
-/// Returns the method that solves the load line of a rendering: "table" if at least a part has one, else "newton";
-/// nothing if the structure does not solve one.
+/// Returns the method that solves the load line of a scheme: "table" if a table of solutions is used for at least a
+/// part of the positions, else "newton"; nothing if the structure has no load line.
 [[nodiscard]] inline std::optional<std::string_view> solver_name(const ForceModel& model,
                                                                  const Scheme& scheme, double period_s) {
     return with_structure(model, scheme, period_s, std::numeric_limits<double>::infinity(),

@@ -11,17 +11,18 @@
 
 namespace palpate {
 
-/// Result of one tick of a structure.
+/// Force and state that a structure computed in one tick.
 struct Rendered {
     double force = 0.0;                 ///< force on the device, positive out of the object [N or N*m]
     double environment_position = 0.0;  ///< y, position of the virtual object [m or rad]
-    int evaluations = 0;                ///< evaluations of the environment
+    int evaluations = 0;                ///< number of evaluations of the model's force
     Status status = Status::Ok;
-    bool extrapolated = false;  ///< true if y lies outside the model's data
+    bool extrapolated = false;  ///< true if y lies outside the model's domain
 };
 
-/// Computes a force from the measured position of the device, once a tick. `reset` sets the object at rest under the
-/// device. A `step` whose input or result is not finite returns zero force and does not change the state.
+/// A class that computes a force from the measured position of the device, once a tick. `reset` sets the virtual object
+/// at rest at the device's position. If the input or the result of `step` is not finite, `step` returns zero force and
+/// does not change the state.
 template <class S>
 concept Structure = requires(S& structure, double position) {
     { structure.reset(position) } noexcept;
@@ -30,28 +31,28 @@ concept Structure = requires(S& structure, double position) {
 
 /// Properties of a structure that do not depend on the model.
 struct StructureTraits {
-    std::string_view name;               ///< in options and files
-    bool coupling = false;               ///< a virtual coupling
-    bool mass = false;                   ///< an object with mass and damping
-    bool solved = false;                 ///< a load line in each step
-    bool velocity = false;               ///< a force of position and velocity
-    bool predicts = false;               ///< a force at a predicted position
-    bool may_reduce_hysteresis = false;  ///< hysteresis that may dissipate less than the play
+    std::string_view name;               ///< name in options and files
+    bool coupling = false;               ///< true: has a virtual coupling
+    bool mass = false;                   ///< true: the object has mass and damping
+    bool solved = false;                 ///< true: each step solves a load line
+    bool velocity = false;               ///< true: can render a force of position and velocity
+    bool predicts = false;               ///< true: can compute the force at a predicted position
+    bool may_reduce_hysteresis = false;  ///< true: may dissipate less energy than the hysteresis
 };
 
-/// Numbers from which a structure is built, without the environment.
+/// Numbers from which a structure is built; the environment is given separately.
 struct StructureNumbers {
     VirtualCoupling coupling;
     Inertia inertia;
-    int predict = 0;            ///< taps of the prediction
+    int predict = 0;            ///< number of past samples of the prediction
     double period_s = 1e-3;     ///< period T [s]
-    double force_limit = 0.0;   ///< infinity without a limit [N or N*m]
-    double finest_width = 0.0;  ///< of the model's wavelets [m or rad]
+    double force_limit = 0.0;   ///< force limit [N or N*m]; infinity without a limit
+    double finest_width = 0.0;  ///< width of the model's finest wavelet [m or rad]
 };
 
 namespace detail {
 
-/// Returns the result for an input that is not finite: zero force, unchanged state.
+/// Returns the result of a step whose input or force is not finite: zero force, unchanged position of the object.
 [[nodiscard]] inline Rendered refused(double environment_position) noexcept {
     return {0.0, environment_position, 0, Status::NonFinite, false};
 }

@@ -16,17 +16,17 @@
 
 namespace palpate {
 
-/// All structures, in the order of `Structures`.
+/// Numbers of all structures, in the order of the list `Structures`.
 enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit, EnergyConsistent };
 
 using Structures = std::tuple<DirectStructure, MasslessStructure, ImplicitStructure, ExplicitStructure,
                               EnergyConsistentStructure>;
 
-/// Properties of all structures, in the order of `Structures`.
+/// Properties of all structures, in the order of the list `Structures`.
 inline constexpr auto structure_traits =
     std::apply([](auto... structure) { return std::array{structure.traits...}; }, Structures{});
 
-/// Names of all structures, in the order of `Structures`.
+/// Names of all structures, in the order of the list `Structures`.
 inline constexpr auto structure_names =
     std::apply([](auto... structure) { return std::array{structure.traits.name...}; }, Structures{});
 
@@ -44,7 +44,7 @@ inline constexpr auto words_of<StructureKind> = structure_names;
     return traits_of(kind).mass;
 }
 
-/// Calls `visit` with the element of `Structures` of this kind.
+/// Calls `visit` with the builder class of a structure, the element number `kind` of the list `Structures`.
 template <std::size_t k = 0, class Visit>
 decltype(auto) with_kind(StructureKind kind, const Visit& visit) {
     if constexpr (k + 1 < std::tuple_size_v<Structures>) {

@@ -11,16 +11,17 @@
 
 namespace palpate {
 
-/// Result of one tick.
+/// Reading, computed force, sent force and status of one tick of the control loop.
 struct Tick {
     Reading reading;             ///< reading from which the force was computed
-    Rendered rendered;           ///< result of the structure
-    Command command;             ///< sent to the device, after the guards
+    Rendered rendered;           ///< force that the structure computed
+    Command command;             ///< force sent to the device, after all guards
     Status status = Status::Ok;  ///< most serious status of the tick
 };
 
-/// One tick of rendering: read, compute, limit, send. It does not allocate, lock, throw, log or make a system call,
-/// except for the device exchange. After a bad reading it sends zero force.
+/// Runs the ticks of the control loop: check the reading, compute the force, limit the force, exchange force and next
+/// reading with the device. Apart from the device's `exchange`, a tick does not allocate, lock, throw, log or make a
+/// system call. After an invalid reading a tick sends zero force.
 template <Device D, Structure S>
 class Controller {
   public:
@@ -30,14 +31,14 @@ class Controller {
     Controller(D& device, S structure, ForceLimit limit)
         : Controller{device, std::move(structure), Guards{.limit = limit}} {}
 
-    /// Takes a first sample with zero force and sets the virtual object at rest there.
+    /// Sends zero force, takes the first sample and sets the virtual object at rest at the position of this sample.
     [[nodiscard]] Status start() noexcept {
         reading_ = device_.exchange({});
         structure_.reset(reading_.position);
         return reading_.status;
     }
 
-    /// Computes the force for the last reading, sends it and takes the next one.
+    /// Computes the force for the last reading, sends the force and takes the next reading.
     [[nodiscard]] Tick tick() noexcept {
         const Status reading_status =
             guards_.reading.check(reading_.position, reading_.sequence, reading_.status);
@@ -60,7 +61,7 @@ class Controller {
         device_.close();
     }
 
-    /// Returns true if the clock of the device paces the loop.
+    /// Returns true if the device's clock sets the rate of the control loop.
     [[nodiscard]] bool paced_by_device() const noexcept {
         if constexpr (requires { device_.sets_pace(); }) {
             return device_.sets_pace();
@@ -73,8 +74,8 @@ class Controller {
     [[nodiscard]] const Guards& guards() const noexcept { return guards_; }
 
   private:
-    /// Adds the last tick to the energy accounts, if both its positions are known. A ramp can give energy once, so the
-    /// account of the given energy starts after it.
+    /// Adds the work of the last tick to the energy accounts, if the positions before and after the tick are valid. The
+    /// start ramp can give energy once, so a separate account counts the ticks of the ramp.
     void observe(double object) noexcept {
         const double moved = guards_.motion.to(reading_.position);
         guards_.tank.visit(reading_.position, object);
@@ -84,9 +85,10 @@ class Controller {
         }
     }
 
-    /// Applies the limits in order: force limit, limit cycle, ramp, slew limit, tank. The force limit comes first,
-    /// because only a scaled clipped force is passive; a clipped scaled force of a periodic model can be active. It
-    /// also replaces numbers that are not finite.
+    /// Applies the guards to the force in this order: force limit, scaling after a limit cycle, start ramp, slew limit,
+    /// energy tank. The force limit comes first: a force that is clipped and then scaled is passive, but a force of a
+    /// periodic model that is scaled and then clipped can be active. The force limit also replaces numbers that are not
+    /// finite.
     [[nodiscard]] Status limit_force(const Rendered& rendered, double& force,
                                      Status reading_status) noexcept {
         force = rendered.force;
@@ -96,7 +98,7 @@ class Controller {
         const Status slewed = guards_.slew.apply(force);
         const Status energy_limited = guards_.tank.apply(force);
         guards_.limit_cycle.watch(reading_.position, force);
-        // A status about given energy comes before a status about a weak device.
+        // The first status that is not Ok is reported, and guards of the energy come before the force limit.
         for (const Status status : {rendered.status, ramped, energy_limited, cycle_scaled, limited, slewed}) {
             if (status != Status::Ok) {
                 return status;

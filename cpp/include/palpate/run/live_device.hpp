@@ -13,14 +13,14 @@
 
 namespace palpate {
 
-/// Fields and lines that a device adds to a summary.
+/// Values and text lines that a device adds to the summary of a run.
 struct DeviceReport {
-    std::string name;  ///< name of the field that holds `fields`; empty without them
+    std::string name;  ///< key of `fields` in the summary; empty without fields
     NamedValues fields;
     Lines lines;
 };
 
-/// A device that is chosen at run time, with its properties. It is a `Device`.
+/// Base class of a device that is chosen while the program runs, with the properties of the device.
 class LiveDevice {
   public:
     LiveDevice() = default;
@@ -31,18 +31,18 @@ class LiveDevice {
     [[nodiscard]] virtual Opened open() = 0;
     [[nodiscard]] virtual Reading exchange(const Command& command) noexcept = 0;
     virtual void close() noexcept = 0;
-    /// Returns true if its exchange waits for the clock of the device.
+    /// Returns true if the device's clock sets the rate of the control loop: `exchange` waits for the next sample.
     [[nodiscard]] virtual bool sets_pace() const noexcept = 0;
-    /// Returns the events of the device so far.
+    /// Returns the counters of the device since it was opened, for the summary.
     [[nodiscard]] virtual DeviceReport report() const = 0;
 
-    std::string title;  ///< name in messages
+    std::string title;  ///< name of the device in messages
     DeviceProfile profile;
-    ModelScale scale;        ///< of the model relative to the default knob
-    double rate_hz = 0.0;    ///< ticks a second
-    Metadata metadata;       ///< head of recordings
-    bool simulated = false;  ///< true if no real device moves
-    bool transducer = true;  ///< true if the device measures the force
+    ModelScale scale;        ///< size of the model relative to the default knob
+    double rate_hz = 0.0;    ///< ticks of the control loop a second
+    Metadata metadata;       ///< metadata of the device for recordings
+    bool simulated = false;  ///< true for a simulated device
+    bool transducer = true;  ///< true if the device has a force transducer
 };
 
 /// Wraps a device of any type as a `LiveDevice`.

@@ -18,21 +18,22 @@
 
 namespace palpate {
 
-/// Rate, duration and limits of a loop.
+/// Rate, duration and limits of a control loop.
 struct LoopSettings {
-    double rate_hz = 1000.0;         ///< 100 to 10 000 [Hz]
-    double duration_s = 10.0;        ///< infinity = endless [s]
-    double lowest_rate_share = 0.8;  ///< least share of rate_hz over half a second; 0 = any
-    std::uint64_t tolerated = 5;     ///< consecutive bad ticks; one more stops the loop
-    /// Longest time between two ticks; a longer time ends the loop, because it is not certified [s].
+    double rate_hz = 1000.0;   ///< ticks a second, 100 to 10 000 [Hz]
+    double duration_s = 10.0;  ///< duration of the run [s]; infinity = until a stop is requested
+    /// Least share of rate_hz; a lower rate for half a second ends the loop; 0 = no check.
+    double lowest_rate_share = 0.8;
+    std::uint64_t tolerated = 5;  ///< allowed consecutive ticks without a valid sample; more end the loop
+    /// Longest time between two ticks [s]. A longer time ends the loop, because the certificate does not hold for it.
     double longest_period_s = std::numeric_limits<double>::infinity();
 };
 
 inline constexpr double lowest_rate_hz = 100.0;
 inline constexpr double highest_rate_hz = 10'000.0;
-inline constexpr double held_rate_share = 0.99;  ///< share of the rate; a slower loop is reported
+inline constexpr double held_rate_share = 0.99;  ///< a rate below this share of rate_hz is reported
 
-/// Throws std::invalid_argument with the field, its value and the rule.
+/// Checks the settings of a control loop. Throws std::invalid_argument with the wrong field, its value and the rule.
 inline void validate(const LoopSettings& settings) {
     require_field(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
                   settings.rate_hz, readable(lowest_rate_hz) + " to " + readable(highest_rate_hz));
@@ -43,33 +44,33 @@ inline void validate(const LoopSettings& settings) {
                   settings.lowest_rate_share, "0 to 1");
 }
 
-/// Reason why a loop ended.
+/// Reason why a control loop ended.
 enum class ExitReason : std::uint8_t {
     TimeUp,
     StopRequested,
-    Guard,        ///< samples or forces were implausible
+    Guard,        ///< a guard found a wrong sample or force
     DeviceFault,  ///< the device reported a fault or did not respond
     RateTooLow,
-    NotCertified,  ///< a tick was later than the certificate allows
+    NotCertified,  ///< the time between two ticks was longer than certified
 };
 
-/// Returns true if the loop ended as planned.
+/// Returns true if the loop ended because its duration ended or a stop was requested.
 [[nodiscard]] constexpr bool is_orderly(ExitReason reason) noexcept {
     return reason == ExitReason::TimeUp || reason == ExitReason::StopRequested;
 }
 
-/// Progress of a running loop. Each number is valid; two numbers may belong to different ticks.
+/// Progress of a running control loop, for other threads. Two of the numbers may belong to different ticks.
 struct LoopProgress {
     std::atomic<std::uint64_t> ticks{0};
     std::atomic<std::uint64_t> missed{0};
-    std::atomic<std::uint64_t> lost{0};     ///< lost samples
+    std::atomic<std::uint64_t> lost{0};     ///< lost samples of the device
     std::atomic<double> position{0.0};      ///< position of the handle [m or rad]
     std::atomic<double> force{0.0};         ///< force on the handle [N or N*m]
     std::atomic<double> object_force{0.0};  ///< force of a real object on the handle [N or N*m]
     RateCheck rate;
 };
 
-/// Result of a loop.
+/// Exit reason, counters and energy of a control loop that has ended.
 struct LoopReport {
     ExitReason exit_reason = ExitReason::TimeUp;
     Status status = Status::Ok;  ///< status of the last tick
@@ -77,13 +78,13 @@ struct LoopReport {
     std::array<std::uint64_t, status_texts.size()> ticks_by_status{};
     std::uint64_t lost_samples = 0;
     std::uint64_t repeated_samples = 0;
-    double given_in_ramp = 0.0;      ///< largest net energy from the motor during the ramp at the start [J]
-    double given = 0.0;              ///< the same after the ramp [J]
-    double most_stored = 0.0;        ///< upper bound of the stored energy above its least [J]
-    std::uint64_t limit_cycles = 0;  ///< limit cycles, each of which scaled all forces down
+    double given_in_ramp = 0.0;  ///< largest net energy that the motor gave during the start ramp [J]
+    double given = 0.0;          ///< largest net energy that the motor gave after the start ramp [J]
+    double most_stored = 0.0;    ///< upper bound of the energy stored in the object, above its minimum [J]
+    std::uint64_t limit_cycles = 0;  ///< detected limit cycles; each scaled all later forces down
 };
 
-/// Returns the record of a tick.
+/// Returns the record of a tick for a recording; `first` is the time of the first wake-up [ns].
 [[nodiscard]] inline TickRecord record_of(const Tick& tick, const Wake& wake, Nanoseconds first) noexcept {
     TickRecord record;
     record.time = static_cast<double>(wake.now - first) * 1e-9;
@@ -104,7 +105,8 @@ struct LoopReport {
 
 namespace detail {
 
-/// Returns true if the loop must stop after this number of consecutive bad ticks; sets `reason`.
+/// Returns true and sets `reason` if the loop must end: after a final status, or after more than `tolerated`
+/// consecutive ticks that sent no force.
 [[nodiscard]] inline bool must_stop(Status status, std::uint64_t bad_in_a_row, std::uint64_t tolerated,
                                     ExitReason& reason) noexcept {
     if (!is_final(status) && bad_in_a_row <= tolerated) {
@@ -117,15 +119,15 @@ namespace detail {
 
 }  // namespace detail
 
-/// Runs the loop (wake up, tick, pass the record on) until the time is up, a stop is requested, a guard or the device
-/// stops it, or its rate is too low. On every exit it sends zero force and closes the device. `clock` has start() and
-/// wait(); `sink` has push(record). It does not allocate, lock, throw, log or make a system call, except for the clock
-/// and the device exchange.
+/// Runs the control loop (wake up, run a tick, pass the tick's record to `sink`) until the duration ends, a stop is
+/// requested, a guard or the device ends the loop, or the rate is too low. On every exit it sends zero force and closes
+/// the device. `clock` has start() and wait(); `sink` has push(record). Apart from the clock and the device's
+/// `exchange`, the loop does not allocate, lock, throw, log or make a system call.
 template <class Control, class Clock, class Sink>
 void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
               const std::atomic<bool>& stop_requested, Sink& sink, LoopProgress& progress,
               LoopReport& report) noexcept {
-    constexpr double most_ticks = 1e15;  // ticks of an infinite duration
+    constexpr double most_ticks = 1e15;  // number of ticks that replaces an infinite duration
     const auto deadlines = static_cast<std::uint64_t>(
         std::clamp(std::round(settings.duration_s * settings.rate_hz), 1.0, most_ticks));
     std::uint64_t bad_in_a_row = 0;
@@ -138,7 +140,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
         report.timing.add(wake);
         if (too_late) {
             report.exit_reason = ExitReason::NotCertified;
-            break;  // the last force was already held too long
+            break;  // no further tick: the device already held the last force for too long
         }
         const Tick tick = controller.tick();
         const TickRecord record = record_of(tick, wake, report.timing.first);
@@ -171,7 +173,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
     controller.stop();
     report.lost_samples = controller.reading_guard().lost();
     report.repeated_samples = controller.reading_guard().repeated();
-    report.given_in_ramp = 0.0 - controller.guards().ramp_observer.least();  // not -0
+    report.given_in_ramp = 0.0 - controller.guards().ramp_observer.least();  // subtraction from 0.0 avoids -0
     report.given = 0.0 - controller.guards().observer.least();
     report.most_stored = controller.guards().tank.stored().most();
     report.limit_cycles = controller.guards().limit_cycle.limit_cycles();

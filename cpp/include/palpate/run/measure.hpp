@@ -20,15 +20,15 @@
 
 namespace palpate {
 
-/// Options of a measurement of a real object. Without `probe` and `push` a hand moves the handle.
+/// Options of a measurement of a real object on a device. Without `probe` and `push` a hand moves the handle.
 struct MeasureOptions : RunOptions {
     RecordUnits units;
-    bool probe = false;  ///< slow motion between lower and upper
-    std::optional<double> lower, upper, speed, stiffness, force_limit;  ///< of the probe
+    bool probe = false;  ///< true: the device moves the handle slowly between lower and upper
+    std::optional<double> lower, upper, speed, stiffness, force_limit;  ///< settings of the probe
     std::optional<double> push;   ///< force of short pushes to either side [N or N*m]
-    bool keep = false;            ///< true: keep every tick
-    bool transducer = true;       ///< of the simulated device
-    double friction_share = 0.0;  ///< Coulomb friction / force limit, simulated
+    bool keep = false;            ///< true: return every tick with the summary
+    bool transducer = true;       ///< true: the simulated device has a force transducer
+    double friction_share = 0.0;  ///< Coulomb friction / force limit of the simulated device
 
     /// Returns true if the device moves the handle.
     [[nodiscard]] bool moves() const noexcept { return probe || push; }
@@ -46,7 +46,7 @@ inline constexpr auto fields_of<MeasureOptions> = std::tuple_cat(
 
 namespace detail {
 
-/// Returns the settings of the probe: the given ones, otherwise the defaults at the scale of the device.
+/// Returns the settings of the probe: the given values, otherwise default values multiplied by the scale of the device.
 [[nodiscard]] inline ProbeSettings chosen_probe(const MeasureOptions& options, const LiveDevice& device) {
     ProbeSettings probe;
     probe.lower = options.lower.value_or(probe.lower);
@@ -56,16 +56,16 @@ namespace detail {
     probe.damping *= device.scale.stiffness();
     probe.force_limit = options.force_limit.value_or(device.profile.force_limit);
     validate(probe);
-    require(device.profile.makes(probe.force_limit), "force_limit is " + readable(probe.force_limit) +
-                                                         ", the device makes " +
-                                                         readable(device.profile.force_limit));
+    require(device.profile.makes(probe.force_limit),
+            "force_limit is " + readable(probe.force_limit) + ": must be at most " +
+                readable(device.profile.force_limit) + ", the force limit of the device");
     probe.force_limit = std::min(probe.force_limit, device.profile.force_limit);
     return probe;
 }
 
 }  // namespace detail
 
-/// Opens a device and measures a real object on it. A hand, a probe or pushes move the object.
+/// Opens a device and measures the force of a real object on it, while a hand, a probe or pushes move the handle.
 [[nodiscard]] inline Summary measure(const MeasureOptions& options, LiveDevice& device,
                                      const std::atomic<bool>& stop_requested, const Watch& watch) {
     SessionSettings session{.loop = options.loop, .real_time = options.real_time};
@@ -87,7 +87,7 @@ namespace detail {
                    readable(probe->force_limit);
     }
     if (!options.moves()) {
-        guards.ramp_s = 0.0;  // there is only zero force
+        guards.ramp_s = 0.0;  // without probe and push the device makes no force
     }
     validate(guards);
     Metadata metadata{{"created_by", options.created_by}};

@@ -19,10 +19,10 @@ namespace palpate {
 
 #ifdef PALPATE_HAS_INVERSE3
 
-/// Opens a Haply Inverse3 for rendering.
+/// Opens a Haply Inverse3 device for rendering. Throws std::invalid_argument with the reason if that is not possible.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_inverse3(const RenderOptions& options,
                                                                const PlannedModel& model) {
-    constexpr double usual_force_limit = 2.0;  // [N]; the service does not state one
+    constexpr double usual_force_limit = 2.0;  // [N]; the service does not send a force limit
     if (model.position_unit != "m" || model.force_unit != "N") {
         refuse(model.units_text() + "; an Inverse3 moves along a line and needs a model in m and N");
     }
@@ -45,8 +45,8 @@ namespace palpate {
     const std::string filters = live->report().lines.front().second;
     const double period_s = 1.0 / options.loop.rate_hz;
     live->scale = scale_of(model.model, false);
-    // The service does not state the mechanics of the device. Those of the certificate are used; without one, damping
-    // and friction are 0.
+    // The service does not send inertia, damping and friction of the device. The profile of the certificate is used;
+    // without a certificate, damping and friction are 0.
     if (!options.uncertified && model.certificate) {
         live->profile = model.certificate->device;
     } else {
@@ -69,7 +69,7 @@ namespace palpate {
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_inverse3(const RenderOptions& options,
                                                                const PlannedModel& /*model*/) {
     refuse("device " + options.device +
-           ": palpate was built without Boost; install libboost-dev and build it again");
+           ": palpate was built without Boost; install libboost-dev and build palpate again");
 }
 
 #endif

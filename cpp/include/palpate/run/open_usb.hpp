@@ -27,7 +27,7 @@ namespace palpate {
 
 namespace detail {
 
-/// Returns the state of the connection for a summary.
+/// Returns the counters and delays of a USB device for the summary of a run.
 [[nodiscard]] inline DeviceReport usb_report(const UsbDevice& device) {
     const UsbHealth health = device.health();
     const StreamHealth& stream = health.stream;
@@ -50,11 +50,11 @@ namespace detail {
          {"bus_errors", health.bus_errors},
          {"watchdog_trips", stream.watchdog_trips}},
         {{"round trip", percentiles(stream.round_trip)},
-         {"delay",
-          "p50 " + readable(samples(0.5)) + ", p99 " + readable(samples(0.99)) + ", max " +
-              readable(samples(1.0)) + " samples, from a sample to its force" +
-              (stream.late_commands == 0 ? ""
-                                         : "; " + number(stream.late_commands) + " later than certified")},
+         {"delay", "p50 " + readable(samples(0.5)) + ", p99 " + readable(samples(0.99)) + ", max " +
+                       readable(samples(1.0)) + " samples, from a sample to the force computed from it" +
+                       (stream.late_commands == 0
+                            ? ""
+                            : "; " + number(stream.late_commands) + " commands later than certified")},
          {"wire", number(stream.packets) + " packets, " + number(stream.lost) + " lost, " +
                       number(stream.repeated) + " repeated, " + number(stream.malformed) + " malformed, " +
                       number(health.discarded) + " discarded; " + number(health.skipped_commands) +
@@ -87,12 +87,13 @@ namespace detail {
 
 }  // namespace detail
 
-/// Opens a USB device for rendering.
+/// Opens a USB device for rendering. Throws std::invalid_argument with the reason if that is not possible.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_usb(const RenderOptions& options,
                                                           const PlannedModel& model) {
     UsbOptions usb = detail::usb_options(options);
     if (!options.uncertified && model.certificate) {
-        usb.longest_delay_s = model.certificate->device.delay_s;  // later commands are not certified
+        usb.longest_delay_s =
+            model.certificate->device.delay_s;  // the certificate does not hold for a longer delay
     }
     auto live = std::make_unique<LiveDeviceOf<UsbDevice>>(UsbDevice{std::move(usb)}, detail::usb_report);
     if (const Opened opened = live->open(); !opened) {
@@ -106,7 +107,7 @@ namespace detail {
     if (std::abs(options.loop.rate_hz - device.info().rate_hz) > 0.5) {
         const std::string rate = std::to_string(device.info().rate_hz);
         refuse("rate_hz is " + readable(options.loop.rate_hz) + "; " + name + " sends " + rate +
-               " packets a second and paces the loop: must be " + rate);
+               " packets a second and sets the rate of the loop: must be " + rate);
     }
     live->title = name + (options.uncertified ? ", uncertified," : "");
     live->profile = device.profile();
@@ -115,7 +116,7 @@ namespace detail {
     return live;
 }
 
-/// Returns a USB device for a measurement, not open yet. It makes force only for a probe and for pushes.
+/// Returns a USB device for a measurement, not open yet. The device makes force only if `probe` or `push` is set.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> usb_to_measure(MeasureOptions& options) {
     UsbOptions usb = detail::usb_options(options);
     usb.makes_force = false;
@@ -126,9 +127,9 @@ namespace detail {
     const wire::Info info = listener.info();
     const std::string name = listener.name().text();
     listener.close();
-    detail::require(
-        !options.probe || options.upper,
-        "a probe on a real device needs upper, its largest position from the zero of the encoder");
+    detail::require(!options.probe || options.upper,
+                    "a probe on a real device needs upper, the largest position of its target from the zero "
+                    "of the encoder");
     options.force_limit =
         options.force_limit.value_or(std::min(ProbeSettings{}.force_limit, profile.force_limit));
     usb.makes_force = options.moves();
@@ -143,10 +144,10 @@ namespace detail {
 
 #else
 
-/// Throws, because this build does not include libusb.
+/// Throws std::invalid_argument, because this build of palpate does not include libusb.
 [[noreturn]] inline void refuse_usb(const RunOptions& options) {
     refuse("device " + options.device +
-           ": palpate was built without libusb; install libusb-1.0-0-dev and build it again");
+           ": palpate was built without libusb; install libusb-1.0-0-dev and build palpate again");
 }
 
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_usb(const RenderOptions& options,

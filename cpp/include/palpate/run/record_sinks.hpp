@@ -13,19 +13,19 @@
 
 namespace palpate {
 
-/// Smallest and largest of some values; NaN before the first value.
+/// Smallest and largest of all added values; NaN before the first value.
 struct Range {
     double lower = std::numeric_limits<double>::quiet_NaN();
     double upper = std::numeric_limits<double>::quiet_NaN();
 
-    /// Extends the range to a value.
+    /// Adds a value: extends the range if the value is outside.
     void add(double value) noexcept {
         lower = std::fmin(lower, value);
         upper = std::fmax(upper, value);
     }
 };
 
-/// Passes the records of ticks to a file, to telemetry and to memory, and keeps their ranges.
+/// Passes the records of ticks to a file, to telemetry and to memory, and stores the range of positions and forces.
 struct RecordSinks {
     RecordingFile file;
     Telemetry telemetry;
@@ -33,7 +33,7 @@ struct RecordSinks {
     bool keeps = false;        ///< true if every tick is kept in memory
     bool real_object = false;  ///< true if the recorded force is that of a real object
 
-    /// Takes the records of some ticks.
+    /// Processes the records of some ticks, in the order of time.
     void take(std::span<const TickRecord> ticks) noexcept {
         if (real_object) {
             recorded_.assign(ticks.begin(), ticks.end());
@@ -56,9 +56,9 @@ struct RecordSinks {
         }
     }
 
-    Range positions;                 ///< range of the handle [m or rad]
-    Range forces;                    ///< range of the force, of a real object if there is one
-    std::uint64_t extrapolated = 0;  ///< ticks outside the model's data
+    Range positions;                 ///< range of the handle's positions [m or rad]
+    Range forces;                    ///< range of the sent force, or of the force of a real object [N or N*m]
+    std::uint64_t extrapolated = 0;  ///< number of ticks with a position outside the model's domain
 
   private:
     std::vector<TickRecord> recorded_;

@@ -32,10 +32,10 @@
 
 namespace palpate {
 
-/// Options of every session.
+/// Options of every run on a device, for rendering and for measuring.
 struct RunOptions {
     std::string device = "simulated";
-    std::optional<double> wait_s;  ///< longest wait for the device; default: that of the device [s]
+    std::optional<double> wait_s;  ///< longest wait for a sample [s]; unset: default of the device
     LoopSettings loop;
     RealTimeOptions real_time;
     std::string record;  ///< name of the recording; empty without one
@@ -59,7 +59,7 @@ inline constexpr auto fields_of<RunOptions> =
                Field<&RunOptions::telemetry_port>{"telemetry_port"},
                Field<&RunOptions::telemetry_hz>{"telemetry_hz"}};
 
-/// Options of a rendering. Unset fields follow the model and the device.
+/// Options of a rendering. Fields that are not set get a default from the model and the device.
 struct RenderOptions : RunOptions {
     bool rate_given = false;  ///< true if the user chose loop.rate_hz
     SchemeChoices scheme;
@@ -80,9 +80,9 @@ inline constexpr auto fields_of<RenderOptions> = std::tuple_cat(
     std::tuple{Field<&RenderOptions::force_limit>{"force_limit"},
                Field<&RenderOptions::uncertified>{"uncertified"}, Field<&RenderOptions::faults>{"faults"}});
 
-/// A model and its plan.
+/// A model with its units, plan and certificate.
 struct PlannedModel {
-    std::string name;  ///< name of its file
+    std::string name;  ///< name of the model file
     ForceModel model;  ///< the identified model
     std::string position_unit;
     std::string force_unit;
@@ -92,16 +92,16 @@ struct PlannedModel {
 
     /// Returns the model that the plan renders.
     [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }
-    /// Returns the name and the units, for a refusal.
+    /// Returns the name and the units of the model, for a message.
     [[nodiscard]] std::string units_text() const {
         const auto unit = [](const std::string& text) { return text.empty() ? "no unit" : text; };
         return name + " is in " + unit(position_unit) + " and " + unit(force_unit);
     }
-    /// Returns the units of a recording of this model.
+    /// Returns the units in the column names of a recording of this model.
     [[nodiscard]] RecordUnits units() const { return record_units(position_unit, force_unit); }
 };
 
-/// Rendering on an open device, with all settings, before the handle moves.
+/// Model and all settings of a rendering on an open device, complete before the handle moves.
 struct RenderJob {
     const ForceModel& model;  ///< the rendered model
     Scheme scheme;
@@ -111,12 +111,13 @@ struct RenderJob {
     std::vector<std::string> notes;  ///< messages for the user
 };
 
-/// Throws std::invalid_argument with the sentence.
+/// Throws std::invalid_argument with the given sentence.
 [[noreturn]] inline void refuse(const std::string& sentence) {
     throw std::invalid_argument(sentence);
 }
 
-/// Returns true if the options choose a rendering that differs from the plan. No certificate holds in this case.
+/// Returns true if the options change the rendering that the plan describes. The certificate does not hold in this
+/// case.
 [[nodiscard]] inline bool changes_plan(const RenderOptions& options) noexcept {
     return options.scheme.any() || options.force_limit || options.slew_s || options.tolerated;
 }
@@ -135,11 +136,11 @@ struct RenderJob {
 namespace detail {
 
 /// Returns the reason why a model must not move a device; empty if its certificate holds for the device, its rate and
-/// the options. The reader of the model has checked that the certificate fits the model.
+/// the options. Reading the model file has already checked that the certificate belongs to the model.
 [[nodiscard]] inline std::string certificate_mismatch(const RenderOptions& options, const PlannedModel& model,
                                                       const DeviceProfile& device) {
     const auto differs = [](double certified, double measured) {
-        constexpr double rounding = 1e-6;  // of a handwritten profile
+        constexpr double rounding = 1e-6;  // allowed relative rounding of a handwritten profile
         return std::abs(certified - measured) > rounding * std::abs(measured);
     };
     if (!model.certificate) {
@@ -162,8 +163,8 @@ namespace detail {
                " rad, the device has " + readable(device.encoder_step) + " rad";
     }
     if (certified.force_limit > device.force_limit && differs(certified.force_limit, device.force_limit)) {
-        return "is certified for " + readable(certified.force_limit) + " N*m, the device makes " +
-               readable(device.force_limit) + " N*m";
+        return "is certified for a force limit of " + readable(certified.force_limit) +
+               " N*m, the device makes at most " + readable(device.force_limit) + " N*m";
     }
     if (changes_plan(options)) {
         return "is certified for its plan only: do not set structure, its numbers, force_limit, slew_s or "
@@ -172,7 +173,7 @@ namespace detail {
     return "";
 }
 
-/// Returns the guards with the chosen options; the others have the defaults for the device.
+/// Returns the settings of the guards: the values of the options, otherwise the defaults for the device.
 [[nodiscard]] inline GuardSettings chosen_guards(const RenderOptions& options, const LiveDevice& device) {
     GuardSettings guards = guards_for(device.scale, device.profile);
     guards.force_limit = options.force_limit.value_or(guards.force_limit);
@@ -183,19 +184,19 @@ namespace detail {
     guards.energy_tank = options.energy_tank;
     validate(guards);
     if (!device.profile.makes(guards.force_limit)) {
-        refuse("force_limit is " + readable(guards.force_limit) + ", the device makes " +
-               readable(device.profile.force_limit));
+        refuse("force_limit is " + readable(guards.force_limit) + ": must be at most " +
+               readable(device.profile.force_limit) + ", the force limit of the device");
     }
     guards.force_limit = std::min(guards.force_limit, device.profile.force_limit);
     return guards;
 }
 
-/// Share of the rate below which the certificate does not hold, because it is for the period of that rate.
+/// Least measured rate for which a certificate holds, divided by the certified rate [-].
 inline constexpr double certified_rate_share = 0.99;
 
-/// Sets guards and loop as certified. Removes the slew limit and ticks without a force, because the proofs do not cover
-/// them. Sets the certified force limit, the longest certified time between two ticks, and the device's damping and
-/// friction for the energy tank.
+/// Sets guards and control loop to the values of the certificate: force limit, longest time between two ticks, and the
+/// device's damping and friction for the energy tank. Disables the slew limit, and lets the loop end after the first
+/// tick without a force, because the proofs of the certificate include neither.
 inline void apply_certificate(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
     guards.certified = true;
     guards.slew_s = 0.0;
@@ -207,7 +208,7 @@ inline void apply_certificate(const Certificate& certificate, GuardSettings& gua
     loop.longest_period_s = certificate.longest_period_s;
 }
 
-/// Opens telemetry and recording. Returns a sentence if an interrupted recording was renamed, otherwise "".
+/// Opens telemetry and recording. Returns a note if an interrupted earlier recording was renamed, otherwise "".
 inline std::string open_sinks(const RunOptions& options, const RecordUnits& units, const Metadata& metadata,
                               RecordSinks& sinks) {
     if (options.telemetry_port) {
@@ -220,10 +221,10 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     const std::string reason = sinks.file.open(options.record, units, metadata, options.force);
     require(reason.empty(), reason);
     const std::string& interrupted = sinks.file.file().interrupted_name();
-    return interrupted.empty() ? "" : "an interrupted earlier recording is kept as " + interrupted;
+    return interrupted.empty() ? "" : "an earlier recording that was interrupted is kept as " + interrupted;
 }
 
-/// Finishes the recording and judges the session.
+/// Finishes the recording of a run and returns the summary with the verdict.
 [[nodiscard]] inline Summary finish(const RunOptions& options, const LoopSettings& loop,
                                     const RecordUnits& units, const Metadata& metadata, RecordSinks& sinks,
                                     SessionReport report, SessionExpectation expected,
@@ -257,9 +258,9 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
 
 }  // namespace detail
 
-/// Chooses scheme, guards and rate of a rendering on an open device, then opens the sinks. A real device requires a
-/// certificate that holds for it, unless `uncertified` is set. Throws std::invalid_argument with the reason of a
-/// refusal.
+/// Chooses scheme, guards and rate of a rendering on an open device, then opens recording and telemetry. A real device
+/// requires a certificate that holds for this device, unless `uncertified` is set. Throws std::invalid_argument with
+/// the reason if the rendering is not allowed.
 [[nodiscard]] inline RenderJob prepare_rendering(const RenderOptions& options, const PlannedModel& model,
                                                  const LiveDevice& device, RecordSinks& sinks) {
     std::string reason = uncertified_reason(options, model);
@@ -267,7 +268,8 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
         reason = detail::certificate_mismatch(options, model, device.profile);
         if (!reason.empty()) {
             refuse(model.name + " " + reason +
-                   "; make a certificate with 'palpate plan', or set uncertified to render without");
+                   "; make a certificate with 'palpate plan', or set uncertified to render without a "
+                   "certificate");
         }
     }
     const bool follows_plan = model.plan && !options.scheme.any();
@@ -291,8 +293,8 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     validate(job.scheme, job.model, 1.0 / loop.rate_hz);
     if (!model.plan && !options.scheme.any() && has_coupling(job.scheme.structure)) {
         job.notes.emplace_back(
-            "the model has no plan: rendered behind the default coupling, which makes it softer; 'palpate "
-            "plan' chooses a structure");
+            "the model has no plan: rendered behind the default coupling, which makes the object softer; "
+            "'palpate plan' chooses a structure");
     }
     job.metadata = device.metadata;
     job.metadata.emplace_back("certified", !reason.empty() ? "no: " + reason
@@ -311,7 +313,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     return job;
 }
 
-/// Renders a model on an open device until the loop ends, then closes the device.
+/// Renders a model on an open device until the control loop ends, then closes the device and returns the summary.
 [[nodiscard]] inline Summary render(const RenderOptions& options, const PlannedModel& model,
                                     const RenderJob& job, LiveDevice& device, RecordSinks& sinks,
                                     const std::atomic<bool>& stop_requested, const Watch& watch) {

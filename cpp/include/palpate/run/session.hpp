@@ -22,33 +22,34 @@
 
 namespace palpate {
 
-/// Settings of a session, which runs the loop and the recorder in two threads.
+/// Settings of a session: one run of the control loop, with a second thread that writes the recording.
 struct SessionSettings {
     LoopSettings loop{};
     RealTimeOptions real_time{};
-    std::chrono::milliseconds hand_over_every{20};  ///< largest age of an unwritten record
-    double ring_s = 10.0;                           ///< longest pause of the writer [s]
-    std::size_t last_ticks = 500;                   ///< saved to NAME.fault.csv after a fault
+    std::chrono::milliseconds hand_over_every{20};  ///< interval at which records are written
+    double ring_s = 10.0;                           ///< recorded time that fits into the ring buffer [s]
+    std::size_t last_ticks = 500;                   ///< number of ticks saved to NAME.fault.csv after a fault
 };
 
-/// State of a running session.
+/// State of a running session, for messages to the user.
 struct SessionView {
     const LoopProgress& progress;
-    const std::vector<std::string>* refused;  ///< refused privileges; null before they were requested
-    int disk_error;                           ///< errno of the recording; 0 without an error
+    const std::vector<std::string>*
+        refused;     ///< requests that the system refused; null before they were made
+    int disk_error;  ///< error number of a failed write of the recording; 0 without
 };
 
-/// Result of a session.
+/// Result of a session: result of the control loop, and its last ticks.
 struct SessionReport {
     LoopReport loop;
-    std::vector<std::string> refused;    ///< privileges that the loop did not get
-    std::uint64_t lost_records = 0;      ///< because the ring was full
-    std::vector<TickRecord> last_ticks;  ///< oldest first
+    std::vector<std::string> refused;    ///< messages on real-time requests that the system refused
+    std::uint64_t lost_records = 0;      ///< records lost because the ring buffer was full
+    std::vector<TickRecord> last_ticks;  ///< records of the last ticks, oldest first
 };
 
 namespace detail {
 
-/// Passes records to the recorder and to the last ticks.
+/// Passes the record of each tick to the recorder, and to the memory of the last ticks.
 template <class Recorder>
 struct LoopSink {
     Recorder& recorder;
@@ -63,11 +64,11 @@ struct LoopSink {
 
 }  // namespace detail
 
-/// Function that is called fifty times a second while a session runs; it may request its stop.
+/// Function that is called fifty times a second while a session runs; it may request the end of the session.
 using Watch = std::function<void(const SessionView&)>;
 
-/// Runs the loop on an open device until it ends. After that the device is closed at zero force, and the sinks have
-/// received every record.
+/// Runs the control loop on an open device until the loop ends. When it returns, the device is closed at zero force,
+/// and `sinks` has received the records of all ticks.
 template <class Control>
 [[nodiscard]] SessionReport run_session(Control& controller, const SessionSettings& settings,
                                         RecordSinks& sinks, const std::atomic<bool>& stop_requested,

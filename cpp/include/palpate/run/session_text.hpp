@@ -17,7 +17,7 @@
 
 namespace palpate {
 
-/// Returns a text such as "p50 1.2 us, p99 3.4 us, p99.9 5.6 us, max 7.8 us".
+/// Returns the percentiles of durations as a text such as "p50 1.2 us, p99 3.4 us, p99.9 5.6 us, max 7.8 us".
 [[nodiscard]] inline std::string percentiles(const DurationHistogram& histogram) {
     std::string text;
     for (const auto& [name, share] :
@@ -28,7 +28,7 @@ namespace palpate {
     return text;
 }
 
-/// Returns the timing of a loop in one line.
+/// Returns rate, periods and delays of a control loop as one line of text.
 [[nodiscard]] inline std::string timing_text(const LoopTiming& timing, double wanted_hz) {
     return readable(timing.rate_hz()) + " Hz of " + readable(wanted_hz) + " Hz over " +
            std::to_string(timing.ticks()) + " ticks; period " + percentiles(timing.period) + "; late by " +
@@ -36,7 +36,7 @@ namespace palpate {
            "; longest gap " + readable(1e-3 * static_cast<double>(timing.period.largest())) + " us";
 }
 
-/// Returns the exit reason of a loop as a sentence.
+/// Returns the exit reason of a control loop as a sentence.
 [[nodiscard]] inline std::string exit_text(const LoopReport& report, const LoopSettings& settings) {
     const StatusText& status = text(report.status);
     switch (report.exit_reason) {
@@ -49,9 +49,9 @@ namespace palpate {
         case ExitReason::DeviceFault:
             return std::string("stopped by a fault of the device: ") + status.word + ", " + status.meaning;
         case ExitReason::NotCertified:
-            return "stopped because a tick came " +
+            return "stopped because a tick started " +
                    readable(1e-6 * static_cast<double>(report.timing.period.largest())) +
-                   " ms after the one before: the certificate holds up to " +
+                   " ms after the previous tick: the certificate holds for at most " +
                    readable(1e3 * settings.longest_period_s) + " ms";
         case ExitReason::RateTooLow:
             break;
@@ -61,17 +61,17 @@ namespace palpate {
            " Hz for half a second";
 }
 
-/// Returns the largest net energy that a rendering gave, in one line. The ramp at the start can give the energy of the
-/// object once, so its energy is stated separately.
+/// Returns the largest net energy that a rendering gave, as one line of text. The energy during the start ramp is
+/// stated separately, because the ramp can give the energy of the object once.
 [[nodiscard]] inline std::string energy_text(const LoopReport& report) {
     const std::string stored = std::isfinite(report.most_stored)
                                    ? "the object stored at most " + readable(report.most_stored) + " J"
                                    : "no bound of the stored energy is known";
-    return "given " + readable(report.given_in_ramp) + " J during the ramp, " + readable(report.given) +
-           " J after it; " + stored;
+    return "the motor gave " + readable(report.given_in_ramp) + " J during the start ramp and " +
+           readable(report.given) + " J after the ramp; " + stored;
 }
 
-/// Returns a text such as "massless, compensated, K_c = 100, B_c = 0.02".
+/// Returns a scheme as a text such as "massless, compensated, K_c = 100, B_c = 0.02".
 [[nodiscard]] inline std::string describe(const Scheme& scheme) {
     std::string text{name_of(scheme.structure)};
     text += scheme.compensated ? ", compensated" : "";
@@ -91,7 +91,7 @@ namespace palpate {
     return text;
 }
 
-/// Returns the head of a flight record.
+/// Returns the metadata of a flight record: program, device, model, structure, guards and rate.
 [[nodiscard]] inline Metadata flight_metadata(const std::string& created_by, const Metadata& device,
                                               const std::string& model, const Scheme& scheme,
                                               const GuardSettings& guards, double rate_hz) {
@@ -109,8 +109,8 @@ namespace palpate {
     return metadata;
 }
 
-/// Writes the exit reason and the timing into the recording and renames the file; `name` becomes its name. Returns a
-/// sentence for each difference from the request.
+/// Writes the exit reason and the timing into the recording, renames the file, and sets `name` to its final name.
+/// Returns a warning if rows are missing, and a warning if the file could not be renamed.
 [[nodiscard]] inline std::vector<std::string> finish_record(RecordingFile& file, const SessionReport& report,
                                                             const LoopSettings& settings, std::string& name) {
     std::vector<std::string> warnings;
@@ -130,8 +130,9 @@ namespace palpate {
     return warnings;
 }
 
-/// Writes the last ticks before a fault to a separate recording, NAME.fault.csv. Without `force` it keeps an existing
-/// file and uses NAME.fault-2.csv, NAME.fault-3.csv, ... Returns a sentence with the name or the error.
+/// Writes the last ticks before a fault to a separate recording, NAME.fault.csv. If the file exists, it is replaced
+/// with `force`; without `force` the name is NAME.fault-2.csv, NAME.fault-3.csv, ... Returns a message with the name of
+/// the file or with the error.
 [[nodiscard]] inline std::string write_last_ticks(const std::string& record, bool force,
                                                   const RecordUnits& units, const Metadata& metadata,
                                                   const SessionReport& report, const LoopSettings& settings) {

@@ -19,29 +19,29 @@
 
 namespace palpate {
 
-/// Defect of a session: value, likely cause and cure in one sentence.
+/// A defect of a run: a sentence with the measured value, the likely cause and the cure.
 struct SessionFinding {
     std::string_view level;  ///< "usable", or "no" for an unusable result
     std::string sentence;
 };
 
-/// Expected properties of a session.
+/// Properties of a run that are needed to judge it.
 struct SessionExpectation {
     bool recorded = false;      ///< true if a recording was requested
-    double encoder_step = 0.0;  ///< of the device [m or rad]; 0 without quantisation
-    Range domain{};             ///< positions of the rendered model; NaN for a real object
+    double encoder_step = 0.0;  ///< encoder step of the device [m or rad]; 0 without
+    Range domain{};             ///< domain of the rendered model [m or rad]; NaN for a real object
     std::string position_unit{};
-    std::vector<std::string> warnings{};  ///< from `finish_record`
+    std::vector<std::string> warnings{};  ///< warnings of `finish_record`
 };
 
 namespace detail {
 
-inline constexpr double tolerated_loss = 0.001;     ///< share of deadlines, samples and rows that may be lost
-inline constexpr double tolerated_change = 0.01;    ///< share of ticks with another force than the model's
-inline constexpr double fewest_encoder_steps = 50;  ///< least number that a recording covers
-inline constexpr double smallest_domain_share = 0.1;  ///< least share that a rendering covers
+inline constexpr double tolerated_loss = 0.001;     ///< largest good share of lost deadlines, samples or rows
+inline constexpr double tolerated_change = 0.01;    ///< largest good share of ticks with a changed force
+inline constexpr double fewest_encoder_steps = 50;  ///< least travel of a good recording [encoder steps]
+inline constexpr double smallest_domain_share = 0.1;  ///< least travel of a good rendering / domain [-]
 
-/// Returns a text such as "12 of 1000 (1.2 %)".
+/// Returns a part of a whole as a text such as "12 of 1000 (1.2 %)".
 [[nodiscard]] inline std::string share_text(std::uint64_t part, std::uint64_t whole) {
     return std::to_string(part) + " of " + std::to_string(whole) + " (" +
            readable(100.0 * static_cast<double>(part) /
@@ -49,12 +49,12 @@ inline constexpr double smallest_domain_share = 0.1;  ///< least share that a re
            " %)";
 }
 
-/// Returns true if a part exceeds a share of the whole.
+/// Returns true if `part` is larger than the given share of `whole`.
 [[nodiscard]] inline bool exceeds(std::uint64_t part, std::uint64_t whole, double share) noexcept {
     return static_cast<double>(part) > share * static_cast<double>(whole);
 }
 
-/// Adds findings about lost time, samples and rows.
+/// Adds findings about missed deadlines, a low rate, lost samples and lost rows.
 inline void judge_losses(const SessionReport& report, const LoopSettings& settings,
                          std::vector<SessionFinding>& findings) {
     const LoopTiming& timing = report.loop.timing;
@@ -62,10 +62,11 @@ inline void judge_losses(const SessionReport& report, const LoopSettings& settin
     if (const std::uint64_t deadlines = ticks + timing.missed;
         exceeds(timing.missed, deadlines, tolerated_loss)) {
         findings.push_back(
-            {"usable", share_text(timing.missed, deadlines) +
-                           " deadlines were missed: close other programs, or allow real-time priority"});
+            {"usable",
+             share_text(timing.missed, deadlines) +
+                 " deadlines of the loop were missed: close other programs, or allow real-time priority"});
     } else if (ticks > 1 && timing.rate_hz() < held_rate_share * settings.rate_hz) {
-        findings.push_back({"usable", "the rate was " + readable(timing.rate_hz()) + " Hz of " +
+        findings.push_back({"usable", "the rate of the loop was " + readable(timing.rate_hz()) + " Hz of " +
                                           readable(settings.rate_hz) +
                                           " Hz: close other programs, or choose a lower rate"});
     }
@@ -84,7 +85,7 @@ inline void judge_losses(const SessionReport& report, const LoopSettings& settin
     }
 }
 
-/// Adds findings about ticks whose force differed from the model's force.
+/// Adds findings about ticks in which the sent force differed from the model's force.
 inline void judge_forces(const LoopReport& loop, const RecordSinks& sinks, const SessionExpectation& expected,
                          std::vector<SessionFinding>& findings) {
     const std::uint64_t ticks = loop.timing.ticks();
@@ -95,23 +96,26 @@ inline void judge_forces(const LoopReport& loop, const RecordSinks& sinks, const
         }
     };
     changed(count(Status::Limited),
-            "clipped the force to its limit: raise the limit, or use a stronger device");
+            "clipped the force to the force limit: raise the force limit, or use a stronger device");
     changed(count(Status::EnergyLimited) + count(Status::LimitCycleScaled),
-            "reduced the force, because the rendering gave energy: choose its structure with palpate plan");
+            "reduced the force, because the rendering gave energy: choose the structure with palpate plan");
     changed(count(Status::MaxIterations) + count(Status::NotUnique),
             "did not solve the load line: choose the structure with palpate plan");
-    changed(sinks.extrapolated, "lay outside the model's data, from " + readable(expected.domain.lower) +
-                                    " to " + readable(expected.domain.upper) + " " + expected.position_unit +
-                                    ": stay within, or identify the model over a larger range");
+    changed(sinks.extrapolated,
+            "had a position outside the model's domain, " + readable(expected.domain.lower) + " to " +
+                readable(expected.domain.upper) + " " + expected.position_unit +
+                ": move the handle only within the domain, or identify the model over a larger domain");
     if (ticks > 0 && count(Status::Ramp) == ticks) {
-        findings.push_back({"usable", "all " + std::to_string(ticks) +
-                                          " ticks lay within the ramp at the start: run for a longer time"});
+        findings.push_back(
+            {"usable",
+             "all " + std::to_string(ticks) +
+                 " ticks were part of the start ramp, which scales the force down: run for a longer time"});
     }
     if (ticks > 0 && sinks.forces.lower == 0.0 && sinks.forces.upper == 0.0) {
         findings.push_back({"no", "every force was zero: the handle did not touch the object between " +
                                       readable(sinks.positions.lower) + " and " +
                                       readable(sinks.positions.upper) + " " + expected.position_unit +
-                                      "; move it against the object"});
+                                      "; move the handle against the object"});
     }
 }
 
@@ -124,19 +128,19 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
     if (!(covered > 2.0 * expected.encoder_step)) {
         findings.push_back(
             {expected.recorded ? "no" : "usable",
-             range + ", so the force over position is unknown: move it over the whole object"});
+             range + ", so the force over position is unknown: move the handle over the whole object"});
     } else if (covered < smallest_domain_share * domain) {
         findings.push_back({"usable", range + ", " + readable(100.0 * covered / domain) +
-                                          " % of the model's domain: move it over the whole object"});
+                                          " % of the model's domain: move the handle over the whole object"});
     } else if (std::isnan(domain) && covered < fewest_encoder_steps * expected.encoder_step) {
         findings.push_back({"usable", range + ", " + readable(covered / expected.encoder_step) +
-                                          " steps of the encoder: move it over the whole object"});
+                                          " encoder steps: move the handle over the whole object"});
     }
 }
 
 }  // namespace detail
 
-/// Judges a session. The most serious finding comes first; an empty list means "good".
+/// Returns the defects of a run, the most serious defect first. An empty list means the verdict "good".
 [[nodiscard]] inline std::vector<SessionFinding> judge_session(const SessionReport& report,
                                                                const LoopSettings& settings,
                                                                const RecordSinks& sinks,
@@ -149,14 +153,14 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
     if (expected.recorded && sinks.file.written() == 0) {
         findings.push_back({"no", "nothing was recorded"});
     } else if (expected.recorded && usable_rows == 0) {
-        findings.push_back({"no", "the recording has no usable row, because none of its " +
-                                      std::to_string(sinks.file.written()) +
-                                      " forces is that of the object alone: record for a longer time"});
+        findings.push_back(
+            {"no", "the recording has no usable row: in all " + std::to_string(sinks.file.written()) +
+                       " rows the force was scaled, limited or missing; record for a longer time"});
     }
     for (const std::string& warning : expected.warnings) {
         findings.push_back({"usable", warning});
     }
-    if (is_orderly(report.loop.exit_reason)) {  // an interrupted run does not show the usual motion
+    if (is_orderly(report.loop.exit_reason)) {  // the motion of a run that was stopped early is not judged
         detail::judge_forces(report.loop, sinks, expected, findings);
         detail::judge_motion(sinks, expected, findings);
     }
@@ -166,12 +170,12 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
     return findings;
 }
 
-/// Returns "good", "usable" or "no".
+/// Returns the verdict on a run without its reasons: "good", "usable" or "no".
 [[nodiscard]] inline std::string level_of(const std::vector<SessionFinding>& findings) {
     return findings.empty() ? "good" : std::string(findings.front().level);
 }
 
-/// Returns "good", "usable: ..." or "no: ...".
+/// Returns the verdict on a run with its reasons: "good", "usable: ..." or "no: ...".
 [[nodiscard]] inline std::string verdict_text(const std::vector<SessionFinding>& findings) {
     std::string text = level_of(findings);
     for (const SessionFinding& finding : findings) {

@@ -23,7 +23,7 @@
 
 namespace palpate {
 
-/// Result of a session: all values that palpate-control and Python report.
+/// Result of a run: all values that palpate-control and Python report.
 struct Summary {
     SessionReport report;
     LoopSettings loop;
@@ -35,19 +35,19 @@ struct Summary {
     std::uint64_t telemetry_dropped = 0;
     Range positions;
     Range forces;
-    std::vector<TickRecord> kept;       ///< every tick, if ticks are kept
-    std::vector<std::string> notes;     ///< from the time before the session
-    std::vector<std::string> warnings;  ///< from the end of the recording
-    std::string last_ticks;             ///< recording of the last ticks before a fault; empty without one
+    std::vector<TickRecord> kept;       ///< records of all ticks, if they are kept
+    std::vector<std::string> notes;     ///< messages from before the run
+    std::vector<std::string> warnings;  ///< warnings about the recording
+    std::string last_ticks;             ///< message on the file of the last ticks; empty without a fault
     std::vector<SessionFinding> findings;
     std::string device;
     DeviceReport device_report;
 
-    /// Returns true if the session ended as planned.
+    /// Returns true if the run ended because its duration ended or a stop was requested.
     [[nodiscard]] bool orderly() const noexcept { return is_orderly(report.loop.exit_reason); }
-    /// Returns the exit reason as a sentence.
+    /// Returns the exit reason of the run as a sentence.
     [[nodiscard]] std::string ended() const { return exit_text(report.loop, loop); }
-    /// Returns a sentence for each difference from the request.
+    /// Returns all messages of the run: refused real-time requests, notes and warnings.
     [[nodiscard]] std::vector<std::string> all_notes() const {
         std::vector<std::string> all = report.refused;
         for (const std::vector<std::string>& more : {notes, warnings}) {
@@ -60,7 +60,7 @@ struct Summary {
     }
 };
 
-/// Returns percentiles of durations [us].
+/// Returns the percentiles of durations by name [us].
 [[nodiscard]] inline NamedValues fields(const DurationHistogram& histogram) {
     return {{"p50_us", 1e-3 * histogram.quantile(0.5)},
             {"p99_us", 1e-3 * histogram.quantile(0.99)},
@@ -68,7 +68,7 @@ struct Summary {
             {"max_us", 1e-3 * static_cast<double>(histogram.largest())}};
 }
 
-/// Returns the number of ticks of each status that occurred.
+/// Returns the number of ticks with each status that occurred in a run.
 [[nodiscard]] inline NamedValues ticks_by_status(const LoopReport& loop) {
     NamedValues counts;
     for (std::size_t k = 0; k < status_texts.size(); ++k) {
@@ -79,7 +79,7 @@ struct Summary {
     return counts;
 }
 
-/// Returns the fields of a summary, for JSON and Python.
+/// Returns the values of a summary by name, for JSON and Python.
 [[nodiscard]] inline NamedValues fields(const Summary& summary) {
     const LoopReport& loop = summary.report.loop;
     std::vector<NamedValues> findings;
@@ -124,7 +124,7 @@ struct Summary {
     return all;
 }
 
-/// Returns the lines of a summary, for the terminal.
+/// Returns a summary as lines of text, for the terminal.
 [[nodiscard]] inline Lines lines(const Summary& summary) {
     const LoopReport& loop = summary.report.loop;
     const bool slow = loop.timing.rate_hz() < held_rate_share * summary.loop.rate_hz;
@@ -137,7 +137,7 @@ struct Summary {
         {"ended", summary.ended()},
         {"rate", readable(loop.timing.rate_hz()) + " Hz of " + readable(summary.loop.rate_hz) + " Hz" +
                      (slow ? ", lower than required, " : ", ") + std::to_string(loop.timing.missed) +
-                     " deadlines missed"},
+                     " deadlines of the loop missed"},
         {"period", percentiles(loop.timing.period) + " (the longest gap)"},
         {"late by", percentiles(loop.timing.lateness)},
         {"ticks", counts},

@@ -21,18 +21,18 @@
 
 namespace palpate {
 
-/// One tick in virtual time, with the simulated device before and after it.
+/// One tick of a simulated run, with the state of the simulated device before and after the tick.
 struct SimulatedTick {
     std::size_t number = 0;
     Tick tick;
-    Motion start;               ///< the handle when the tick began
-    Motion end;                 ///< the handle when it ended
-    double force_before = 0.0;  ///< of the device at the start of the tick [N or N*m]
-    double force = 0.0;         ///< of the device at its end [N or N*m]
+    Motion start;               ///< motion of the handle at the start of the tick
+    Motion end;                 ///< motion of the handle at the end of the tick
+    double force_before = 0.0;  ///< applied force at the start of the tick [N or N*m]
+    double force = 0.0;         ///< applied force at the end of the tick [N or N*m]
 };
 
-/// Runs a controller on a simulated device in virtual time. Calls `watch(SimulatedTick)` after every tick; the loop
-/// ends when it returns false. Returns the number of ticks.
+/// Runs a structure on a simulated device in simulated time. Calls `watch(SimulatedTick)` after every tick; the loop
+/// ends when `watch` returns false. Returns the number of ticks.
 template <Device D, Structure S, class Watch>
 std::size_t closed_loop(D& device, S structure, const Guards& guards, std::size_t ticks, Watch&& watch) {
     (void)device.open();
@@ -50,24 +50,24 @@ std::size_t closed_loop(D& device, S structure, const Guards& guards, std::size_
     return now.number;
 }
 
-/// Start, integration and guards of a closed loop with energy account.
+/// Start position, integration and guards of a simulated run with an energy account.
 struct ClosedLoopSettings {
-    int substeps = usual_substeps;  ///< of a tick
-    double start_position = 0.0;    ///< [m or rad]
+    int substeps = usual_substeps;  ///< integration steps in a tick
+    double start_position = 0.0;    ///< of the handle [m or rad]
     double start_velocity = 0.0;    ///< of handle and hand [m/s or rad/s]
-    Guards guards{};                ///< default: only the limit of the device
+    Guards guards{};                ///< default: only the device's force limit
 };
 
-/// Result of a closed loop with energy account.
+/// Energies and motion at the end of a simulated run.
 struct ClosedLoopEnd {
     EnergyAccount energy;
-    Motion at_first_force;  ///< the handle when the object's first force acted on it
-    Motion handle;          ///< the handle at the end
+    Motion at_first_force;  ///< motion of the handle when the first force acts on it
+    Motion handle;          ///< motion of the handle at the end
     std::size_t ticks = 0;  ///< number of ticks
 };
 
 /// Runs a structure on a simulated device with an energy account. Calls `watch(tick, handle, account)` after every
-/// tick; the loop ends when it returns false.
+/// tick; the loop ends when `watch` returns false.
 template <Structure S, SimulatedHand H, class Watch>
 [[nodiscard]] ClosedLoopEnd closed_loop(S structure, const DeviceProfile& profile, H hand, std::size_t ticks,
                                         const ClosedLoopSettings& settings, Watch watch) {
@@ -90,26 +90,27 @@ template <Structure S, SimulatedHand H, class Watch>
 /// A simulated rendering, one row for each tick.
 struct Trace {
     std::vector<double> time;      ///< time [s]
-    std::vector<double> position;  ///< measured by the encoder [m or rad]
-    std::vector<double> velocity;  ///< difference quotient, computed by the device [m/s or rad/s]
+    std::vector<double> position;  ///< position measured by the encoder [m or rad]
+    std::vector<double> velocity;  ///< difference quotient of measured positions [m/s or rad/s]
 
-    std::vector<double> handle_start;   ///< true position when the encoder was read [m or rad]
-    std::vector<double> handle_middle;  ///< true position in the middle of the tick [m or rad]
-    std::vector<double> handle_end;  ///< true position at the end of the tick that holds the force [m or rad]
+    std::vector<double> handle_start;   ///< true handle position when the encoder is read [m or rad]
+    std::vector<double> handle_middle;  ///< true handle position in the middle of the tick [m or rad]
+    std::vector<double> handle_end;     ///< true handle position at the end of the tick [m or rad]
 
-    std::vector<double> environment_position;  ///< y [m or rad]
+    std::vector<double> environment_position;  ///< y, position of the virtual object [m or rad]
     std::vector<double> force;                 ///< commanded force [N or N*m]
-    std::vector<double> applied;               ///< force of the device at the end [N or N*m]
-    std::vector<double> mean_applied;          ///< mean force over the tick [N or N*m]
-    std::vector<int> evaluations;              ///< evaluations of the model
+    std::vector<double> applied;               ///< applied force at the end of the tick [N or N*m]
+    std::vector<double> mean_applied;          ///< mean applied force over the tick [N or N*m]
+    std::vector<int> evaluations;              ///< evaluations of the model in the tick
     std::vector<Status> status;
-    std::vector<std::uint8_t> extrapolated;  ///< 1 if y lies outside the model's data
+    std::vector<std::uint8_t> extrapolated;  ///< 1 if y lies outside the model's domain
 };
 
 /// Largest number of ticks of `simulate`: one hour at 1 kHz, about 270 MB.
 inline constexpr std::size_t most_simulated_ticks = 3'600'000;
 
-/// Returns the ticks of a simulated time. Throws std::invalid_argument if that is not 1 to `most_simulated_ticks`.
+/// Returns the number of ticks in a simulated time. Throws std::invalid_argument if the number is not 1 to
+/// `most_simulated_ticks`.
 [[nodiscard]] inline std::size_t simulated_ticks(double duration_s, double period_s) {
     const double ticks = std::round(duration_s / period_s);
     detail::require(duration_s > 0.0 && ticks >= 1.0, "duration_s is " + readable(duration_s) +
@@ -122,8 +123,8 @@ inline constexpr std::size_t most_simulated_ticks = 3'600'000;
     return static_cast<std::size_t>(ticks);
 }
 
-/// Renders a model on a simulated device with a hand, in virtual time. Calls `each(tick)` at every tick; an exception
-/// from it ends the simulation.
+/// Renders a model on a simulated device with a hand, in simulated time. Calls `each(number)` after every tick; an
+/// exception of `each` ends the simulation.
 template <class Each>
 [[nodiscard]] Trace simulate(const ForceModel& model, const Scheme& scheme, const DeviceProfile& profile,
                              const Hand& hand, std::size_t ticks, int substeps, double start_position,
@@ -159,15 +160,15 @@ template <class Each>
     return trace;
 }
 
-/// Renders a model without a callback.
+/// Renders a model on a simulated device as above, without a function that is called after every tick.
 [[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
                                     const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
                                     int substeps = usual_substeps, double start_position = 0.0) {
     return simulate(model, scheme, profile, hand, ticks, substeps, start_position, [](std::size_t) {});
 }
 
-/// Returns the force rendered along a recorded motion of the device. Calls `each(k)` before every sample; an exception
-/// from it ends the simulation.
+/// Returns the force that a scheme renders while the device follows a recorded motion. Calls `each(k)` before every
+/// sample; an exception of `each` ends the simulation.
 template <class Each>
 [[nodiscard]] std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
                                                   std::span<const double> position, double period_s,
@@ -193,8 +194,8 @@ template <class Each>
     return motion_driven(model, scheme, position, period_s, [](std::size_t) {});
 }
 
-/// Returns the motion of the environment driven by a recorded force (paper figures 12 and 14). Calls `each(k)` before
-/// every sample.
+/// Returns the motion of the virtual object, without device and coupling, when a recorded force drives it (paper
+/// figures 12 and 14). Calls `each(k)` before every sample.
 template <class Each>
 [[nodiscard]] std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
                                                  std::span<const double> force, double period_s,
@@ -214,7 +215,7 @@ template <class Each>
             } else {
                 throw std::invalid_argument(
                     "structure is " + std::string(name_of(scheme.structure)) +
-                    ", must be implicit or explicit: others have no mass that a force can move");
+                    ", must be implicit or explicit: a force can move only an object with mass");
             }
         });
 }

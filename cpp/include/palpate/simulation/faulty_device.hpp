@@ -17,36 +17,36 @@
 
 namespace palpate {
 
-/// Faults between a host and a device.
+/// Kinds of simulated faults in the exchange between the host and a device.
 enum class FaultKind : std::uint8_t {
-    Late,        ///< no sample in time
+    Late,        ///< no sample arrives in time
     Lost,        ///< one sample is missing
-    Repeated,    ///< the last sample again
+    Repeated,    ///< the device sends the last sample again
     NotANumber,  ///< the position is NaN
-    Frozen,      ///< the encoder repeats its value
-    Jump,        ///< the encoder is off by `jump`
-    Saturated,   ///< half of the force, reported as Limited
-    Gone,        ///< Fault until the end, without force
+    Frozen,      ///< the encoder repeats its last position
+    Jump,        ///< the position has an error of `jump`
+    Saturated,   ///< the device applies half of the force and reports Limited
+    Gone,        ///< the device reports Fault and makes no force until the end
 };
 
 inline constexpr std::array<std::string_view, 8> fault_names{"late",   "lost", "repeated",  "nan",
                                                              "frozen", "jump", "saturated", "gone"};
 
-/// One fault: its first exchange and its number of samples.
+/// One simulated fault: its kind, the number of its first exchange, and its duration in samples.
 struct Fault {
     FaultKind kind = FaultKind::Late;
     std::uint64_t exchange = 0;
     std::uint64_t samples = 1;
 };
 
-/// A device with scripted faults, for tests of programs. The faults are visible as on a real device: in the status, in
-/// the sequence number, or only in wrong numbers. The time of a late sample is not simulated.
+/// A device that simulates faults at chosen times, for tests of programs. The readings show a fault as those of a real
+/// device do: in the status, in the number of the sample, or only in wrong values. A late sample does not take longer.
 template <Device D>
 class Faulty {
   public:
     static constexpr bool paces_host = palpate::paces_host<D>;
 
-    /// Makes the device; `jump` is the error of a jumping encoder [m or rad].
+    /// Makes the device from a device and a list of faults; `jump` is the position error of the fault Jump [m or rad].
     Faulty(D device, std::vector<Fault> script, double jump)
         : device_{std::move(device)}, script_{std::move(script)}, jump_{jump} {
         std::stable_sort(script_.begin(), script_.end(),
@@ -60,7 +60,7 @@ class Faulty {
         return device_.open();
     }
 
-    /// Exchanges a command for a reading, with the fault of this exchange.
+    /// Sends a command and returns a reading, both changed by the fault of this exchange, if there is one.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         const Fault* fault = fault_of(exchanges_++);
         disconnected_ = disconnected_ || (fault != nullptr && fault->kind == FaultKind::Gone);
@@ -132,8 +132,8 @@ class Faulty {
     Reading last_;
 };
 
-/// Reads "KIND@SECONDS" or "KIND@SECONDSxSAMPLES", such as late@1.5 or frozen@2x200. Throws std::invalid_argument with
-/// the valid form.
+/// Reads a simulated fault from a text KIND@SECONDS or KIND@SECONDSxSAMPLES: kind, start time and number of samples,
+/// such as late@1.5 or frozen@2x200. Throws std::invalid_argument with the valid form.
 [[nodiscard]] inline Fault parse_fault(const std::string& text, double period_s) {
     const auto refuse = [&] {
         std::string names;

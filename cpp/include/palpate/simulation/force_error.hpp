@@ -14,29 +14,30 @@
 
 namespace palpate {
 
-/// Error of a rendered force against a force law f along the true motion x(t) of the handle, over all ticks. The force
-/// F that the device holds is compared with f at different times of the tick [t_k, t_k + T]:
+/// Errors of a rendered force F, compared with the model's force f at the true position x(t) of the handle, over all
+/// ticks. Each tick lasts from t_k to t_k + T, and the device holds F. The errors differ in the time of comparison:
 /// - end: F(t_k + T) - f(x(t_k + T)), RMS
 /// - instant: F(t_k + T) - f(x(t_k)), RMS
 /// - mean: e_k = (1/T) integral of F(t) - f(x(t)) dt, RMS
-/// - band: e_k filtered with zero phase to below 50 Hz, RMS
+/// - band: e_k after a low-pass of 50 Hz without phase shift, RMS
 /// - work: integral of (F - f) dx over all ticks; below 0 the rendering gives energy
 ///
-/// The error at the end is smaller for a force that leads the motion. The mean is not, so it describes the error that a
-/// hand feels, which is slow compared with the sample rate.
+/// The error `end` is small also for a force that wrongly leads the motion. The error `mean` is not, so it describes
+/// the error that a hand feels, because a hand is slow compared with the sample rate.
 struct ForceError {
-    double end = 0.0;      ///< [N or N*m]
-    double instant = 0.0;  ///< [N or N*m]
-    double mean = 0.0;     ///< [N or N*m]
-    double band = 0.0;     ///< [N or N*m]
-    double work = 0.0;     ///< [J]
+    double end = 0.0;      ///< RMS error at the end of the tick [N or N*m]
+    double instant = 0.0;  ///< RMS error at the sampling time [N or N*m]
+    double mean = 0.0;     ///< RMS of the mean error over a tick [N or N*m]
+    double band = 0.0;     ///< RMS of the mean error below 50 Hz [N or N*m]
+    double work = 0.0;     ///< work of the error [J]
 };
 
 /// Largest frequency of the band-limited force error [Hz].
 inline constexpr double force_error_band_hz = 50.0;
 
-/// Removes the part of a signal above a frequency, without a phase shift. Convolves it with sin(2 pi f t) / (pi t)
-/// under a Hann window of +-4 / f. The signal is mirrored at its ends. The amplitude at f is halved.
+/// Removes the part of a signal above the frequency f, without a phase shift. Convolves the signal with
+/// sin(2 pi f t) / (pi t) under a Hann window from -4 / f to 4 / f. The signal is mirrored at its ends. The amplitude
+/// at the frequency f is halved.
 [[nodiscard]] inline std::vector<double> below_frequency(std::span<const double> signal, double period_s,
                                                          double frequency_hz) {
     const double cycles = frequency_hz * period_s;
@@ -70,22 +71,23 @@ inline constexpr double force_error_band_hz = 50.0;
     return filtered;
 }
 
-/// True motion of the handle and the force on it, a value for each tick: spans of a `Trace`, or of its columns.
+/// True positions of the handle and forces of the device, one value for each tick.
 struct HeldForces {
-    std::span<const double> start;         ///< handle at the start of the tick
-    std::span<const double> middle;        ///< handle in the middle of the tick
-    std::span<const double> end;           ///< handle at the end of the tick
-    std::span<const double> applied;       ///< force at the end of the tick
-    std::span<const double> mean_applied;  ///< mean force over the tick
+    std::span<const double> start;         ///< handle position at the start of the tick
+    std::span<const double> middle;        ///< handle position in the middle of the tick
+    std::span<const double> end;           ///< handle position at the end of the tick
+    std::span<const double> applied;       ///< applied force at the end of the tick
+    std::span<const double> mean_applied;  ///< mean applied force over the tick
 };
 
-/// Returns the columns of a trace.
+/// Returns the positions and forces of a simulated rendering that the force error needs.
 [[nodiscard]] inline HeldForces held_forces(const Trace& trace) noexcept {
     return {trace.handle_start, trace.handle_middle, trace.handle_end, trace.applied, trace.mean_applied};
 }
 
-/// Returns the errors of forces against `law(motion, step_s)`, the force law along a motion with a constant time step.
-/// Within a tick f is evaluated at four evenly spaced times, on the parabola through start, middle and end.
+/// Returns the errors of applied forces, compared with the force law `law(motion, step_s)`, which returns the force f
+/// along a motion with a constant time step. In each tick f is evaluated at four evenly spaced times; the motion in the
+/// tick is the parabola through the positions at start, middle and end.
 template <class Law>
 [[nodiscard]] ForceError force_error(const HeldForces& held, double period_s, Law&& law) {
     const std::size_t ticks = held.start.size();
@@ -99,8 +101,8 @@ template <class Law>
         return {};
     }
     constexpr std::size_t parts = 4;
-    std::vector<double> motion;  // middles of the parts
-    std::vector<double> moved;   // motion in each part
+    std::vector<double> motion;  // position in the middle of each quarter of a tick
+    std::vector<double> moved;   // change of position in each quarter of a tick
     std::vector<double> ends{held.start[0]};
     for (std::size_t k = 0; k < ticks; ++k) {
         const double slope = held.end[k] - held.start[k];
@@ -141,7 +143,8 @@ template <class Law>
     return error;
 }
 
-/// Returns the errors of a trace against a model that is rendered exactly, with play radius `play_radius`.
+/// Returns the errors of a simulated rendering, compared with the force of the model itself at the true positions of
+/// the handle. `play_radius` is the play radius of a hysteresis model; 0 = that of the model.
 [[nodiscard]] inline ForceError force_error(const ForceModel& model, double play_radius,
                                             const HeldForces& held, double period_s) {
     Scheme exact;

@@ -21,15 +21,16 @@
 
 namespace palpate {
 
-/// Opens the simulated device for rendering: that of a valid certificate, otherwise the default knob at the model's
-/// scale.
+/// Opens the simulated device for rendering. Its profile is that of the model's certificate, if the certificate holds;
+/// otherwise the default knob, scaled to the model.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_simulated(const RenderOptions& options,
                                                                 const PlannedModel& model) {
     const bool certified = uncertified_reason(options, model).empty();
     const double rate_hz = certified ? 1.0 / model.certificate->device.period_s : options.loop.rate_hz;
     if (options.rate_given && std::abs(options.loop.rate_hz - rate_hz) > 1e-6 * rate_hz) {
         refuse("rate_hz is " + readable(options.loop.rate_hz) + ", but the certificate is for " +
-               readable(rate_hz) + " Hz: plan for a device with this period, or set uncertified");
+               readable(rate_hz) +
+               " Hz: make a plan for a device with the period 1 / rate_hz, or set uncertified");
     }
     LoopSettings loop = options.loop;
     loop.rate_hz = rate_hz;
@@ -62,7 +63,7 @@ namespace palpate {
 }
 
 /// Opens a device for rendering by its name: simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]. Throws
-/// std::invalid_argument with the reason if it cannot be opened or does not fit the model.
+/// std::invalid_argument with the reason if the device cannot be opened or does not fit the model.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_device(const RenderOptions& options,
                                                              const PlannedModel& model) {
     const std::string kind = options.device.substr(0, options.device.find(':'));
@@ -73,7 +74,9 @@ namespace palpate {
                "', must be simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]");
     }
     if (kind != "simulated" && !options.faults.empty()) {
-        refuse("faults is set: must be empty for a real device");
+        refuse(
+            "faults is set: must be empty for a real device, because only the simulated device simulates "
+            "faults");
     }
     if (model.force_unit == "A") {
         refuse("the model's force is a motor current in A: identify it with --torque-constant-Nm-per-A");
@@ -83,8 +86,8 @@ namespace palpate {
                                 : open_simulated(options, model);
 }
 
-/// Returns a device for a measurement by its name, not open yet: usb[:SERIAL], or simulated with the model `object`
-/// mounted. Sets the options that depend on the device.
+/// Returns a device for a measurement by its name, not open yet: usb[:SERIAL], or the simulated device with the model
+/// `object` mounted on its handle. Sets options of the measurement that depend on the device.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> device_to_measure(MeasureOptions& options,
                                                                    const std::optional<ForceModel>& object) {
     if (options.device == "usb" || options.device.starts_with("usb:")) {

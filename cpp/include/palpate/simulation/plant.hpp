@@ -10,25 +10,25 @@
 
 namespace palpate {
 
-/// Mechanical properties of a handle.
+/// Inertia, damping and friction of a simulated handle.
 struct Mechanics {
-    double inertia = 0.0;   ///< [kg or kg*m^2], > 0
-    double damping = 0.0;   ///< b [N*s/m or N*m*s/rad]
-    double friction = 0.0;  ///< f_c [N or N*m]
+    double inertia = 0.0;   ///< inertia, > 0 [kg or kg*m^2]
+    double damping = 0.0;   ///< viscous damping b [N*s/m or N*m*s/rad]
+    double friction = 0.0;  ///< Coulomb friction f_c [N or N*m]
 };
 
-/// Base of integrators without memory and without a force transducer.
+/// Base class of integrators that have no memory and no force transducer.
 struct PlainPlant {
-    /// Does nothing, because this plant is without memory.
+    /// Does nothing, because this integrator has no memory.
     void start() noexcept {}
-    /// Returns NaN, because this plant is without a transducer.
+    /// Returns NaN, because this integrator has no force transducer.
     [[nodiscard]] static double measured(const Motion& /*handle*/) noexcept {
         return std::numeric_limits<double>::quiet_NaN();
     }
 };
 
-/// Semi-implicit Euler, the usual integrator of a simulated device. Coulomb friction reduces the velocity at most to
-/// zero: it can stop the handle but never reverses it.
+/// The semi-implicit Euler method, the usual integrator of a simulated handle. Coulomb friction can stop the handle,
+/// but never reverses its velocity.
 struct SemiImplicitEuler : PlainPlant {
     /// Moves the handle over one tick.
     void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,
@@ -44,11 +44,12 @@ struct SemiImplicitEuler : PlainPlant {
     }
 };
 
-/// Semi-implicit Euler with a real object mounted on the handle.
+/// The semi-implicit Euler method with an object mounted on the handle, like a real object on a real device.
 struct MountedObject {
-    /// Force over position, positive out of the object; empty without an object. It must neither throw nor allocate.
+    /// Function that returns the object's force at a position, positive out of the object; empty without an object. It
+    /// must neither throw nor allocate.
     std::function<double(double)> force;
-    bool transducer = true;  ///< true if the device measures that force
+    bool transducer = true;  ///< true if the device measures the object's force
 
     void start() noexcept {}
 
@@ -61,29 +62,30 @@ struct MountedObject {
         }
     }
 
-    /// Returns the force of the transducer; NaN without one.
+    /// Returns the force that the transducer measures; NaN without a transducer.
     [[nodiscard]] double measured(const Motion& handle) const noexcept {
         return force && transducer ? force(handle.position) : PlainPlant::measured(handle);
     }
 };
 
-/// Energy flows since the device was opened. The port is between hand and handle, so the handle's damping and friction
-/// are inside: hand = motor + dissipated + increase of the handle's kinetic energy.
+/// Energies since the simulated device was opened. The account counts the work of the hand on the handle, which
+/// includes the losses of the handle: hand = motor + dissipated + increase of the handle's kinetic energy.
 struct EnergyAccount {
-    double hand = 0.0;        ///< work on the handle [J]
-    double motor = 0.0;       ///< work against the motor [J]
-    double dissipated = 0.0;  ///< by damping and friction [J]
-    double throughput = 0.0;  ///< absolute work of hand and motor, the scale of rounding errors [J]
-    double least = 0.0;       ///< least of hand + 1e-12 throughput after any substep [J]
+    double hand = 0.0;        ///< work of the hand on the handle [J]
+    double motor = 0.0;       ///< work of the handle against the motor [J]
+    double dissipated = 0.0;  ///< energy lost by damping and friction [J]
+    double throughput = 0.0;  ///< sum of |work| of hand and motor, for rounding [J]
+    double least = 0.0;       ///< smallest hand + 1e-12 throughput so far [J]
 };
 
-/// The midpoint rule, whose energy account is exact. With u the mean velocity of a substep of length h,
+/// The midpoint rule, an integrator with an exact energy account. For a handle and hand of total mass M, with the mean
+/// velocity u of a substep of length h, the hand's spring K, all damping D and the device's force `applied`,
 ///
 ///     M (v_1 - v_0) / h = push + K (target - x_0 - h u / 2) - D u - f_c sgn u - applied,
 ///     v_1 = 2u - v_0,   x_1 = x_0 + h u,
 ///
-/// force times distance is exactly the work, for every h. If friction holds a handle that would reverse, it dissipates
-/// the remaining speed.
+/// force times distance is exactly the work, for every h. If friction is large enough to hold the handle when its
+/// velocity would reverse, the handle stops and its kinetic energy is dissipated.
 class Midpoint : public PlainPlant {
   public:
     /// Resets the energy account.
@@ -103,8 +105,8 @@ class Midpoint : public PlainPlant {
             const double pull = grip.push + grip.stiffness * (grip.target - motion.position);
             const double driving = momentum * before + pull - applied;
             const double friction = std::copysign(handle.friction, driving);
-            // Changes are computed instead of new values, because the momentum of a heavy hand is much larger than
-            // every force.
+            // The change of the velocity is computed instead of the new velocity, to reduce rounding errors: the
+            // momentum of a heavy hand is much larger than every force.
             const double change = std::abs(driving) > handle.friction
                                       ? mobility * (pull - applied - drag * before - friction)
                                       : -before;
@@ -124,11 +126,11 @@ class Midpoint : public PlainPlant {
         }
     }
 
-    /// Returns the energy account since the start.
+    /// Returns the energies since the device was opened.
     [[nodiscard]] const EnergyAccount& account() const noexcept { return account_; }
 
   private:
-    static constexpr double rounding = 1e-12;  ///< relative to the throughput
+    static constexpr double rounding = 1e-12;  ///< bound of rounding errors / throughput
 
     void stop(const Mechanics& handle, const Grip& grip, double applied, Motion& motion) noexcept {
         const double pull = grip.push + grip.stiffness * (grip.target - motion.position);

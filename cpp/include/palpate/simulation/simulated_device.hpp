@@ -17,15 +17,16 @@
 
 namespace palpate {
 
-inline constexpr int usual_substeps = 20;   ///< in one tick of 1 ms of a simulated device
-inline constexpr int most_substeps = 1000;  ///< in one tick of a simulated device
+inline constexpr int usual_substeps = 20;   ///< integration steps of the simulated handle in 1 ms
+inline constexpr int most_substeps = 1000;  ///< most integration steps in one tick
 
-/// A haptic device with a hand, one tick of virtual time for each exchange. It models inertia, viscous and Coulomb
-/// friction, encoder, force step and limit, hold over the tick, and delay. `Plant` moves the handle: SemiImplicitEuler,
-/// Midpoint for an energy account, or MountedObject for the measurement of a real object.
+/// A simulated haptic device with a hand. Each exchange simulates one tick. The simulation includes inertia, viscous
+/// and Coulomb friction, encoder step, force step, force limit, a force that is held for one tick, and delay. The
+/// integrator `Plant` moves the handle: SemiImplicitEuler, Midpoint for an energy account, or MountedObject with an
+/// object on the handle.
 ///
-/// It does not model electrical dynamics of the motor, torque ripple, backlash, flexible parts, jitter of the sample
-/// time, and noise of a force transducer.
+/// The simulation does not include electrical dynamics of the motor, torque ripple, backlash, flexible parts, jitter of
+/// the sample time, or noise of a force transducer.
 template <SimulatedHand H, class Plant>
 class SimulatedHandle {
   public:
@@ -39,7 +40,7 @@ class SimulatedHandle {
         }
     }
 
-    /// Replaces the plant, for example to mount an object.
+    /// Replaces the integrator of the handle, for example to mount an object on the handle.
     void mount(Plant plant) { plant_ = std::move(plant); }
 
     /// Sets the handle to its start position and velocity.
@@ -53,8 +54,9 @@ class SimulatedHandle {
         return {};
     }
 
-    /// Applies the command over one period (later by the delay) and samples the encoder at its end. With a fractional
-    /// delay the force changes within the tick; the reading reports the later one.
+    /// Simulates one period: applies the commanded force, later by the delay, and reads the encoder at the end of the
+    /// period. If the delay is not a whole number of periods, the force changes within the period, and the reading
+    /// reports the force at the end.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
         pend(converted(command.force));
         const double late = profile_.delay_fraction();
@@ -74,7 +76,7 @@ class SimulatedHandle {
     void close() noexcept { applied_ = 0.0; }
 
     [[nodiscard]] const DeviceProfile& profile() const noexcept { return profile_; }
-    /// Returns the true motion of the handle, which a real host cannot measure.
+    /// Returns the true position and velocity of the handle, which the encoder reports only in steps.
     [[nodiscard]] const Motion& handle() const noexcept { return handle_; }
     [[nodiscard]] double handle_position() const noexcept { return handle_.position; }
     [[nodiscard]] double handle_velocity() const noexcept { return handle_.velocity; }
@@ -84,14 +86,14 @@ class SimulatedHandle {
   private:
     [[nodiscard]] double time() const noexcept { return static_cast<double>(tick_) * profile_.period_s; }
 
-    /// Returns the reading of the encoder [m or rad].
+    /// Returns the position that the encoder reports for a true position [m or rad].
     [[nodiscard]] double encoded(double position) const noexcept {
         const double step = profile_.encoder_step;
         return step > 0.0 ? step * std::floor(position / step + 0.5) : position;
     }
 
-    /// Returns the force of the motor for a command: zero if it is not finite, otherwise limited and rounded to the
-    /// force step.
+    /// Returns the motor's force for a commanded force: zero if the command is not finite, otherwise the command
+    /// limited to the force limit and rounded to the force step.
     [[nodiscard]] double converted(double force) const noexcept {
         if (!std::isfinite(force)) {
             return 0.0;
@@ -101,7 +103,7 @@ class SimulatedHandle {
         return step > 0.0 ? step * std::round(limited / step) : limited;
     }
 
-    /// Stores the command of this tick until its delay is over.
+    /// Stores the force commanded in this tick until the delay is over.
     void pend(double force) noexcept {
         const auto delay = static_cast<std::size_t>(profile_.whole_delay_samples());
         pending_[(tick_ + delay) % pending_.size()] = force;
@@ -110,7 +112,7 @@ class SimulatedHandle {
         return pending_[tick % pending_.size()];
     }
 
-    /// Moves the handle against a force over a share of the tick.
+    /// Moves the handle against the motor's force for a share of the tick.
     void move(const Grip& grip, double force, double share, int substeps) noexcept {
         applied_ = force;
         plant_.tick({profile_.inertia, profile_.viscous_damping, profile_.coulomb_friction}, grip, applied_,
@@ -126,19 +128,19 @@ class SimulatedHandle {
     double applied_ = 0.0;
     double last_reading_ = 0.0;
     std::uint64_t tick_ = 0;
-    std::array<double, longest_delay_samples + 2> pending_{};  ///< pending forces, by tick
+    std::array<double, longest_delay_samples + 2> pending_{};  ///< delayed forces, by tick
 };
 
-/// Simulated device with a sweeping hand, for demonstrations, tests and examples.
+/// Simulated device whose hand moves the handle back and forth, for demonstrations, tests and examples.
 using SimulatedDevice = SimulatedHandle<Hand, SemiImplicitEuler>;
 
-/// Simulated device with a real object, from which recordings are made.
+/// Simulated device with an object mounted on its handle, which makes recordings like those of a real object.
 using SimulatedRig = SimulatedHandle<Hand, MountedObject>;
 
 static_assert(Device<SimulatedDevice>);
 static_assert(Device<SimulatedRig>);
 
-/// Returns the substeps of a tick that keep the inner step of the simulation independent of the rate.
+/// Returns the number of integration steps in one tick of a period [s], so that each step is 1/20 ms for every rate.
 [[nodiscard]] inline int simulated_substeps(double period_s) noexcept {
     return std::max(1, static_cast<int>(std::lround(usual_substeps * (period_s / 1e-3))));
 }

@@ -19,30 +19,33 @@
 
 namespace palpate {
 
-/// Simulated device and hand scaled to a model. An angle is rendered on the default knob. For any other unit the
-/// model's scale multiplies lengths and forces of the knob and its hand.
+/// Simulated device and hand, scaled to a model. For a model with positions in rad it is the default knob. For any
+/// other unit, lengths and forces of the default knob and its hand are multiplied by the scale of the model.
 struct TestRig {
     DeviceProfile device;
     Hand hand;
     ModelScale scale;
 
-    /// Returns the scheme with the chosen fields; the others have the defaults at the model's scale.
+    /// Returns a scheme with the fields that the user chose; the other fields have defaults, multiplied by the model's
+    /// scale.
     [[nodiscard]] Scheme scheme(const ForceModel& model, const SchemeChoices& chosen = {}) const {
         return scheme_for(model, scale, device, chosen);
     }
 };
 
 template <>
-inline constexpr auto fields_of<TestRig> = std::tuple{
-    Field<&TestRig::device>{"device"}, Field<&TestRig::hand>{"hand"},
-    Field<&TestRig::scale, &ModelScale::length>{"length",
-                                                "Positions, relative to those of the default knob."},
-    Field<&TestRig::scale, &ModelScale::force>{"force", "Forces, relative to those of the default knob."}};
+inline constexpr auto fields_of<TestRig> =
+    std::tuple{Field<&TestRig::device>{"device"}, Field<&TestRig::hand>{"hand"},
+               Field<&TestRig::scale, &ModelScale::length>{
+                   "length", "Factor of positions, relative to those of the default knob [-]."},
+               Field<&TestRig::scale, &ModelScale::force>{
+                   "force", "Factor of forces, relative to those of the default knob [-]."}};
 
 namespace detail {
 
-/// Returns the target at which the handle rests at the end of a slow motion, or before it if the rendered force exceeds
-/// 80 % of the force limit. The remaining 20 % are for coupling and damping.
+/// Returns the position of the hand's spring target that holds the handle at rest at the last position of a slow
+/// motion, or at the last position where the rendered force is at most 80 % of the force limit. The remaining 20 % are
+/// for the forces of coupling and damping.
 [[nodiscard]] inline double resting_target(const std::vector<Rendered>& rendered,
                                            const std::vector<double>& motion, double force_limit,
                                            double hand_stiffness) {
@@ -54,11 +57,11 @@ namespace detail {
     return motion[last] + rendered[last].force / hand_stiffness;
 }
 
-/// Returns a hand that moves the handle through the domain, except 1 % at either end.
+/// Returns a simulated hand that moves the handle through the model's domain, except 1 % at both ends.
 ///
-/// The hand is a spring to a moving target, which leads the handle by the rendered force divided by the hand's stiffness. A
-/// coupling reduces this force, so the target is computed for the default coupling. Stiffer
-/// structures are pressed less far, and the handle never leaves the domain.
+/// The hand is a spring to a moving target. The distance from handle to target is the rendered force divided by the
+/// hand's stiffness. The target is computed for the default coupling, which reduces the force. With a stiffer structure
+/// the hand presses the handle less far, so the handle never leaves the domain.
 [[nodiscard]] inline Hand sweeping_hand(const ForceModel& model, const TestRig& rig) {
     constexpr int steps = 1000;
     const double lower = model.domain().lower[0];
@@ -89,7 +92,8 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns the test rig for a model of position, or of position and velocity. If `is_angle`, its positions are in rad.
+/// Returns the simulated device and hand for a model of position, or of position and velocity. If `is_angle`, the
+/// model's positions are in rad.
 [[nodiscard]] inline TestRig rig_for(const ForceModel& model, bool is_angle, double period_s) {
     TestRig rig;
     rig.scale = scale_of(model, is_angle);
@@ -98,8 +102,8 @@ namespace detail {
     return rig;
 }
 
-/// Returns the force of a model over position, as an object that can be mounted on the simulated device of its rig. The
-/// object is at rest at `start`.
+/// Returns a function that gives the force of a model at a position, as an object that can be mounted on the handle of
+/// the simulated device. The object is at rest at the position `start`.
 [[nodiscard]] inline std::function<double(double)> object_of(const ForceModel& model, const TestRig& rig,
                                                              double start) {
     SchemeChoices direct;
@@ -113,7 +117,7 @@ namespace detail {
                           });
 }
 
-/// Returns the metadata of a flight record on a simulated device.
+/// Returns the metadata about the simulated device and hand for a flight record.
 [[nodiscard]] inline Metadata simulated_metadata(const TestRig& rig) {
     return {{"simulated", "yes: device and hand; no value was measured"},
             {"device", rig.device.id},

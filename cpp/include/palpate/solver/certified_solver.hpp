@@ -20,43 +20,51 @@
 
 namespace palpate {
 
-/// Solves f(y) + p y = q in at most four evaluations, for every start and every q, if p is certified to make
-/// F(y) = f(y) + p y rise. Otherwise `LoadLineSolver` searches from the last position.
+/// Solves the load line f(y) + p y = q for the position y in at most four evaluations of the force f, for every start
+/// and every q. This requires a slope p for which F(y) = f(y) + p y is proved to rise everywhere. For other slopes
+/// `LoadLineSolver` searches from the last position.
 ///
-/// When the model is loaded, all positions are cut into cells of width w with
+/// When the model is loaded, the constructor divides all positions into cells of width w with
 ///
 ///     w max|F''| <= min F' / 4.                                                                        (C)
 ///
-/// Taylor's formula about the middle of each cell certifies (C), and F is stored at the borders. Cells over all
-/// positions prove that F rises. A step finds the cell of q among the border values, interpolates linearly and applies
-/// Newton's method inside the cell:
-/// - The error of the interpolation is at most w^2 max|F''| / 8 in F and w/32 in the position. A guess within w/32 of
-///   it, such as the tangent of the last step, is at most w/16 away from the solution.
-/// - A step changes an error e to at most c e^2, c = max|F''| / (2 min F') <= 1/(8w). Errors: w/16, w/2^11, w/2^25,
-///   w/2^53. Clamping to the cell does not increase them, because the cell holds the solution.
-/// - A correction d bounds the error before it: e <= |d| + c e^2 <= |d| + e/8. The error after it is at most (64/49) c
-///   d^2. If that is below `tolerance`, or the residual is below rounding, no evaluation is needed to confirm the step.
+/// Taylor's formula about the middle of each cell proves condition (C), and F is stored at the borders of the cells. As
+/// the cells cover all positions, F rises everywhere. `solve` finds the cell with F = q by the values at the borders,
+/// interpolates linearly between them and applies Newton's method inside the cell:
+/// - The error of the linear interpolation is at most w^2 max|F''| / 8 in F and w/32 in the position. A first guess
+///   that differs from the interpolated position by at most w/32, such as the tangent of the last solution, differs
+///   from the solution by at most w/16.
+/// - A Newton step reduces a position error e to at most c e^2 with c = max|F''| / (2 min F') <= 1/(8w). The errors are
+///   w/16, w/2^11, w/2^25, w/2^53. Limiting the position to the cell does not increase the error, because the cell
+///   contains the solution.
+/// - The correction d of a Newton step gives a bound of the error e before the step: e <= |d| + c e^2 <= |d| + e/8. The
+///   error after the step is at most (64/49) c d^2. If this error is below `tolerance`, or the residual F(y) - q is
+///   below rounding, the solution needs no evaluation to confirm it.
 ///
-/// If the tangent stays in the cell of the last step, it is tried before the search for the cell. Most steps of a slow
-/// motion then need one evaluation; the others need at most three more.
+/// If the tangent of the last solution predicts a position in the same cell, `solve` tries this position before it
+/// searches for the cell. Most ticks of a slow motion then need one evaluation; the other ticks need at most three
+/// more.
 ///
-/// A hysteresis has three sheets: F with g + h (press), with g - h (release) and with g + (y - play) h / r (sticking).
-/// Each rises and satisfies (C), the last one for all |y - play| <= r + w, so one partition serves every `play`. F is
-/// the median of the three. The median of their interpolations, or of their Newton steps, is as accurate as each of
-/// them on its sheet. At the solution two sheets are >= q and two are <= q. Two of the steps therefore end below it
-/// (except for c e^2), and two above it.
+/// A force with hysteresis (mean force g, hysteresis h, play radius r) has three sheets. These are functions F with g +
+/// h (press), with g - h (release) and with g + (y - play) h / r (sticking: the play operator does not move). Each
+/// sheet rises and satisfies (C), the sticking sheet for all |y - play| <= r + w, so the same cells are valid for every
+/// position `play` of the play operator. F is the median of the three sheets. The median of the three interpolations,
+/// or of the three Newton steps, is as accurate as each of them for its sheet. At the solution two sheets are >= q and
+/// two are <= q. Two of the Newton steps therefore end below the solution (except for c e^2), and two above the
+/// solution.
 class CertifiedSolver {
   public:
-    /// State between two steps: the last solution as a function of q, and the range around it in which F is smooth.
+    /// State between two calls of `solve`: the last solution, its tangent as a function of q, and the interval of
+    /// positions around it in which F is smooth.
     struct Memory {
-        double position = 0.0;    ///< last solution [m]
-        double at_zero = 0.0;     ///< prediction of the last tangent for q = 0 [m]
-        double compliance = 0.0;  ///< 1 / F' of the last solution
-        double low =
-            std::numeric_limits<double>::infinity();  ///< ends of its cell; empty range: no prediction
-        double high = -std::numeric_limits<double>::infinity();
-        double curvature = 0.0;  ///< c of its cell
-        double play = 0.0;       ///< position of the play operator for which this holds [m]
+        double position = 0.0;    ///< solution of the last call [m]
+        double at_zero = 0.0;     ///< position that the last tangent predicts for q = 0 [m]
+        double compliance = 0.0;  ///< 1 / F' at the last solution [m/N]
+        /// Lower end of the interval around the last solution in which F is smooth; low > high: no prediction [m]
+        double low = std::numeric_limits<double>::infinity();
+        double high = -std::numeric_limits<double>::infinity();  ///< upper end of this interval [m]
+        double curvature = 0.0;  ///< c = max|F''| / (2 min F') of the cell of the last solution
+        double play = 0.0;       ///< position of the play operator at the last solution [m]
 
         Memory() = default;
         explicit Memory(double at) noexcept : position{at} {}
@@ -68,13 +76,13 @@ class CertifiedSolver {
         : CertifiedSolver{piecewise(pair, 0.0), piecewise_hysteresis(pair), pair.play_radius(), p} {}
 
     [[nodiscard]] static constexpr bool tabulated() noexcept { return false; }
-    /// Returns true if every load line of this slope is certified to have one solution.
+    /// Returns true if it is proved that every load line of slope p has exactly one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return p >= least_slope_; }
-    /// Returns the search for a force without a certificate.
+    /// Returns the solver for load lines that are not proved to have exactly one solution.
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return search_; }
     [[nodiscard]] std::size_t cells() const noexcept { return borders_.empty() ? 0 : borders_.size() - 1; }
 
-    /// Solves the load line and updates the memory.
+    /// Returns the position on the load line with its force, and updates `memory` with this solution.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
                                                             const typename E::State& state, LoadLine line,
@@ -84,16 +92,16 @@ class CertifiedSolver {
             return from_borders(environment, state, line, memory, y, 0);
         }
         const EnvironmentSample sample = environment.at(y, state);
-        // Newton's correction by the last compliance and two terms of its geometric series, which avoids a division.
-        // The remaining error is the share missing^3 of the correction.
+        // Newton's correction without a division: 1 / F' is the last compliance times a geometric series, of which
+        // three terms are used. The relative error of the correction is slope_mismatch^3.
         const double first_correction =
             (sample.force + (line.slope * y - line.intercept)) * memory.compliance;
         const double slope_mismatch =
             (1.0 - memory.compliance * line.slope) - memory.compliance * sample.slope;
         const double correction =
             -first_correction - first_correction * (slope_mismatch + slope_mismatch * slope_mismatch);
-        // F' changes by at most a quarter over a cell. The solution is in the cell if the ends are farther away than
-        // this.
+        // F' changes by at most a quarter over a cell. The cell contains the solution if its ends are farther from y
+        // than `reach`.
         const double reach = 3.0 * std::abs(correction);
         const double remaining_error =
             2.0 * (std::abs(first_correction * slope_mismatch) * (slope_mismatch * slope_mismatch) +
@@ -105,7 +113,7 @@ class CertifiedSolver {
         return found(sample, y + correction, 1.0 / (line.slope + sample.slope), line, 1, memory);
     }
 
-    /// Searches from the last position, as for a force without a certificate.
+    /// Searches the load line from the last position, without a proof that the solution is the only one.
     template <Environment E>
     [[nodiscard]] Solution search(const E& environment, const typename E::State& state, LoadLine line,
                                   Memory& memory) const noexcept {
@@ -120,28 +128,30 @@ class CertifiedSolver {
     static constexpr double infinity = std::numeric_limits<double>::infinity();
     static constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-    /// A border between cells, with c of the cell above it.
+    /// A border between two cells; `curvature` is c = max|F''| / (2 min F') of the cell above the border.
     struct Border {
         double position;
-        double force;       ///< f, or g of a hysteresis
-        double hysteresis;  ///< h
+        double force;       ///< force f, or mean force g with hysteresis [N]
+        double hysteresis;  ///< hysteresis h [N]
         double curvature;
     };
 
-    /// Cell k lies below border k and above border k - 1; the outermost two are half-lines.
+    /// Cell k of the positions lies above border k - 1 and below border k; the first and the last cell are infinite.
     struct Cell {
         double low;
         double high;
         double curvature;
     };
 
-    /// Index of a cell, and the turns of a knob as a distance.
+    /// Index of a cell in the first period of the force, and the whole periods from this cell to the position, as a
+    /// distance [m].
     struct Place {
         std::size_t cell;
         double turn_offset;
     };
 
-    /// An interval over which force and hysteresis are networks; a straight line is a network without wavelets.
+    /// An interval of positions with the networks of force and hysteresis; a straight line is a network without
+    /// wavelets.
     struct Piece {
         Interval positions;
         NetworkParameters force;
@@ -152,8 +162,8 @@ class CertifiedSolver {
     struct Trial {
         double position;
         double correction;
-        double compliance;  ///< 1 / F' at the evaluated position
-        double steepest;    ///< largest F' of any sheet at that position
+        double compliance;  ///< 1 / F' at the evaluated position [m/N]
+        double steepest;    ///< largest F' of all sheets at the evaluated position [N/m]
         EnvironmentSample sample;
     };
 
@@ -184,24 +194,27 @@ class CertifiedSolver {
         }
     }
 
-    /// Returns the distance from which a position is certainly on one side of a kink.
+    /// Returns the distance from a kink of F at position y above which a position is on a certain side of the kink, in
+    /// spite of rounding [m].
     [[nodiscard]] double margin(double y) const noexcept { return 4.0 * epsilon * (std::abs(y) + travel_); }
 
     [[nodiscard]] static double median(double a, double b, double c) noexcept {
         return std::max(std::min(a, b), std::min(std::max(a, b), c));
     }
 
-    /// Returns true if a play operator can stick at some position of the cell.
+    /// Returns true if the cell contains positions that leave the play operator at its position `play`.
     [[nodiscard]] bool may_stick(const Cell& cell, double play) const noexcept {
         return radius_ > 0.0 && cell.low < play + radius_ && cell.high > play - radius_;
     }
 
-    /// Returns 1 if the cell lies above the positions that stick, -1 if it lies below.
+    /// Returns the direction state of positions in the cell: 1 (press) if the cell lies above play + r, otherwise -1
+    /// (release).
     [[nodiscard]] double direction(const Cell& cell, double play) const noexcept {
         return cell.low >= play + radius_ ? 1.0 : -1.0;
     }
 
-    /// Returns F at a border, sliding or sticking, for a knob after `turn_offset`.
+    /// Returns F at a border of a cell that is moved by `turn_offset` (whole periods), for the position `play` of the
+    /// play operator [N].
     [[nodiscard]] double value(const Border& border, double turn_offset, double p,
                                double play) const noexcept {
         const double y = border.position + turn_offset;
@@ -209,15 +222,15 @@ class CertifiedSolver {
         return border.force + s * border.hysteresis + p * y;
     }
 
-    /// Returns cell k of a knob after `turn_offset`.
+    /// Returns cell k moved by `turn_offset` (whole periods of a periodic force).
     [[nodiscard]] Cell cell_at(std::size_t k, double turn_offset) const noexcept {
         return {k == 0 ? -infinity : borders_[k - 1].position + turn_offset,
                 k == borders_.size() ? infinity : borders_[k].position + turn_offset,
                 k == 0 ? 0.0 : borders_[k - 1].curvature};
     }
 
-    /// Applies one Newton step from y, clamped to the cell. Evaluates a few units in the last place inside the borders,
-    /// because f' may jump there.
+    /// Applies one Newton step from position y and limits the result to the cell. The force is evaluated slightly
+    /// inside the borders of the cell, because the slope f' may jump at a border.
     template <class E, class State>
     [[nodiscard, gnu::always_inline]] inline Trial newton(const E& environment, const State& state,
                                                           LoadLine line, double y,
@@ -261,7 +274,7 @@ class CertifiedSolver {
         }
     }
 
-    /// Stores a confirmed solution in the memory and returns it.
+    /// Stores the solution `position` and its tangent in `memory`, and returns the solution.
     [[nodiscard]] static Solution found(const EnvironmentSample& sample, double position, double compliance,
                                         LoadLine line, int evaluations, Memory& memory) noexcept {
         memory.position = position;
@@ -274,7 +287,8 @@ class CertifiedSolver {
                 Status::Ok};
     }
 
-    /// Solves from the border values and their interpolation, or from a guess that agrees with it.
+    /// Solves the load line inside the cell that contains the solution. Starts at the linear interpolation between the
+    /// borders of the cell, or at `guess` if it is near the interpolated position.
     template <Environment E>
     [[nodiscard, gnu::noinline]] Solution from_borders(const E& environment, const typename E::State& state,
                                                        LoadLine line, Memory& memory, double guess,
@@ -308,7 +322,7 @@ class CertifiedSolver {
         }
     }
 
-    /// Stores the range around y in which F is smooth.
+    /// Stores in `memory` the interval of positions around the solution y in which F is smooth.
     void store_range(const Cell& cell, double y, double play, Memory& memory) const noexcept {
         memory.low = cell.low + margin(y);
         memory.high = cell.high - margin(y);
@@ -326,7 +340,8 @@ class CertifiedSolver {
         memory.play = play;
     }
 
-    /// Returns the cell of the solution, from the values at the borders only.
+    /// Returns the cell that contains the solution of the load line, found by comparing q with F at the borders of the
+    /// cells.
     [[nodiscard]] Place locate(LoadLine line, double play) const noexcept {
         const Border& first = borders_.front();
         double turn_offset = 0.0;
@@ -337,7 +352,7 @@ class CertifiedSolver {
             double turns = std::floor((line.intercept - first.force - line.slope * first.position) /
                                       (line.slope * period_));
             turn_offset = turns * period_;
-            // Hysteresis or rounding can shift the solution by some turns.
+            // Hysteresis or rounding can place the solution some periods away from the computed one.
             constexpr int farthest = 4;
             for (int k = 0; k < farthest && !lies_below(first); ++k) {
                 turn_offset = --turns * period_;
@@ -350,8 +365,8 @@ class CertifiedSolver {
         return {static_cast<std::size_t>(above - borders_.begin()), turn_offset};
     }
 
-    /// Returns the position at which the chords of the sheets over cell k reach q. On a half-line returns its end,
-    /// because every sheet is a line there.
+    /// Returns the position in cell k at which linear interpolation of F between the borders of the cell gives q. In an
+    /// infinite cell F is a straight line, so its finite end is a sufficient start.
     [[nodiscard]] double interpolated(std::size_t k, double turn_offset, LoadLine line,
                                       double play) const noexcept {
         if (k == 0 || k == borders_.size()) {
@@ -378,19 +393,20 @@ class CertifiedSolver {
         return std::clamp(start, cell.low, cell.high);
     }
 
-    /// Returns a network without wavelets: a straight line.
+    /// Returns a network without wavelets: a straight line of this slope with the force `at_zero` at position 0.
     [[nodiscard]] static NetworkParameters straight(double slope, double at_zero) {
         return {1, {}, {}, {}, {slope}, at_zero};
     }
 
-    /// Returns a hysteresis of zero in the same pieces, for a force without memory.
+    /// Returns a hysteresis of zero over the same intervals as the force, for a force without hysteresis.
     [[nodiscard]] static PiecewiseForce zero_hysteresis(const PiecewiseForce& force) {
         PiecewiseForce hysteresis = scaled(force, 0.0);
         hysteresis.network = straight(0.0, 0.0);
         return hysteresis;
     }
 
-    /// Returns the pieces from left to right; on both sides the last line is infinite.
+    /// Returns the intervals of force and hysteresis in the order of position; the first and the last interval are
+    /// infinite.
     [[nodiscard]] static std::vector<Piece> pieces_of(const PiecewiseForce& force,
                                                       const PiecewiseForce& hysteresis) {
         std::vector<Piece> pieces;
@@ -417,7 +433,8 @@ class CertifiedSolver {
         return pieces;
     }
 
-    /// Returns c of a cell on which (C) is certified for every sheet; infinity if it is not.
+    /// Returns c = max|F''| / (2 min F') of a cell if condition (C) of the class is proved for every sheet in it;
+    /// otherwise infinity.
     [[nodiscard]] double certified_curvature(const Piece& piece, double from, double to,
                                              double p) const noexcept {
         const double reach = std::max(std::abs(from), std::abs(to));
@@ -438,18 +455,21 @@ class CertifiedSolver {
                          sheet_curvature(g, h, -s, by_radius_, radius, p)});
     }
 
-    /// Derivatives of a network in the middle of a cell, with bounds over the cell.
+    /// Derivatives of a network in the middle of a cell, bounds of their rounding errors, and bounds of the derivatives
+    /// over the cell.
     struct Expansion {
         Derivatives middle;
         Derivatives rounding;
         DerivativeBounds over;
     };
 
-    /// Returns c for g + s h, or with `by_radius` for the sheet that sticks, whose s grows with y. Both bounds are
-    /// linear in s, so s and -s cover all values between them.
+    /// Returns c = max|F''| / (2 min F') over a cell for the force g + s h with a fixed direction state s. With
+    /// `by_radius` = 1 / r the direction state grows with the position (the play operator sticks). The bounds of F' and
+    /// F'' are linear in s, so their values at s and -s are valid for all direction states between.
     [[nodiscard]] static double sheet_curvature(const Expansion& g, const Expansion& h, double s,
                                                 double by_radius, double radius, double p) noexcept {
-        // Derivative n of f in the middle, and a bound of its rounding error.
+        // Element n is derivative n of the force in the middle of the cell, and a bound of the rounding error of this
+        // derivative.
         std::array<double, 5> f{};
         std::array<double, 5> rounding{};
         for (std::size_t n = 1; n < f.size(); ++n) {
@@ -475,8 +495,8 @@ class CertifiedSolver {
         return least > 0.0 && 8.0 * r * most_steps <= least ? 0.5 * most_steps / least : infinity;
     }
 
-    /// Makes the cells from left to right, each about as wide as can be certified. Makes none if one cannot be
-    /// certified.
+    /// Makes the cells in the order of position, each about as wide as condition (C) can be proved. Makes no cells if
+    /// (C) cannot be proved for one of them.
     void cut(const std::vector<Piece>& pieces, double p) {
         constexpr std::size_t most_cells = 4096;
         constexpr double narrowest = 1e-12;
@@ -488,7 +508,7 @@ class CertifiedSolver {
         for (const Piece& piece : pieces) {
             const auto [lower, upper] = piece.positions;
             if (!std::isfinite(lower) || !std::isfinite(upper)) {
-                // F is a straight line, because h is constant there.
+                // In an infinite interval F is a straight line, because the hysteresis h is constant there.
                 const double edge = std::isfinite(lower) ? lower : upper;
                 const double slope = piece.force.linear[0];
                 const double gain = by_radius_ * jet(piece.hysteresis, edge)[0];
@@ -521,12 +541,13 @@ class CertifiedSolver {
     }
 
     LoadLineSolver search_;
-    double radius_;     ///< r of a hysteresis, otherwise 0 [m]
-    double by_radius_;  ///< 1 / r, otherwise 0 [1/m]
+    double radius_;     ///< play radius r; 0 without hysteresis [m]
+    double by_radius_;  ///< 1 / r; 0 without hysteresis [1/m]
     double travel_;
-    double period_;                  ///< of a knob, otherwise 0 [m]
-    double tolerance_;               ///< of the position [m]
-    double least_slope_ = infinity;  ///< smallest p for which the cells are certified
+    double period_;     ///< period of the force; 0 if the force is not periodic [m]
+    double tolerance_;  ///< largest error of the solution's position [m]
+    double least_slope_ =
+        infinity;  ///< smallest load-line slope p for which (C) is proved in every cell [N/m]
     std::vector<Border> borders_;
 };
 

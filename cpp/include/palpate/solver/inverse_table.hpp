@@ -18,48 +18,49 @@
 
 namespace palpate {
 
-/// Required accuracy and largest size of a tabulated resolvent.
+/// Required accuracy and largest size of the tables that give the solution of a load line.
 struct ResolventOptions {
-    double relative_error = 1e-12;     ///< largest error, divided by the travel; includes rounding
-    std::size_t largest_table = 8192;  ///< largest number of cells of 64 bytes for each branch
+    double relative_error = 1e-12;     ///< largest position error / length of the domain; includes rounding
+    std::size_t largest_table = 8192;  ///< largest number of cells of 64 bytes in each table
 };
 
-/// Function to invert: F(y) = f(y) + p y on an interval where it rises; f is a network of one input without
-/// continuation.
+/// Function whose inverse is tabulated: F(y) = f(y) + p y on an interval of positions y over which F rises. f is a
+/// network of one input without continuation.
 struct RisingForce {
     const NetworkParameters& network;
     double p = 0.0;
     Interval positions;
-    Interval values;           ///< F at both ends
-    bool folds_below = false;  ///< true: F has a fold at the lower end; false: it continues to rise there
-    bool folds_above = false;
+    Interval values;           ///< F at both ends of `positions`
+    bool folds_below = false;  ///< true: F falls below the lower end; false: F also rises there
+    bool folds_above = false;  ///< true: F falls above the upper end
 };
 
-/// Part of the inverse of a rising F as polynomials of degree 7, with a proved error.
+/// Table of polynomials of degree 7 that gives the position y for a value q = F(y) of a rising function F, with a
+/// proved error.
 struct InverseTable {
     Interval values{std::numeric_limits<double>::infinity(),
-                    -std::numeric_limits<double>::infinity()};  ///< of F: range of the table
-    Interval positions;                                         ///< inverse at both ends
-    double error = 0.0;                                         ///< proved bound of |y - F^-1(q)|
+                    -std::numeric_limits<double>::infinity()};  ///< smallest and largest value q of the table
+    Interval positions;                                         ///< positions y for both values
+    double error = 0.0;  ///< proved bound of the position error |y - F^-1(q)|
     PiecewiseSeptic table;
 
     [[nodiscard]] bool empty() const noexcept { return table.empty(); }
-    /// Returns true if q lies in the table.
+    /// Returns true if the table contains the value q.
     [[nodiscard, gnu::always_inline]] inline bool covers(double q) const noexcept {
         return q >= values.lower && q <= values.upper;
     }
-    /// Returns the inverse at q.
+    /// Returns the position y with F(y) = q.
     [[nodiscard, gnu::always_inline]] inline double at(double q) const noexcept { return table.value(q); }
 };
 
 namespace detail {
 
-/// The inverse of F on cells of one width.
+/// The inverse function of a rising function F as polynomials on cells of equal width.
 ///
-/// Each cell is certified separately by the residual of its polynomial P, r(q) = F(P(q)) - q. At both borders r and
-/// three derivatives are zero, so |r| <= max|r^(8)| h^8 / (256 * 8!). Bounds of the Taylor coefficients of both
-/// functions bound the eighth derivative of their composition. The error is at most |r| / min F' over the positions of
-/// the cell.
+/// The error of each cell is proved separately by the residual r(q) = F(P(q)) - q of its polynomial P. At both borders
+/// of the cell, r and three derivatives are zero, so |r| <= max|r^(8)| h^8 / (256 * 8!) with the cell width h. Bounds
+/// of the Taylor coefficients of F and P give a bound of the eighth derivative r^(8). The position error is at most |r|
+/// / min F' over the positions of the cell.
 class InverseCells {
   public:
     InverseCells(const RisingForce& force, double largest_error, double width)
@@ -79,12 +80,14 @@ class InverseCells {
         }
     }
 
-    /// Return the number of certified cells, and of the others that could be certified if they were narrower.
+    /// Return the number of cells whose proved error is small enough, and the number of other cells that could satisfy
+    /// the required error if they were narrower.
     [[nodiscard]] std::size_t certified() const noexcept { return certified_; }
     [[nodiscard]] std::size_t improvable() const noexcept { return improvable_; }
     [[nodiscard]] std::size_t size() const noexcept { return table_.size(); }
 
-    /// Returns the runs of certified cells from left to right. Runs of fewer than four cells are dropped as too short.
+    /// Returns one table for each group of adjacent cells whose proved error is small enough, in the order of q. Groups
+    /// of fewer than four cells are omitted.
     [[nodiscard]] std::vector<InverseTable> runs() const {
         constexpr std::size_t shortest = 4;
         std::vector<InverseTable> runs;
@@ -95,7 +98,8 @@ class InverseCells {
                 run.error = std::max(run.error, errors_[past++]);
             }
             if (past - first >= shortest) {
-                // Rounding may place a border itself in the next cell.
+                // Rounding may place a value q at the border of the last cell in the next cell, so the table ends
+                // slightly before the border.
                 const double low = table_.middle(first) - 0.5 * table_.width();
                 const double high = table_.middle(past - 1) + 0.5 * table_.width();
                 run.values = {std::max(force_.values.lower, std::nextafter(low, high)),
@@ -111,16 +115,17 @@ class InverseCells {
     }
 
   private:
-    /// The inverse and its derivatives at one q, with the forward function at that position.
+    /// The position y = F^-1(q) for one value q with derivatives by q, and the function F at this position.
     struct InverseJet {
-        Jet inverse;
-        Jet forward;      ///< F and its derivatives at the inverse
-        double residual;  ///< F(y) - q
+        Jet inverse;      ///< y = F^-1(q) and its derivatives by q
+        Jet forward;      ///< F(y) and its derivatives by y
+        double residual;  ///< F(y) - q [N]
     };
 
     [[nodiscard]] bool certified(std::size_t k) const noexcept { return errors_[k] <= largest_error_; }
 
-    /// Applies Newton's method to the last digit, in a bracket between the ends.
+    /// Returns the position y with F(y) = q, exact to rounding, and its derivatives. Applies Newton's method with a
+    /// bracket; outside the interval of F the result is NaN if F has a fold there.
     [[nodiscard]] InverseJet invert(double q) const noexcept {
         constexpr double infinity = std::numeric_limits<double>::infinity();
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
@@ -157,7 +162,8 @@ class InverseCells {
         return at;
     }
 
-    /// Returns a Taylor polynomial from the border before, if there is one.
+    /// Returns a first position for Newton's method at the value q: the Taylor polynomial of the previous border if
+    /// there is one, otherwise the middle or an end of the bracket from `low` to `high`.
     [[nodiscard]] double first_guess(double q, double low, double high) const noexcept {
         if (!borders_.empty()) {
             const InverseJet& last = borders_.back();
@@ -171,17 +177,19 @@ class InverseCells {
         return std::isfinite(low) ? (std::isfinite(high) ? 0.5 * (low + high) : low) : high;
     }
 
-    /// Error of a cell that a narrower cell would not reduce.
+    /// Value of a cell's error if rounding alone exceeds the required error, so that narrower cells would not reduce
+    /// the error.
     static constexpr double rounding_limited = std::numeric_limits<double>::max();
 
-    /// Returns a bound of |P - F^-1| on one cell; infinity without a proof.
+    /// Returns a proved bound of the position error of the polynomial in cell k; infinity if no bound is proved. `of_f`
+    /// has bounds of the rounding errors of f and its derivatives.
     [[nodiscard]] double cell_error(std::size_t k, const Jet& of_f) noexcept {
         constexpr std::size_t order = 8;
         const auto c = table_.coefficients(k);
         if (!std::all_of(c.begin(), c.end(), [](double one) { return std::isfinite(one); })) {
             return std::numeric_limits<double>::infinity();
         }
-        // Bounds of |P^(j)| / j! over the cell, rounding included.
+        // Element j is a bound of |P^(j)| / j! over the cell for its polynomial P, rounding included.
         std::array<double, order + 1> inner{};
         for (std::size_t j = 1; j < c.size(); ++j) {
             double binomial = 1.0;
@@ -199,7 +207,8 @@ class InverseCells {
         if (!(least_slope > 0.0)) {
             return std::numeric_limits<double>::infinity();
         }
-        // The coefficient of t^8 in sum_k |f^(k)| / k! (sum_j inner_j t^j)^k. k = 1 adds 0, because P has degree 7.
+        // Bound of the eighth Taylor coefficient of F(P): the coefficient of t^8 in sum_k |f^(k)| / k! (sum_j inner_j
+        // t^j)^k. The term k = 1 adds 0, because P has degree 7.
         std::array<double, order + 1> composed = inner;
         double eighth = 0.0;
         double factorial = 1.0;
@@ -221,7 +230,8 @@ class InverseCells {
         return rounding < largest_error_ ? truncation + rounding : rounding_limited;
     }
 
-    /// Returns a bound of the change of a cell's polynomial by rounding at a border.
+    /// Returns a bound of the position error of a cell's polynomial that comes from rounding errors of the inverse and
+    /// its derivatives at one border of the cell.
     [[nodiscard]] double border_rounding(const InverseJet& at, const Jet& of_f,
                                          double least_slope) const noexcept {
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
@@ -229,7 +239,8 @@ class InverseCells {
         const double argument =
             4.0 * epsilon * (std::abs(at.forward[0]) + std::abs(force_.p * at.inverse[0]));
         const double offset = (std::abs(at.residual) + of_f[0] + argument) / least_slope;
-        // An error in y changes every derivative by the next one; the change by the fourth is below rounding.
+        // A position error `offset` changes each derivative of F by `offset` times the next derivative; the change of
+        // the third derivative is below rounding.
         const double f2 = std::abs(second);
         const double f3 = std::abs(third);
         const double d1 = of_f[1] + f2 * offset + 2.0 * epsilon * s;
@@ -259,9 +270,10 @@ class InverseCells {
 
 }  // namespace detail
 
-/// Returns tables of the inverse of a rising F, with the widest cells that cover all values or as many as any cells do.
-/// Near a fold the inverse is a square root, which polynomials do not approximate, so a few cells are missing there.
-/// They are also missing if F is so flat that rounding alone exceeds the required error.
+/// Returns tables of the inverse of a rising function F. The cell width is halved until the tables contain all values
+/// of F, or until narrower cells do not add values. Near a fold of F the inverse is a square root, which polynomials do
+/// not approximate well, so the tables omit some cells there. The tables also omit cells in which F is so flat that
+/// rounding alone exceeds the required error.
 [[nodiscard]] inline std::vector<InverseTable> inverse_tables(const RisingForce& force, double largest_error,
                                                               std::size_t largest_table) {
     const double range = force.values.upper - force.values.lower;

@@ -11,21 +11,23 @@
 
 namespace palpate {
 
-/// Solves the load line of a force-limited environment, c(f(y)) + p y = q, with the solver of f(y) + p y = q.
+/// Solves the load line of a force that is limited to +-F_max, c(f(y)) + p y = q, with a solver for the unlimited force
+/// f. c(f) is f limited to +-F_max.
 ///
-/// Let F(y) = f(y) + p y rise, and let F(u) = q. Then c(f(y)) + p y also rises, because p > 0 and each of its slopes is
-/// F' or p. It has one solution:
+/// Let F(y) = f(y) + p y rise, and let u be the solution for the unlimited force, F(u) = q. Then c(f(y)) + p y also
+/// rises, because p > 0 and each of its slopes is F' or p. The limited load line has one solution y:
 /// - |f(u)| <= F_max: u itself, since c(f(u)) = f(u).
 /// - f(u) > F_max: y = (q - F_max) / p. Since p y = q - F_max > q - f(u) = p u, y > u and F(y) > q. This means
-///   f(y) > q - p y = F_max: the limit is active at y.
+///   f(y) > q - p y = F_max: the force limit is active at y.
 /// - f(u) < -F_max: y = (q + F_max) / p in the same way.
 ///
-/// For an environment with memory this holds for each of its states. If p does not certify that F rises, the solver
-/// searches the limited environment from the last position.
+/// For a force with hysteresis this holds for each position of the play operator. If it is not proved that F rises, the
+/// solver searches the load line of the limited force from the last position.
 template <class Solver>
 class LimitedResolvent {
   public:
-    /// State between two steps.
+    /// State between two calls of `solve`: that of the solver for the unlimited force, and the last position of the
+    /// search.
     struct Memory {
         typename Solver::Memory unlimited;
         WarmStart newton;

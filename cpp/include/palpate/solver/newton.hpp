@@ -9,59 +9,64 @@
 
 namespace palpate {
 
-/// The equation that a time step solves for the position y of the environment:
+/// The equation that a tick solves for the position y of the virtual object with the force f:
 ///
 ///     f(y) + slope * y = intercept.
 ///
-/// The two numbers contain inertia, damping and the virtual coupling, so every implicit structure uses the same scalar
-/// equation. It has one solution for every intercept if slope + f' > 0.
+/// `slope` and `intercept` contain object mass, object damping and the virtual coupling, so every implicit structure
+/// solves the same scalar equation. The equation has one solution for every intercept if slope + f' > 0 at all
+/// positions.
 struct LoadLine {
-    double slope = 0.0;      ///< p [N/m]
-    double intercept = 0.0;  ///< q [N]
+    double slope = 0.0;      ///< slope p of the load line [N/m]
+    double intercept = 0.0;  ///< right side q of the load line [N]
 };
 
-/// Position on the load line, and the result of the search.
+/// Position y that solves a load line f(y) + p y = q, with the force at y and the result of the search.
 struct Solution {
     double position = 0.0;          ///< solution y [m]
-    EnvironmentSample environment;  ///< force, slope and energy there
-    double residual = 0.0;  ///< f(y) + p y - q [N or N*m]; 0 if a bound confirms it without an evaluation
-    int evaluations = 0;    ///< evaluations of the environment
+    EnvironmentSample environment;  ///< force, slope and energy at the solution
+    double residual = 0.0;          ///< f(y) + p y - q [N or N*m]; 0 if a proof replaces the evaluation
+    int evaluations = 0;            ///< number of evaluations of the force
     Status status = Status::Ok;
 };
 
-/// State between two steps.
+/// State between two calls of the solver: the position at which the next search starts.
 struct WarmStart {
-    double position = 0.0;  ///< last solution [m]
+    double position = 0.0;  ///< solution of the last call [m]
 
     WarmStart() = default;
     explicit WarmStart(double at) noexcept : position{at} {}
 };
 
-/// Interval that contains the solution.
+/// Interval of positions that contains the solution of a load line.
 struct Bracket {
-    double low = -std::numeric_limits<double>::infinity();  ///< residual < 0 here: the solution lies above
-    double high = std::numeric_limits<double>::infinity();  ///< residual > 0 here: the solution lies below
+    double low = -std::numeric_limits<double>::infinity();  ///< residual < 0 at `low`: the solution is > low
+    double high =
+        std::numeric_limits<double>::infinity();  ///< residual > 0 at `high`: the solution is < high
 };
 
-/// Applies Newton's method to f(y) + p y = q for a force without a certificate, inside a bracket and with a limit of
-/// evaluations. (`CertifiedSolver` solves load lines that are certified to have one solution.)
+/// Solves a load line f(y) + p y = q that is not proved to have exactly one solution, by Newton's method inside a
+/// bracket and with a limited number of evaluations. (`CertifiedSolver` solves load lines that are proved to have
+/// exactly one solution.)
 ///
-/// Until the residual changes sign the search moves in the direction of -residual, at most `longest_step` at a time. If
-/// the solution is not unique, the search ends on the first branch from the start. A slow motion would follow the same
-/// branch.
+/// Until the residual f(y) + p y - q changes its sign, the search moves the position y in the direction of -residual,
+/// by at most `longest_step` in each iteration. If the load line has several solutions, the search ends at the first
+/// solution in this direction. A slow motion would reach the same solution.
 struct LoadLineSolver {
-    int max_evaluations = 64;  ///< evaluations after which the search stops
-    double tolerance = 1e-13;  ///< largest |residual / slope|, divided by 1 + |y|
-    double longest_step = std::numeric_limits<double>::infinity();  ///< until the bracket is found [m]
+    int max_evaluations = 64;  ///< number of evaluations of the force after which the search stops
+    double tolerance = 1e-13;  ///< largest accepted |residual / slope| / (1 + |y|)
+    double longest_step =
+        std::numeric_limits<double>::infinity();  ///< largest change of y without a bracket [m]
 
     using Memory = WarmStart;
 
     [[nodiscard]] static constexpr bool tabulated() noexcept { return false; }
-    /// Returns false: without a certificate several solutions are possible.
+    /// Returns false: without a proof a load line may have several solutions.
     [[nodiscard]] static constexpr bool unique(double /*p*/) noexcept { return false; }
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return *this; }
 
-    /// Solves from the last position. A step that is not finite does not change the memory.
+    /// Solves the load line from the last solution in `memory`, and stores the new solution in `memory` unless it is
+    /// not finite.
     template <Environment E>
     [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
                                  WarmStart& memory) const noexcept {
@@ -72,20 +77,21 @@ struct LoadLineSolver {
         return solution;
     }
 
-    /// Solves from a start, without memory.
+    /// Solves the load line from the position `start`.
     template <Environment E>
     [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
                                  double start) const noexcept {
         return search(environment, state, line, start, Bracket{});
     }
 
-    /// Solves from a start inside a bracket in which the residual rises.
+    /// Solves the load line from the position `start`, inside a bracket over which the residual rises with the
+    /// position.
     template <Environment E>
     [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
                                  double start, Bracket bracket) const noexcept {
         Solution at = search(environment, state, line, start, bracket);
         if (at.status == Status::NotUnique) {
-            at.status = Status::Ok;  // the end of the rising interval
+            at.status = Status::Ok;  // the solution is an end of the bracket
         }
         return at;
     }
@@ -113,8 +119,9 @@ struct LoadLineSolver {
                 at.status = Status::NonFinite;
                 return at;
             }
-            // This test comes before the bracket can halve the step, and its bound is at least the rounding error of a
-            // residual. Otherwise the end of the bracket would cost dozens of bisections.
+            // The residual is tested before the bracket can replace a Newton step by a bisection, and the tolerance is
+            // at least the rounding error of the residual. Otherwise a solution at an end of the bracket would need
+            // dozens of bisections.
             const double tolerated = accepted(at.position);
             const double size = std::abs(line.slope * at.position) + std::abs(line.intercept);
             if (std::abs(at.residual) <= std::fmax(tolerated * std::abs(slope), rounding * size)) {
@@ -130,7 +137,7 @@ struct LoadLineSolver {
             if (bracketed && high - low <= tolerated) {
                 return at;
             }
-            // Newton's step is used while it leads uphill and reduces the residual.
+            // Newton's step is used while slope + f' > 0 and the step at least halves the residual.
             const double newton = slope > 0.0 ? -at.residual / slope : 0.0;
             const double direction = at.residual < 0.0 ? 1.0 : -1.0;
             double step = newton;

@@ -11,26 +11,27 @@
 
 namespace palpate {
 
-/// Interval outside the domain over which a force is a straight line.
+/// Interval of positions outside the domain over which a force is a straight line.
 struct OuterLine {
-    double length;  ///< length of the interval; infinity for the last [m]
+    double length;  ///< length of the interval; infinity for the outermost line [m]
     double slope;   ///< slope of the line [N/m]
 };
 
-/// A force over all positions in pieces: a network inside the domain, and outside either straight lines or the same
-/// period repeated.
+/// A force over all positions: a network inside the domain, and outside the domain either straight lines or, for a
+/// periodic force, the network repeated.
 struct PiecewiseForce {
     NetworkParameters network;
     double lower = 0.0;
     double upper = 0.0;
     bool periodic = false;
-    std::vector<OuterLine> below;  ///< from the lower edge outward
-    std::vector<OuterLine> above;  ///< from the upper edge outward
+    std::vector<OuterLine> below;  ///< straight lines below the domain, the nearest first
+    std::vector<OuterLine> above;  ///< straight lines above the domain, the nearest first
 };
 
 namespace detail {
 
-/// Returns the pieces of a sum of edge lines. `slope_at(x)` is that sum's slope; it may change at `reaches`.
+/// Returns the straight lines of a force outside one edge of the domain, the nearest first. `slope_at(x)` returns the
+/// slope of the force, which may change at each distance from the edge in `reaches`.
 template <class Slope>
 [[nodiscard]] std::vector<OuterLine> outer_lines(double edge, double outward, std::vector<double> reaches,
                                                  Slope slope_at) {
@@ -49,7 +50,7 @@ template <class Slope>
 
 }  // namespace detail
 
-/// Returns the pieces of a curve.
+/// Returns the force of a network over all positions: its parameters, and its straight lines outside the domain.
 [[nodiscard]] inline PiecewiseForce piecewise(const NetworkCurve& curve) {
     PiecewiseForce force{curve.parameters(), curve.lower(), curve.upper(), curve.periodic(), {}, {}};
     if (!force.periodic) {
@@ -63,7 +64,8 @@ template <class Slope>
     return force;
 }
 
-/// Returns a hysteresis pair while it slides: g + s h, s = 1 for press and -1 for release.
+/// Returns the force g + s h (mean force g, hysteresis h) over all positions for a fixed direction state s: 1 for
+/// press, -1 for release.
 [[nodiscard]] inline PiecewiseForce piecewise(const HysteresisNetwork& pair, double s) {
     const NetworkCurve& g = pair.force();
     const NetworkCurve& h = pair.hysteresis_force();
@@ -84,7 +86,7 @@ template <class Slope>
     return force;
 }
 
-/// Returns h of a hysteresis pair, in the same pieces.
+/// Returns the hysteresis h over all positions, over the same intervals as the mean force.
 [[nodiscard]] inline PiecewiseForce piecewise_hysteresis(const HysteresisNetwork& pair) {
     PiecewiseForce hysteresis = piecewise(pair, 0.0);
     hysteresis.network = pair.hysteresis_force().parameters();
@@ -99,7 +101,7 @@ template <class Slope>
     return hysteresis;
 }
 
-/// Returns the force multiplied by a factor.
+/// Returns the force multiplied by `factor` at all positions.
 [[nodiscard]] inline PiecewiseForce scaled(PiecewiseForce force, double factor) {
     for (double& weight : force.network.weight) {
         weight *= factor;

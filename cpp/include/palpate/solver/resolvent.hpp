@@ -21,23 +21,26 @@
 
 namespace palpate {
 
-/// Interval over which F(y) = f(y) + p y rises from `values.lower` to `values.upper`. Each q between them has one
-/// solution, which comes from a table, a straight line, or Newton's method between the ends.
+/// Interval of positions y over which F(y) = f(y) + p y rises from `values.lower` to `values.upper`. For each q between
+/// these values the interval contains one solution of F(y) = q. It is computed by a table, a straight line, or Newton's
+/// method between the ends of the interval.
 struct Branch {
     Interval values{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     Interval positions{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     InverseTable table;
-    double line_slope = 0.0;     ///< p + f' of a straight line; 0: a curve
-    double curvature_low = 0.0;  ///< |f''| at an end that is a fold
-    double curvature_high = 0.0;
+    double line_slope = 0.0;      ///< slope p + f' if F is a straight line; otherwise 0 [N/m]
+    double curvature_low = 0.0;   ///< |f''| at the lower end if F falls below it; else 0
+    double curvature_high = 0.0;  ///< |f''| at the upper end if F falls above it; else 0
 
-    /// Returns the position on a straight line, from its finite end.
+    /// Returns the position y with F(y) = q if F is a straight line over this interval, computed from a finite end of
+    /// the interval.
     [[nodiscard]] double on_line(double q) const noexcept {
         return std::isfinite(positions.upper) ? positions.upper + (q - values.upper) / line_slope
                                               : positions.lower + (q - values.lower) / line_slope;
     }
 
-    /// Returns a start for Newton's method: a parabola near a fold, elsewhere the last position.
+    /// Returns a first position for Newton's method at the value q. Near a fold (an end at which F changes from rising
+    /// to falling) it lies on a parabola; elsewhere it is the last position `last`.
     [[nodiscard]] double first_guess(double q, double last) const noexcept {
         const double near = 0.1 * (values.upper - values.lower);
         if (curvature_high > 0.0 && values.upper - q < near) {
@@ -50,24 +53,27 @@ struct Branch {
     }
 };
 
-/// y = R(q), the solution of f(y) + p y = q as a function of q for a fixed p: the implicit step without iteration.
+/// Solves the load line f(y) + p y = q for a fixed slope p without iteration: tables give the position y = R(q) as a
+/// function of q.
 ///
-/// F = f + p y rises along its branches; between some of them it falls. A branch inside the domain has a table that is
-/// certified cell by cell (`inverse_tables`). Outside the edges f is a straight line, which is solved exactly. A knob
-/// repeats all branches with every turn. The motion defines the branch of the solution: the step moves from the last
-/// position in the direction of -residual to the first root. From a rising branch it goes to the next branch while q is
-/// above the branch's highest F, and back while q is below its lowest F.
+/// F(y) = f(y) + p y rises over intervals called branches; between some of them F falls. A branch inside the domain has
+/// a table with an error bound proved for each cell (`inverse_tables`). Outside the domain f is a straight line, which
+/// is solved exactly. For a periodic force all branches repeat with every period. If several branches contain a
+/// solution, the motion defines the branch: from the last position, the solver moves in the direction of -residual (q -
+/// F) to the first solution. It goes to the next branch while q is above the largest F of the branch, and to the
+/// previous branch while q is below the smallest F of the branch.
 ///
-/// Near a fold, and if the required error cannot be certified, a short branch is without a table. There
-/// `CertifiedSolver` solves a load line with one solution, and Newton's method between the branch's ends solves the
-/// others. If the folds cannot be located, `CertifiedSolver` solves all load lines.
+/// A short branch near a fold (a position at which F changes between rising and falling) has no table, nor has a branch
+/// whose required error cannot be proved. In such a branch `CertifiedSolver` solves load lines that have exactly one
+/// solution, and Newton's method between the ends of the branch solves other load lines. If the folds cannot be
+/// located, `CertifiedSolver` solves all load lines.
 class Resolvent {
   public:
-    /// State between two steps: the branch of the last solution.
+    /// State between two calls of `solve`: the branch of the last solution, and the state of `CertifiedSolver`.
     struct Memory {
         CertifiedSolver::Memory newton;
-        std::size_t branch = 0;  ///< 0: unknown
-        double turns = 0.0;      ///< turns of a knob
+        std::size_t branch = 0;  ///< index of the branch; 0: unknown
+        double turns = 0.0;      ///< whole periods from the first branches to the position
 
         Memory() = default;
         explicit Memory(double position) noexcept : newton{position} {}
@@ -91,7 +97,7 @@ class Resolvent {
         }
         return sum;
     }
-    /// Returns a proved bound of |y - R(q)| for the tables [m]; 0 without tables.
+    /// Returns a proved bound of the position error of all tables [m]; 0 without tables.
     [[nodiscard]] double position_error() const noexcept {
         double worst = 0.0;
         for (const Branch& branch : branches_) {
@@ -99,16 +105,17 @@ class Resolvent {
         }
         return worst;
     }
-    /// Returns the branches of one turn, from left to right. The first is empty and represents an unknown branch.
+    /// Returns the branches of F (of one period if the force is periodic), in the order of position. The first element
+    /// is empty and represents an unknown branch.
     [[nodiscard]] const std::vector<Branch>& branches() const noexcept { return branches_; }
     [[nodiscard]] const CertifiedSolver& solver() const noexcept { return solver_; }
-    /// Returns true if every load line of this slope is certified to have one solution.
+    /// Returns true if it is proved that every load line of slope p has exactly one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return solver_.unique(p); }
-    /// Returns the search for a force without a certificate.
+    /// Returns the solver for load lines that are not proved to have exactly one solution.
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return solver_.uncertified(); }
 
-    /// Solves the load line and updates the memory. Inlined, so that the compiler drops the parts that a caller does
-    /// not use.
+    /// Returns the position on the load line with its force, and updates `memory` with this solution. Inlined, so that
+    /// the compiler drops the results that a caller does not use.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
                                                             const typename E::State& state, LoadLine line,
@@ -122,7 +129,8 @@ class Resolvent {
         return solve_outside_table(environment, state, line, memory);
     }
 
-    /// Returns the unique solution if a table or a line gives it without an evaluation; otherwise NaN.
+    /// Returns the solution of a load line that has exactly one, if a table or a straight line gives it without an
+    /// evaluation of the force; otherwise the position NaN.
     [[nodiscard, gnu::always_inline]] inline Solution without_evaluation(LoadLine line,
                                                                          Memory& memory) const noexcept {
         const Branch& branch = branches_[memory.branch];
@@ -133,7 +141,7 @@ class Resolvent {
         return from_any_branch(line, memory);
     }
 
-    /// Solves from a start, without memory.
+    /// Solves the load line from the position `start`.
     template <Environment E>
     [[nodiscard]] Solution solve(const E& environment, const typename E::State& state, LoadLine line,
                                  double start) const noexcept {
@@ -142,7 +150,8 @@ class Resolvent {
     }
 
   private:
-    /// Returns position and force. Slope and energy would double the cost, and no structure uses them.
+    /// Returns the solution y with its force q - p y. Slope and energy are NaN: they would double the computing time,
+    /// and no structure uses them.
     [[nodiscard]] Solution solution_at(double y, double q, bool extrapolated) const noexcept {
         constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
         return {y, {q - slope_ * y, unknown, unknown, extrapolated}};
@@ -192,7 +201,8 @@ class Resolvent {
         return solution;
     }
 
-    /// Looks up the solution on any branch.
+    /// Returns the solution from the table or the straight line of the first branch that contains q; the position is
+    /// NaN if that branch has neither.
     [[nodiscard, gnu::noinline]] Solution from_any_branch(LoadLine line, Memory& memory) const noexcept {
         if (!(branches_.size() > 1 && line.slope == slope_ && std::isfinite(line.intercept))) {
             constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -203,7 +213,8 @@ class Resolvent {
         return on_branch(line.intercept, memory);
     }
 
-    /// Looks up the solution on the branch in the memory; NaN if it has neither a table nor a line.
+    /// Returns the solution from the table or the straight line of the branch in `memory`; the position is NaN if that
+    /// branch has neither.
     [[nodiscard]] Solution on_branch(double intercept, const Memory& memory) const noexcept {
         const Branch& branch = branches_[memory.branch];
         const double turn_offset = period_ * memory.turns;
@@ -219,7 +230,8 @@ class Resolvent {
         return solution_at(nan, nan, false);
     }
 
-    /// Sets the branch that holds the last position. Where F falls, sets the branch in the direction of -residual.
+    /// Sets `memory.branch` to the branch that contains the last position. If F falls at this position, sets it to the
+    /// nearest branch in the direction of -residual, that is of q - F.
     template <Environment E>
     void locate_branch(const E& environment, const typename E::State& state, LoadLine line,
                        Memory& memory) const noexcept {
@@ -255,11 +267,11 @@ class Resolvent {
         }
     }
 
-    /// Moves over the branches to the first one that contains q.
+    /// Changes `memory.branch` to the next or the previous branch until the values of F on the branch contain q.
     void find_branch(double q, Memory& memory) const noexcept {
         const double turn = slope_ * period_;
         if (repeats_) {
-            // Skips whole turns without a root.
+            // Skips whole periods of the force that do not contain a solution.
             if (q > highest_ + memory.turns * turn) {
                 memory.branch = 1;
                 memory.turns = std::ceil((q - highest_) / turn);
@@ -268,7 +280,8 @@ class Resolvent {
                 memory.turns = std::floor((q - lowest_) / turn);
             }
         }
-        // Two turns are sufficient. The limit ends the loop at positions so large that rounding exceeds a turn.
+        // All branches of two periods are sufficient. The limit of the iterations ends the loop at positions so large
+        // that their rounding error exceeds a period.
         std::size_t steps = 2 * branches_.size();
         while (q - memory.turns * turn > branches_[memory.branch].values.upper && steps-- > 0) {
             to_next_branch(memory);
@@ -300,7 +313,8 @@ class Resolvent {
         return jet(force.network, y)[0] + slope_ * y;
     }
 
-    /// Adds the tables of a rising interval, and branches without a table for the gaps between them.
+    /// Adds a branch for each table of the inverse of F over `positions`, an interval over which F rises, and branches
+    /// without a table for the gaps between the tables.
     void add_interval(const PiecewiseForce& force, Interval positions, const ResolventOptions& options) {
         const Interval values{total(force, positions.lower), total(force, positions.upper)};
         const bool folds_below = positions.lower > force.lower;
@@ -317,7 +331,8 @@ class Resolvent {
                 branches_.push_back(gap);
             }
         };
-        // If F continues to rise, a bracket may be slightly wider than the gap, because its ends are not exact.
+        // Without a fold at its end, a branch without a table may be slightly wider than the gap between two tables,
+        // because the ends of the tables are not exact positions.
         const double margin = 1e-9 * period_;
         for (InverseTable& table :
              inverse_tables({force.network, slope_, positions, values, folds_below, folds_above},
@@ -338,7 +353,8 @@ class Resolvent {
         lowest_ = std::min(lowest_, values.lower);
     }
 
-    /// Adds straight lines one after the other, from an edge outward. A falling line is not a branch.
+    /// Adds a branch for each straight line outside one edge of the domain, the nearest first. A line along which F
+    /// falls is not a branch.
     void add_lines(const std::vector<OuterLine>& lines, double y, double q, double outward) {
         for (const OuterLine& line : lines) {
             const double y_end = y + outward * line.length;
@@ -359,8 +375,8 @@ class Resolvent {
     double slope_;
     double period_;
     bool repeats_ = false;
-    double highest_ = -std::numeric_limits<double>::infinity();  ///< largest F of all branches, first turn
-    double lowest_ = std::numeric_limits<double>::infinity();
+    double highest_ = -std::numeric_limits<double>::infinity();  ///< largest F of the first period [N]
+    double lowest_ = std::numeric_limits<double>::infinity();    ///< smallest F of the first period [N]
     std::vector<Branch> branches_ = std::vector<Branch>(1);
 };
 

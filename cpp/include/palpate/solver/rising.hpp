@@ -13,12 +13,13 @@
 
 namespace palpate {
 
-/// Returns the intervals of [lower, upper] over which F(y) = f(y) + p y rises, from left to right; f is a network of
-/// one input without continuation. Between them are the folds, where p + f' = 0; each is located to the last digit.
+/// Returns the intervals of positions between `lower` and `upper` over which F(y) = f(y) + p y rises, in the order of
+/// position; f is a network of one input without continuation. The ends of the intervals are folds, positions with p +
+/// f' = 0 at which F changes between rising and falling. Each fold is located to the last digit.
 ///
-/// A bisection proves on every cell that p + f' keeps its sign, or that it is monotone and has one zero. The proof uses
-/// its value and slope in the middle of the cell and the bound of |f'''| over the cell. Returns nothing if a fold is
-/// too flat to be distinguished from a curve without a fold.
+/// Bisection divides [lower, upper] into cells. For every cell it is proved that the slope p + f' keeps its sign, or
+/// that the slope is monotone and has one zero. The proof uses p + f' and f'' in the middle of the cell and a bound of
+/// |f'''| over the cell. Returns nothing if rounding hides whether F has a fold at some position.
 [[nodiscard]] inline std::optional<std::vector<Interval>> rising_intervals(const NetworkParameters& network,
                                                                            double p, double lower,
                                                                            double upper) {
@@ -39,7 +40,7 @@ namespace palpate {
         return std::nullopt;
     }
     bool rises = first_slope > 0.0;
-    double start = lower;  // of the current interval
+    double start = lower;  // start of the interval over which F now rises
     for (int examined = 0; !cells.empty(); ++examined) {
         const Interval cell = cells.back();
         cells.pop_back();

@@ -14,14 +14,16 @@
 
 namespace palpate {
 
-/// The resolvent of a hysteresis pair: one table for sliding in press, g + h, and one for sliding in release, g - h.
-/// `CertifiedSolver` solves the cases outside the tables and the sticking between both slides.
+/// Solves the load line of a force with hysteresis by tables: one `Resolvent` for the press force g + h and one for the
+/// release force g - h. `CertifiedSolver` solves load lines outside the tables, and those whose solution does not move
+/// the play operator (sticking).
 ///
-/// If `CertifiedSolver` certifies that f + p y rises, sliding and sticking, the solution is that of press if it lies at
-/// or above play + r, and that of release if it lies at or below play - r.
+/// It must be proved that f(y) + p y rises for press, release and sticking. The solution for press is then valid if it
+/// lies at or above play + r (position of the play operator + play radius). The solution for release is valid if it
+/// lies at or below play - r.
 class SlidingResolvent {
   public:
-    /// State between two steps.
+    /// State between two calls of `solve`: those of the solver and of the tables for press and release.
     struct Memory {
         CertifiedSolver::Memory newton;
         Resolvent::Memory press;
@@ -37,13 +39,13 @@ class SlidingResolvent {
           solver_{pair, p},
           radius_{pair.play_radius()} {}
 
-    /// Returns true if both slides have a table.
+    /// Returns true if press force and release force both have a table.
     [[nodiscard]] bool tabulated() const noexcept {
         return solver_.cells() > 0 && press_.tabulated() && release_.tabulated();
     }
-    /// Returns true if every load line of this slope is certified to have one solution.
+    /// Returns true if it is proved that every load line of slope p has exactly one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return solver_.unique(p); }
-    /// Returns the search for a force without a certificate.
+    /// Returns the solver for load lines that are not proved to have exactly one solution.
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return solver_.uncertified(); }
     [[nodiscard]] const CertifiedSolver& solver() const noexcept { return solver_; }
     [[nodiscard]] std::size_t cells() const noexcept { return press_.cells() + release_.cells(); }
@@ -51,7 +53,7 @@ class SlidingResolvent {
         return std::max(press_.position_error(), release_.position_error());
     }
 
-    /// Solves the load line and updates the memory.
+    /// Returns the position on the load line with its force, and updates `memory` with this solution.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
                                                             const typename E::State& state, LoadLine line,

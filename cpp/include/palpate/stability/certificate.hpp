@@ -28,8 +28,8 @@ namespace palpate {
 
 /// Result of a certificate.
 enum class Verdict : std::uint8_t {
-    Certified,      ///< no motion of the handle can take out more energy than was put in
-    StableLocally,  ///< the linearised system is stable; energy is not considered
+    Certified,      ///< proved: no motion of the handle can get more energy from the device than it gave
+    StableLocally,  ///< the linearised system is stable; nothing is proved about energy
     Refused,
 };
 
@@ -37,7 +37,8 @@ template <>
 inline constexpr auto words_of<Verdict> =
     std::array<std::string_view, 3>{"certified", "stable-locally", "refused"};
 
-/// Proved properties of a model that a scheme renders on a device: every inequality with both sides.
+/// Proved properties of a rendering (model, structure with its numbers, device): all inequalities with both sides, and
+/// the verdict.
 struct Certificate {
     std::string model;
     Scheme scheme;
@@ -57,7 +58,7 @@ template <>
 inline constexpr auto fields_of<Certificate> = std::tuple{
     Field<&Certificate::model>{"model", "Fingerprint of the model; empty if only bounds were certified."},
     Field<&Certificate::scheme>{"scheme", "Structure that renders the model, with its numbers."},
-    Field<&Certificate::device>{"device", "Device for which it holds."},
+    Field<&Certificate::device>{"device", "Device for which the certificate holds."},
     Field<&Certificate::bounds>{"bounds", "Bounds of the rendered force, compensation included."},
     Field<&Certificate::inequalities>{"inequalities", "All inequalities with both sides."},
     Field<&Certificate::verdict>{"verdict", "certified, stable-locally or refused."},
@@ -77,7 +78,7 @@ void hash_value(NumberHash& hash, const T& value) {
         for_each_field<T>([&](const auto& field) {
             const auto& part = field.of(value);
             if constexpr (is_optional<std::remove_cvref_t<decltype(part)>>) {
-                if (part) {  // a missing optional field keeps older fingerprints valid
+                if (part) {  // an optional field without a value is left out, so older fingerprints remain valid
                     hash.add(std::string_view{field.name});
                     hash_value(hash, *part);
                 }
@@ -101,7 +102,7 @@ void hash_value(NumberHash& hash, const T& value) {
 }  // namespace detail
 
 /// Returns 16 hexadecimal digits that change with every number and name of a certificate: model, scheme, each field of
-/// the device, bounds, sides of each line, verdict. They detect an edited certificate; they are not a signature.
+/// the device, bounds, sides of each line, verdict. The digits detect an edited certificate; they are not a signature.
 [[nodiscard]] inline std::string fingerprint_of(const Certificate& certificate) {
     detail::NumberHash hash;
     for_each_field<Certificate>([&](const auto& field) {
@@ -115,23 +116,24 @@ void hash_value(NumberHash& hash, const T& value) {
     return hash.text();
 }
 
-/// Returns the inequalities of a scheme, whether they hold or not. Fields that the structure does not use are ignored.
+/// Returns the inequalities of a certificate for a force with these bounds, rendered by a scheme on a device.
+/// Inequalities that do not hold are included. Numbers of the scheme that its structure does not use are ignored.
 [[nodiscard]] inline std::vector<Inequality> inequalities_of(const ForceBounds& bounds, const Scheme& scheme,
                                                              const DeviceProfile& device) {
     std::vector<Inequality> lines = with_kind(
         scheme.structure, [&](auto structure) { return inequalities(structure, bounds, scheme, device); });
     if (bounds.drag > 0.0 && !traits_of(scheme.structure).velocity) {
-        lines.push_back({"velocity-coupling", "force of velocity without direct rendering", "B_v = 0", 0.0,
-                         bounds.drag, Basis::None, "use direct rendering"});
+        lines.push_back({"velocity-coupling", "force that depends on velocity, without direct rendering",
+                         "proved only for B_v = 0", 0.0, bounds.drag, Basis::None, "use direct rendering"});
     }
     return lines;
 }
 
 namespace detail {
 
-/// Returns the longest period for which every line holds with all other numbers unchanged, at most 100 times the
-/// longest requested period. Most right sides are proportional to the period, so the proportional value is tried before
-/// a bisection.
+/// Returns the longest time between two samples for which every inequality holds with all other numbers unchanged [s],
+/// at most 100 times the longest period of the device. Most right sides of the inequalities are proportional to the
+/// period, so the period computed from this proportion is tried before a bisection.
 [[nodiscard]] inline double longest_period(const std::vector<Inequality>& lines, const ForceBounds& bounds,
                                            const Scheme& scheme, const DeviceProfile& device) {
     constexpr double most = 100.0;
@@ -170,7 +172,7 @@ namespace detail {
     return low * T;
 }
 
-/// Returns the line with the smallest reserve.
+/// Returns the inequality with the smallest reserve, that is (left side - right side) / left side.
 [[nodiscard]] inline const Inequality* tightest(const std::vector<Inequality>& lines) noexcept {
     const Inequality* least = nullptr;
     for (const Inequality& line : lines) {
@@ -181,7 +183,7 @@ namespace detail {
     return least;
 }
 
-/// Returns the sentence that explains the verdict.
+/// Returns a sentence that explains the verdict: the first inequality that does not hold, or the smallest reserve.
 [[nodiscard]] inline std::string reason(const std::vector<Inequality>& lines, Verdict verdict) {
     for (const Inequality& line : lines) {
         if (!line.holds()) {
@@ -199,12 +201,14 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns bounds of the force that a scheme renders: those of the model, compensated if the scheme is.
+/// Returns bounds of the rendered force: the bounds of the model, or those of the compensated model if the scheme is
+/// compensated.
 [[nodiscard]] inline ForceBounds rendered_bounds(const ForceBounds& bounds, const Scheme& scheme) noexcept {
     return scheme.compensated ? compensated(bounds, scheme.coupling.stiffness) : bounds;
 }
 
-/// Certifies any rendered force within bounds. Wider bounds never prove more.
+/// Returns a certificate that holds for any rendered force whose slopes and hysteresis lie within `bounds`. Wider
+/// bounds never prove more.
 [[nodiscard]] inline Certificate certify_rendered(const ForceBounds& bounds, const Scheme& scheme,
                                                   const DeviceProfile& device) {
     Certificate certificate;
@@ -229,15 +233,17 @@ namespace detail {
     return certificate;
 }
 
-/// Certifies any force within bounds that a scheme renders on a device.
+/// Returns a certificate that holds for any model whose slopes and hysteresis lie within `bounds`, rendered by a scheme
+/// on a device.
 [[nodiscard]] inline Certificate certify(const ForceBounds& bounds, const Scheme& scheme,
                                          const DeviceProfile& device) {
     return certify_rendered(rendered_bounds(bounds, scheme), scheme, device);
 }
 
-/// Returns bounds of a model's force that a scheme renders on a device. The mean of a periodic force is that of the
-/// limited force. An object with mass has the unlimited force, and the energy-consistent step may dissipate less than
-/// the play.
+/// Returns bounds of a model's force as a scheme renders it on a device. The mean of a periodic force is computed with
+/// the force limit of the device, but without a force limit for a virtual object with mass. The energy-consistent
+/// structure may dissipate less energy than the hysteresis of the model, so its mean force is computed without
+/// hysteresis.
 [[nodiscard]] inline ForceBounds rendered_bounds(const ForceModel& model, const Scheme& scheme,
                                                  const DeviceProfile& device) {
     const double limit =
@@ -250,8 +256,8 @@ namespace detail {
     return bounds;
 }
 
-/// Certifies a model that a scheme renders on a device. A refusal is a result with a reason; an impossible scheme or
-/// profile throws std::invalid_argument.
+/// Returns the certificate of a model that a scheme renders on a device. A refused certificate contains the reason; an
+/// impossible scheme or device profile throws std::invalid_argument.
 [[nodiscard]] inline Certificate certify(const ForceModel& model, const Scheme& scheme,
                                          const DeviceProfile& device) {
     validate(device);

@@ -15,8 +15,8 @@
 
 namespace palpate {
 
-/// Returns true if two computations of one number agree. On another machine the last digits may differ. A number that
-/// is not finite agrees with no other number.
+/// Returns true if a stored number and its recomputed value differ by at most 1e-9 of the larger one, because another
+/// computer may round differently. A number that is not finite agrees with no other number.
 [[nodiscard]] inline bool agree(double stored, double recomputed) noexcept {
     const double larger = std::max(std::abs(stored), std::abs(recomputed));
     return std::isfinite(larger) && std::abs(stored - recomputed) <= 1e-9 * larger;
@@ -27,15 +27,17 @@ namespace palpate {
 
 namespace detail {
 
-/// Returns the sentence about a stored number that differs from the recomputed one.
+/// Returns the error message for a number of a stored certificate that differs from the recomputed number. `path` is
+/// its name in the certificate.
 [[nodiscard]] inline std::string disagrees(const std::string& path, double stored, double recomputed,
                                            const char* bound = "") {
     return "certificate." + path + " is " + readable(stored) + ": must be " + bound + readable(recomputed) +
-           ", computed from model and device; plan it again";
+           ", computed from model and device; plan the model again";
 }
 
-/// Returns a sentence if a stored bound does not hold for the model. It may be wider than the bound computed today: an
-/// older release used wider bounds, and its proofs remain valid.
+/// Returns an error message if a stored bound of the force does not hold for the model, otherwise an empty text. A
+/// stored bound may be wider than the recomputed bound, because an older release computed wider bounds and its proofs
+/// remain valid.
 [[nodiscard]] inline std::string narrower_bound(const ForceBounds& stored, const ForceBounds& now) {
     std::string difference;
     for_each_field<ForceBounds>([&](const auto& field) {
@@ -51,7 +53,8 @@ namespace detail {
     return difference;
 }
 
-/// Returns a sentence about the first difference between two lines; empty without one.
+/// Returns an error message about the first difference between a stored and a recomputed inequality; empty if they
+/// agree.
 [[nodiscard]] inline std::string line_disagrees(const std::string& path, const Inequality& stored,
                                                 const Inequality& now) {
     if (stored.id != now.id) {
@@ -68,7 +71,8 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns a sentence about the first field in which a device differs from the certified one; empty without one.
+/// Returns an error message about the first field in which `device` differs from the device of a certificate; empty if
+/// they agree.
 [[nodiscard]] inline std::string device_difference(const DeviceProfile& certified,
                                                    const DeviceProfile& device) {
     const std::string opening = "the certificate is for the device " + certified.id;
@@ -81,28 +85,30 @@ namespace detail {
         }
         if constexpr (std::is_same_v<decltype(before), const std::string&>) {
             if (&before == &certified.id && before != now) {
-                difference = opening + ", not for " + now + "; plan it again for this device";
+                difference = opening + ", not for " + now + "; plan the model again for this device";
             } else if (before != now) {
                 difference = opening + " in " + before + ", not in " + now;
             }
         } else if (!agree(before, now)) {
             difference = opening + " with " + field.name + " = " + readable(before) + ", not " +
-                         readable(now) + "; plan it again";
+                         readable(now) + "; plan the model again";
         }
     });
     return difference;
 }
 
-/// Recomputes a stored certificate and returns the result, with its texts. The stored sides, verdict and period must
-/// follow from the stored bounds. The stored bounds must contain the bounds computed from the model. Throws
-/// std::invalid_argument with the first field that differs, its value and the right one.
+/// Recomputes a stored certificate and returns the recomputed certificate, with the texts that files do not store. The
+/// stored inequalities, verdict and longest period must follow from the stored bounds of the force. The stored bounds
+/// must contain the bounds computed from the model. Throws std::invalid_argument with the first field that differs, its
+/// stored value and the recomputed value.
 [[nodiscard]] inline Certificate checked(const Certificate& stored, const ForceModel& model) {
     const auto require = [](const std::string& difference) {
         detail::require(difference.empty(), difference);
     };
     if (const std::string now = fingerprint(model); stored.model != now) {
         require("certificate.model is \"" + stored.model + "\": must be \"" + now +
-                "\", that of this network; the model was changed after it was certified, plan it again");
+                "\", the fingerprint of this network; the model was changed after it was certified, plan the "
+                "model again");
     }
     ForceBounds bounds;
     try {
@@ -125,7 +131,8 @@ namespace detail {
     for (std::size_t k = 0; k < now.inequalities.size(); ++k) {
         const std::string path = "inequalities[" + std::to_string(k) + "]";
         require(detail::line_disagrees(path, stored.inequalities[k], now.inequalities[k]));
-        // Another machine may round differently, so the stored numbers are kept, which the fingerprint covers.
+        // Another computer may round differently, so the returned certificate keeps the stored numbers; the stored
+        // fingerprint was computed from them.
         now.inequalities[k].left = stored.inequalities[k].left;
         now.inequalities[k].right = stored.inequalities[k].right;
     }
@@ -134,7 +141,7 @@ namespace detail {
     }
     if (const std::string right = fingerprint_of(stored); stored.fingerprint != right) {
         require("certificate.fingerprint is \"" + stored.fingerprint + "\": must be \"" + right +
-                "\"; the certificate was edited, plan it again");
+                "\"; the certificate was edited, plan the model again");
     }
     now.longest_period_s = stored.longest_period_s;
     now.model = stored.model;

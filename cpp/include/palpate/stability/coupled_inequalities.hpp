@@ -18,19 +18,20 @@ namespace palpate {
 
 namespace detail {
 
-/// Returns true if the device has a delay.
+/// Returns true if the device has a delay between reading a position and applying its force.
 [[nodiscard]] inline bool has_delay(const DeviceProfile& device) noexcept {
     return device.late_samples() > 0;
 }
 
-/// Returns a line for an unknown bound, with the cure.
+/// Returns an inequality for a case in which no bound is proved beyond `known`; `cure` is the action that avoids this
+/// case.
 [[nodiscard]] inline Inequality unknown(const char* id, const char* name, const char* formula, double known,
                                         double value, const char* cure) {
     return {id, name, formula, known, value, Basis::None, cure};
 }
 
-/// Returns the damping needed for a coupling and an object behind it whose force falls with a slope of at most
-/// `falling`. For 0 it holds with and without a force limit.
+/// Returns the inequality for the device damping that a virtual coupling needs. The force of the virtual object falls
+/// with a slope of at most `falling` [N/m]. With `falling` = 0 the inequality is proved with and without a force limit.
 [[nodiscard]] inline Inequality coupling_inequality(VirtualCoupling coupling, double falling,
                                                     const DeviceProfile& device) {
     return {"damping-coupling",
@@ -45,19 +46,19 @@ namespace detail {
             "Colgate, Stanley and Brown 1995; docs/certificate.md"};
 }
 
-/// Adds the line h >= 0, if the model has hysteresis.
+/// Adds the inequality h >= 0 (hysteresis never negative) if the model has hysteresis.
 inline void add_hysteresis(std::vector<Inequality>& lines, const ForceBounds& bounds) {
     if (bounds.hysteresis) {
         lines.push_back(nonnegative_hysteresis(bounds));
     }
 }
 
-/// Adds a line for encoder steps; a bound of their effect on this object is not known.
+/// Adds two inequalities for an object for which the effect of encoder steps has no proved bound: the encoder step must
+/// be 0, and Coulomb friction must exceed the effect of force steps.
 inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                 const DeviceProfile& device, const char* name, const char* cure) {
-    lines.push_back(unknown("encoder-step-coupling", name,
-                            "known for an encoder without steps, Delta = 0, only", 0.0, device.encoder_step,
-                            cure));
+    lines.push_back(unknown("encoder-step-coupling", name, "proved only for an encoder step Delta = 0", 0.0,
+                            device.encoder_step, cure));
     DeviceProfile smooth = device;
     smooth.encoder_step = 0.0;
     Inequality friction = friction_inequality(smooth, 0.0, bounds.mean_force, "0");
@@ -66,32 +67,34 @@ inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBound
     lines.push_back(friction);
 }
 
-/// Adds these lines for an object with mass.
+/// Adds the inequalities for encoder steps and force steps of a virtual object with mass, for which the effect of
+/// encoder steps has no proved bound.
 inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                           const DeviceProfile& device) {
-    add_no_quantisation(lines, bounds, device, "encoder steps and a mass behind a coupling",
-                        "leave the mass out (mass 0, object damping 0)");
+    add_no_quantisation(lines, bounds, device, "encoder steps with a virtual object with mass",
+                        "leave out the mass of the virtual object (mass 0, object damping 0)");
 }
 
-/// Returns p + min f' > 0: the load line has one solution.
+/// Returns the inequality p > `falling`: with it the load line of slope p has exactly one solution, because p + min f'
+/// > 0.
 [[nodiscard]] inline Inequality uniqueness(double p, double falling, const char* formula) {
     return {"unique-solution", "one solution of the load line", formula, p, falling,
             Basis::Proved,     "docs/certificate.md",           true};
 }
 
-/// Returns true if the force of a coupling to a mass can reach the limit. It is unbounded, because a hand can move any
-/// distance in a sample.
+/// Returns true if the force of a virtual coupling to a mass can reach the force limit of the device. Without a force
+/// limit this force is unbounded, because a hand can move any distance in one sample.
 [[nodiscard]] inline bool limit_acts(const DeviceProfile& device) noexcept {
     return std::isfinite(device.force_limit);
 }
 
 }  // namespace detail
 
-/// Share of the device's damping that a coupling uses, if no other setting defines its stiffness.
+/// Share of the device damping that a virtual coupling may need, if no setting defines the stiffness of the coupling.
 inline constexpr double usual_coupling_share = 0.95;
 
-/// Returns the largest coupling stiffness for which `share` of the device's damping is sufficient. The coupling has
-/// damping, and the force of the object falls with a slope of at most `falling`. Returns 0 if no stiffness is
+/// Returns the largest stiffness of a virtual coupling for which the part `share` of the device damping is sufficient
+/// [N/m]. The force of the virtual object falls with a slope of at most `falling` [N/m]. Returns 0 if no stiffness is
 /// certified.
 [[nodiscard]] inline double stiffest_coupling(double coupling_damping, double falling,
                                               const DeviceProfile& device,
@@ -120,8 +123,9 @@ inline constexpr double usual_coupling_share = 0.95;
     return low;
 }
 
-/// Returns the lines of a limited object without mass behind a coupling. Slopes of the limited force are those of the
-/// force or 0. Without coupling damping a static force acts as a static force F(x) of slope K_c f' / (K_c + f').
+/// Returns the inequalities of the massless structure with or without a force limit. The slopes of the limited force
+/// are those of the force f, or 0. Without coupling damping, a force without hysteresis and its coupling act like a
+/// directly rendered force of slope K_c f' / (K_c + f').
 [[nodiscard]] inline std::vector<Inequality> inequalities(MasslessStructure, const ForceBounds& bounds,
                                                           const Scheme& scheme, const DeviceProfile& device) {
     const VirtualCoupling coupling = scheme.coupling;
@@ -148,12 +152,14 @@ inline constexpr double usual_coupling_share = 0.95;
     }
     lines.push_back(detail::coupling_inequality(coupling, bounds.falling(), device));
     if (bounds.hysteresis) {
-        detail::add_no_quantisation(lines, bounds, device, "encoder steps and a play behind a coupling",
+        detail::add_no_quantisation(lines, bounds, device,
+                                    "encoder steps with hysteresis behind a virtual coupling",
                                     "use direct rendering");
     } else if (bounds.falling() >= coupling.stiffness) {
-        detail::add_no_quantisation(lines, bounds, device,
-                                    "encoder steps and a force that falls at least as steeply as K_c",
-                                    "use direct rendering");
+        detail::add_no_quantisation(
+            lines, bounds, device,
+            "encoder steps with a force that falls at least as steeply as the coupling stiffness K_c",
+            "use direct rendering");
     } else {
         lines.push_back(detail::friction_inequality(device, massless_gain(bounds, coupling, device.period_s),
                                                     bounds.mean_force, "gamma Delta / 2"));
@@ -161,8 +167,8 @@ inline constexpr double usual_coupling_share = 0.95;
     return lines;
 }
 
-/// Returns the lines of an object with mass behind a coupling, by backward Euler. The mass does not reduce the need of
-/// a falling force.
+/// Returns the inequalities of the implicit structure: a virtual object with mass behind a virtual coupling, integrated
+/// by backward Euler. The mass does not reduce the damping that a falling force needs.
 [[nodiscard]] inline std::vector<Inequality> inequalities(ImplicitStructure, const ForceBounds& bounds,
                                                           const Scheme& scheme, const DeviceProfile& device) {
     const VirtualCoupling coupling = scheme.coupling;
@@ -174,9 +180,10 @@ inline constexpr double usual_coupling_share = 0.95;
     detail::add_hysteresis(lines, bounds);
     if (detail::limit_acts(device)) {
         lines.push_back(detail::coupling_inequality(coupling, 0.0, device));
-        lines.push_back(detail::unknown(
-            "falling-slope-limit", "falling force of a force-limited object with mass",
-            "known for s_ <= 2 B_o / T", damped, bounds.falling(), "use the energy-consistent structure"));
+        lines.push_back(detail::unknown("falling-slope-limit",
+                                        "falling force on a virtual object with mass, with a force limit",
+                                        "proved only for s_ <= 2 B_o / T", damped, bounds.falling(),
+                                        "use the energy-consistent structure"));
         lines.push_back(detail::uniqueness(uncoupled, bounds.falling(), "m / T^2 + B_o / T > s_"));
         detail::add_no_quantisation_of_a_mass(lines, bounds, device);
         return lines;
@@ -196,8 +203,9 @@ inline constexpr double usual_coupling_share = 0.95;
     return lines;
 }
 
-/// Returns the lines of an object with mass behind a coupling by the energy-consistent step, which stores exactly the
-/// work done on it. It is passive for any slope, and at any solution of the step.
+/// Returns the inequalities of the energy-consistent structure: a virtual object with mass behind a virtual coupling,
+/// whose integration stores exactly the work done on the object. The object is passive for any slope of the force, and
+/// for any solution of a step.
 [[nodiscard]] inline std::vector<Inequality> inequalities(EnergyConsistentStructure,
                                                           const ForceBounds& bounds, const Scheme& scheme,
                                                           const DeviceProfile& device) {

@@ -13,14 +13,15 @@
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/stability/force_bounds.hpp"
 
-// Device damping and friction that a coupling needs because of hold, delay and encoder steps.
+// Device damping and Coulomb friction that a virtual coupling needs, because its force is held for a sample, is
+// delayed, and is computed from encoder steps.
 namespace palpate {
 
 namespace detail {
 
-/// Returns the largest value over theta = 2 phi of a non-negative trigonometric polynomial of degree N. By Bernstein's
-/// inequality it is at most 1 / (1 - (N h)^2 / 8) of the largest value at points h apart. The result is never below the
-/// true maximum, and at most 2e-6 of it above.
+/// Returns the maximum over all frequencies theta = 2 phi of a non-negative trigonometric polynomial of degree N. By
+/// Bernstein's inequality the maximum is at most 1 / (1 - (N h)^2 / 8) times the largest of the values at frequencies
+/// with the spacing h. The result is at least the true maximum, and exceeds it by at most a share of 2e-6.
 template <class Polynomial>
 [[nodiscard]] double largest_over_frequencies(int degree, Polynomial polynomial) noexcept {
     const int points = 1024 * degree;
@@ -32,14 +33,16 @@ template <class Polynomial>
     return largest / (1.0 - spacing * spacing / 8.0);
 }
 
-/// Returns sin((n + 1) phi) / sin(phi), the absolute value of 1 + z^-1 + ... + z^-n.
+/// Returns sin((n + 1) phi) / sin(phi), whose absolute value is that of 1 + z^-1 + ... + z^-n at the frequency theta =
+/// 2 phi, z = e^(j theta).
 [[nodiscard]] inline double sum_of_delays(int whole, double phi) noexcept {
     return phi > 0.0 ? std::sin((whole + 1) * phi) / std::sin(phi) : whole + 1.0;
 }
 
-/// Returns the largest need of every delay up to n + tau samples; need(n, phi) is that of n whole samples at one
-/// frequency. In the first part of a sample, tau of it, the force is that of n + 1 samples of delay. At each frequency
-/// its need is (1 - tau) need(n) + tau need(n + 1).
+/// Returns the largest damping needed by any delay up to n + tau samples (n = `whole`, tau = `fraction`). need(n, phi)
+/// is the damping needed by n whole samples of delay at the frequency 2 phi. During the first part tau of a sample, the
+/// applied force has a delay of n + 1 samples, afterwards of n samples. At each frequency the needed damping is
+/// therefore (1 - tau) need(n) + tau need(n + 1).
 template <class Need>
 [[nodiscard]] double need_up_to(int whole, double fraction, Need need) noexcept {
     double largest = 0.0;
@@ -57,14 +60,14 @@ template <class Need>
 
 }  // namespace detail
 
-/// Returns the device damping, divided by the longest period, that a coupling needs if it is held for a sample and
-/// delayed by n + tau samples. It holds for any object behind it whose force falls with a slope of at most s. With
-/// beta = B_c / T, H_n = K_c (1 + z^-1 + ... + z^-n) + beta (1 - z^-(n+1)),
+/// Returns the device damping divided by the longest period that a virtual coupling needs, if its force is held for a
+/// sample and delayed by n + tau samples [N/m]. The result is proved for any virtual object whose force falls with a
+/// slope of at most s. With beta = B_c / T and H_n = K_c (1 + z^-1 + ... + z^-n) + beta (1 - z^-(n+1)), the result is
 ///
 ///     s / 2 + max over theta of |H_n - s|^2 / (2 (K_c + 2 beta - s)),   s <= K_c + beta.
 ///
-/// Without delay this is K_c / 2 + beta for each s. A force limit on the coupling does not change it if s = 0. Returns
-/// infinity without a proof.
+/// Without delay this is K_c / 2 + beta for each s. If s = 0, a limit of the coupling's force does not change the
+/// result. Returns infinity if s > K_c + beta, because then there is no proof.
 [[nodiscard]] inline double coupling_need(VirtualCoupling coupling, double period_s, int whole,
                                           double fraction = 0.0, double falling = 0.0) noexcept {
     const double stiffness = coupling.stiffness;
@@ -89,8 +92,8 @@ template <class Need>
                     }));
 }
 
-/// Returns gamma: largest error of the force of a massless object behind a coupling, divided by the error of the
-/// reading that causes it.
+/// Returns gamma: the largest error of the rendered force divided by the position error of the encoder that causes it
+/// [N/m], for a massless virtual object behind a virtual coupling.
 [[nodiscard]] inline double massless_gain(const ForceBounds& bounds, VirtualCoupling coupling,
                                           double period_s) noexcept {
     const double falling = bounds.falling();
@@ -107,14 +110,16 @@ template <class Need>
     return gain;
 }
 
-/// Returns gamma of a spring of stiffness K with mass behind a coupling, by backward Euler without a force limit: the
-/// sum of |g|, where g is the impulse response of C A / (C + A),
+/// Returns gamma, the largest error of the rendered force divided by the position error of the encoder [N/m]. The
+/// virtual object is a spring of stiffness K with mass behind a virtual coupling, integrated by backward Euler without
+/// a force limit. The result is the sum of |g|, where g is the impulse response from position to force, C A / (C + A),
 ///
 ///     C = K_c + beta (1 - z^-1),   A = (m/T^2) (1 - z^-1)^2 + (B_o/T) (1 - z^-1) + K.
 ///
-/// With the poles r_1, r_2, |r_2| <= |r_1| = rho, and u = g_N - r_1 g_{N-1}, N >= 3, g_{k+1} = r_1 g_k + r_2^{k+1-N} u.
-/// The terms after g_N therefore add at most (rho |g_N| + |u| |r_2| / (1 - |r_2|)) / (1 - rho). The sum ends when this
-/// remainder is 1 % of it, and includes it. Returns infinity if a pole does not lie inside the unit circle.
+/// The poles are r_1 and r_2 with |r_2| <= |r_1| = rho. From N >= 3 on, g_{k+1} = r_1 g_k + r_2^{k+1-N} u with u = g_N
+/// - r_1 g_{N-1}. The terms after g_N therefore add at most (rho |g_N| + |u| |r_2| / (1 - |r_2|)) / (1 - rho). The
+/// summation ends when this remainder is at most 1 % of the sum; the result includes the remainder. Returns infinity if
+/// a pole does not lie inside the unit circle.
 [[nodiscard]] inline double implicit_gain(double stiffness, Inertia inertia, VirtualCoupling coupling,
                                           double period_s) noexcept {
     constexpr double tail_share = 0.01;
@@ -132,7 +137,7 @@ template <class Need>
     const std::complex<double> half_difference =
         std::sqrt(std::complex<double>{0.25 * first * first - second});
     std::complex<double> far =
-        -0.5 * first - half_difference;  // first <= 0: no cancellation in the other one
+        -0.5 * first - half_difference;  // first <= 0, so the sum in `near` has no cancellation
     std::complex<double> near = -0.5 * first + half_difference;
     if (std::abs(near) > std::abs(far)) {
         std::swap(near, far);

@@ -15,11 +15,11 @@ namespace palpate {
 
 namespace detail {
 
-/// Returns the line for friction, which must exceed the errors of the force: `gain` times half an encoder step, half a
-/// force step, and the mean force of a periodic model.
+/// Returns the inequality for Coulomb friction, which must be at least the sum of three force errors: `gain` times half
+/// an encoder step, half a force step, and the mean force of a periodic model.
 [[nodiscard]] inline Inequality friction_inequality(const DeviceProfile& device, double gain,
                                                     double mean_force, const std::string& formula) {
-    // Without encoder steps a steep force needs no friction.
+    // An encoder without steps needs no friction, even if `gain` is infinite.
     const double encoder = device.encoder_step > 0.0 ? 0.5 * gain * device.encoder_step : 0.0;
     return {"friction-steps",
             "Coulomb friction against encoder and force steps",
@@ -30,7 +30,7 @@ namespace detail {
             "Abbott and Okamura 2005; Diolaiti et al. 2006; docs/certificate.md"};
 }
 
-/// Returns the line h >= 0 for hysteresis.
+/// Returns the inequality min h >= 0: hysteresis that is never negative does not generate energy.
 [[nodiscard]] inline Inequality nonnegative_hysteresis(const ForceBounds& bounds) {
     return {"loss-nonnegative",
             "hysteresis that never generates energy",
@@ -41,19 +41,23 @@ namespace detail {
             "docs/certificate.md"};
 }
 
-/// Returns the line for damping, which must exceed the effects of hold and delay on a force with these slopes, and B_v
-/// of its dependence on velocity.
+/// Returns the inequality for the device damping that a directly rendered force needs, because the force is held for a
+/// sample and delayed. `slopes` are bounds of its slope by position; `drag` is B_v, the bound of its slope by velocity
+/// [N*s/m].
 [[nodiscard]] inline Inequality hold_inequality(const DeviceProfile& device, SlopeRange slopes, double drag,
                                                 const std::string& formula) {
     const double T = device.longest_period_s();
     const bool late = device.late_samples() > 0;
-    return {"damping-hold", "viscous damping against hold and delay", formula, device.viscous_damping,
-            // Velocities are differences over the nominal period.
-            T * device_need(device, slopes) + T / device.period_s * drag, Basis::Proved,
-            late ? "docs/certificate.md" : "Colgate and Schenkel 1997; docs/certificate.md"};
+    return {
+        "damping-hold", "viscous damping against hold and delay", formula, device.viscous_damping,
+        // The velocity is computed with the nominal period; with jitter the true time between two samples can be
+        // longer.
+        T * device_need(device, slopes) + T / device.period_s * drag, Basis::Proved,
+        late ? "docs/certificate.md" : "Colgate and Schenkel 1997; docs/certificate.md"};
 }
 
-/// Returns the line for damping with prediction.
+/// Returns the inequality for the device damping of direct rendering with prediction; `need` is the damping divided by
+/// the longest period [N/m].
 [[nodiscard]] inline Inequality prediction_inequality(const DeviceProfile& device, double need,
                                                       const std::string& formula) {
     return {"damping-hold",
@@ -67,8 +71,9 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns the lines of a static force that is held for a sample, with any motion within it. M and s_ bound the slopes
-/// of f. B is `device_need`; with a prediction from m samples it is `predicted_need`.
+/// Returns the inequalities of direct rendering of a force without hysteresis that is held for a sample, for any motion
+/// of the handle during the sample. M and s_ are bounds of the rising and the falling slope of the force. B is computed
+/// by `device_need`, or with a prediction from m samples by `predicted_need`.
 [[nodiscard]] inline std::vector<Inequality> direct_inequalities(const ForceBounds& bounds,
                                                                  const DeviceProfile& device,
                                                                  int predict = 0) {
@@ -84,9 +89,10 @@ namespace detail {
             detail::friction_inequality(device, bounds.steepest, bounds.mean_force, "L Delta / 2")};
 }
 
-/// Returns the lines of a force with hysteresis, f = g + s h with a play of radius r, rendered directly. While it
-/// sticks, h / r adds to its slope. The encoder has errors in x and in the play. Without delay the play of the reading
-/// is treated as exact, for a slightly larger slope. With a prediction the play follows the measured position.
+/// Returns the inequalities of direct rendering of a force with hysteresis, f = g + s h with the play radius r. While
+/// the play operator sticks, h / r adds to the slope of the force. The encoder causes errors of the position x and of
+/// the play operator. Without delay, the play operator of the measured position may be treated as exact if the slope is
+/// increased slightly. With a prediction, the play operator follows the measured position.
 [[nodiscard]] inline std::vector<Inequality> hysteresis_inequalities(const ForceBounds& bounds,
                                                                      const DeviceProfile& device,
                                                                      int predict = 0) {
@@ -119,8 +125,9 @@ namespace detail {
                                         bounds.mean_force, "(max(|g'| + |h'|) + e + max h / r) Delta / 2")};
 }
 
-/// Returns the lines of a force f(x, v) of position and velocity that is rendered directly, with the velocity as a
-/// backward difference or a mean of several. M and s_ are of f(., 0); L_x = max |df/dx| is over all v.
+/// Returns the inequalities of direct rendering of a force f(x, v) of position x and velocity v. The velocity is a
+/// backward difference of positions or a mean of several differences. M and s_ are bounds of the rising and the falling
+/// slope at velocity zero; L_x = max |df/dx| over all velocities.
 [[nodiscard]] inline std::vector<Inequality> velocity_inequalities(const ForceBounds& bounds,
                                                                    const DeviceProfile& device) {
     return {detail::hold_inequality(
@@ -136,8 +143,9 @@ namespace detail {
     if (bounds.drag > 0.0) {
         std::vector<Inequality> lines = velocity_inequalities(bounds, device);
         if (scheme.predict > 0) {
-            lines.push_back({"velocity-prediction", "prediction of a force of velocity", "B_v = 0", 0.0,
-                             bounds.drag, Basis::None, "docs/certificate.md"});
+            lines.push_back({"velocity-prediction", "prediction of a force that depends on velocity",
+                             "proved only for B_v = 0", 0.0, bounds.drag, Basis::None,
+                             "docs/certificate.md"});
         }
         return lines;
     }

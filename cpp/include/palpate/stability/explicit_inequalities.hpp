@@ -17,12 +17,13 @@
 
 namespace palpate {
 
-/// Returns the device damping that the explicit structure needs for a passive port, linearised at the slope K:
+/// Returns the device damping that the explicit structure needs to be passive at the frequency theta [N*s/m],
+/// linearised at the slope K of the model's force:
 ///
 ///     T / (2 (1 - cos theta)) Re{(1 - e^{-j theta}) z^{-n_d} H},   z = e^{j theta},   H = C E / (C + E).
 ///
-/// E is the object, E = (m/T^2) (z^2 - (2 - T B_o/m) z + 1 - T B_o/m) / z + K, and C the coupling,
-/// C = K_c + B_c (1 - z^{-1}) / T.
+/// n_d is the delay in samples. The virtual object is E = (m/T^2) (z^2 - (2 - T B_o/m) z + 1 - T B_o/m) / z + K, and
+/// the virtual coupling is C = K_c + B_c (1 - z^{-1}) / T.
 [[nodiscard]] inline double explicit_need_at(double theta, double slope, Inertia inertia,
                                              VirtualCoupling coupling, double period_s,
                                              int delay_samples) noexcept {
@@ -38,14 +39,15 @@ namespace palpate {
            ((1.0 - back) * std::polar(1.0, -delay_samples * theta) * series).real();
 }
 
-/// Returns the largest need over all frequencies and all slopes of an interval, by sampling and refinement of the best
-/// sample. It holds for the linearised system; its error is not bounded.
+/// Returns the largest device damping that the linearised explicit structure needs over all frequencies and all slopes
+/// in `slopes` [N*s/m]. It is the largest of many samples, refined by smaller steps around the largest sample, so the
+/// error of the result has no proved bound.
 [[nodiscard]] inline double explicit_need(Interval slopes, Inertia inertia, VirtualCoupling coupling,
                                           double period_s, int delay_samples) noexcept {
     constexpr int frequencies = 512;
     constexpr int slope_steps = 32;
-    constexpr int halvings = 20;     // of the step of the grid
-    constexpr double lowest = 1e-4;  // [rad a sample]
+    constexpr int halvings = 20;     // halvings of the distance between samples
+    constexpr double lowest = 1e-4;  // lowest frequency [rad per sample]
     const double octaves = std::log(std::numbers::pi / lowest);
     const auto need = [&](double along, double slope) noexcept {
         return explicit_need_at(lowest * std::exp(octaves * along), slope, inertia, coupling, period_s,
@@ -82,9 +84,10 @@ namespace palpate {
     return best;
 }
 
-/// Returns the lines of an object with mass behind a coupling, with forces that are one sample old (paper figure 14).
-/// They are not proofs. They state the slopes for which the linearisation is stable at a held device, and the damping
-/// that makes the linearised port passive.
+/// Returns the inequalities of the explicit structure: a virtual object with mass behind a virtual coupling, moved by
+/// forces that are one sample old (paper figure 14). They prove nothing about the nonlinear system. They state the
+/// slopes for which the linearised object is stable while the device does not move, and the device damping for which
+/// the linearised rendering is passive.
 [[nodiscard]] inline std::vector<Inequality> inequalities(ExplicitStructure, const ForceBounds& bounds,
                                                           const Scheme& scheme, const DeviceProfile& device) {
     const Inertia inertia = scheme.inertia;
@@ -94,16 +97,16 @@ namespace palpate {
     const char* const poles = "poles of the linearised step; docs/certificate.md";
     const Interval slopes{bounds.slope.lower, bounds.slope.upper};
     return {
-        {"explicit-slope", "slope below the step's limit", "(4 m - 2 (B_o + B_c) T) / T^2 > K + K_c",
-         explicit_slope_limit(inertia, {0.0, coupling.damping}, T), slopes.upper + coupling.stiffness,
-         Basis::Linear, poles, true},
-        {"explicit-damping", "damping below the step's limit", "2 m > (B_o + B_c) T", 2.0 * inertia.mass,
-         damping * T, Basis::Linear, poles, true},
-        {"explicit-damping-positive", "damping inside the unit circle", "B_o + B_c > 0", damping, 0.0,
-         Basis::Linear, poles, true},
+        {"explicit-slope", "slope small enough for the explicit integration",
+         "(4 m - 2 (B_o + B_c) T) / T^2 > K + K_c", explicit_slope_limit(inertia, {0.0, coupling.damping}, T),
+         slopes.upper + coupling.stiffness, Basis::Linear, poles, true},
+        {"explicit-damping", "damping small enough for the explicit integration", "2 m > (B_o + B_c) T",
+         2.0 * inertia.mass, damping * T, Basis::Linear, poles, true},
+        {"explicit-damping-positive", "positive damping of object and coupling", "B_o + B_c > 0", damping,
+         0.0, Basis::Linear, poles, true},
         {"explicit-falling-slope", "falling force behind the coupling", "K_c > s_", coupling.stiffness,
          bounds.falling(), Basis::Linear, poles, true},
-        {"explicit-port-damping", "viscous damping of the linearised port",
+        {"explicit-port-damping", "viscous damping for the linearised rendering",
          "b >= max T Re{(1 - 1/z) H} / (2 - 2 cos theta)", device.viscous_damping,
          device.longest_period_s() / T * explicit_need(slopes, inertia, coupling, T, device.late_samples()),
          Basis::Linear, "Colgate and Schenkel 1997, linearised; docs/certificate.md"}};

@@ -16,8 +16,9 @@
 
 namespace palpate {
 
-/// Proved bounds of a model over all positions, continuations included. For a force with hysteresis, f = g + s h with a
-/// play of radius r, the slope of a path is g' + s h', plus h/r while it sticks.
+/// Proved bounds of a model's force over all positions, continuations included. A force with hysteresis is f = g + s h
+/// (mean force g, hysteresis h, direction state s, play radius r). Its slope is g' + s h', plus h/r while the play
+/// operator does not move (sticks).
 struct ForceBounds {
     Interval slope;
     double steepest = 0.0;
@@ -28,12 +29,12 @@ struct ForceBounds {
     double drag = 0.0;
     bool hysteresis = false;
 
-    /// Returns M = max(0, max f'); NaN stays NaN.
+    /// Returns M = max(0, max f'), the steepest rising slope [N/m]; NaN stays NaN.
     [[nodiscard]] double rising() const noexcept { return slope.upper <= 0.0 ? 0.0 : slope.upper; }
-    /// Returns s_ = max(0, -min f'); NaN stays NaN.
+    /// Returns s_ = max(0, -min f'), the steepest falling slope [N/m]; NaN stays NaN.
     [[nodiscard]] double falling() const noexcept { return slope.lower >= 0.0 ? 0.0 : -slope.lower; }
 
-    /// Returns r, computed from the largest h and h/r; infinity without hysteresis.
+    /// Returns the play radius r [m], computed from the largest h and the largest h/r; infinity without hysteresis.
     [[nodiscard]] double play_radius() const noexcept {
         return hysteresis_per_play > 0.0 ? hysteresis_force.upper / hysteresis_per_play
                                          : std::numeric_limits<double>::infinity();
@@ -42,17 +43,21 @@ struct ForceBounds {
 
 template <>
 inline constexpr auto fields_of<ForceBounds> = std::tuple{
-    Field<&ForceBounds::slope, &Interval::lower>{"slope_min",
-                                                 "Smallest slope of any path: min f', or min(g' - |h'|)."},
+    Field<&ForceBounds::slope, &Interval::lower>{
+        "slope_min", "Smallest slope of the force [N/m]: min f', or min(g' - |h'|)."},
     Field<&ForceBounds::slope, &Interval::upper>{
-        "slope_max", "Largest slope of any path: max f', or max(g' + |h'| + h/r)."},
-    Field<&ForceBounds::steepest>{"steepest", "L = max |f'|, or max(|g'| + |h'| + h/r)."},
+        "slope_max", "Largest slope of the force [N/m]: max f', or max(g' + |h'| + h/r)."},
+    Field<&ForceBounds::steepest>{"steepest",
+                                  "Steepest slope [N/m]: L = max |f'|, or max(|g'| + |h'| + h/r)."},
     Field<&ForceBounds::sliding>{"sliding", "max |f'|, or max(|g'| + |h'|), over all velocities."},
-    Field<&ForceBounds::hysteresis_force, &Interval::lower>{"loss_min", "Smallest h; 0 without hysteresis."},
-    Field<&ForceBounds::hysteresis_force, &Interval::upper>{"loss_max", "Largest h; 0 without hysteresis."},
-    Field<&ForceBounds::hysteresis_per_play>{"loss_per_play", "max h/r"},
+    Field<&ForceBounds::hysteresis_force, &Interval::lower>{
+        "loss_min", "Smallest hysteresis h [N]; 0 for a force without hysteresis."},
+    Field<&ForceBounds::hysteresis_force, &Interval::upper>{
+        "loss_max", "Largest hysteresis h [N]; 0 for a force without hysteresis."},
+    Field<&ForceBounds::hysteresis_per_play>{"loss_per_play",
+                                             "Largest slope h/r that the play operator adds, max h/r [N/m]."},
     Field<&ForceBounds::mean_force>{"mean_force",
-                                    "Mean of a limited periodic force in excess of its hysteresis."},
+                                    "Mean of a limited periodic force above its hysteresis [N]; 0: passive."},
     Field<&ForceBounds::drag>{"drag", "B_v = max |f(x, v) - f(x, 0)| / |v|; 0 for a force of position alone.",
                               Rule::NotNegative},
     Field<&ForceBounds::hysteresis>{"hysteresis", "True if the model has hysteresis.", Rule::Any, false}};
@@ -65,12 +70,14 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
     return all;
 }
 
-/// Returns K_c k / (K_c + k), the slope of an object of slope k > -K_c behind a coupling.
+/// Returns K_c k / (K_c + k), the slope of the rendered force for a virtual object of slope k > -K_c behind a virtual
+/// coupling of stiffness K_c [N/m].
 [[nodiscard]] inline double slope_behind_coupling(double slope, double coupling_stiffness) noexcept {
     return coupling_stiffness * slope / (coupling_stiffness + slope);
 }
 
-/// Returns the bounds of a compensated static force, with slopes K_c f' / (K_c - f').
+/// Returns the bounds of a compensated force without hysteresis; its slopes are K_c f' / (K_c - f') for the slopes f'
+/// of the model.
 [[nodiscard]] inline ForceBounds compensated(const ForceBounds& bounds, double coupling_stiffness) noexcept {
     const auto hardened = [&](double slope) {
         return slope < coupling_stiffness ? -slope_behind_coupling(-slope, coupling_stiffness)
@@ -84,20 +91,22 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
 
 namespace detail {
 
-/// Largest excess of the bounds of a slope over its true range [share of the steepest]. The excess is stiffness that
-/// cannot be rendered.
+/// Largest difference between the proved bounds of a slope and its true minimum and maximum, as a share of the steepest
+/// slope. A wider bound reduces the stiffness that can be rendered.
 inline constexpr double slope_slack = 1e-4;
-/// The same for a force of two inputs, whose box needs many more cells.
+/// Largest difference between bounds and true slopes of a force of position and velocity, as a share of the steepest
+/// slope. It is larger than `slope_slack`, because two inputs need many more cells.
 inline constexpr double velocity_slack = 1e-3;
 
-/// Coefficients of a g' + b h' + c h, where h uses the wavelets of g.
+/// Coefficients a, b, c of the slope a g' + b h' + c h of a force with hysteresis (mean force g, hysteresis h).
 struct SlopeReading {
     double of_force_slope = 1.0;       ///< a
     double of_hysteresis_slope = 0.0;  ///< b
     double of_hysteresis = 0.0;        ///< c
 };
 
-/// Returns proved bounds of this sum over [from, to].
+/// Returns proved bounds of the slope a g' + b h' + c h over [from, to] with the coefficients in `reading`. g and h
+/// have the same wavelets.
 [[nodiscard]] inline Interval reading_bounds(const NetworkParameters& force,
                                              const NetworkParameters& hysteresis, const SlopeReading& reading,
                                              double from, double to, double relative = slope_slack) {
@@ -115,15 +124,16 @@ struct SlopeReading {
     return enclose(std::array{Term{slope_of, 1}, Term{value_of, 0}}, from, to, relative);
 }
 
-/// Returns the slopes of a continuation: that of its line, and 0 beyond its reach.
+/// Returns the smallest and the largest slope of a force outside one edge of the domain: the slope of its straight
+/// line, and 0 where the line has ended.
 [[nodiscard]] inline Interval line_slopes(const EdgeLine& line) noexcept {
     const double slope = line.at_edge.slope;
     return std::isfinite(line.reach) ? Interval{std::min(slope, 0.0), std::max(slope, 0.0)}
                                      : Interval{slope, slope};
 }
 
-/// Returns bounds of h, sharpened until its sign is certain or irrelevant. h >= 0 is enforced with a margin that is
-/// small compared with its largest value.
+/// Returns proved bounds of the hysteresis h. They are computed again with 1e-6 instead of 1e-4 relative error if the
+/// first lower bound is negative. An identified h >= 0 has a minimum near 0, small compared with its largest value.
 [[nodiscard]] inline Interval hysteresis_force_bounds(const NetworkParameters& hysteresis, double from,
                                                       double to) {
     Interval bounds;
@@ -136,7 +146,7 @@ struct SlopeReading {
     return bounds;
 }
 
-/// Returns bounds of a force without hysteresis.
+/// Returns proved bounds of a force of position without hysteresis, continuations included.
 [[nodiscard]] inline ForceBounds static_bounds(const NetworkCurve& curve, double force_limit) {
     ForceBounds bounds;
     bounds.slope = slope_bounds(curve.parameters(), curve.lower(), curve.upper(), slope_slack);
@@ -152,7 +162,7 @@ struct SlopeReading {
     return bounds;
 }
 
-/// Returns bounds of a force with hysteresis.
+/// Returns proved bounds of a force with hysteresis for the play radius `radius` [m], continuations included.
 [[nodiscard]] inline ForceBounds hysteresis_bounds(const HysteresisNetwork& pair, double radius,
                                                    double force_limit) {
     const NetworkCurve& g = pair.force();
@@ -179,7 +189,7 @@ struct SlopeReading {
              {std::pair{g.below(), h.below()}, std::pair{g.above(), h.above()}}) {
             const Interval slopes = line_slopes(line);
             const double hysteresis_slope = std::abs(hysteresis.at_edge.slope);
-            if (std::isfinite(hysteresis.reach)) {  // it decreases to zero
+            if (std::isfinite(hysteresis.reach)) {  // the hysteresis decreases to zero
                 bounds.hysteresis_force.lower = std::min(bounds.hysteresis_force.lower, 0.0);
             }
             const double stick = std::max(0.0, hysteresis.at_edge.value) / radius;
@@ -196,8 +206,8 @@ struct SlopeReading {
     return bounds;
 }
 
-/// Returns bounds of the slopes at rest, continuations included, and over all velocities of the drag and of the effect
-/// of an encoder step.
+/// Returns proved bounds of a force of position and velocity: its slope at velocity zero, continuations included, and
+/// over all velocities its slopes by position (`sliding`) and by velocity (`drag`).
 [[nodiscard]] inline ForceBounds velocity_bounds(const VelocityNetwork& force) {
     const RadialBounds rest = force.resting_bounds(velocity_slack);
     const RadialBounds moving = force.moving_bounds(velocity_slack);
@@ -214,8 +224,9 @@ struct SlopeReading {
 
 }  // namespace detail
 
-/// Returns bounds of a model of position, or of position and velocity, on a device with this force limit. A
-/// `play_radius` above 0 replaces that of the model. Throws std::invalid_argument for other models of several inputs.
+/// Returns proved bounds of the force of a model of position, or of position and velocity, on a device with this force
+/// limit [N]. A `play_radius` above 0 replaces the play radius of the model [m]. Throws std::invalid_argument for
+/// models with other inputs.
 [[nodiscard]] inline ForceBounds force_bounds(const ForceModel& model, double play_radius = 0.0,
                                               double force_limit = std::numeric_limits<double>::infinity()) {
     require_renderable(model);
@@ -229,8 +240,8 @@ struct SlopeReading {
     return detail::hysteresis_bounds(pair, play_radius > 0.0 ? play_radius : pair.play_radius(), force_limit);
 }
 
-/// Returns the shift of a periodic force for which its limited mean is not active; 0 for other models. Add it to the
-/// bias of the network.
+/// Returns the constant force [N] that must be added to the bias of a periodic model, so that the force limited to
+/// +-`force_limit` does not generate energy in a full period. Returns 0 for other models.
 [[nodiscard]] inline double passive_shift(const ForceModel& model, double force_limit) {
     if (const WaveletNetwork* network = model.network()) {
         const NetworkCurve& f = network->curve();

@@ -16,17 +16,19 @@
 
 namespace palpate {
 
-/// Range of the slopes of a force: df/dx lies in [-falling, rising] everywhere.
+/// Bounds of the slope of a force [N/m]: df/dx is between -falling and rising at every position.
 struct SlopeRange {
-    double rising = 0.0;   ///< M >= 0
-    double falling = 0.0;  ///< s >= 0
+    double rising = 0.0;   ///< M, steepest rising slope, >= 0 [N/m]
+    double falling = 0.0;  ///< s, steepest falling slope, >= 0 [N/m]
 
-    /// Returns the larger absolute slope.
+    /// Returns the larger of the two slopes [N/m].
     [[nodiscard]] double steepest() const noexcept { return std::max(rising, falling); }
 };
 
-/// Returns R(Lambda): damping divided by the period, b / T, that a held force needs if it is computed at a position
-/// x_k - q_k with sum of q^2 <= Lambda^2 sum of d^2. The closed form is proved in docs/certificate.md.
+/// Returns R(Lambda): device damping divided by the period, b / T [N/m], that a held force needs if it is computed at a
+/// position x_k - q_k instead of the position x_k of the handle. The position error q_k satisfies sum of q^2 <=
+/// Lambda^2 sum of d^2 for the steps d_k = x_{k+1} - x_k; Lambda is `lag`. The formula is proved in
+/// docs/certificate.md.
 [[nodiscard]] inline double held_need(double lag, SlopeRange slopes) noexcept {
     const double M = slopes.rising;
     const double s = slopes.falling;
@@ -41,8 +43,10 @@ struct SlopeRange {
 
 namespace detail {
 
-/// Returns a = max over rho of h(rho) - l rho - gamma rho^2, gamma > 0: the largest energy of one step. h is M
-/// (1/2 + rho) above 0, M (1 + rho)^2 / 2 + s rho^2 / 2 on [-1, 0] and s (-rho - 1/2) below -1.
+/// Returns a = max over rho of h(rho) - l rho - gamma rho^2, gamma > 0: a bound of the energy that a held force gives
+/// in one sample, divided by the square of the handle's step. The ratio rho is the position error divided by the
+/// handle's step, and l and gamma are weights. The function h(rho) is M (1/2 + rho) for rho > 0, M (1 + rho)^2 / 2 + s
+/// rho^2 / 2 for -1 <= rho <= 0, and s (-rho - 1/2) for rho < -1.
 [[nodiscard]] inline double step_energy(SlopeRange slopes, double l, double gamma) noexcept {
     const double M = slopes.rising;
     const double s = slopes.falling;
@@ -59,8 +63,8 @@ namespace detail {
     return most;
 }
 
-/// Returns the conjugate of Q = sum of taps[j - 1] z^-j at z = exp(i theta), by the recurrence of cos and sin of j
-/// theta.
+/// Returns the conjugate of the frequency response Q = sum of taps[j - 1] z^-j of a filter at z = exp(i theta).
+/// Computes the cosine and the sine of j theta by a recurrence.
 [[nodiscard]] inline std::complex<double> response(std::span<const double> taps, double theta) noexcept {
     const double twice = 2.0 * std::cos(theta);
     std::complex<double> before = 1.0;
@@ -73,7 +77,7 @@ namespace detail {
     return sum;
 }
 
-/// Returns the sum of |taps|.
+/// Returns the sum of the absolute filter coefficients |taps|.
 [[nodiscard]] inline double size_of(std::span<const double> taps) noexcept {
     double size = 0.0;
     for (const double tap : taps) {
@@ -82,13 +86,15 @@ namespace detail {
     return size;
 }
 
-/// Method for the maximum over frequency of a trigonometric polynomial of degree N, from `resolution` N + 1 values.
+/// Method that computes the maximum over all frequencies of a trigonometric polynomial of degree N from its values at
+/// `resolution` N + 1 frequencies.
 enum class Maximum : std::uint8_t {
-    Likely,  ///< from a parabola through the largest value and its neighbours
-    Proved,  ///< never below the true maximum, rounding included
+    Likely,  ///< maximum of a parabola through the largest value and its neighbours
+    Proved,  ///< upper bound that is never below the true maximum, rounding included
 };
 
-/// Returns the maximum of value(k) over k = 0 to last. `size` bounds the polynomial minus its mean.
+/// Returns the maximum over all frequencies of a trigonometric polynomial with the sampled values value(0) to
+/// value(last). `size` is a bound of |polynomial minus its mean|.
 template <class Value>
 [[nodiscard]] double maximum_of(Maximum kind, int resolution, std::size_t last, double size, Value value) {
     std::size_t at = 0;
@@ -100,8 +106,8 @@ template <class Value>
         }
     }
     if (kind == Maximum::Proved) {
-        // Riesz: near its maximum the polynomial stays above a cosine of N theta, and the nearest sampled frequency is
-        // at most pi / (2 resolution N) away.
+        // By a theorem of Riesz, the polynomial of degree N stays above a cosine of N theta near its maximum. The
+        // distance from the maximum to the nearest sampled frequency is at most pi / (2 resolution N).
         return largest + (1.0 - std::cos(0.5 * std::numbers::pi / resolution) + 1e-12) * size;
     }
     if (at == 0 || at == last) {
@@ -112,7 +118,8 @@ template <class Value>
     return bend > 0.0 ? largest + 0.125 * rise * rise / bend : largest;
 }
 
-/// A causal filter q_k = sum of taps[j - 1] d_{k-j}, j = 1 to N, at `resolution` N + 1 frequencies.
+/// Frequency response Q, at `resolution` N + 1 frequencies, of the filter q_k = sum of taps[j - 1] d_{k-j}, j = 1 to N,
+/// from the handle's steps d to the position error q.
 class FilterGain {
   public:
     FilterGain(std::span<const double> taps, Maximum kind, int resolution)
@@ -126,10 +133,10 @@ class FilterGain {
         }
     }
 
-    /// Returns the sum of |taps|, an upper bound of |Q|.
+    /// Returns the sum of |taps|, an upper bound of the frequency response |Q|.
     [[nodiscard]] double size() const noexcept { return size_; }
 
-    /// Returns max over theta of l Re Q + gamma |Q|^2.
+    /// Returns the maximum over all frequencies of l Re Q + gamma |Q|^2 for the frequency response Q.
     [[nodiscard]] double most(double l, double gamma) const noexcept {
         return maximum_of(kind_, resolution_, real_.size() - 1, (std::abs(l) + gamma * size_) * size_,
                           [&](std::size_t k) { return l * real_[k] + gamma * square_[k]; });
@@ -148,10 +155,10 @@ struct Minimum {
     double at = 0.0;
     double value = 0.0;
 };
-/// Finds the minimum of a convex function between two ends by golden sections.
+/// Finds the minimum of a convex function between `low` and `high` by golden-section search.
 template <class Function>
 [[nodiscard]] Minimum minimum_between(double low, double high, Function function) {
-    constexpr int steps = 40;  // to 4e-9 of the interval
+    constexpr int steps = 40;  // reduce the interval to a share of 4e-9
     constexpr double golden = 0.6180339887498949;
     double left = high - golden * (high - low);
     double right = low + golden * (high - low);
@@ -175,9 +182,9 @@ template <class Function>
     return at_left <= at_right ? Minimum{left, at_left} : Minimum{right, at_right};
 }
 
-/// Returns min over l and gamma of cost(gain, l, gamma), convex in both. Every l and gamma is a proof, so the search
-/// may use likely maxima; the result uses proved maxima. A small weight on l and gamma makes the search end at the same
-/// values on every machine.
+/// Returns the minimum over l and gamma of cost(gain, l, gamma), which is convex in l and gamma. Every pair (l, gamma)
+/// gives a proved bound, so the search may use approximate maxima over the frequencies; the result uses proved maxima.
+/// A small penalty for large l and gamma makes the search end at the same values on every computer.
 template <class Gain = FilterGain, class Cost>
 [[nodiscard]] double least_cost(std::span<const double> taps, SlopeRange slopes, Cost cost) {
     constexpr double weight = 1e-8;
@@ -196,12 +203,14 @@ template <class Gain = FilterGain, class Cost>
 
 }  // namespace detail
 
-/// Returns b / T that a static force needs if it is computed at x_k - q_k. Here q = Q d is a causal filter of the steps
-/// d_k = x_{k+1} - x_k: q_k = sum of taps[j - 1] d_{k-j}. The result is the smaller of
+/// Returns the device damping divided by the period, b / T [N/m], that a held force without hysteresis needs if it is
+/// computed at x_k - q_k instead of the handle's position x_k. The position error q is filtered from the handle's steps
+/// d_k = x_{k+1} - x_k: q_k = sum of taps[j - 1] d_{k-j}, with the frequency response Q. The result is the smaller of
 ///
 ///     min over l, gamma of a + max over theta of l Re Q + gamma |Q|^2     and     R(sum of |taps|).
 ///
-/// n samples of delay are n taps of 1. For a force with hysteresis only delays are proved (docs/certificate.md).
+/// a is computed by `step_energy`, R by `held_need`. For n samples of delay the filter has n taps of 1. For a force
+/// with hysteresis the result is proved only for delays, not for other filters (docs/certificate.md).
 [[nodiscard]] inline double filtered_need(std::span<const double> taps, SlopeRange slopes) {
     const double size = detail::size_of(taps);
     const double simple = held_need(size, slopes);
@@ -217,7 +226,8 @@ template <class Gain = FilterGain, class Cost>
 
 namespace detail {
 
-/// Returns the need of `delayed_need` for exactly n + tau samples, 0 < tau < 1.
+/// Returns the device damping divided by the period that a held force needs with a delay of exactly n + tau samples (n
+/// = `whole`, tau = `fraction`, 0 < tau < 1) [N/m]. `delayed_need` gives the formula.
 [[nodiscard]] inline double split_sample_need(int whole, double fraction, SlopeRange slopes) {
     const double uneven = fraction * (1.0 - fraction);
     const double simple = held_need(std::sqrt(whole * (whole + 2.0 * fraction) + fraction), slopes);
@@ -236,15 +246,16 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns b / T that a held force needs with a delay of n + tau samples, static or with hysteresis. Each sample begins
-/// with the command before; the motion during that part, alpha, is free. With Q = z^-1 + ... + z^-n + tau z^-(n+1), for
-/// one l and gamma,
+/// Returns the device damping divided by the period, b / T [N/m], that a held force with or without hysteresis needs
+/// with a delay of n + tau samples. During the first part tau of each sample the previous force still acts; the
+/// handle's motion alpha in this part is arbitrary. With Q = z^-1 + ... + z^-n + tau z^-(n+1) and any l and gamma,
 ///
 ///     Z = a + max over theta of (l Re Q + gamma |Q|^2) + gamma tau (1 - tau)
 ///     b / T >= (Z + sqrt(Z^2 - 4 tau (1 - tau) (a gamma - l^2 / 4))) / 2,
 ///
-/// the largest eigenvalue of the form in d and alpha. It is continuous in the delay. A falling force can need slightly
-/// less after n + tau samples than after n. The result is the larger need, because a delay may be shorter than stated.
+/// the largest eigenvalue of a quadratic form in the handle's step d and alpha; a is computed by `step_energy`. The
+/// bound is continuous in the delay. A falling force can need slightly less damping with n + tau samples of delay than
+/// with n samples. The result is the larger of both, because the true delay may be shorter than n + tau samples.
 [[nodiscard]] inline double delayed_need(int whole, double fraction, SlopeRange slopes) {
     const std::vector<double> taps(static_cast<std::size_t>(whole), 1.0);
     const double need = filtered_need(taps, slopes);
@@ -253,7 +264,8 @@ namespace detail {
 
 namespace detail {
 
-/// A causal filter in both parts of a sample: Q for the command of this sample and (1 + Q) / z for the one before.
+/// Frequency responses of a filter in both parts of a sample whose force changes within the sample: Q for the force of
+/// this sample, and (1 + Q) / z for the force of the previous sample, which acts first.
 class SplitGain {
   public:
     SplitGain(std::span<const double> taps, Maximum kind, int resolution)
@@ -268,7 +280,8 @@ class SplitGain {
 
     [[nodiscard]] double size() const noexcept { return size_; }
 
-    /// Returns the largest eigenvalue over all frequencies of the form of both parts, with a gamma for each.
+    /// Returns the largest eigenvalue over all frequencies of the quadratic form of both parts of a sample, with the
+    /// shares `fraction` and `rest` and a separate gamma for each part.
     [[nodiscard]] double most(double fraction, double rest, SlopeRange slopes, double l, double gamma_first,
                               double gamma_second) const noexcept {
         const double first = step_energy(slopes, l, gamma_first);
@@ -298,11 +311,12 @@ class SplitGain {
 
 }  // namespace detail
 
-/// Returns the need of a static force whose command, computed at x_k - q_k, acts a further fraction tau of a sample
-/// late. During the first part of a sample, in which the handle moves by alpha, the command before acts. Each part is a
-/// separate step, alpha^2 h(q' / alpha) and beta^2 h((q + alpha) / beta), compared with B
-/// (alpha^2 / tau + beta^2 / (1 - tau)). `rest` is 1 - tau. If the instant between both parts varies, tau and `rest`
-/// are the longest of each.
+/// Returns the device damping divided by the period, b / T [N/m], that a force without hysteresis needs if it is
+/// computed at x_k - q_k and acts with an additional delay of a fraction tau of a sample. During the first part of a
+/// sample, in which the handle moves by alpha, the previous force acts; in the second part the handle moves by beta.
+/// Each part is treated as a separate step. The energies of the parts, alpha^2 h(q' / alpha) and beta^2 h((q + alpha) /
+/// beta), are compared with B (alpha^2 / tau + beta^2 / (1 - tau)), where B is the result. `rest` is 1 - tau. If the
+/// time of the force change within the sample varies, tau and `rest` are the longest durations of both parts.
 [[nodiscard]] inline double filtered_need(std::span<const double> taps, double fraction, SlopeRange slopes,
                                           double rest) {
     if (!(fraction > 0.0) || !(slopes.steepest() > 0.0) || !std::isfinite(slopes.rising + slopes.falling)) {
@@ -316,15 +330,17 @@ class SplitGain {
     };
     return std::min(least(fraction, rest), least(std::sqrt(fraction), std::sqrt(rest)));
 }
-/// Returns the same need with `rest` = 1 - tau.
+/// Returns the device damping divided by the period for a force that acts with an additional delay of exactly a
+/// fraction tau of a sample (`rest` = 1 - tau).
 [[nodiscard]] inline double filtered_need(std::span<const double> taps, double fraction, SlopeRange slopes) {
     return filtered_need(taps, fraction, slopes, 1.0 - fraction);
 }
 
 namespace detail {
 
-/// Returns the need of a filter that ignores the motion during a time of at most nu T around each sample. That motion
-/// enters q up to `gain` times.
+/// Returns the device damping divided by the period, b / T [N/m], for a filter that describes the position error q
+/// except for the handle's motion during a time of at most nu T for each sample. This unknown motion changes q by at
+/// most `gain` times the motion.
 [[nodiscard]] inline double roughly_filtered_need(std::span<const double> taps, double gain, double nu,
                                                   SlopeRange slopes) {
     const double off = gain * std::sqrt(nu);
@@ -335,23 +351,25 @@ namespace detail {
     });
 }
 
-/// Returns nu of `roughly_filtered_need`: the time between a sample and the instant `delay` after the one `whole`
-/// before it, times the number of such times that can overlap, divided by T.
+/// Returns nu of `roughly_filtered_need`: the difference between the delay and `whole` periods, jitter included, times
+/// the number of such time intervals that can overlap, divided by the longest period T.
 [[nodiscard]] inline double uncertain_time(double delay, double period, double jitter, int whole) noexcept {
     const double off = std::abs(delay - whole * period);
     const double span = off + jitter + std::max(0.0, jitter - off);
     return (off + jitter) * std::ceil(span / (period - jitter)) / (period + jitter);
 }
 
-/// Returns the need with samples at k period + u_k, 0 <= u_k <= jitter. Each command acts `delay` after its sample. It
-/// is the smaller of R(Lambda) and the need for n samples of delay plus the effect of the remaining delay, at most a
-/// time nu T from the n-th sample.
+/// Returns the device damping divided by the longest period, b / T [N/m], for samples at the times k period + u_k with
+/// 0 <= u_k <= jitter, if each force acts the time `delay` after its sample. The result is the smaller of two bounds.
+/// One is R(Lambda) of `held_need`; the other is the damping for n whole samples of delay plus the effect of the
+/// remaining delay, at most nu T.
 [[nodiscard]] inline double jittered_need(double delay, double period, double jitter, SlopeRange slopes) {
     const double T = period + jitter;
-    if (delay <= period - jitter) {  // within the same sample
+    if (delay <= period - jitter) {  // the force always acts before the next sample
         return delayed_need(0, delay / T, slopes);
     }
-    // Lambda^2 T: overlap of the delay that begins at one sample with all others, itself included.
+    // Lambda^2 T: the time during which the delay after one sample overlaps the delays after all samples, this sample
+    // included.
     double common = delay;
     for (int j = 1; j * period < delay + jitter; ++j) {
         const double rest = delay - j * period;
@@ -369,9 +387,10 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns b / T that a held force needs on a device, static or with hysteresis; T is the longest time between two
-/// samples. Samples are taken at k period_s + u_k with 0 <= u_k <= jitter_s, because the loop uses absolute times. Each
-/// command acts delay_s after its sample. If a device counts its delay in samples, jitter does not increase its need.
+/// Returns the device damping divided by the longest period, b / T [N/m], that a held force with or without hysteresis
+/// needs on a device. Samples are taken at k period_s + u_k with 0 <= u_k <= jitter_s, because the control loop uses
+/// absolute times. Each force acts delay_s after its sample. If the delay of the device is given in samples, jitter
+/// does not increase the needed damping except by the longer period.
 [[nodiscard]] inline double device_need(const DeviceProfile& device, SlopeRange slopes) {
     const bool steady = device.jitter_s == 0.0 || device.late_samples() == 0;
     return steady ? delayed_need(device.whole_delay_samples(), device.delay_fraction(), slopes)

@@ -14,17 +14,17 @@
 
 namespace palpate {
 
-/// Basis of an inequality.
+/// Kind of proof of an inequality in a certificate.
 enum class Basis : std::uint8_t {
-    Proved,  ///< a proof for every motion and every passive hand
-    Linear,  ///< the linearised system only: stable near an equilibrium
-    None,    ///< no known bound beyond the stated one; larger values are refused
+    Proved,  ///< proved for every motion and every passive hand
+    Linear,  ///< valid for the linearised system only: stable near an equilibrium
+    None,    ///< nothing is proved for values above the left side; they are refused
 };
 
 template <>
 inline constexpr auto words_of<Basis> = std::array<std::string_view, 3>{"proved", "linear", "none"};
 
-/// One line of a certificate: left >= right, or left > right if it is strict.
+/// One inequality of a certificate: left >= right, or left > right if `strict` is true.
 struct Inequality {
     std::string id;
     std::string name;
@@ -35,43 +35,46 @@ struct Inequality {
     std::string source;
     bool strict = false;
 
-    /// Returns left - right.
+    /// Returns the left side minus the right side. If it is negative, the inequality does not hold.
     [[nodiscard]] double margin() const noexcept { return left - right; }
 
-    /// Returns the margin divided by the left side.
+    /// Returns the share of the left side that is not needed: (left - right) / |left|.
     [[nodiscard]] double reserve() const noexcept { return margin() / std::abs(left); }
 
-    /// Returns true if the inequality holds; false if a side is not finite.
+    /// Returns true if the inequality holds; returns false if its left or right side is not finite.
     [[nodiscard]] bool holds() const noexcept {
         return std::isfinite(left) && std::isfinite(right) && (strict ? left > right : left >= right);
     }
 };
 
 template <>
-inline constexpr auto fields_of<Inequality> = std::tuple{
-    Field<&Inequality::id>{"id", "Stable name, compared when a certificate is checked; texts are not."},
-    Field<&Inequality::left>{"left", "Left side: the available value."},
-    Field<&Inequality::right>{"right", "Right side: the required value."},
-    Field<&Inequality::name>{"name", "Subject in words.", Rule::Any, false},
-    Field<&Inequality::formula>{"formula", "Formula in the symbols of docs/certificate.md.", Rule::Any,
-                                false},
-    Field<&Inequality::basis>{"basis",
-                              "proved, linear (the linearised system only) or none (no bound is known).",
-                              Rule::Any, false},
-    Field<&Inequality::source>{"source", "Source of the proof.", Rule::Any, false},
-    Field<&Inequality::strict>{"strict", "True if both sides must differ.", Rule::Any, false}};
+inline constexpr auto fields_of<Inequality> =
+    std::tuple{Field<&Inequality::id>{
+                   "id", "Name that never changes. A check of a certificate compares it, not the texts."},
+               Field<&Inequality::left>{"left", "Left side of the inequality: the available value."},
+               Field<&Inequality::right>{"right", "Right side of the inequality: the required value."},
+               Field<&Inequality::name>{"name", "Subject of the inequality in words.", Rule::Any, false},
+               Field<&Inequality::formula>{"formula", "Formula in the symbols of docs/certificate.md.",
+                                           Rule::Any, false},
+               Field<&Inequality::basis>{
+                   "basis", "proved, linear (the linearised system only) or none (no bound is known).",
+                   Rule::Any, false},
+               Field<&Inequality::source>{"source", "Source of the proof.", Rule::Any, false},
+               Field<&Inequality::strict>{
+                   "strict", "True if the left side must be larger than the right side.", Rule::Any, false}};
 
-/// Returns true if all lines hold.
+/// Returns true if all inequalities hold.
 [[nodiscard]] inline bool all_hold(const std::vector<Inequality>& lines) noexcept {
     return std::all_of(lines.begin(), lines.end(), [](const Inequality& line) { return line.holds(); });
 }
 
-/// Returns a text such as "viscous damping: b >= T M / 2 needs 0.075, there is 0.06, short by 0.015". A line without a
-/// known bound has its cure as source.
+/// Returns a text about an inequality that does not hold, such as "viscous damping: b >= T M / 2 needs 0.075, there is
+/// 0.06, short by 0.015". An inequality for which nothing is proved (`Basis::None`) has the advice to the user in
+/// `source`.
 [[nodiscard]] inline std::string shortfall(const Inequality& line) {
     if (line.basis == Basis::None) {
         return line.name + ": " + line.formula + (line.left != 0.0 ? " = " + readable(line.left) : "") +
-               ", and it is " + readable(line.right) + "; " + line.source;
+               ", but the value is " + readable(line.right) + "; " + line.source;
     }
     return line.name + ": " + line.formula + " needs " + readable(line.right) + ", there is " +
            readable(line.left) + ", short by " + readable(-line.margin());

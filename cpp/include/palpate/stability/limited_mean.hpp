@@ -17,13 +17,15 @@ namespace palpate {
 
 namespace detail {
 
-/// Press and release force g + h and g - h of a periodic model; h is null without hysteresis.
+/// Press force g + h and release force g - h of a periodic model (mean force g, hysteresis h); h is null without
+/// hysteresis.
 struct PeriodicStrokes {
     const NetworkCurve& g;
     const NetworkCurve* h = nullptr;
     double steepest = 0.0;  ///< proved bound of |g'| + |h'|
 
-    /// Returns value and antiderivative of g + side h + shift.
+    /// Returns value and antiderivative of the force g + side h + shift at position x; `side` is 1 for press, -1 for
+    /// release.
     [[nodiscard]] std::pair<double, double> at(double x, double side, double shift) const noexcept {
         const Curve force = g.inside(x);
         const Curve hysteresis = h != nullptr ? h->inside(x) : Curve{};
@@ -31,7 +33,7 @@ struct PeriodicStrokes {
                 force.integral + side * hysteresis.integral + shift * x};
     }
 
-    /// Returns the largest rounding error of a mean.
+    /// Returns a bound of the rounding error of the mean force over a period [N].
     [[nodiscard]] double rounding() const noexcept {
         const double reach = std::max(std::abs(g.lower()), std::abs(g.upper()));
         const auto size = [&](const NetworkParameters& network) {
@@ -46,9 +48,10 @@ struct PeriodicStrokes {
     }
 };
 
-/// Returns proved bounds of the mean over a period of c(g + side h + shift), where c limits a force to +-limit. Cells
-/// in which the limit is certainly reached, or certainly not, are integrated exactly. Others are halved until their
-/// error is below rounding: in a cell of width w it is at most L w^2 / 4.
+/// Returns proved bounds of the mean force over a period of g + side h + shift, limited to +-`limit` [N]. Cells in
+/// which the force limit is certainly active at all positions, or certainly inactive at all positions, are integrated
+/// exactly. Other cells are halved until their error is below rounding; the error of a cell of width w is at most L w^2
+/// / 4 with the steepest slope L.
 [[nodiscard]] inline Interval limited_mean(const PeriodicStrokes& strokes, double side, double shift,
                                            double limit) {
     constexpr std::size_t first_cells = 256;
@@ -58,7 +61,7 @@ struct PeriodicStrokes {
     const double period = strokes.g.upper() - lower;
     const auto at = [&](double x) { return strokes.at(x, side, shift); };
     const double whole = at(strokes.g.upper()).second - at(lower).second;
-    double beyond = 0.0;  // integral of f - c(f)
+    double beyond = 0.0;  // integral of the force that the limit removes
     double uncertain = 0.0;
     if (std::isfinite(limit)) {
         std::vector<std::uint64_t> open(first_cells);
@@ -94,8 +97,9 @@ struct PeriodicStrokes {
     return {mean - uncertain / period, mean + uncertain / period};
 }
 
-/// Returns the mean force of a limited periodic model in excess of its hysteresis: max(0, mean c(g - h), -mean c(g + h)).
-/// Above 0 the model is active. Values below rounding count as 0.
+/// Returns the mean force by which a periodic model with a force limit generates energy [N]: max(0, mean c(g - h),
+/// -mean c(g + h)), where c(f) is the force f limited to +-`limit`. If the result is above 0, the model generates
+/// energy in each period. Values below rounding count as 0.
 [[nodiscard]] inline double active_mean(const PeriodicStrokes& strokes, double limit, double shift = 0.0) {
     if (!strokes.g.periodic()) {
         return 0.0;
@@ -108,13 +112,15 @@ struct PeriodicStrokes {
     return excess <= strokes.rounding() ? 0.0 : excess;
 }
 
-/// Returns the smallest shift of the force for which the model is not active. The mean of a limited force never
-/// decreases with the shift, and has one zero.
+/// Returns the smallest constant force [N] that must be added to a periodic model so that it does not generate energy
+/// in a period. The mean of the limited force never decreases if this constant increases, and it is zero for one
+/// constant.
 [[nodiscard]] inline double passive_shift(const PeriodicStrokes& strokes, double limit) {
     if (active_mean(strokes, limit) == 0.0) {
         return 0.0;
     }
-    // The active side: the mean of g - h is above 0, or that of g + h is below 0.
+    // Direction of motion in which the model generates energy: release if the mean of g - h is above 0, press if the
+    // mean of g + h is below 0.
     const double side = limited_mean(strokes, -1.0, 0.0, limit).upper > 0.0 ? -1.0 : 1.0;
     const auto is_active = [&](double shift) {
         const Interval mean = limited_mean(strokes, side, side * shift, limit);
@@ -126,7 +132,7 @@ struct PeriodicStrokes {
         low = high;
         high *= 2.0;
     }
-    constexpr int halvings = 1100;  // sufficient to reach neighbouring numbers
+    constexpr int halvings = 1100;  // sufficient for `low` and `high` to become adjacent doubles
     for (int k = 0; k < halvings; ++k) {
         const double middle = 0.5 * (low + high);
         if (!(middle > low && middle < high)) {

@@ -12,8 +12,9 @@
 
 namespace palpate {
 
-/// Returns Q of a force that is delayed by n samples at a position predicted from m samples, as taps of z^-1, z^-2,
-/// ...:
+/// Returns the filter Q from the handle's steps to the position error, for a force that is delayed by n samples
+/// (`whole`) and computed at a position predicted from m samples (`predict`). The elements are the coefficients of
+/// z^-1, z^-2, ...:
 ///
 ///     Q = z^-1 + ... + z^-n - z^-n sum of w_j z^-j.
 [[nodiscard]] inline std::vector<double> prediction_taps(int whole, int predict) {
@@ -24,23 +25,32 @@ namespace palpate {
     return taps;
 }
 
-/// Returns b / T that a force held at a predicted position needs, static or with a play that follows the measured
-/// position. The prediction changes the force by at most L |sum of w_j d_{k-j}|, which adds L / 2.
+/// Returns the device damping divided by the longest period, b / T [N/m], for a held force that is computed at a
+/// predicted position. The force may have hysteresis if its play operator follows the measured position. The prediction
+/// changes the force by at most L |sum of w_j d_{k-j}| (steepest slope L, prediction weights w, handle's steps d),
+/// which adds L / 2 to the result.
+/// Returns the device damping divided by the longest period, b / T [N/m], for a held force that is computed at a
+/// predicted position. The force may have hysteresis if its play operator follows the measured position. The prediction
+/// changes the force by at most L |sum of w_j d_{k-j}| (steepest slope L, prediction weights w, handle's steps d),
+/// which adds L / 2 to the result.
 [[nodiscard]] inline double predicted_path_need(const DeviceProfile& device, SlopeRange slopes) {
     return device_need(device, slopes) + 0.5 * slopes.steepest();
 }
 
-/// Returns the largest error of a predicted position divided by that of the encoder, (m + 3) / (m + 1). The last sample
-/// has the weight (m + 2) / (m + 1), the m before it together 1 / (m + 1).
+/// Returns the largest error of a predicted position divided by the position error of the encoder, (m + 3) / (m + 1)
+/// for a prediction from m samples. The absolute weight of the last sample is (m + 2) / (m + 1); the m samples before
+/// it have together the absolute weight 1 / (m + 1).
 [[nodiscard]] constexpr double predicted_encoder_gain(int predict) noexcept {
     return predict > 0 ? (predict + 3.0) / (predict + 1.0) : 1.0;
 }
 
-/// Returns b / T that a static force held at a predicted position needs: at most R(1/2) without delay; with delay often
-/// less than without prediction.
+/// Returns the device damping divided by the longest period, b / T [N/m], for a held force without hysteresis that is
+/// computed at a predicted position. Without delay it is at most R(1/2) of `held_need`; with delay it is often less
+/// than without prediction.
 ///
-/// With jitter the instant at which a command begins to act varies by up to the jitter within its sample. If it can
-/// leave the sample, the delay is rounded to whole samples and the rest is treated as unknown motion.
+/// With jitter, the time at which a force begins to act varies within its sample by up to the jitter. If the force can
+/// begin to act in another sample, the delay is rounded to whole samples, and the handle's motion during the remaining
+/// delay is treated as unknown.
 [[nodiscard]] inline double predicted_need(const DeviceProfile& device, int predict, SlopeRange slopes) {
     const double simple = predicted_path_need(device, slopes);
     if (!(slopes.steepest() > 0.0) || !std::isfinite(simple)) {
@@ -59,7 +69,8 @@ namespace palpate {
         const std::vector<double> taps = prediction_taps(whole, predict);
         const double split = filtered_need(taps, (fraction * P + uncertain_s) / T, slopes,
                                            ((1.0 - fraction) * P + jitter) / T);
-        return std::min(simple, std::max(filtered_need(taps, slopes), split));  // a delay may be shorter
+        return std::min(simple,
+                        std::max(filtered_need(taps, slopes), split));  // the true delay may be shorter
     }
     if (jitter >= P) {
         return simple;

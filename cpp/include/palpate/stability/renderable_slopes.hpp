@@ -23,8 +23,8 @@ namespace palpate {
 
 namespace detail {
 
-/// Returns the largest value in [0, most] for which a condition holds; the condition also holds for every smaller
-/// value.
+/// Returns the largest value between 0 and `most` for which holds(value) is true; holds must also be true for every
+/// smaller value.
 template <class Holds>
 [[nodiscard]] double largest_that_holds(double most, Holds holds) {
     if (holds(most)) {
@@ -32,7 +32,7 @@ template <class Holds>
     }
     double low = 0.0;
     double high = most;
-    // First the order of magnitude, then 50 bits.
+    // The first loop finds the order of magnitude of the value, the second its 50 leading bits.
     constexpr int eighths = 20;
     for (int k = 1; k < eighths && low == 0.0; ++k) {
         const double guess = std::ldexp(most, -3 * k);
@@ -45,7 +45,8 @@ template <class Holds>
     return low;
 }
 
-/// Returns true if direct rendering of a force with these slopes is certified; with hysteresis, h / r = stick.
+/// Returns true if direct rendering of a force with these slopes is certified on a device. `stick` is the slope h / r
+/// (hysteresis / play radius) that sticking adds; 0 without hysteresis [N/m].
 [[nodiscard]] inline bool holds_directly(const DeviceProfile& device, SlopeRange sliding, double stick) {
     ForceBounds bounds;
     bounds.slope = {-sliding.falling, sliding.rising + stick};
@@ -56,18 +57,21 @@ template <class Holds>
                                 : direct_inequalities(bounds, device));
 }
 
-/// Returns a slope that is larger than any realistic one and far below the largest number.
+/// Returns the largest slope that searches for slopes try [N/m]: larger than any realistic slope, and far below the
+/// largest double.
 [[nodiscard]] inline double slope_search_limit(const DeviceProfile& device) noexcept {
     return 1e9 * (1.0 + device.viscous_damping / device.period_s);
 }
 
 }  // namespace detail
 
-/// Returns the slopes for which direct rendering is certified: the inverse of its inequalities.
+/// Returns the most negative and the largest slope of a force for which direct rendering on a device is certified
+/// [N/m].
 ///
-/// First finds the largest k for which slopes of -k and k are certified together, both limited to `wanted`. Then finds
-/// the largest falling slope, and after that the largest rising one, because falling slopes need less damping. With
-/// hysteresis these are slopes while sliding; sticking adds h / r = `stick`. A side without a limit is infinite.
+/// First finds the largest k for which a force with slopes from -k to k is certified, both slopes limited to `wanted`.
+/// Then finds the steepest falling slope, and after that the steepest rising slope, because falling slopes need less
+/// damping. With hysteresis these are the slopes while the play operator moves; while it sticks, h / r = `stick` adds
+/// to the slope. A slope that the device does not limit is infinite.
 [[nodiscard]] inline Interval renderable_slopes(const DeviceProfile& device, double stick = 0.0,
                                                 SlopeRange wanted = {
                                                     std::numeric_limits<double>::infinity(),
@@ -79,7 +83,8 @@ template <class Holds>
     };
     const double both = detail::largest_that_holds(
         most, [&](double k) { return holds(std::min(k, wanted.rising), std::min(k, wanted.falling)); });
-    // Slightly inside the edge, because there rounding would hide the remaining margin for the other side.
+    // Slightly smaller slopes than the certified ones, because at the certified slopes rounding would hide the margin
+    // that remains for a steeper falling or rising slope.
     double rising = inside * std::min(both, wanted.rising);
     double falling = inside * std::min(both, wanted.falling);
     falling = std::max(falling, inside * detail::largest_that_holds(most, [&](double k) {
@@ -93,15 +98,17 @@ template <class Holds>
     return {-end(falling), end(rising)};
 }
 
-/// Returns the slope h / r that leaves half of the device's largest slope for sliding.
+/// Returns the largest slope h / r (hysteresis / play radius) for which a force with hysteresis is certified on a
+/// device, if the slopes of its press force and release force are as large as h / r [N/m].
 [[nodiscard]] inline double steepest_stick(const DeviceProfile& device) {
     return detail::largest_that_holds(detail::slope_search_limit(device), [&](double stick) {
         return detail::holds_directly(device, {stick, stick}, stick);
     });
 }
 
-/// Returns the narrowest play radius for which hysteresis is certified, at least `least`; infinity without one.
-/// `sliding` are bounds of the model with a play so wide that sticking adds no slope.
+/// Returns the smallest play radius between `least` and `most` for which a force with hysteresis is certified on a
+/// device [m]; infinity if `most` is not certified. `sliding` has the bounds of the force for a play radius so large
+/// that h / r adds nothing to the slope.
 [[nodiscard]] inline double narrowest_play(const ForceBounds& sliding, const DeviceProfile& device,
                                            double least, double most) {
     const auto holds = [&](double radius) {
@@ -127,14 +134,16 @@ template <class Holds>
     return wide;
 }
 
-/// Returns object and coupling of the explicit structure: the stiffest coupling, then the least object damping, for
-/// which its linearisation is stable; otherwise the last ones tried. `chosen` sets mass, damping, coupling and play
-/// radius.
+/// Returns the virtual object and the virtual coupling for the explicit structure: those with the stiffest coupling,
+/// then with the smallest object damping, for which the linearised rendering is stable. If no combination is stable,
+/// returns the last one tried. `chosen` contains the values that the user sets: object mass, object damping, coupling,
+/// play radius.
 [[nodiscard]] inline Scheme explicit_scheme(const ForceBounds& bounds, const DeviceProfile& device,
                                             const SchemeChoices& chosen) {
-    constexpr std::array shares{0.9, 0.75, 0.6, 0.45, 0.3, 0.15};  // of the stiffest coupling
-    constexpr std::array ratios{0.1, 0.25, 0.5, 1.0};              // B_o T / m; the paper's choice is 0.5
-    constexpr std::array reserves{1.1, 1.5, 2.5, 5.0};             // slope limit / steepest slope
+    constexpr std::array shares{0.9,  0.75, 0.6,
+                                0.45, 0.3,  0.15};      // coupling stiffness / stiffest certified one
+    constexpr std::array ratios{0.1, 0.25, 0.5, 1.0};   // B_o T / m; the paper's choice is 0.5
+    constexpr std::array reserves{1.1, 1.5, 2.5, 5.0};  // slope limit / steepest slope
     const double T = device.period_s;
     const double stiffest = stiffest_coupling(0.0, 0.0, device);
     Scheme scheme;

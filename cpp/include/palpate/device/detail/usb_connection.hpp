@@ -19,7 +19,7 @@
 
 namespace palpate {
 
-/// Name of a device, for messages and to find it again.
+/// Name of a USB device, for messages and to find the device again.
 struct UsbName {
     std::string manufacturer;
     std::string product;
@@ -27,7 +27,7 @@ struct UsbName {
     int bus = 0;
     int address = 0;
 
-    /// Returns a text such as "emulated knob EMU-1 (bus 1, address 2)".
+    /// Returns the name as a text such as "emulated knob EMU-1 (bus 1, address 2)".
     [[nodiscard]] std::string text() const {
         const std::string place =
             "(bus " + std::to_string(bus) + ", address " + std::to_string(address) + ")";
@@ -49,12 +49,12 @@ struct CloseHandle {
         libusb_close(handle);
     }
 };
-/// Deleter of a list of devices.
+/// Deleter of a list of USB devices.
 struct FreeList {
     void operator()(libusb_device** list) const noexcept { libusb_free_device_list(list, 1); }
 };
 
-/// Connection to one suitable device, with its interface claimed for this program.
+/// Connection to one suitable USB device, whose interface is reserved for this program.
 class UsbConnection {
   public:
     static constexpr unsigned request_timeout_ms = 500;
@@ -79,7 +79,7 @@ class UsbConnection {
         context_.reset();
     }
 
-    /// Sends a request without data. Returns 0 or an error of libusb.
+    /// Sends a control request without data to the device. Returns 0 or an error code of libusb.
     [[nodiscard]] int request(wire::Request request, std::uint16_t value) const noexcept {
         const int transferred = libusb_control_transfer(
             handle_.get(), wire::request_to_device, static_cast<std::uint8_t>(request), value,
@@ -95,14 +95,14 @@ class UsbConnection {
   private:
     using Handle = std::unique_ptr<libusb_device_handle, CloseHandle>;
 
-    /// A suitable device, open.
+    /// A device that this program can use, already open.
     struct Candidate {
         Handle handle;
         UsbName name;
         wire::Info info;
     };
 
-    /// Opens the suitable device; refuses none or several.
+    /// Opens the only suitable USB device. Returns a reason if there is no suitable device or more than one.
     [[nodiscard]] Opened choose(const std::string& serial) {
         libusb_device** found = nullptr;
         const auto count = libusb_get_device_list(context_.get(), &found);
@@ -111,7 +111,7 @@ class UsbConnection {
         }
         const std::unique_ptr<libusb_device*, FreeList> list{found};
         std::vector<Candidate> suitable;
-        std::vector<std::string> others;   // serial numbers
+        std::vector<std::string> others;   // serial numbers of devices that were not requested
         std::vector<std::string> reasons;  // why a device is not suitable
         for (libusb_device* device : std::span{found, static_cast<std::size_t>(count)}) {
             if (is_ours(device)) {
@@ -127,7 +127,7 @@ class UsbConnection {
         return {refusal(serial, suitable, others, reasons)};
     }
 
-    /// Returns the sentence about none or several suitable devices.
+    /// Returns the message for the case that there is no suitable USB device, or more than one.
     [[nodiscard]] static std::string refusal(const std::string& serial,
                                              const std::vector<Candidate>& suitable,
                                              const std::vector<std::string>& others,
@@ -159,7 +159,8 @@ class UsbConnection {
                "that the system detects";
     }
 
-    /// Returns true if the descriptors, which the system knows without opening the device, are those of the protocol.
+    /// Returns true if the USB descriptors of a device are those of the protocol. Reading descriptors does not open the
+    /// device.
     [[nodiscard]] static bool is_ours(libusb_device* device) noexcept {
         libusb_device_descriptor descriptor{};
         if (libusb_get_device_descriptor(device, &descriptor) != 0 ||
@@ -189,7 +190,7 @@ class UsbConnection {
         });
     }
 
-    /// Opens a device, reads its name and checks its properties.
+    /// Opens a USB device, reads its name, checks its properties, and adds it to one of the three lists.
     static void examine(libusb_device* device, const std::string& serial, std::vector<Candidate>& suitable,
                         std::vector<std::string>& others, std::vector<std::string>& reasons) {
         UsbName name;

@@ -15,7 +15,7 @@
 
 namespace palpate::detail {
 
-/// Returns the meaning of an error of libusb, and the cure.
+/// Returns the meaning of a libusb error code, and the cure.
 [[nodiscard]] inline std::string usb_reason(int code) {
     static_assert(LIBUSB_ERROR_IO == -1 && LIBUSB_ERROR_ACCESS == -3 && LIBUSB_ERROR_NO_MEM == -11);
     const std::string_view cause = wire::usb_cause(code);
@@ -23,12 +23,12 @@ namespace palpate::detail {
                          : std::string(cause);
 }
 
-/// Returns an integer of two bytes, little endian.
+/// Returns the integer in the two bytes from index `at`, low byte first.
 [[nodiscard]] inline std::uint16_t two_bytes(std::span<const std::uint8_t> bytes, std::size_t at) {
     return static_cast<std::uint16_t>(bytes[at] + 256U * bytes[at + 1]);
 }
 
-/// Appends one character as UTF-8.
+/// Appends one Unicode character to a text in UTF-8.
 inline void append_utf8(std::string& text, std::uint32_t character) {
     const auto byte = [&](std::uint32_t bits) { text.push_back(static_cast<char>(bits)); };
     const auto rest = [&](unsigned shift) { byte(0x80U | (character >> shift & 0x3FU)); };
@@ -49,8 +49,8 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
     }
 }
 
-/// Returns the UTF-16 text (little endian) of a string descriptor as UTF-8, on one line and without blanks at its ends;
-/// empty if it is not text.
+/// Converts the UTF-16 text (little endian) of a USB string descriptor to UTF-8, on one line and without blanks at both
+/// ends. Returns an empty text if the bytes are not valid UTF-16.
 [[nodiscard]] inline std::string text_of_utf16(std::span<const std::uint8_t> bytes) {
     std::string text;
     std::uint32_t high = 0;  // first half of a surrogate pair
@@ -76,7 +76,8 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
                : text.substr(first, text.find_last_not_of(' ') + 1 - first);
 }
 
-/// Returns a string of the device, in its first language; empty without one.
+/// Reads the string descriptor `index` of a USB device, in the device's first language. Returns an empty text if the
+/// device has no such string.
 [[nodiscard]] inline std::string string_of(libusb_device_handle* handle, std::uint8_t index) {
     std::array<std::uint8_t, 255> bytes{};
     const auto read = [&](std::uint8_t string_index, std::uint16_t language) {

@@ -21,7 +21,7 @@
 
 namespace palpate::detail {
 
-/// One received packet, unchanged, with its time.
+/// One received packet, unchanged, with the time of its arrival.
 struct UsbArrival {
     std::array<std::uint8_t, wire::largest_packet> bytes{};
     std::uint32_t size = 0;
@@ -32,11 +32,11 @@ struct UsbArrival {
     }
 };
 
-/// The transfers of one stream: two queued reads, at most one write and one request in flight, one thread for libusb's
-/// events. All memory is allocated at the start.
+/// The USB transfers between a device and this program: two queued reads, at most one unfinished write, at most one
+/// unfinished request, and one thread for libusb's events. All memory is allocated at the start.
 ///
-/// The owner's thread writes and takes arrivals; the event thread runs the callbacks. Shared members are atomic. A
-/// transfer counts as in flight until the last line of its callback.
+/// The control loop's thread writes commands and takes received packets; the event thread runs the callbacks of libusb.
+/// Members that both threads use are atomic. A transfer counts as in flight until the last line of its callback.
 class UsbTransfers {
   public:
     UsbTransfers(libusb_context* context, libusb_device_handle* handle)
@@ -52,7 +52,7 @@ class UsbTransfers {
     UsbTransfers(const UsbTransfers&) = delete;
     UsbTransfers& operator=(const UsbTransfers&) = delete;
 
-    /// Starts the reads and the event thread. Returns 0 or an error of libusb; after an error nothing runs.
+    /// Starts the reads and the event thread. Returns 0 or an error code of libusb.
     [[nodiscard]] int start() {
         if (write_ == nullptr || request_ == nullptr ||
             std::any_of(reads_.begin(), reads_.end(),
@@ -67,7 +67,7 @@ class UsbTransfers {
         return error_.load(std::memory_order_acquire);
     }
 
-    /// Cancels every transfer and waits until all have ended. Errors of the device are ignored.
+    /// Cancels every transfer and waits until all transfers have ended. Errors of the device are ignored.
     void stop() noexcept {
         if (!events_.joinable()) {
             return;
@@ -87,8 +87,8 @@ class UsbTransfers {
         events_.join();
     }
 
-    /// Sends a command, unless the last one is still in flight. Returns 0, LIBUSB_ERROR_BUSY or another error of
-    /// libusb.
+    /// Sends a command, unless the previous command is still in flight. Returns 0, LIBUSB_ERROR_BUSY or another error
+    /// code of libusb.
     [[nodiscard]] int write(const wire::OutPacket& command) noexcept {
         if (has_failed()) {
             return LIBUSB_ERROR_NO_DEVICE;
@@ -97,7 +97,8 @@ class UsbTransfers {
             return LIBUSB_ERROR_BUSY;
         }
         out_bytes_ = wire::encode(command);
-        constexpr unsigned no_timeout = 0;  // the device's watchdog ends a command instead
+        constexpr unsigned no_timeout =
+            0;  // no timeout in libusb, because the device's watchdog ends the torque of an old command
         libusb_fill_interrupt_transfer(write_.get(), handle_, wire::out_endpoint, out_bytes_.data(),
                                        static_cast<int>(out_bytes_.size()), &UsbTransfers::write_callback,
                                        this, no_timeout);
@@ -110,8 +111,8 @@ class UsbTransfers {
         return code;
     }
 
-    /// Sends a request without data and waits for its end. Returns 0 or an error of libusb. Only the owner's thread may
-    /// call it, one request at a time.
+    /// Sends a control request without data and waits for its end. Returns 0 or an error code of libusb. Only the
+    /// control loop's thread may call this function, one request at a time.
     [[nodiscard]] int request(wire::Request request, std::uint16_t value) noexcept {
         if (requests_in_flight_.load(std::memory_order_acquire) != 0) {
             return LIBUSB_ERROR_BUSY;
@@ -131,42 +132,43 @@ class UsbTransfers {
         return ended ? answer_.load(std::memory_order_relaxed) : static_cast<int>(LIBUSB_ERROR_TIMEOUT);
     }
 
-    /// Waits for packets. Returns false if none came before the deadline, or none can come.
+    /// Waits until a received packet is available. Returns false if no packet arrived before the deadline.
     [[nodiscard]] bool wait_for_arrival(Nanoseconds deadline) noexcept {
         (void)wait_until([&] { return arrived() > 0 || has_failed(); }, deadline);
         return arrived() > 0;
     }
-    /// Returns true if a write is in flight.
+    /// Returns true if a command is being sent and has not ended.
     [[nodiscard]] bool writes() const noexcept {
         return writes_in_flight_.load(std::memory_order_acquire) != 0;
     }
-    /// Waits until the write has ended. Returns false if it has not.
+    /// Waits until the command in flight has ended. Returns false if the command has not ended at the deadline.
     [[nodiscard]] bool wait_for_write(Nanoseconds deadline) noexcept {
         return wait_until([&] { return !writes(); }, deadline);
     }
-    /// Waits until the write has ended or a packet has arrived. Returns false if neither happened.
+    /// Waits until the command in flight has ended or a packet has arrived. Returns false if neither happened before
+    /// the deadline.
     [[nodiscard]] bool wait_for_write_or_arrival(Nanoseconds deadline) noexcept {
         return wait_until([&] { return !writes() || arrived() > 0 || has_failed(); }, deadline);
     }
 
-    /// Returns the number of packets that wait.
+    /// Returns the number of received packets that the control loop has not taken.
     [[nodiscard]] std::size_t arrived() const noexcept { return arrivals_.size(); }
-    /// Takes the oldest packet. Returns false if there is none.
+    /// Takes the oldest received packet from the queue. Returns false if the queue is empty.
     [[nodiscard]] bool take(UsbArrival& arrival) noexcept { return arrivals_.pop({&arrival, 1}) == 1; }
 
-    /// Returns true after an error that cannot be recovered: unplugged, or a repeated error.
+    /// Returns true after an error that ends the connection: the device was unplugged, or errors were repeated.
     [[nodiscard]] bool has_failed() const noexcept { return error_.load(std::memory_order_acquire) != 0; }
-    /// Returns the first error that cannot be recovered; 0 without one.
+    /// Returns the first libusb error code that ended the connection; 0 without such an error.
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_acquire); }
     [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_.load(std::memory_order_relaxed); }
     [[nodiscard]] std::uint64_t bus_errors() const noexcept {
         return bus_errors_.load(std::memory_order_relaxed);
     }
-    /// Returns the number of commands that were in flight and did not arrive.
+    /// Returns the number of commands that were sent and did not arrive at the device.
     [[nodiscard]] std::uint64_t lost_writes() const noexcept {
         return lost_writes_.load(std::memory_order_relaxed);
     }
-    /// Returns the number of transfers in flight.
+    /// Returns the number of unfinished USB transfers.
     [[nodiscard]] int in_flight() const noexcept {
         return reads_in_flight_.load(std::memory_order_acquire) +
                writes_in_flight_.load(std::memory_order_acquire) +
@@ -178,7 +180,7 @@ class UsbTransfers {
     static constexpr Nanoseconds longest_stop = 5 * nanoseconds_a_second;
     static constexpr Nanoseconds cancel_interval = nanoseconds_a_second / 10;
     static constexpr unsigned request_timeout_ms = 500;
-    static constexpr int most_errors_in_a_row = 100;  ///< consecutive errors
+    static constexpr int most_errors_in_a_row = 100;  ///< consecutive bus errors that end the connection
 
     struct FreeTransfer {
         void operator()(libusb_transfer* transfer) const noexcept { libusb_free_transfer(transfer); }
@@ -193,12 +195,14 @@ class UsbTransfers {
 
     // ---------------------------------------------------------------------------------------- event thread
 
-    /// Runs libusb's events until the stop.
+    /// Processes libusb's events until stop() is called.
     void handle_events() noexcept {
-        // This thread has a higher priority than the loop, because a waiting packet makes the loop late.
+        // The event thread has a higher priority than the control loop, because an unprocessed packet makes the loop
+        // late.
         const sched_param priority{90};
-        (void)pthread_setschedparam(pthread_self(), SCHED_FIFO,
-                                    &priority);  // a refusal is reported for the loop
+        (void)pthread_setschedparam(
+            pthread_self(), SCHED_FIFO,
+            &priority);  // a refused priority is reported for the control loop's thread
         while (runs_.load(std::memory_order_acquire)) {
             timeval wait{0, 100'000};
             const int code = libusb_handle_events_timeout_completed(context_, &wait, nullptr);
@@ -210,7 +214,7 @@ class UsbTransfers {
         }
     }
 
-    /// Clears a halted endpoint: cancels its other transfers, clears it and continues.
+    /// Restarts a halted USB endpoint: cancels the transfers of the endpoint, clears the halt, and submits them again.
     void recover() noexcept {
         if (stopping_.load(std::memory_order_acquire) || has_failed()) {
             return;
@@ -236,7 +240,7 @@ class UsbTransfers {
         }
     }
 
-    /// Submits a read. start() calls it before the event thread uses it, then only the event thread.
+    /// Submits a read to libusb. start() submits each read once; after that only the event thread submits it.
     void submit(Read& read) noexcept {
         constexpr unsigned no_timeout = 0;
         libusb_fill_interrupt_transfer(read.transfer.get(), handle_, wire::in_endpoint, read.bytes.data(),
@@ -254,7 +258,7 @@ class UsbTransfers {
         read.owner->read_ended(read);
     }
 
-    /// Handles the end of a read: passes the packet on and submits the read again.
+    /// Handles the end of a read: passes the received packet to the control loop and submits the read again.
     void read_ended(Read& read) noexcept {
         const libusb_transfer& transfer = *read.transfer;
         switch (transfer.status) {
@@ -284,13 +288,14 @@ class UsbTransfers {
         }
     }
 
-    /// Passes a packet to the loop's thread.
+    /// Passes a received packet to the control loop's thread.
     void deliver(const Read& read) noexcept {
         UsbArrival arrival;
         arrival.time = monotonic_now();
         arrival.size = static_cast<std::uint32_t>(read.transfer->actual_length);
         std::copy_n(read.bytes.begin(), arrival.size, arrival.bytes.begin());
-        (void)arrivals_.push(arrival);  // full: the loop has not read for long and will restart
+        (void)arrivals_.push(
+            arrival);  // a full queue drops the packet: the loop then discards all old packets
         changes_.notify();
     }
 
@@ -303,7 +308,7 @@ class UsbTransfers {
         static_cast<UsbTransfers*>(transfer->user_data)->write_ended(*transfer);
     }
 
-    /// Handles the end of a write.
+    /// Handles the end of a sent command: counts errors and marks the write as ended.
     void write_ended(const libusb_transfer& transfer) noexcept {
         if (transfer.status != LIBUSB_TRANSFER_COMPLETED) {
             lost_writes_.fetch_add(1, std::memory_order_relaxed);
@@ -312,7 +317,8 @@ class UsbTransfers {
             case LIBUSB_TRANSFER_STALL:
                 stalls_.fetch_add(1, std::memory_order_relaxed);
                 if (!stopping_.load(std::memory_order_acquire)) {
-                    writes_halted_ = true;  // in flight until it is cleared
+                    writes_halted_ =
+                        true;  // the write counts as in flight until the endpoint's halt is cleared
                     return;
                 }
                 break;
@@ -337,7 +343,7 @@ class UsbTransfers {
         self.changes_.notify();
     }
 
-    /// Returns the error of libusb for the status of a transfer.
+    /// Returns the libusb error code that corresponds to the status of a transfer.
     [[nodiscard]] static int error_of(libusb_transfer_status status) noexcept {
         switch (status) {
             case LIBUSB_TRANSFER_COMPLETED:
@@ -356,7 +362,8 @@ class UsbTransfers {
 
     // ------------------------------------------------------------------------------------------- both threads
 
-    /// Waits until a condition that transfers change is true. Returns false after the deadline.
+    /// Waits until `condition` is true, and checks it after every event of a transfer. Returns false after the
+    /// deadline.
     template <class Condition>
     [[nodiscard]] bool wait_until(Condition condition, Nanoseconds deadline) noexcept {
         while (!condition()) {
@@ -368,7 +375,7 @@ class UsbTransfers {
         return true;
     }
 
-    /// Counts an error of the bus. Many consecutive errors are final.
+    /// Counts an error of the USB bus. 100 consecutive errors end the connection.
     void count_bus_error() noexcept {
         bus_errors_.fetch_add(1, std::memory_order_relaxed);
         if (++errors_in_a_row_ >= most_errors_in_a_row) {
@@ -376,7 +383,7 @@ class UsbTransfers {
         }
     }
 
-    /// Stores the first error that cannot be recovered.
+    /// Stores `code` if it is the first error; the connection then counts as failed.
     void store_error(int code) noexcept {
         if (code == 0) {
             return;

@@ -11,49 +11,53 @@
 
 namespace palpate {
 
-/// Quantity that is computed for many positions in one call.
+/// Quantity of a sum of wavelets that one call computes for many positions: value, slope or antiderivative.
 enum class HatQuantity : std::uint8_t { Value, Slope, Integral };
 
 namespace detail {
 
-/// |u| from which a hat is below 1e-300. The limit keeps e^{-u^2/2} a normal number.
+/// Distance |u| from the centre above which a Mexican hat is below 1e-300. With |u| limited to it, e^{-u^2/2} is a
+/// normal floating-point number.
 inline constexpr double hat_reach = 37.4;
 
-/// Parameters of hats, column by column. Entries from `count` to `size` have weight zero.
+/// Parameters of `count` Mexican hats of one input, one column for each parameter. A column has `size` entries; those
+/// from `count` on have weight zero.
 struct HatColumns {
     std::size_t count, size;
     const double *alpha, *beta, *weight;
     const double *weight_by_width, *weight_width, *weight_width_squared;  ///< w alpha, w / alpha, w / alpha^2
 };
 
-/// Parameters of radial hats of several inputs, input by input and each column by column, and the box of their data.
-/// Padded like `HatColumns`.
+/// Parameters of radial Mexican hats of several inputs, and the box to which inputs are limited. `alpha` and `beta`
+/// have one column of `size` entries for each input. Unused entries have weight zero.
 struct RadialColumns {
     std::size_t dimension, size;
     const double *alpha, *beta, *weight;
-    const double* uncancelled;  ///< replaces |weight| in the remainder of an expansion
+    const double* uncancelled;  ///< replaces |weight| in the remainder of Taylor's formula
     const double *lower, *upper;
 
-    /// Returns component j of the projection of x onto the box.
+    /// Returns component j of the point of the box that is nearest to x.
     [[nodiscard]] double projected(const double* x, std::size_t j) const noexcept {
         return x[j] < lower[j] ? lower[j] : x[j] > upper[j] ? upper[j] : x[j];
     }
 };
 
-/// Decay of the bound of the fourth derivative. The radial hat of d inputs is the Laplacian of a Gaussian. With x along
-/// a direction and y across it, its fourth derivative along that direction is (He_6(x) + He_4(x) (|y|^2 - d + 1)) E.
-/// Multiplied by e^{0.22 r^2}, each factor is largest at 0. A symmetric form is largest for equal vectors. At a
-/// distance r from the centre therefore |D^4 psi(a, b, c, e)| <= 3 (d + 4) e^{-0.22 r^2} for any unit vectors.
+/// Decay of a bound of the fourth derivative D^4 psi with the distance r from the centre: |D^4 psi(a, b, c, e)| <= 3 (d
+/// + 4) e^{-0.22 r^2} for any unit vectors. The radial Mexican hat psi of d inputs is the Laplacian of a Gaussian E =
+/// e^{-r^2/2}. With x along a direction and y across it, the fourth derivative along this direction is (He_6(x) +
+/// He_4(x) (|y|^2 - d + 1)) E with Hermite polynomials He. Multiplied by e^{0.22 r^2}, each factor is largest at 0. A
+/// symmetric form such as D^4 psi is largest for four equal vectors.
 inline constexpr double fourth_derivative_decay = 0.22;
 
-/// Returns the factor 3 (d + 4) of that bound.
+/// Returns 3 (d + 4), the largest fourth derivative of the radial Mexican hat of d inputs.
 [[nodiscard]] constexpr double fourth_derivative_supremum(std::size_t dimension) noexcept {
     return 3.0 * static_cast<double>(dimension + 4);
 }
 
-/// Taylor's formula about the middle of a box for a sum of radial hats. Distances along an input are divided by the
-/// box's radius along it. `rest` bounds the fourth order: rest_j = sum w B |s|^2 s_j^2, where s_j is a wavelet's
-/// dilation times the radius, B bounds |D^4 psi| at the wavelet's least distance, and w are the uncancelled weights.
+/// Taylor's formula about the middle of a box for a sum of radial Mexican hats psi. Distances along an input are
+/// divided by half the width of the box along this input. `rest` is a bound of the fourth-order term: rest_j = sum over
+/// the wavelets of w B |s|^2 s_j^2. Here s_j is the dilation times half the width of the box along input j, B is a
+/// bound of |D^4 psi| at the wavelet's smallest distance from the box, and w is its `uncancelled` weight.
 struct RadialExpansion {
     RadialExpansion(std::size_t d, std::size_t size)
         : gradient(d),
@@ -63,18 +67,18 @@ struct RadialExpansion {
           workspace((2 * d + 4) * size + d * d) {}
 
     double value = 0.0;
-    std::vector<double> gradient;           ///< d
-    std::vector<double> second_derivative;  ///< d x d second derivatives
-    std::vector<double> third_derivative;   ///< d x d x d third derivatives
-    std::vector<double> rest;               ///< d
-    std::vector<double> workspace;          ///< working memory of the kernel
+    std::vector<double> gradient;           ///< gradient in the middle of the box, d numbers
+    std::vector<double> second_derivative;  ///< second derivatives, d x d numbers
+    std::vector<double> third_derivative;   ///< third derivatives, d x d x d numbers
+    std::vector<double> rest;               ///< bound of the fourth-order term, d numbers
+    std::vector<double> workspace;          ///< working memory of the computation
 };
 
-/// Functions that one instruction set implements.
+/// Functions for sums of Mexican hats, compiled for one instruction set of the processor.
 struct HatKernel {
     void (*at)(const HatColumns& of, double x, Curve& sum) noexcept;
     std::array<void (*)(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept, 3>
-        batch;  ///< one function for each `HatQuantity`
+        batch;  ///< sums at many positions, one function for each `HatQuantity`
     void (*radial)(const RadialColumns& of, const double* x, double& value, double* gradient) noexcept;
     void (*expansion)(const RadialColumns& of, const double* middle, const double* radius,
                       RadialExpansion& sums) noexcept;

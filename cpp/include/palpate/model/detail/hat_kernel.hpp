@@ -1,8 +1,8 @@
-// SPDX-License-Identifier: Apache-2.0
-// Sums of Mexican hats for one instruction set. hat_sum.hpp includes this file once for each instruction set, with
-// PALPATE_KERNEL the namespace, PALPATE_LANES doubles in a register, PALPATE_TARGET a function attribute. The file has
-// no include guard, because it is included several times. Every function carries the attribute, because only then the
-// compiler keeps its vectors in registers of that width.
+// SPDX-License-Identifier: Apache-2.0 Sums of Mexican hats for one instruction set. hat_sum.hpp includes this file once
+// for each instruction set, with PALPATE_KERNEL the namespace, PALPATE_LANES doubles in a register, PALPATE_TARGET a
+// function attribute. The file has no include guard, because it is included several times. Every function has the
+// attribute PALPATE_TARGET, because otherwise the compiler does not keep its vectors in registers of PALPATE_LANES
+// doubles.
 
 namespace PALPATE_KERNEL {
 
@@ -13,13 +13,13 @@ PALPATE_TARGET inline void load(Lanes& lanes, const double* from) noexcept {
     __builtin_memcpy(&lanes, from, sizeof(Lanes));
 }
 
-/// Computes e^{-s/2} for 0 <= s <= hat_reach^2 without branches: 2^n e^r with an integer n, |r| <= ln 2 / 2 and a
-/// polynomial for e^r. NaN stays NaN.
+/// Computes the Gaussian e^{-s/2} of a squared distance 0 <= s <= hat_reach^2 without branches, as 2^n e^r with an
+/// integer n and |r| <= ln 2 / 2. A polynomial approximates e^r. NaN stays NaN.
 PALPATE_TARGET inline void gaussian_within(const Lanes& square, Lanes& e) noexcept {
     const Lanes exponent = -0.5 * square;
     const Lanes rounded = exponent * 0x1.71547652b82fep+0 + 0x1.8p52;  // log2(e)
     const Lanes n = rounded - 0x1.8p52;
-    // ln 2 as a sum of two numbers; the first is short enough for an exact product.
+    // ln 2 is the sum of two numbers; the first has so few digits that its product with n is exact.
     const Lanes r = (exponent - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
     const Lanes r2 = r * r;
     const Lanes r4 = r2 * r2;
@@ -36,14 +36,14 @@ PALPATE_TARGET inline void gaussian_within(const Lanes& square, Lanes& e) noexce
     e = (low + (middle + high * r4) * r4) * power;
 }
 
-/// Computes e^{-s/2} for any s >= 0; limits s to hat_reach^2.
+/// Computes the Gaussian e^{-s/2} of any squared distance s >= 0; limits s to hat_reach^2.
 PALPATE_TARGET inline void gaussian(Lanes& square, Lanes& e) noexcept {
     const Lanes farthest = Lanes{} + hat_reach * hat_reach;
     square = square > farthest ? farthest : square;
     gaussian_within(square, e);
 }
 
-/// Limits u to +-hat_reach and computes its square and e^{-u^2/2}.
+/// Limits the distance u to +-hat_reach and computes the square of u and the Gaussian e^{-u^2/2}.
 PALPATE_TARGET inline void gaussian(Lanes& u, Lanes& square, Lanes& e) noexcept {
     const Lanes reach = Lanes{} + hat_reach;
     u = u > reach ? reach : u;
@@ -52,7 +52,7 @@ PALPATE_TARGET inline void gaussian(Lanes& u, Lanes& square, Lanes& e) noexcept 
     gaussian_within(square, e);
 }
 
-/// Returns the sum of the lanes.
+/// Returns the sum of the doubles in a vector register.
 PALPATE_TARGET inline double total(const Lanes& lanes) noexcept {
     double sums[PALPATE_LANES];
     __builtin_memcpy(sums, &lanes, sizeof(sums));
@@ -64,7 +64,8 @@ PALPATE_TARGET inline double total(const Lanes& lanes) noexcept {
     return sums[0];
 }
 
-/// Adds all sums at one x, a register of wavelets at a time. `size` is a multiple of the lanes.
+/// Adds value, slope and antiderivatives of all wavelets at one position x. Each iteration computes PALPATE_LANES
+/// wavelets, one in each element of a register.
 PALPATE_TARGET inline void at(const HatColumns& of, double x, Curve& sum) noexcept {
     Lanes value{};
     Lanes slope{};
@@ -92,7 +93,7 @@ PALPATE_TARGET inline void at(const HatColumns& of, double x, Curve& sum) noexce
     sum.double_integral += total(double_integral);
 }
 
-/// Adds one of the sums at a register of positions.
+/// Adds value, slope or antiderivative of all wavelets at the positions in one register.
 template <HatQuantity quantity>
 PALPATE_TARGET inline void sum_at(const HatColumns& of, const Lanes& position, Lanes& sum) noexcept {
     for (std::size_t i = 0; i < of.count; ++i) {
@@ -112,7 +113,7 @@ PALPATE_TARGET inline void sum_at(const HatColumns& of, const Lanes& position, L
     }
 }
 
-/// Adds one of the sums at many positions to `sum`.
+/// Adds value, slope or antiderivative of all wavelets at n positions to the n elements of `sum`.
 template <HatQuantity quantity>
 PALPATE_TARGET void batch(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept {
     Lanes position, total;
@@ -136,14 +137,14 @@ PALPATE_TARGET void batch(const HatColumns& of, const double* x, std::size_t n, 
     }
 }
 
-/// Adds the sum of radial hats of several inputs at the projection of x onto the box to `value`, and its gradient,
-/// unless that is null, to `gradient`.
+/// Adds the sum of radial Mexican hats of several inputs to `value`, and its gradient to `gradient` unless `gradient`
+/// is null. The sum is computed at the point of the box that is nearest to x.
 PALPATE_TARGET inline void radial(const RadialColumns& of, const double* x, double& value,
                                   double* gradient) noexcept {
-    constexpr std::size_t block = 64;  // a multiple of all lanes
+    constexpr std::size_t block = 64;  // number of wavelets; a multiple of every PALPATE_LANES
     const auto inputs = static_cast<double>(of.dimension);
     const Lanes reach = Lanes{} + hat_reach;
-    double factors[block];  // of u in the gradient by u: w (d + 2 - r^2) E
+    double factors[block];  // w (d + 2 - r^2) E; times u: gradient by u
     Lanes values{};
     for (std::size_t first = 0; first < of.size; first += block) {
         const std::size_t count = of.size - first < block ? of.size - first : block;
@@ -189,7 +190,7 @@ PALPATE_TARGET inline void multiply(Lanes& product, const double* column) noexce
     product *= factor;
 }
 
-/// Returns the sum over the wavelets of a product of columns.
+/// Returns the sum over all wavelets of the product of one entry from each column.
 template <class... Columns>
 PALPATE_TARGET inline double sum_of(std::size_t size, const Columns*... columns) noexcept {
     Lanes sum{};
@@ -201,21 +202,23 @@ PALPATE_TARGET inline double sum_of(std::size_t size, const Columns*... columns)
     return total(sum);
 }
 
-/// Computes Taylor's formula about the middle of a box. With A_n = w (d + n - r^2) E of each wavelet, psi = -A_0, D
-/// psi = A_2 u and D^2 psi = A_2 I - A_4 u u'. D^3 psi is A_6 u u u minus A_4 u_j for each pair of equal other indices.
-/// The factors of all wavelets are computed first, then the sums over the wavelets.
+/// Computes the terms of Taylor's formula for a sum of radial Mexican hats psi about the middle of a box. A wavelet has
+/// the weight w and the scaled distance u from its centre; r = |u|, E = e^{-r^2/2} and A_n = w (d + n - r^2) E. Its
+/// value w psi is -A_0, its first derivative A_2 u, and its second derivative A_2 I - A_4 u u'. Its third derivative is
+/// A_6 u u u minus A_4 u_j for each pair of equal other indices. The factors A_n of all wavelets are computed first,
+/// then the sums over the wavelets.
 PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* middle, const double* radius,
                                      RadialExpansion& sums) noexcept {
     const std::size_t n = of.size;
     const std::size_t d = of.dimension;
     const auto inputs = static_cast<double>(d);
-    double* const first = sums.workspace.data();  // A_2, A_4, A_6
+    double* const first = sums.workspace.data();  // A_2 of each wavelet; then A_4, A_6
     double* const second = first + n;
     double* const third = second + n;
     double* const rest = third + n;
-    double* const offset = rest + n;        // input by input: u_j s_j, s = alpha times the radius
+    double* const offset = rest + n;        // u_j s_j for each input j; s_j = alpha times half the width
     double* const spread = offset + d * n;  // s_j^2
-    double* const mixed = spread + d * n;   // d x d: sums of A_4 s_j^2 u_l s_l
+    double* const mixed = spread + d * n;   // d x d sums over the wavelets of A_4 s_j^2 u_l s_l
     const Lanes zero{};
     const Lanes reach = zero + hat_reach;
     Lanes values{};
@@ -285,7 +288,7 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
     }
 }
 
-/// Computes e^{-s/2} for many s >= 0.
+/// Computes the Gaussian e^{-s/2} of n squared distances s >= 0.
 PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double* e) noexcept {
     Lanes s, result;
     std::size_t k = 0;
@@ -305,7 +308,7 @@ PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double
     }
 }
 
-/// Returns the functions of this instruction set.
+/// Returns the functions for sums of Mexican hats of this instruction set.
 [[nodiscard]] inline HatKernel kernel() noexcept {
     return {at,
             {batch<HatQuantity::Value>, batch<HatQuantity::Slope>, batch<HatQuantity::Integral>},

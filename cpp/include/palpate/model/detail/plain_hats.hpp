@@ -72,8 +72,9 @@ inline void expansion(const RadialColumns& of, const double* middle, const doubl
             least += near * near;
             spread += scale[j] * scale[j];
         }
-        // psi = -A_0, D psi = A_2 u, D^2 psi = A_2 I - A_4 u u', with A_n = (d + n - r^2) E. D^3 psi is A_6 u u u minus
-        // A_4 u_j for each pair of equal other indices.
+        // Derivatives of the radial Mexican hat psi at u, with A_n = (d + n - r^2) E, r = |u| and E = e^{-r^2/2}: psi =
+        // -A_0, D psi = A_2 u, D^2 psi = A_2 I - A_4 u u'. D^3 psi is A_6 u u u minus A_4 u_j for each pair of equal
+        // other indices.
         const double factor = of.weight[i] * std::exp(-0.5 * std::min(square, hat_reach * hat_reach));
         const double first = (inputs + 2.0 - square) * factor;
         const double second = (inputs + 4.0 - square) * factor;
