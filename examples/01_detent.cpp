@@ -28,7 +28,7 @@ int main() {
     const DeviceProfile device;
     const Hand hand;
 
-    // 3. List the structures, from the simplest to the one of the paper.
+    // 3. List the structures, from the simplest to the explicit structure of the paper.
     Scheme direct;
     Scheme compensated;
     Scheme massless;
@@ -47,7 +47,7 @@ int main() {
                                                                  {"implicit", implicit},
                                                                  {"explicit", explicit_one}}};
 
-    // 4. Render each for four seconds and print the force error at the handle.
+    // 4. Render the object with each structure for four seconds and print the force error at the handle.
     for (const auto& [name, scheme] : schemes) {
         const Trace trace = simulate(detent, scheme, device, hand, 4000);
         double sum = 0.0;

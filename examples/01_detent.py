@@ -22,7 +22,7 @@ detent = palpate.Model.from_network(
 # 2. Choose a simulated device and hand: a knob with a 16-bit encoder at 1 kHz, moved through the detent.
 device, hand = palpate.DeviceProfile(), palpate.Hand()
 
-# 3. List the structures, from the simplest to the one of the paper.
+# 3. List the structures, from the simplest to the explicit structure of the paper.
 schemes = {
     "direct": palpate.Scheme(structure="direct"),
     "massless, compensated": palpate.Scheme(structure="massless", compensated=True, coupling_damping=0.005),
@@ -31,7 +31,7 @@ schemes = {
     "explicit": palpate.Scheme(structure="explicit"),
 }
 
-# 4. Render each for four seconds and print the force error at the handle.
+# 4. Render the object with each structure for four seconds and print the force error at the handle.
 for name, scheme in schemes.items():
     plan = palpate.Plan(detent, scheme)
     error = force_error(plan, palpate.simulate(plan, device, hand, 4.0))

@@ -96,7 +96,7 @@ int main(int count, char** arguments) {
     }
     write(folder / "real.csv", position, force, period_s);
 
-    // 2. Identify.
+    // 2. Identify a model from the recording.
     const ForceModel real = identify(folder / "real.csv");
     std::printf("identified: %zu wavelets, %s\n", real.parameters().weight.size(),
                 real.hysteresis() != nullptr ? "press and release differ" : "one stroke");

@@ -33,7 +33,7 @@ def lateness_of_palpate(program: Path, model: Path, seconds: float, cpu: int) ->
 
 
 def lateness_of_cyclictest(seconds: float, cpu: int) -> dict[str, float]:
-    # verbose, because the histogram ends at 1 ms and a virtual machine can wake up later
+    # cyclictest prints every wake-up: its histogram ends at 1 ms, and a virtual machine can wake up later
     command = ["cyclictest", "-v", "-m", "-N", "-t", "1", "-a", f"{cpu}", "-p", f"{PRIORITY}"]
     command += ["-i", f"{10**6 // RATE_HZ}", "-l", f"{round(seconds * RATE_HZ)}"]
     completed = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -48,7 +48,7 @@ def quantile(ascending: list[float], share: float) -> float:
 
 
 def load() -> list[subprocess.Popen[bytes]]:
-    """Starts one busy process for every core."""
+    """Loads the machine: starts and returns one busy process for every core."""
     return [subprocess.Popen(["sh", "-c", "while :; do :; done"]) for _ in os.sched_getaffinity(0)]
 
 
@@ -59,7 +59,10 @@ def main() -> int:
     parser.add_argument("output", type=Path)
     parser.add_argument("--seconds", type=float, default=20.0, help="length of a block")
     parser.add_argument(
-        "--blocks", type=int, default=10, help="number for each program and state of the machine"
+        "--blocks",
+        type=int,
+        default=10,
+        help="number of blocks for each program and each load of the machine",
     )
     options = parser.parse_args()
     cpu = max(os.sched_getaffinity(0))

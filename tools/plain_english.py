@@ -23,13 +23,13 @@ from pygments.lexers import CppLexer
 from pygments.token import Token
 
 MOST_WORDS = 40
-"""Words of a sentence at most"""
+"""Largest number of words in a sentence"""
 
 MEAN_WORDS = 20.0
-"""Words of a sentence on average, for each kind of text"""
+"""Largest mean number of words in the sentences of one kind of text"""
 
 LEAST_MESSAGE_WORDS = 4
-"""Words from which a string of a program is taken for a message"""
+"""Least number of words in a string of a program that is taken for a message"""
 
 INSTEAD = {
     # metaphors where a term exists
@@ -109,7 +109,7 @@ _SECTION = re.compile(r"^ *(Parameters|Returns|Raises|Notes|Examples|Attributes|
 
 
 class Text(NamedTuple):
-    """A piece of prose."""
+    """A piece of prose: its file, line, kind and words."""
 
     file: Path
     line: int
@@ -187,7 +187,7 @@ def cpp_texts(file: Path) -> Iterator[Text]:
     message, started, line = "", 0, 1
     for kind, value in CppLexer().get_tokens(source):
         if kind in Token.Comment.Single and "SPDX" not in value:
-            # The comment of a member is a separate text.
+            # A comment after a member of a C++ class is not joined with the comment in the next line.
             lines.append((-line if value.startswith("///<") else line, value.lstrip("/<! ").rstrip()))
         elif kind in Token.Comment.Multiline:
             lines += [(line + at, each.strip("/* ")) for at, each in enumerate(value.splitlines())]

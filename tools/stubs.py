@@ -63,7 +63,7 @@ def main() -> int:
     if n_different:
         print("Stubs or schema do not describe the compiled module: run `make stubs`.", file=sys.stderr)
         return 1
-    # The stubs of NumPy, which these stubs use, are complete from Python 3.11.
+    # The generated stubs use the type stubs of NumPy, which are complete from Python 3.11 on.
     if check and sys.version_info >= (3, 11):
         command = [sys.executable, "-m", "mypy.stubtest", MODULE, "--allowlist", str(ALLOW_LIST)]
         return subprocess.run(command, check=False).returncode

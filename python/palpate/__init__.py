@@ -94,7 +94,7 @@ def _has_scikit_learn() -> bool:
 
 
 if not _has_scikit_learn():
-    # Not part of `from palpate import *` and help(), because using it may report a missing package.
+    # Left out of `from palpate import *` and help(): the name needs a package that may be missing.
     __all__.remove("WaveletNetworkRegressor")
 
 

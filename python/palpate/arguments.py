@@ -15,11 +15,11 @@ from ._typing import Float1D
 from .errors import InputError
 
 LONGEST_VALUE = 60
-"""Largest length of a value in a message [characters]."""
+"""Largest length of a value that a message repeats; longer values are cut [characters]."""
 
 
 def shown(value: object) -> str:
-    """Returns the value as one line for a message; long values are cut."""
+    """Returns an argument's value as one line for a message; long values are cut."""
     if isinstance(value, np.ndarray):
         return f"an array of {value.dtype} of shape {value.shape}"
     text = " ".join(repr(value).split())
@@ -42,7 +42,7 @@ def path_of(name: str, value: object) -> Path:
 
 
 def instance_of(name: str, value: object, kind: type | tuple[type, ...], cure: str) -> None:
-    """Refuses a value that is not of this type.
+    """Refuses an argument that is not of the given type.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def instance_of(name: str, value: object, kind: type | tuple[type, ...], cure: s
 
 
 def real_of(name: str, value: object) -> float:
-    """Returns an argument as a real number. The caller checks its range, NaN and infinity.
+    """Returns an argument as a real number, which may be NaN or infinite. The caller checks its range.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def named_arguments(kind: Any) -> None:
             except TypeError:
                 return f"{name} is {shown(value)}; it must be {words[type(getattr(example, name))]}"
             except ValueError:
-                continue  # of the right type
+                continue  # the value has the right type
         return f"{kind.__name__} does not take {shown(fields)}"
 
     named.__doc__ = construct.__doc__

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exception for bad input, and text from files in its message: escaped, and cut if long."""
+"""Exception for bad input; functions that escape and shorten text from files for its message."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import unicodedata
 from collections.abc import Iterable
 
 LONGEST_TEXT = 60
-"""Largest length of a name or a cell in a message [characters]."""
+"""Largest length of a column name or a cell in a message; longer texts are cut [characters]."""
 
 MOST_NAMES = 20
-"""Largest number of names in a message."""
+"""Largest number of names that a message lists."""
 
 _CONTROL_CATEGORIES = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
-"""Categories of characters that control a terminal or break a line."""
+"""Unicode categories of characters that control a terminal or break a line."""
 
 
 class InputError(ValueError):
@@ -39,7 +39,7 @@ def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Returns names joined by commas, up to a limit."""
+    """Returns names joined by commas; after the first `MOST_NAMES` it states only how many more there are."""
     all_names = list(names)
     shown = ", ".join(map(shortened, all_names[:MOST_NAMES]))
     return shown if len(all_names) <= MOST_NAMES else f"{shown} and {len(all_names) - MOST_NAMES} more"

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 from .errors import InputError
 
 Level = Literal["good", "usable", "no"]
-"""From best to worst."""
+"""Levels of a verdict, from best to worst."""
 
 LEVELS: tuple[Level, ...] = get_args(Level)
 
@@ -60,7 +60,7 @@ class Verdict:
         return f"{self.level}: {'; '.join(self.reasons)}" if self.findings else self.level
 
     def __add__(self, other: Verdict) -> Verdict:
-        """Returns the verdict on both results together."""
+        """Returns one verdict on both results, with the findings of both."""
         return Verdict(tuple(dict.fromkeys(self.findings + other.findings)))
 
     def record(self) -> list[dict[str, str]]:
@@ -94,10 +94,10 @@ they are rendered.
 
 
 def usable(sentence: str) -> Finding:
-    """Returns a finding that leaves the result usable."""
+    """Returns a finding of the level "usable" with this sentence."""
     return Finding("usable", sentence)
 
 
 def no(sentence: str) -> Finding:
-    """Returns a finding that makes the result unfit for use."""
+    """Returns a finding of the level "no" with this sentence: the result must not be used."""
     return Finding("no", sentence)

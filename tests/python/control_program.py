@@ -19,7 +19,7 @@ MODEL = ROOT / "tests" / "models" / "good" / "position.json"
 
 needs_program = pytest.mark.skipif(not PROGRAM.exists(), reason="needs palpate-control, run make control")
 
-# The test machine may be busy: only the test of the rate checks it.
+# Any loop rate is accepted, because the test machine may be busy; only the test of the rate checks the rate.
 ANY_RATE = ["--lowest-rate-share", "0"]
 
 
@@ -40,12 +40,12 @@ def start_control(*arguments: Any) -> subprocess.Popen[str]:
 
 
 def every_row(recording: Path) -> pd.DataFrame:
-    """Returns all rows, also those that a reader of recordings ignores."""
+    """Returns all rows of a flight record, also the rows that `read_recording` leaves out."""
     return pd.read_csv(recording, comment="#")
 
 
 def wait_for_rows(part: Path, process: subprocess.Popen[str]) -> float:
-    """Waits until the recording has rows; returns the time of their detection."""
+    """Waits until a recording that is being written has rows; returns the time at which rows were found."""
     while process.poll() is None:
         if part.exists() and sum(not line.startswith(b"#") for line in part.read_bytes().splitlines()) > 15:
             return time.monotonic()

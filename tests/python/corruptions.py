@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Corrupted recordings of a known law: one seed gives one case.
+"""Corrupted recordings of a known force law: one seed of the random numbers gives one case.
 
 python tests/python/corruptions.py [--first 0] [--count 300] [--kind KIND] [--each]
 
@@ -55,7 +55,7 @@ MEASURED = (
 
 @dataclass(frozen=True)
 class Rows:
-    """Columns of one recording while it is corrupted."""
+    """Columns of one recording, which the functions below corrupt."""
 
     x: Array
     f: Array
@@ -81,7 +81,7 @@ class Rows:
 
 @dataclass
 class Case:
-    """One corrupted case: its recordings, and the clean recordings for its judgement."""
+    """One case: corrupted recordings, and the clean recordings by which the identified model is judged."""
 
     seed: int
     base: str
@@ -120,7 +120,7 @@ def _p2(random: Generator) -> Rows:
 
 
 def _loop(random: Generator) -> Rows:
-    """Returns press and release at even positions, like a test machine."""
+    """Returns press and release force at evenly spaced positions, as a tensile test machine records them."""
     x = np.linspace(0.0, 4e-3, 800)
     x, d = np.r_[x, x[::-1]], np.repeat([1, -1], 800).astype(np.int8)
     h = 0.05 + 0.1 * np.exp(-(((1e3 * x - 1.5) / 0.5) ** 2))
@@ -129,7 +129,7 @@ def _loop(random: Generator) -> Rows:
 
 
 def _sweeps(random: Generator) -> Rows:
-    """Returns several strokes with time: a spring with friction that the play operator follows."""
+    """Returns several strokes, with time, of a spring whose friction force follows a play operator."""
     t = 4e-3 * np.arange(3000)
     x = 0.01 * (1.0 - np.cos(2 * np.pi * 0.5 * t)) / 2 * (1.0 + 0.05 * np.sin(0.7 * t))
     d = np.where(np.gradient(x) >= 0, 1, -1)
@@ -148,7 +148,7 @@ SYNTHETIC: dict[str, Callable[[Generator], Rows]] = {
 
 @cache
 def _measured(name: str) -> Rows:
-    # position must grow into the object, here towards the magnet
+    # the position must grow into the object: towards the magnet
     negate = ("position",) if name.startswith("magnet") else ()
     found = palpate.read_recording(DATA / name, negate=negate)
     time, direction = found.time, found.direction
@@ -167,7 +167,7 @@ def base_names() -> list[str]:
 
 
 def base(name: str, random: Generator) -> Rows:
-    """Returns a clean recording; a synthetic one has separate noise and motion for every generator."""
+    """Returns the clean recording of a name; `random` gives noise and motion of a synthetic one."""
     return SYNTHETIC[name](random) if name in SYNTHETIC else _measured(name)
 
 
@@ -177,7 +177,7 @@ Corruption = Callable[[Generator, Rows, Case], list[Rows]]
 
 
 def _restarted(rows: Rows, after: float) -> Rows:
-    """Returns the same rows with a time that begins later."""
+    """Returns the same rows with their times moved to begin after the given time."""
     return rows if rows.t is None else replace(rows, t=rows.t - rows.t[0] + after)
 
 
@@ -239,11 +239,11 @@ def _reversed(random: Generator, rows: Rows, case: Case) -> list[Rows]:
 
 
 UNIT_RATIOS = (1e3, 1e6, 9.80665, 25.4, 10.0, 4.4482, 101.97, 57.29578)
-"""Ratios of units that files mix up: milli, micro, kgf, inch, cm, lbf, gf and degree."""
+"""Ratios of units that are often confused in files: milli, micro, kgf, inch, cm, lbf, gf and degree."""
 
 
 def _unit(random: Generator, rows: Rows, case: Case) -> list[Rows]:
-    """Changes the unit of one recording of two; or scales a single one by an impossible factor."""
+    """Changes the unit of one of two recordings; a single recording is scaled by an implausible factor."""
     ratio = float(random.choice(UNIT_RATIOS)) ** float(random.choice([-1, 1]))
     role = str(random.choice(["position", "force"]))
     if case.base in SYNTHETIC and random.random() < 0.6:
@@ -252,7 +252,7 @@ def _unit(random: Generator, rows: Rows, case: Case) -> list[Rows]:
         case.strength.append(f"second recording: {role} times {ratio:.4g}")
         wrong = replace(other, x=ratio * other.x) if role == "position" else replace(other, f=ratio * other.f)
         return [rows, wrong]
-    # A factor of 1000 on the force of a key gives the force of a press: another object, not an error.
+    # The force of a key switch times 1000 is a plausible force of another object and cannot be reported.
     role, ratio = "position", float(random.choice([1e-3, 1e3] if rows.units["position"] == "m" else [1e3]))
     case.strength.append(f"{role} times {ratio:g}")
     return [replace(rows, x=ratio * rows.x)]
@@ -349,13 +349,13 @@ CAUSES = {
     "gaps": r"gap|without rows|no rows|interval|interpolat",
     "saturation": r"satur|clip|range of the sensor|stuck|is constant|limit",
 }
-"""Words of a sentence that names a plausible cause."""
+"""Words that a finding must contain to name a plausible cause, by kind of corruption."""
 
 PAIR_SHARE = 0.25
 
 
 def case_of(seed: int, kind: str | None = None) -> Case:
-    """Returns the case of a seed. Kinds alternate, and a quarter of the cases has a second one."""
+    """Returns the case of a seed. Kinds of corruption alternate; a quarter of the cases has a second kind."""
     random = np.random.default_rng([SEED, seed])
     names = list(KINDS)
     first = kind or names[seed % len(names)]
@@ -376,7 +376,7 @@ def case_of(seed: int, kind: str | None = None) -> Case:
 
 @dataclass
 class Outcome:
-    """Result of the identification of a case, and the truth."""
+    """Result of identifying a corrupted case: reported and true error, verdict or error message."""
 
     case: Case
     reported: float = float("nan")
@@ -390,28 +390,28 @@ class Outcome:
 
     @property
     def correct_error(self) -> bool:
-        """True if the reported error is not far below the true one."""
+        """True if the reported NRMSE is not far below the true NRMSE."""
         return bool(self.reported >= self.true / LARGEST_ERROR_RATIO)
 
     @property
     def warned(self) -> bool:
-        """True if the result was refused, or its verdict is not good."""
+        """True if identification refused the recordings, or if its verdict is not good."""
         return bool(self.refused) or self.level not in ("", "good")
 
     @property
     def names_cause(self) -> bool:
-        """True if the refusal or a reason names a cause of the kind of corruption."""
+        """True if the error message or a finding names a cause that fits the kind of corruption."""
         text = " ".join((self.refused, *self.reasons))
         return any(re.search(CAUSES[kind], text, re.IGNORECASE) for kind in self.case.kinds)
 
     @property
     def unreported(self) -> bool:
-        """True for a wrong result without a warning that names a plausible cause."""
+        """True if the reported error is far below the true one and no warning names a plausible cause."""
         return bool(self.crashed) or not (self.correct_error or (self.warned and self.names_cause))
 
 
 def true_nrmse(model: palpate.Model, clean: Sequence[Rows]) -> float:
-    """Returns the NRMSE of a model on clean rows inside its domain."""
+    """Returns the NRMSE of a model on the clean rows inside the model's domain."""
     errors, forces = [], []
     for rows in clean:
         check = palpate.verify(model, rows.recording())
@@ -453,7 +453,7 @@ def outcome_of(case: Case) -> Outcome:
 
 
 def described(found: Outcome) -> str:
-    """Returns one case in one line."""
+    """Returns the outcome of one case in one line."""
     if found.refused:
         return f"{found.case}: refused: {found.refused}"
     if found.crashed:
@@ -464,7 +464,7 @@ def described(found: Outcome) -> str:
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
-    """Returns counts by kind; a case of two kinds counts for its first."""
+    """Returns a table of the outcomes by kind of corruption; a case of two kinds counts for its first."""
     lines = [f"{'kind':16}{'cases':>7}{'correct':>8}{'warned':>8}{'cause named':>13}{'unreported':>12}"]
     for kind in (*KINDS, "all"):
         group = [each for each in outcomes if kind in ("all", each.case.kinds[0])]

@@ -26,17 +26,17 @@ def wall(x: Array) -> Array:
 
 
 def sweep(n: int) -> Array:
-    """Returns positions of one stroke."""
+    """Returns evenly spaced positions of one stroke."""
     return np.linspace(0.0, TRAVEL, n)
 
 
 def strokes(n: int, cycles: float = 7.0) -> Array:
-    """Returns positions of some strokes into the object and out of it."""
+    """Returns the positions of alternating strokes into the object and out of it."""
     return TRAVEL * (0.5 - 0.5 * np.cos(2.0 * np.pi * cycles * np.arange(n) / n))
 
 
 def noise(n: int, seed: int = 7, correlation: float = 0.0) -> Array:
-    """Returns normal noise of standard deviation NOISE; adjacent values have that correlation."""
+    """Returns normal noise of standard deviation NOISE; adjacent values have the given correlation."""
     white = np.random.default_rng(seed).normal(0.0, NOISE * np.sqrt(1.0 - correlation**2), n + 500)
     return np.asarray(lfilter([1.0], [1.0, -correlation], white)[500:])
 
@@ -46,6 +46,6 @@ def recorded(x: Array, y: Array, time: Array | None = None) -> palpate.Recording
 
 
 def true_nrmse(model: palpate.Model, law: Law, travel: float = TRAVEL) -> float:
-    """Returns the NRMSE against the law without noise, over the travel."""
+    """Returns the NRMSE of a model against the force law without noise, over the recorded positions."""
     x = np.linspace(0.0, travel, 2001)
     return float(np.sqrt(np.mean((model.force(x) - law(x)) ** 2)) / np.std(law(x)))

@@ -23,7 +23,7 @@ STEP_S = 1e-3
 
 @dataclass
 class Service:
-    """State and commands of the service; `after` is the number of the message of a fault."""
+    """Simulated Inverse Service: handle, hand and received commands; a fault occurs at message `after`."""
 
     devices: int = 1
     calibrated: bool = True

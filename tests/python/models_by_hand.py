@@ -7,7 +7,7 @@ from palpate import Model
 
 
 def model_by_hand(**changes: Any) -> Model:
-    """Returns f = 5 x + one wavelet over 0 to 0.5 rad, at most 3 N*m; with changes."""
+    """Returns a model f = 5 x + one wavelet, over 0 to 0.5 rad and at most 3 N*m, with changed fields."""
     arguments: dict[str, Any] = {
         "units": {"position": "rad", "force": "N*m"},
         "alpha": [[20.0]],

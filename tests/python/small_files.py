@@ -23,7 +23,7 @@ def timed_rows(n: int = 12) -> list[str]:
 
 
 def refusal(path: Path, **options: object) -> str:
-    """Returns the only sentence of a refusal, without the folder of the file."""
+    """Returns the error message of reading a file, which must be one sentence, without the file's folder."""
     with pytest.raises(InputError) as refused:
         read_recording(path, **options)  # type: ignore[arg-type]
     sentence = str(refused.value)
@@ -32,7 +32,7 @@ def refusal(path: Path, **options: object) -> str:
 
 
 def options_in(sentence: str, given: dict[str, object] | None = None) -> dict[str, object]:
-    """Returns the options of reading after applying the cure of a refusal literally."""
+    """Returns the options of reading that an error message suggests, as arguments of `read_recording`."""
     options = dict(given or {})
     if "add: " not in sentence:
         assert "--invalid drop" in sentence, sentence

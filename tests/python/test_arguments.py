@@ -60,14 +60,14 @@ WRONG_VALUES: dict[str, Any] = {
 }
 
 NUMBERS = {"int", "nan", "empty_list", "empty_array", "two_dimensional", "frame"}
-"""Wrong values that are nevertheless arrays of numbers."""
+"""Names of test values that are wrong for most arguments but right as arrays of numbers."""
 
 REFUSED_AS_TYPE = {"object", "function", "none", "dict"}
-"""Wrong values for which scikit-learn requires a TypeError."""
+"""Names of test values for which scikit-learn requires a TypeError instead of an InputError."""
 
 
 def model_with(**changes: Any) -> Model:
-    """Returns a manual copy of the model with some arguments changed."""
+    """Returns a new model with the arguments of the given model, some of them changed."""
     names = ("kind", "inputs", "units", "alpha", "beta", "weight", "linear", "bias", "lower", "upper")
     arguments = {name: getattr(MODEL, name) for name in (*names, "fit", "data")}
     return Model(**{**arguments, **changes})
@@ -75,7 +75,7 @@ def model_with(**changes: Any) -> Model:
 
 Call = Callable[[Any], object]
 
-# Public callables with one argument under test; some of the wrong values are right for it.
+# Calls of every public callable with one test value as one argument; some test values are right for it.
 CALLS: dict[str, tuple[Call, str, set[str]]] = {
     # name: (call, argument that the message names, values that are right there)
     "identify": (identify, "recording|frame", set()),
@@ -176,7 +176,7 @@ OPTIONS: dict[str, set[str]] = {
         (each, getattr(IdentifyOptions(), each)) for each in IdentifyOptions.__annotations__
     )
 }
-"""Fields of IdentifyOptions, and the wrong values that are right for them."""
+"""Fields of IdentifyOptions, and the names of the test values that are right for each field."""
 
 OPTIONAL = ("search", "slope_bounds", "fixed_force", "coupling_stiffness", "period")
 
@@ -210,7 +210,7 @@ def test_an_option_of_a_wrong_type_is_refused_by_its_name(field: str, wrong_valu
 
 
 def test_every_public_callable_is_in_the_table() -> None:
-    """Verification and InputError are results, which users do not construct."""
+    """The classes Verification and InputError are not in the table, because users do not construct them."""
     tested_in_other_files = {"Verification", "InputError", "Recording", "IdentifyOptions", "SearchOptions"}
     tested = {name.split()[0].split(".")[0] for name in CALLS}
     public = {name for name in palpate.__all__ if callable(getattr(palpate, name))}

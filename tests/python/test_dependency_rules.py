@@ -15,13 +15,13 @@ HEADERS = ROOT / "cpp" / "include" / "palpate"
 # array shapes and the compiled core.
 COMMON = {"errors", "arguments", "verdict", "_typing", "_core"}
 
-# A module may import the modules before it.
+# Modules of the package in order: a module may import the modules that are listed before it.
 MODULE_ORDER = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
 
-# These modules may import any module except cli; only cli imports them.
+# Modules of the package that may import any module except cli; only the module cli imports them.
 SIDE_MODULES = {"plotting", "baselines"}
 
-# Folder of the headers -> the folders that it may include, besides itself, status.hpp and fields.
+# Folder of C++ headers -> folders whose headers it may include, besides its own, status.hpp and fields.
 INCLUDES = {
     "fields": set(),
     "model": set(),

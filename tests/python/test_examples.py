@@ -24,7 +24,7 @@ def output_in_cpp(example: str, folder: Path) -> str:
     source, program = ROOT / "examples" / f"{example}.cpp", folder / example
     flags = ["-std=c++20", "-Wall", "-Wextra", "-Werror", "-I", str(ROOT / "cpp" / "include")]
     subprocess.run([compiler, *flags, str(source), "-o", str(program)], check=True)
-    # Identification uses the verb.
+    # The C++ example runs the command `palpate identify`.
     environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
     return subprocess.run(
         [str(program)], capture_output=True, text=True, check=True, cwd=ROOT, env=environment

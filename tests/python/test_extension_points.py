@@ -54,7 +54,7 @@ def test_an_unknown_structure_is_refused_with_all_names() -> None:
 
 
 def strings_in(node: ast.AST) -> set[str]:
-    """Returns the words of a literal collection."""
+    """Returns the words in the source text of a tuple, list or dictionary."""
     parts = node.keys if isinstance(node, ast.Dict) else getattr(node, "elts", [])
     return {item.value for item in parts if isinstance(item, ast.Constant) and isinstance(item.value, str)}
 

@@ -9,7 +9,8 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "python" / "palpate"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
-# Packages that are optional, or whose import takes longer than most verbs; plotting imports matplotlib.
+# Packages that are optional, or whose import takes longer than a run of most verbs; these are imported inside
+# functions. The module plotting imports matplotlib.
 IMPORTED_LATE = {
     "matplotlib",
     "palpate.plotting",
@@ -29,7 +30,7 @@ def module_of(path: Path) -> str:
 
 
 def targets_of(path: Path, node: ast.Import | ast.ImportFrom) -> list[str]:
-    """Yields modules, or names in modules, that an import loads."""
+    """Yields the modules, or names in modules, that an import statement loads."""
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
     folder = ("palpate", *path.relative_to(PACKAGE).parts[:-1])
@@ -58,7 +59,7 @@ def test_functions_import_only_optional_or_slow_packages(path: Path) -> None:
 
 
 def imported_modules(path: Path, all_modules: set[str]) -> set[str]:
-    """Returns the modules of the package that a file imports when it is loaded, except for type checking."""
+    """Returns the modules of palpate that a file imports when it is loaded, except for type checking."""
     pending: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
     modules = set()
     while pending:

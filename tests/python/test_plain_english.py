@@ -15,7 +15,7 @@ CHECKER = runpy.run_path(str(TOOL))
 
 
 def findings_of(folder: Path, name: str, content: str) -> list[str]:
-    """Returns the findings in a file of this content as `kind: finding`."""
+    """Returns the findings of the language check in a file with this content, as `kind: finding`."""
     file = folder / name
     file.write_text(content, encoding="utf-8")
     texts = CHECKER["READERS"].get(file.suffix, CHECKER["READERS"].get(name))(file)
@@ -23,7 +23,7 @@ def findings_of(folder: Path, name: str, content: str) -> list[str]:
 
 
 LONG = "The program " + "sends zero force and " * 10 + "closes the device"
-"""Sentence of 45 words"""
+"""Sentence of 45 words, which is longer than the check of the language allows"""
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ PROGRAMS = {
     "palpate": Path(sysconfig.get_path("scripts")) / "palpate",
     "build/control/palpate-control": PROGRAM,
 }
-"""Paths of the programs in the README."""
+"""Paths of the programs that the commands in the README call."""
 
 
 @needs_program
@@ -81,7 +81,7 @@ def test_every_target_of_make_exists() -> None:
 
 
 def commands_not_run() -> list[str]:
-    """Returns the commands that need hardware, and those inside a sentence."""
+    """Returns the README's commands that no test runs: they need hardware or are part of a sentence."""
     lines = [line for block in blocks("text", RENDERING) for line in block.splitlines()]
     return [line for line in lines if line.startswith("palpate")] + re.findall(
         r"`(palpate [a-z-]+ [^`]+)`", README + RENDERING

@@ -39,12 +39,12 @@ def emulated(
 
 @dataclass
 class Frame:
-    """True state of the device in one millisecond."""
+    """True state of the emulated device in one millisecond."""
 
     started: int
-    """Frames since the first command."""
+    """Number of frames (milliseconds) since the first command"""
     sequence: int
-    """Sequence number of its sample, modulo 65536."""
+    """Sequence number of the sample that the device sent, modulo 65536"""
     position: float
     torque: float
     status: int

@@ -29,7 +29,9 @@ _MARKS = {True: "ok", False: "WRONG", None: "-"}
 @click.option("--rate-hz", type=float, default=1000.0, help="Sampling rate [Hz].")
 @click.option("--duration-s", type=float, default=10.0, help="Total duration [s].")
 @click.option(
-    "--push", is_flag=True, help="Also push the handle a little, to measure sign, delay and mechanics."
+    "--push",
+    is_flag=True,
+    help="Let the device push the handle a little, to measure sign, delay and mechanics.",
 )
 @click.option("--profile", type=PATH, metavar="DEVICE.toml", help="Profile to compare with the device.")
 @click.option(
@@ -49,9 +51,9 @@ _MARKS = {True: "ok", False: "WRONG", None: "-"}
     "--coulomb-friction",
     type=float,
     metavar="F",
-    help="Friction of the device in N or N*m, if the pushes cannot show it; at most the true one.",
+    help="Friction of the device in N or N*m, if the pushes cannot show it; not above the true friction.",
 )
-@click.option("--yes", is_flag=True, help="Push without a question.")
+@click.option("--yes", is_flag=True, help="Push the handle without a question on the terminal.")
 @json_option
 @verbose_option
 def check_device(
@@ -74,8 +76,7 @@ def check_device(
 
     The device stays disabled while its rate, period, lost samples and encoder are measured. Move the handle
     against an object to show the signs of its velocity and transducer. A reversed motor cannot be detected
-    while the drive is disabled. With --push, and only if everything else is right, the device is enabled for
-    pushes of half a percent of its force. Do not render before this check. Exit code 1: not suitable.
+    while the drive is disabled. Do not render before this check. Exit code 1: not suitable.
     """
     if write_profile is not None:
         if not push:

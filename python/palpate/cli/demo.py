@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate demo: all steps on a simulated sample."""
+"""palpate demo: identifies, verifies and renders a model of a simulated knob."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ def demo(output: Path, as_json: bool) -> None:
         "sample-1.csv": "simulated recording that the model was identified from",
         "sample-2.csv": "simulated recording that the model was verified on",
         "model.json": "the model",
-        "force-over-position.png": "the model and the fresh recording, with residuals",
-        "closed-loop.png": "recorded and rendered force over position in closed loop",
+        "force-over-position.png": "modelled force, and force of the fresh recording, with their difference",
+        "closed-loop.png": "recorded and rendered force over position, with a simulated device in the loop",
         "structures.png": "force error of each rendering structure",
     }
     with finishing():
@@ -137,7 +137,7 @@ def demo(output: Path, as_json: bool) -> None:
 
 
 def _require_folder(folder: Path) -> None:
-    """Refuses, before the work, a folder that cannot be created or written."""
+    """Refuses a folder that cannot be created or written, before anything is computed."""
     if folder.is_dir():
         require_writable(folder / "model.json")
     elif folder.exists():
@@ -149,7 +149,7 @@ def _require_folder(folder: Path) -> None:
 
 
 def _print_structures(rows: tuple[Comparison, ...], unit: str) -> None:
-    """Prints the force error of each structure, or the reason of its refusal."""
+    """Prints the force error of each structure, or the reason why the structure is refused."""
     print_line(f"force error of each structure, RMS in {unit}")
     print_table(
         ("structure", "tick mean", "below 50 Hz", "end of tick", "sampled"),

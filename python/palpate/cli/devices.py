@@ -25,12 +25,12 @@ from .verb import json_option, verb
 )
 @click.option("--device", default="usb", metavar="usb[:SERIAL]", help="The device for the next four options.")
 @click.option("--disable", is_flag=True, help="End its force.")
-@click.option("--clear", is_flag=True, help="Clear its faults; needed after an emergency stop.")
-@click.option("--zero", is_flag=True, help="Make its present position 0.")
+@click.option("--clear", is_flag=True, help="Clear the faults of the device; needed after an emergency stop.")
+@click.option("--zero", is_flag=True, help="Make the device's present position 0.")
 @click.option(
     "--watchdog-ms",
     type=click.IntRange(shortest_watchdog_ms, longest_watchdog_ms),
-    help="Time for which it makes force without a command.",
+    help="Time for which the device holds its force without a new command.",
 )
 @json_option
 def devices(

@@ -19,19 +19,19 @@ from ..verdict import Verdict
 from .printing import OutputError, echo, end_line_on_terminal, print_line
 
 FAILED = 1
-"""The work failed, or the verdict is no."""
+"""Exit code if the work failed, or if the verdict is no."""
 BAD_INPUT = 2
-"""Bad usage or bad input."""
+"""Exit code for bad usage or bad input."""
 INTERRUPTED = 130
-"""Ctrl-C; the output does not exist."""
+"""Exit code after Ctrl-C; no output file was written."""
 
 
 _GRACE_S = 0.05
-"""Time in which Python can raise KeyboardInterrupt [s]."""
+"""Time after Ctrl-C in which Python can raise KeyboardInterrupt, before the process is ended [s]."""
 
 
 class WorkError(Exception):
-    """Failure of work on valid input: one sentence."""
+    """Failure of a verb although its input is valid: one sentence."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class ExitStatus:
     help: str = ""
 
     def report(self, *, as_json: bool) -> None:
-        """Prints the sentence: as one object on standard output with --json, else on standard error.
+        """Prints the message: with --json as a JSON object on standard output, else on standard error.
 
         A stream that cannot be written does not change the exit code.
         """
@@ -59,7 +59,7 @@ class ExitStatus:
 
 @contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
-    """Treats a termination signal like Ctrl-C within the block."""
+    """Context in which a termination signal (SIGTERM) acts like Ctrl-C."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLUMN_INCHES = 3.5
-"""Width of one column of a journal page."""
+"""Width of a figure: one column of a journal page [inch]."""
 
 _DOTS_PER_INCH = 200
 
@@ -42,10 +42,10 @@ _STYLE: Any = {
 }
 
 _LIGHTER = 0.01
-"""Mass and damping of the implicit environment over those that keep the paper's explicit one stable."""
+"""Mass and damping of the object in the implicit structure, over those that the explicit one needs."""
 
 _MOST_NAMES = 2
-"""Largest number of source files in a title."""
+"""Largest number of source files that the title of a figure names."""
 
 _DRIVEN = {
     "motion-driven": "recorded motion drives the device",
@@ -57,7 +57,7 @@ _DRIVEN = {
 def figure_file(
     path: Path, *, height_inches: float, rows: Sequence[float] = (1.0,), columns: int = 1, title: str = ""
 ) -> Iterator[list[Axes]]:
-    """Yields axes one below the other, with the given shares of the height, and writes the file atomically.
+    """Yields axes one below the other, with the given shares of the height, and writes the figure at the end.
 
     Several axes share their position axis. In several columns, filled row by row, each has a separate one.
     The title is above them, wrapped to the width of the figure.
@@ -86,7 +86,7 @@ def figure_file(
 
 
 def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:
-    """Closes the loop in both ways.
+    """Simulates a recording and its model in closed loop in two ways.
 
     The recorded motion drives the device. The recorded force drives the object: once with the mass and
     damping of the paper's explicit environment, once with the small values that the implicit one needs.
@@ -102,7 +102,9 @@ def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:
 
 
 def print_closed_loops(loops: Sequence[ClosedLoop]) -> None:
-    """Prints the error of each closed loop: of the force if driven by motion, else of the position."""
+    """Prints the error of each closed loop: the force error if the recorded motion drives it, else the
+    position error.
+    """
     print_table(
         ("closed loop", "NRMSE"),
         [(f"{loop.view}, {describe(loop.scheme)}", number(loop.nrmse)) for loop in loops],
@@ -134,9 +136,9 @@ def picture_verification(
     verified: Sequence[tuple[Recording, Verification]],
     identified_on: Sequence[Recording] = (),
 ) -> None:
-    """Draws measured and modelled force over position, residuals below; several recordings in one figure.
+    """Draws measured and modelled force over position, and their difference below them, for all recordings.
 
-    With the recordings that identified the model, it also draws the 95 % band if it is known.
+    For the recordings from which the model was identified, it also draws the 95 % band of the model's force.
     """
     from ..plotting import draw_measured_and_modelled
 
@@ -172,7 +174,7 @@ def picture_verification(
 def _standard_error(
     model: Model, identified_on: Sequence[Recording], drawn: Recording
 ) -> NDArray[np.float64] | None:
-    """Returns the standard error of the model's force at the drawn rows; None if unknown."""
+    """Returns the standard error of the model's force at the drawn rows; None if it is not known."""
     if not identified_on or (model.hysteretic and drawn.direction is None):
         return None
     try:
@@ -184,7 +186,7 @@ def _standard_error(
 
 
 def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:
-    """Draws the rendered force and the model's force at the measured position, differences below."""
+    """Draws rendered force and model force at the measured position, and their difference below them."""
     from ..plotting import draw_measured_and_modelled
 
     modelled = force_at(plan, rendered.position, rendered.sample_period)
@@ -221,7 +223,7 @@ def picture_closed_loops(path: Path, recording: Recording, loops: Sequence[Close
 
 
 def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, *, of: str) -> None:
-    """Draws the force error of each rendered structure; `of` describes the rendering."""
+    """Draws the force error of each rendered structure; `of` is the title of the figure."""
     from ..plotting import draw_structures
 
     shown = [(row.name, row.error) for row in rows if row.error is not None]
@@ -236,11 +238,11 @@ def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, 
 
 
 def picture_path(path: Path, model: Model) -> None:
-    """Draws the error of every considered network, the criterion below."""
+    """Draws error and criterion of each network that identification compared, over the number of wavelets."""
     from ..plotting import draw_path
 
     if not model.path:
-        raise InputError("the model does not say how it was found: it holds no path of networks")
+        raise InputError("the model file lists no networks that identification compared: identify again")
     fit = model.fit
     title = f"{source_name(model.data.files)}\n{fit.n_wavelets} wavelets, NRMSE {number(fit.nrmse)}"
     with figure_file(path, height_inches=4.0, rows=(1.4, 1.0), title=title) as (error, criterion):

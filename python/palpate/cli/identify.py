@@ -51,11 +51,11 @@ from .verb import (
 )
 
 _READ_BY_PARTS = ("position", "force", "time", "direction", "units", "negate", "invalid")
-"""Reading options that do not need all rows at once."""
+"""Options of reading that can be used if a file is read part by part."""
 
 
 def _text(value: Any) -> str:
-    """Returns a default in the form after NAME=."""
+    """Returns the default value of a setting as the text that follows NAME= in the help."""
     if isinstance(value, tuple):
         return ",".join(f"{number:g}" for number in value)
     return str(value).lower() if isinstance(value, bool) else str(value)
@@ -78,17 +78,17 @@ HELP = {
 }
 
 _METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE", "inputs": "NAMES"}
-"""Name of the value of an option."""
+"""Name that the help shows for the value of an option."""
 
 _MOST_DECISIONS = 7
-"""Decisions of the model selection that the summary prints; a model of several inputs has more"""
+"""Largest number of decisions of the model selection that the summary prints"""
 
 _GROUP = {"inputs": "Model", "monotone": "Constraints"}
-"""Groups of the options in the help; all others are for experts."""
+"""Heading of an option in the help; options that are not listed here are under "Expert"."""
 
 
 def _search(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> SearchOptions:
-    """Returns settings of the search, each given as NAME=VALUE."""
+    """Returns the settings of the search for wavelets, each given as NAME=VALUE."""
     for value in values:
         if "=" not in value:
             raise click.BadParameter(f"{value!r} must be NAME=VALUE", ctx, param)
@@ -236,7 +236,7 @@ def identify(
     of_rows = str(rows) if compared == rows else f"{compared} of {rows}"
     judged = "the rows it was identified on" if hold_out_every is None else f"{of_rows} rows held out"
     if hold_out_every is None and settings["loss"] == "huber":
-        judged += ", those far from the others weighed down"
+        judged += ", where rows far from the model have less weight"
     with finishing():
         if plot is not None:
             picture_verification(plot, model, verified, recordings)
@@ -263,7 +263,7 @@ def identify(
 
 
 def _require_unused(**others: Any) -> None:
-    """Refuses options that need all rows at once."""
+    """Refuses options that need all rows in memory, if a file is read part by part."""
     for name, value in others.items():
         if value:
             raise click.UsageError(
@@ -273,7 +273,7 @@ def _require_unused(**others: Any) -> None:
 
 
 def _rms_text(verified: Sequence[tuple[Recording, Verification]]) -> str:
-    """Returns the RMS error of all rows in the unit of the file, as "RMS 0.02 N*m, "."""
+    """Returns the RMS force error of all rows in the unit of the file, as "RMS 0.02 N*m, "."""
     if not verified:
         return ""
     rms = float(np.sqrt(np.mean(np.concatenate([found.residual for _, found in verified]) ** 2)))
@@ -281,14 +281,14 @@ def _rms_text(verified: Sequence[tuple[Recording, Verification]]) -> str:
 
 
 def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:
-    """Returns the RMSE over the standard deviation of the force, for the rows of all recordings together."""
+    """Returns the NRMSE of the model's force for the rows of all recordings together."""
     residual = np.concatenate([verification.residual for _, verification in verified])
     force = np.concatenate([recording.force[verification.rows] for recording, verification in verified])
     return float(np.sqrt(np.mean(residual**2)) / np.std(force))
 
 
 def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) -> list[Compared]:
-    """Fits the baselines to the rows that are not held out."""
+    """Fits the usual methods, to compare with the model, to the rows that are not held out."""
     if hold_out_every is None:
         raise click.UsageError("--baselines compares on held-out rows and needs --hold-out-every K")
     talk("fitting the baselines ...")
@@ -296,7 +296,7 @@ def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) 
 
 
 def _print_baselines(nrmse: float, n_parameters: int, seconds: float, others: Sequence[Compared]) -> None:
-    """Prints the model first, then the baselines."""
+    """Prints the errors on the held-out rows: of the model, then of the usual methods."""
     rows = [("wavelet network", number(nrmse), str(n_parameters), f"{seconds:.2f}")]
     rows += [
         (each.name, "refused", "", "")

@@ -38,12 +38,12 @@ device_options = options(
         help="The simulated device has a force transducer.",
     ),
 )
-"""Options for the measured device and the object on the simulated one."""
+"""Options that choose the device, and the object that is mounted on a simulated device."""
 
 
 @contextmanager
 def live_line(rate_hz: float, units: tuple[str, str]) -> Iterator[LiveLine]:
-    """Yields a `LiveLine` while a device runs. A termination signal acts like Ctrl-C.
+    """Yields a `LiveLine` that shows a running device. A termination signal (SIGTERM) acts like Ctrl-C.
 
     A refusal of the device is raised as InputError.
     """
@@ -58,14 +58,14 @@ def live_line(rate_hz: float, units: tuple[str, str]) -> Iterator[LiveLine]:
 
 
 class LiveLine:
-    """One line on a terminal: rows, position and its range, force, lost samples.
+    """Line on a terminal with the rows so far, position, least and largest position, force and lost samples.
 
     Parameters
     ----------
     rate_hz : float
-        Rows a second.
+        Rows of the recording per second [Hz].
     units : tuple of str
-        Of position and force.
+        Units of position and force.
     """
 
     def __init__(self, rate_hz: float, units: tuple[str, str]) -> None:
@@ -75,7 +75,7 @@ class LiveLine:
         self._lower, self._upper = math.inf, -math.inf
 
     def show(self, rows: int, position: float, force: float, lost: int) -> None:
-        """Shows the current values."""
+        """Replaces the line by the current values."""
         self._lower, self._upper = min(self._lower, position), max(self._upper, position)
         self._line.show(
             f"{rows / self._rate_hz:6.1f} s  {rows} rows, {lost} lost  "
@@ -85,12 +85,12 @@ class LiveLine:
         )
 
     def end(self) -> None:
-        """Keeps the line as it is."""
+        """Ends the line, so that the last values stay on the terminal."""
         self._line.end()
 
 
 def session_verdict(summary: Mapping[str, Any]) -> Verdict:
-    """Returns the verdict of a summary; prints on standard error why a run did not end normally."""
+    """Returns the verdict in the summary of a run; prints on standard error why the run ended early."""
     if not summary["orderly"]:
         talk(f"error: {summary['ended']}; zero force sent, device closed")
     return Verdict.from_record(summary["findings"])

@@ -25,11 +25,11 @@ _VERBS = {
     "show": "Print a model.",
     "demo": "Identify, verify and render a simulated sample.",
 }
-"""Every verb with its line in the help. Its file is imported only when it is used."""
+"""Verbs with their lines in the help. The file of a verb is imported only when the verb is used."""
 
 
 class _LazyVerbs(Verbs):
-    """Group of commands, each in the module of its name."""
+    """Group of the verbs; each verb is a command in the module with the verb's name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_VERBS)
@@ -91,5 +91,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = status.code
     drop_what_cannot_be_written()
     if code == INTERRUPTED and arguments is None:
-        os._exit(code)  # unloading the libraries would take noticeably long
+        os._exit(code)  # a normal exit would unload the libraries, which takes long
     return code

@@ -32,7 +32,7 @@ from .verb import PATH, json_option, plot_option, require_writable, verb, verbos
 
 
 class Samples(click.ParamType[int | str]):
-    """A number of samples, auto or off. The called function checks the range."""
+    """Value of --predict: a number of samples, auto or off. The range is checked later, by `plan`."""
 
     name = "M|auto|off"
 
@@ -46,7 +46,7 @@ class Samples(click.ParamType[int | str]):
 
 
 class _PlanVerb(Verb):
-    """Verb or list of example profiles, which needs neither model nor device."""
+    """Command `palpate plan`; with --examples it needs neither a model nor a device."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if "--examples" in args:
@@ -211,12 +211,12 @@ def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds:
 def _summary(
     plan: Plan, certificate: Certificate, device: DeviceProfile, written: Path | None
 ) -> dict[str, str]:
-    """Returns the plan, the device properties that it needs, and its certificate."""
+    """Returns the summary of a plan: structure, needed device properties and certificate, one line each."""
     rows = plan.summary()
     _, damping, force = mechanical_units(device.position_unit)
     units = {"b": ("device damping", damping), "f_c": ("device friction", force)}
     lines = () if certificate.refused else certificate.inequalities
-    for line in sorted(lines, key=lambda each: -each.margin):  # of several, the tightest is shown
+    for line in sorted(lines, key=lambda each: -each.margin):  # the least margin is printed
         name, unit = units.get(line.formula.split(" ")[0], ("", ""))
         if name:
             sign, judged = (">=", "OK") if line.holds else ("<", "not enough")

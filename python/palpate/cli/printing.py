@@ -28,30 +28,32 @@ TERMS = "Terms: docs/glossary.md"
 """Last line of each help."""
 
 WIDEST = 80
-"""Largest readable width of text [columns]."""
+"""Largest width to which printed text is wrapped [columns]."""
 
 _NARROWEST_VALUE = 24
-"""Width after a name below which its value continues on the next line [columns]."""
+"""Least width for a value to the right of its name; else the value is on the next line [columns]."""
 
 _EVERY_S = 10.0
-"""Time between two lines if standard error is not a terminal [s]."""
+"""Time between two lines of progress if standard error is not a terminal [s]."""
 
 _REFRESH_S = 0.1
-"""Time between two states of the line on a terminal [s]."""
+"""Time between two updates of the line of progress on a terminal [s]."""
 
 _NARROWEST_HELP = 30
-"""Least width of help [columns]."""
+"""Least width to which a help text is wrapped [columns]."""
 
 
 class OutputError(Exception):
-    """Failure to write standard output: one sentence."""
+    """Standard output cannot be written; the message is one sentence with the reason."""
 
 
 def prepare_streams() -> None:
-    """Makes the three standard streams safe to use in any state.
+    """Makes standard input, output and error usable, even if the program is started with one of them closed.
 
     A closed descriptor is occupied, so that no file that is opened later gets its number. Writing to a closed
-    standard output then fails like writing to a full disk. A character outside the encoding is escaped.
+    A closed stream is replaced by /dev/null, so that no file that is opened later gets the stream's number.
+    Writing to a closed standard output then fails like writing to a full disk. A character outside the
+    encoding is escaped.
     """
     for number in (0, 1, 2):
         try:
@@ -80,7 +82,7 @@ def terminal_width(*, err: bool = False) -> int | None:
     stream = sys.stderr if err else sys.stdout
     try:
         on_terminal = stream.isatty()
-    except (AttributeError, ValueError):  # closed
+    except (AttributeError, ValueError):  # the stream is closed
         return None
     return min(shutil.get_terminal_size().columns, WIDEST) if on_terminal else None
 
@@ -113,7 +115,7 @@ def print_line(text: str = "", *, err: bool = False, hanging: int = 2, elsewhere
 
 
 def print_value(name: str, value: str, name_width: int) -> None:
-    """Prints a padded name and its value; on a terminal a long value continues below itself."""
+    """Prints a padded name and its value; on a terminal a long value is wrapped and stays indented."""
     width = terminal_width()
     hanging = name_width + 2
     if width is not None and width - hanging < _NARROWEST_VALUE:
@@ -122,7 +124,7 @@ def print_value(name: str, value: str, name_width: int) -> None:
 
 
 def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
-    """Writes text unchanged. The text must not contain control characters from outside."""
+    """Writes text unchanged. The text must not contain control characters from files or arguments."""
     if err:
         with suppress(OSError):
             click.echo(text, err=True, nl=nl)
@@ -190,7 +192,7 @@ def print_verdict(verdict: Verdict) -> None:
 
 
 def print_details(details: Iterable[str]) -> None:
-    """Prints the sentences that --verbose adds, under a heading."""
+    """Prints the sentences that the option --verbose adds to the summary, under a heading."""
     print_line()
     print_line("details")
     for sentence in details:
@@ -237,21 +239,21 @@ class OverwrittenLine:
             self._used = True
 
     def clear(self) -> None:
-        """Removes the line."""
+        """Removes the line from the terminal."""
         if self._used:
             self.show("")
             echo("\r", err=True, nl=False)
             self._used = False
 
     def end(self) -> None:
-        """Keeps the line and begins the next one."""
+        """Ends the line, so that it stays on the terminal."""
         if self._used:
             echo("", err=True)
             self._used = False
 
 
 class Progress:
-    """Prints the state of some work and the seconds since it began."""
+    """Prints how far some work is, and the seconds since the work began."""
 
     def __init__(self, work: str) -> None:
         self._work = work
@@ -259,7 +261,7 @@ class Progress:
         self._start = self._shown = time.monotonic()
 
     def __call__(self, state: str) -> None:
-        """Prints a state if the previous one is old enough."""
+        """Prints how far the work is, if enough time has passed since the line before."""
         now = time.monotonic()
         if now - self._shown >= (_REFRESH_S if self._line.on_terminal else _EVERY_S):
             self._shown = now
@@ -276,7 +278,7 @@ class Progress:
 
 @contextmanager
 def progress(work: str) -> Iterator[Progress]:
-    """Yields a `Progress` whose line is removed at the end, also after an error."""
+    """Yields a `Progress` and removes its line from the terminal at the end, also after an error."""
     shown = Progress(work)
     try:
         yield shown
@@ -285,7 +287,7 @@ def progress(work: str) -> Iterator[Progress]:
 
 
 class _Formatter(click.HelpFormatter):
-    """Formatter of click that also follows a terminal below 50 columns."""
+    """Help formatter of click that also wraps to a terminal of less than 50 columns."""
 
     def __init__(
         self, indent_increment: int = 2, width: int | None = None, max_width: int | None = None
@@ -302,11 +304,11 @@ class _Context(click.Context):
 
 
 GROUPS = ("Input", "Model", "Constraints", "Output", "Expert")
-"""Groups of options in the order of the help."""
+"""Headings of the options of a long verb, in the order of the help."""
 
 
 class Option(click.Option):
-    """Option whose place in the help of a long verb is one of `GROUPS`."""
+    """Option that the help of a long verb lists under one of the headings in `GROUPS`."""
 
     def __init__(self, *args: Any, group: str = "Output", **settings: Any) -> None:
         super().__init__(*args, **settings)
@@ -319,7 +321,7 @@ class Verb(click.Command):
     context_class = _Context
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Writes the options of each group under its name, or all together if none is for experts."""
+        """Writes the options of each group under its heading; without expert options, under one heading."""
         options = [
             (getattr(each, "group", "Output"), each)
             for each in self.get_params(ctx)

@@ -25,31 +25,31 @@ from .verb import PATH, json_option, require_writable, verb
 @click.option("--rate-hz", type=float, default=1000.0, help="Sampling rate [Hz].")
 @click.option("--duration-s", type=float, default=10.0, help="Duration [s]; inf: until Ctrl-C.")
 @click.option("--probe", is_flag=True, help="The device moves the handle slowly forward and back.")
-@click.option("--lower", type=float, help="Lower end of the sweep, in the device's position unit.")
-@click.option("--upper", type=float, help="Upper end of the sweep.")
+@click.option("--lower", type=float, help="Least position of the probe's motion, in the device's unit.")
+@click.option("--upper", type=float, help="Largest position of the probe's motion.")
 @click.option(
     "--speed",
     type=float,
     show_default="0.2 rad/s, scaled",
-    help="Speed of the sweep, in position units per second.",
+    help="Speed of the probe's motion, in position units per second.",
 )
 @click.option(
     "--stiffness",
     type=float,
     show_default="50 N*m/rad, scaled",
-    help="Stiffness of the spring that moves the handle.",
+    help="Stiffness of the virtual spring that moves the handle.",
 )
 @click.option(
     "--force-limit",
     type=float,
     show_default="the device's",
-    help="The sweep reverses at this force.",
+    help="Force at which the probe's motion reverses.",
 )
 @click.option(
     "--lowest-rate-share",
     type=click.FloatRange(0, 1),
     show_default="the loop's",
-    help="Lower rates for half a second end a probe; as a share of the rate; 0: never.",
+    help="A rate below this share of --rate-hz for half a second ends a probe; 0: never.",
 )
 @json_option
 def record(

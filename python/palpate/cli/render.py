@@ -60,13 +60,13 @@ _LOOP = LoopSettings()
     "--telemetry-hz",
     type=click.FloatRange(0.1, 10000),
     default=usual_telemetry_hz,
-    help="Rate of the lines [Hz].",
+    help="Rate of the JSON lines [Hz].",
 )
 @click.option(
     "--lowest-rate-share",
     type=click.FloatRange(0, 1),
     default=_LOOP.lowest_rate_share,
-    help="Lower rates for half a second end the run; as a share of the rate; 0: never.",
+    help="A rate below this share of --rate-hz for half a second ends the run; 0: never.",
 )
 @json_option
 @scheme_options

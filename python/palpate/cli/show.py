@@ -26,7 +26,7 @@ from .verb import PATH, json_option, plot_option, require_writable, verb
 
 _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping", "domain", "continuation",
           "slope_bounds", "data")  # fmt: skip
-"""Fields of the model file that --json prints unchanged."""
+"""Fields of a model file that `palpate show --json` prints unchanged."""
 
 
 @verb("palpate show press.json")
@@ -36,9 +36,9 @@ _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping"
     "other_file",
     metavar="OTHER.json",
     type=PATH,
-    help="Another model: print how far it is from the first, in shares of the just noticeable difference.",
+    help="Another model; prints the largest difference of both forces, over the just noticeable difference.",
 )
-@plot_option("every network that was considered; with --beside both models and their difference")
+@plot_option("error of every compared network; with --beside the forces of both models and their difference")
 @json_option
 def show(model_file: Path, other_file: Path | None, plot: Path | None, as_json: bool) -> None:
     """Print a model: its verdict, terms, domain and units, how it was identified, and its plan.
@@ -65,7 +65,7 @@ def show(model_file: Path, other_file: Path | None, plot: Path | None, as_json: 
 
 
 def _record(model: Model, file: Path) -> dict[str, Any]:
-    """Returns the printed values under the names of the model file."""
+    """Returns the values that are printed, under the names that they have in the model file."""
     content = model.to_dict()
     fit = {name: value for name, value in content["fit"].items() if name != "path"}
     return {
@@ -92,7 +92,7 @@ def _plan_record(model: Model) -> dict[str, Any] | None:
 def _compare(
     model: Model, model_file: Path, other: Model, other_file: Path, *, plot: Path | None, as_json: bool
 ) -> None:
-    """Prints the difference of two models, with a verdict on both and on their difference."""
+    """Prints the largest force difference of two models, and a verdict on both models and the difference."""
     strokes = compare(model, other)
     verdict = model.verdict + other.verdict + _noticed(strokes)
     with finishing():
@@ -110,7 +110,7 @@ def _compare(
         else:
             print_verdict(verdict)
             print_table(
-                ("stroke", "largest difference, in just noticeable ones"),
+                ("stroke", "largest force difference, in just noticeable differences"),
                 [(stroke.name or "both", number(stroke.worst)) for stroke in strokes],
             )
         end_with(verdict)
@@ -121,4 +121,7 @@ def _noticed(strokes: tuple[Stroke, ...]) -> Verdict:
     worst = max(stroke.worst for stroke in strokes)
     if worst <= 1.0:
         return GOOD
-    return Verdict((usable(f"a hand notices the difference: up to {number(worst)} just noticeable ones"),))
+    sentence = (
+        f"a hand notices the difference of the models: up to {number(worst)} just noticeable differences"
+    )
+    return Verdict((usable(sentence),))

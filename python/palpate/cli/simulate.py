@@ -116,7 +116,7 @@ def simulate(
 
 
 def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any]) -> Plan:
-    """Returns the requested plan, else the plan in the model, else the default, which it reports."""
+    """Returns the requested plan, else the plan in the model file, else the default plan, with a note."""
     if all(value is None or value is False for value in scheme.values()):
         if model.plan is not None:
             return Plan.of(model)

@@ -23,11 +23,11 @@ F = TypeVar("F", bound=Callable[..., Any])
 PATH = click.Path(path_type=Path)
 
 _FIGURES = (".png", ".pdf", ".svg")
-"""Suffixes of figure files."""
+"""Suffixes of the file names of figures."""
 
 _READ = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows", "zero",
          "force_late_s", "invalid")  # fmt: skip
-"""Arguments of `read_recording` that are options."""
+"""Arguments of `read_recording` that are also options of the command line."""
 
 _SCHEME = Scheme()
 
@@ -40,9 +40,9 @@ def verb(
     Parameters
     ----------
     example : str
-        Command line.
+        Command line that the help shows as the example.
     cls : type
-        Class of the command.
+        Class of the click command.
     ends_at_once : bool
         Ctrl-C ends the process also while a library computes; False if a device must be closed first.
     settings
@@ -58,7 +58,7 @@ def verb(
 
 
 def options(*each: Callable[[Any], Any]) -> Callable[[F], F]:
-    """Adds several options to a verb. Its help lists them in this order."""
+    """Adds several options to a verb. The help lists the options in the given order."""
 
     def decorate(command: F) -> F:
         for option in reversed(each):
@@ -104,7 +104,7 @@ class ReadingOptions:
     options: dict[str, Any] = field(default_factory=dict)
 
     def read(self, path: Path, inputs: Sequence[str] = ()) -> Recording:
-        """Reads a recording with further inputs; first prints the file and the chosen columns."""
+        """Reads a recording with further inputs, and prints its file, number of rows and chosen columns."""
         recording = read_recording(path, inputs=inputs, **self.options)
         chosen, *others = recording.notes
         talk(f"read {path}: {len(recording)} rows; {chosen}")
@@ -114,7 +114,7 @@ class ReadingOptions:
 
 
 expert_option = partial(click.option, cls=Option, group="Expert")
-"""Option of a long verb, in the group "Expert" or another one."""
+"""Option of a verb with many options; the help lists it under "Expert" unless `group` names a heading."""
 
 _column = partial(expert_option, metavar="COLUMN", default=None)
 _rows = partial(expert_option, metavar="START:STOP", callback=_row_range, default=None)
@@ -158,7 +158,7 @@ _READING = options(
         "--invalid",
         type=click.Choice(["refuse", "drop"]),
         default="refuse",
-        help="Refuse or drop rows without a number.",
+        help="Refuse the file, or drop rows without a number.",
     ),
 )
 
@@ -182,7 +182,11 @@ scheme_options = options(
         show_default=f"the model's plan, else {_SCHEME.structure}",
         help="Structure that computes the force.",
     ),
-    click.option("--compensated", is_flag=True, help="Subtract the softness of the coupling from the model."),
+    click.option(
+        "--compensated",
+        is_flag=True,
+        help="Make the model stiffer, so that model and coupling in series give the recorded force.",
+    ),
     click.option(
         "--coupling-stiffness",
         type=float,
@@ -221,14 +225,14 @@ scheme_options = options(
         help="Samples used to predict the position half a sample ahead, direct only; 0 = none.",
     ),
 )
-"""Options for the fields of `Scheme`. A missing one is None and follows the model."""
+"""Options for the fields of `Scheme`. An option that is not given is None; the model or its plan decides."""
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 verbose_option = click.option("-v", "--verbose", is_flag=True, help="Print all details below the summary.")
 
 
 def _figure_name(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
-    """Refuses, before the work, a name whose suffix is not a figure format."""
+    """Refuses a file name whose suffix is not a figure format, before anything is computed."""
     if value is not None and value.suffix.lower() not in _FIGURES:
         raise InputError(f"{value} is not a figure file: its name must end in {', '.join(_FIGURES)}")
     return value
@@ -242,7 +246,7 @@ def plot_option(shows: str, name: str = "--plot") -> Callable[[F], F]:
 
 
 def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = ()) -> None:
-    """Refuses, before the work, results that could not be written at its end. None means no file.
+    """Refuses output files that cannot be written, before anything is computed. None means no file.
 
     Raises
     ------

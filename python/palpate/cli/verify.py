@@ -48,7 +48,10 @@ from .verb import (
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.argument("recording_file", metavar="RECORDING", type=PATH)
 @plot_option("measured and modelled force over position, residuals beneath")
-@plot_option("recorded and rendered force over position, the loop closed both ways", "--plot-closed-loop")
+@plot_option(
+    "recorded and rendered force over position, driven by recorded motion and by recorded force",
+    "--plot-closed-loop",
+)
 @json_option
 @verbose_option
 @expert_option(
@@ -57,7 +60,7 @@ from .verb import (
     type=float,
     default=None,
     metavar="NUMBER",
-    show_default="that of the flight record, the model or its plan, else 1 % of the travel",
+    show_default="from the flight record, the model or its plan, else 1 % of the model's domain",
     help="Play radius r of a model with hysteresis. The play operator then ignores the recorded direction.",
 )
 @reading_options
@@ -114,7 +117,7 @@ def verify(
 
 
 def _summary(recording: Recording, found: Verification) -> dict[str, str]:
-    """Returns the main numbers, in the units of the file."""
+    """Returns the main numbers of a verification, in the units of the recording's file."""
     worst = int(np.argmax(np.abs(found.residual)))
     position = recording.file_unit("position").text(float(recording.position[found.rows][worst]))
     return {
@@ -122,12 +125,12 @@ def _summary(recording: Recording, found: Verification) -> dict[str, str]:
         "largest": f"{recording.file_unit('force').text(found.worst)} at position {position}",
         "not felt": f"{100 * found.within_jnd:.3g} % of the rows have an error that a hand does not feel",
         "rows": f"{found.n} of {len(recording)} compared, {found.extrapolated} outside the model's domain",
-        "recording": "fresh" if found.fresh else "not fresh: the model was identified on it",
+        "recording": "fresh" if found.fresh else "not fresh: the model was identified on this recording",
     }
 
 
 def _further_numbers(recording: Recording, found: Verification) -> list[str]:
-    """Returns the other numbers of a verification, in sentences."""
+    """Returns the numbers of a verification that --verbose adds, in sentences."""
     numbers = [
         f"r2 {found.r2:.6f}",
         f"lag-1 autocorrelation of the residuals {found.whiteness:.3g} (0 is white), "

@@ -20,52 +20,52 @@ from .observations import Observation, compare, observe_at_rest
 from .pushes import Mechanics, Push, push_response
 
 NO_FORCE_SHARE = 0.7
-"""Share of the duration that is measured without force; the rest is for the pushes [-]"""
+"""Share of a check's duration without force; during the remaining time the device pushes the handle [-]"""
 
 PUSH_FORCE_SHARE = 0.005
 """Force of a push [share of the largest force of the device]; too small to be felt"""
 
 _FRICTION_ADVICE = (
-    "take the hand off the handle and check for 10 s; if the friction exceeds the pushes, give it with "
-    "--coulomb-friction"
+    "take the hand off the handle and check for 10 s; if the friction exceeds the force of the pushes, state "
+    "the friction with --coulomb-friction"
 )
 _NO_FRICTION_ADVICE = (
-    "direct rendering needs friction above 0 for a certificate, because an encoder has steps"
+    "a certificate of direct rendering needs device friction above 0, because the encoder has steps"
 )
 _SHORTEST_DURATION_S = 2.0
-"""Shortest check [s]; the handle must move and rest in it"""
+"""Least duration of a check [s]; in this time the handle must be moved and must be at rest"""
 _DELAY_MARGIN_PERIODS = 0.05
-"""Added to the measured delay, because the clocks of host and device drift [periods]"""
+"""Time added to the measured delay, because the clocks of host and device drift [periods]"""
 _LEAST_SIGN_STEPS = 5.0
-"""Least displacement for a reliable sign [encoder steps]"""
+"""Least displacement of the handle by a push that shows the sign of the force reliably [encoder steps]"""
 _LEAST_SIGN_ERRORS = 3.0
-"""Least displacement for a reliable sign [standard errors]"""
+"""Least displacement of the handle by a push that shows the sign of the force reliably [standard errors]"""
 _FORCE_SIGN = "sign of the force"
 """Name of the observation"""
 _SIMULATED_FRICTION_SHARE = 0.002
-"""Coulomb friction of the simulated device [share of its largest force]"""
+"""Coulomb friction of the simulated device [share of the device's largest force]"""
 
 
 @dataclass(frozen=True)
 class Check:
-    """Result of a check."""
+    """Result of a check of a device: observations, measured numbers and verdict."""
 
     device: str
     observations: tuple[Observation, ...]
     numbers: Mapping[str, float | None]
     base: CoreProfile
-    """Properties that the device states, without its mechanics."""
+    """Properties that the device itself states; inertia, damping and friction are not among them."""
     coulomb_friction: float | None = None
     """Friction that the user states [N or N*m]"""
 
     @property
     def suitable(self) -> bool:
-        """True if no observation is wrong."""
+        """True if no observed property of the device is wrong."""
         return all(each.right is not False for each in self.observations)
 
     @property
     def may_push(self) -> bool:
-        """True if a small force is allowed. A host that is only late allows it."""
+        """True if the device may push the handle: no wrong property forbids force. A late host is allowed."""
         return not any(each.right is False and each.forbids_force for each in self.observations)
 
     @property
@@ -77,7 +77,8 @@ class Check:
         """Returns the measured device.
 
         Friction is a lower bound, as a certificate requires; encoder, force step and force limit are those
-        that the device states.
+        The friction is a lower bound, as a certificate requires. Encoder step, force step and force limit are
+        those that the device states.
 
         Raises
         ------
@@ -86,15 +87,15 @@ class Check:
         """
         if not self.may_push:
             raise InputError(
-                "this device has no profile, because a wrong result of its check forbids force; "
-                "correct it first"
+                "this device gets no profile: its check found a wrong property that makes force unsafe; "
+                "correct that property first"
             )
         inertia, damping = self.numbers["inertia"], self.numbers["viscous_damping"]
         friction = self.numbers["coulomb_friction_at_least"]
         if inertia is None or damping is None or friction is None:
             raise InputError(
                 "a profile needs inertia, damping and friction: check a free handle without load "
-                "for 10 s with --push; if the friction exceeds the pushes, give it with --coulomb-friction "
+                "for 10 s with --push; if the friction exceeds the pushes, state it with --coulomb-friction "
                 "(in Python coulomb_friction)"
             )
         period, jitter, delay = self.numbers["period_s"], self.numbers["jitter_s"], self.numbers["delay_s"]
@@ -112,7 +113,7 @@ class Check:
         )
 
     def profile_notes(self) -> tuple[str, ...]:
-        """Origin of each number of the profile."""
+        """States how each number of the profile was obtained: measured, stated by the device, or assumed."""
         stated = self.coulomb_friction is not None
         friction = "stated, not measured" if stated else "measured minus its uncertainty, a lower bound"
         delay = "measured" if self.numbers["delay_s"] is not None else "not measured; assumed to be 0"
@@ -189,7 +190,7 @@ def check_device(
         "wait_s": wait_s,
         "progress": progress,
         "keep": True,
-        "lowest_rate_share": 0.0,  # a low rate is an observation and does not stop the check
+        "lowest_rate_share": 0.0,  # the check continues at a low rate, which becomes an observation
         "friction_share": _SIMULATED_FRICTION_SHARE,
     }
     summary = measure(device, duration_s=duration_s * (NO_FORCE_SHARE if push else 1.0), **common)
@@ -199,7 +200,8 @@ def check_device(
             check, Observation(_FORCE_SIGN, "not measured", None, "check a free handle with --push")
         )
     elif not check.may_push:
-        check = _with(check, Observation(_FORCE_SIGN, "not measured: a wrong result forbids force"))
+        text = "not measured: no force is sent while another property is wrong"
+        check = _with(check, Observation(_FORCE_SIGN, text))
     else:
         force = PUSH_FORCE_SHARE * check.base.force_limit
         push_summary = measure(device, duration_s=duration_s * (1.0 - NO_FORCE_SHARE), push=force, **common)
@@ -219,7 +221,7 @@ def judge(summary: Mapping[str, Any]) -> Check:
     Parameters
     ----------
     summary : mapping
-        A summary of :func:`measure`, with ticks in ``kept`` and the stated device in ``profile``.
+        A summary of :func:`measure`: ``kept`` holds the ticks, ``profile`` the device's stated properties.
     """
     base = summary["profile"]
     ticks = summary["kept"]
@@ -258,7 +260,7 @@ def judge(summary: Mapping[str, Any]) -> Check:
 
 
 def with_pushes(check: Check, push: Push) -> Check:
-    """Adds the results of pushes to a check."""
+    """Returns the check with the results of the pushes: sign and delay of the force, and the mechanics."""
     observations = [*check.observations, _sign(push, check.base.encoder_step, check.base.position_unit)]
     numbers = dict(check.numbers)
     if push.delay_samples is not None and numbers["delay_s"] is None:
@@ -296,7 +298,7 @@ def _mechanics(mechanics: Mechanics, check: Check) -> list[Observation]:
 
 
 def _sign(push: Push, step: float, unit: str) -> Observation:
-    """Returns the observation that pushes moved the handle in the right or wrong direction."""
+    """Returns the observation of the sign of the force: did pushes move the handle in the right direction?"""
     text = (
         f"a push moved the handle by {push.displacement:.3g} {unit} "
         f"(standard error {push.standard_error:.1g} {unit})"
@@ -306,8 +308,8 @@ def _sign(push: Push, step: float, unit: str) -> Observation:
         or push.displacement == 0.0
     ):
         advice = (
-            f"must be at least {_LEAST_SIGN_STEPS:g} encoder steps and {_LEAST_SIGN_ERRORS:g} "
-            "standard errors: take the hand off the handle"
+            f"a push must move the handle by {_LEAST_SIGN_STEPS:g} encoder steps and "
+            f"{_LEAST_SIGN_ERRORS:g} standard errors at least: take the hand off the handle"
         )
         return Observation(_FORCE_SIGN, f"not clear: {text}", None, advice)
     if push.displacement < 0.0:
@@ -320,13 +322,13 @@ def _sign(push: Push, step: float, unit: str) -> Observation:
         _FORCE_SIGN,
         text,
         push.displacement > 0.0 and push.reported_sign_agrees,
-        "exchange two wires of the motor, or reverse its sign in the firmware; do not enable force",
+        "exchange two wires of the motor, or reverse the motor's sign in the firmware; do not enable force",
         True,
     )
 
 
 def _expected(profile: DeviceProfile | None, model: Model | None) -> dict[str, CoreProfile]:
-    """Returns the devices to compare with, by the name of the observation."""
+    """Returns the devices with which the measured one is compared, by the name of the observation."""
     devices: dict[str, CoreProfile] = {} if profile is None else {"profile": profile}
     if model is not None:
         if model.certificate is None:

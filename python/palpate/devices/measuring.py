@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..model import Model
 
 Progress = Callable[[int, float, float, int], None]
-"""Called ten times a second with ticks, position, force of the object and samples lost"""
+"""Function that is called ten times a second with ticks, position, object force and lost samples so far"""
 
 
 def measure(device: str = "simulated", *, object: Model | None = None, **settings: Any) -> dict[str, Any]:
@@ -30,7 +30,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     Returns
     -------
     dict
-        The summary, by name.
+        Numbers and words of the summary, by name.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     """
     if object is not None:
         if device != "simulated":
-            raise InputError(f"an object needs device simulated; {device} has a real one: leave out object")
+            raise InputError(f"object needs device simulated; {device} has a real object: leave out object")
         settings["position_unit"] = object.units["position"]
         settings["force_unit"] = object.units["force"]
         if object.units["force"] == "A":
@@ -78,7 +78,7 @@ def record(
     Parameters
     ----------
     path : str or Path
-        The recording. Until it is complete it is path.part, which is locked.
+        File of the recording. Until the recording is complete, the file is called path.part and is locked.
     force : bool
         True: an existing recording is replaced. False: it is refused.
     device : str
@@ -90,15 +90,16 @@ def record(
     duration_s, rate_hz : float
         Duration (inf: until Ctrl-C) [s] and sampling rate [Hz].
     transducer : bool
-        True if the simulated device has one.
+        True if the simulated device has a force transducer.
     wait_s : float, optional
         Longest wait for a packet of a USB device [s].
     lowest_rate_share : float, optional
-        A lower share of the rate for half a second ends a probe; 0: never. It never ends a recording by hand.
+        A rate below this share of `rate_hz` for half a second ends a probe; 0: never. A recording by hand
+        continues.
     progress : callable, optional
         Called ten times a second with ticks, position, force and samples lost.
     **sweep
-        lower, upper [m or rad], speed [a second], stiffness, force_limit of the probe; None: chosen.
+        lower, upper [m or rad], speed [m/s or rad/s], stiffness and force_limit of the probe; None: chosen.
 
     Returns
     -------
@@ -112,7 +113,7 @@ def record(
         The recording was refused before any motion.
     """
     if not probe:
-        lowest_rate_share = 0.0  # a low rate is reported but does not stop a recording without force
+        lowest_rate_share = 0.0  # without a probe a low rate is reported but does not stop the recording
     if lowest_rate_share is not None:
         sweep["lowest_rate_share"] = lowest_rate_share
     return measure(

@@ -15,30 +15,30 @@ from .._typing import Float1D
 from ..verdict import Finding, no, usable
 
 _RATE_TOLERANCE = 0.01
-"""Largest error of the rate [share of the requested rate]"""
+"""Largest accepted error of the loop's rate [share of the requested rate]"""
 _CLOCK_TOLERANCE = 0.005
-"""Largest error of the device's clock [share of the period]; a quartz clock is far better"""
+"""Largest accepted error of the device's clock [share of the period]; a quartz clock has a far smaller one"""
 _LARGEST_PERIOD_RATIO = 2.0
-"""Largest p99.9 of the period over the requested period."""
+"""Largest accepted 99.9th percentile of the loop's period, over the requested period."""
 _LARGEST_LOST_SHARE = 1e-3
-"""Largest share of lost and repeated samples."""
+"""Largest accepted share of lost and repeated samples."""
 _LARGEST_NOISE_STEPS = 2.0
-"""Largest RMS of the encoder at rest [encoder steps]."""
+"""Largest accepted RMS noise of the encoder while the handle is at rest [encoder steps]."""
 _REST_DURATION_S = 0.1
-"""Length of a piece in which a handle may be at rest [s]."""
+"""Duration of the pieces into which a check is divided to find one with the handle at rest [s]."""
 _LEAST_MOTION_STEPS = 50.0
-"""Least motion of the handle that gives reliable signs [encoder steps]."""
+"""Least motion of the handle that shows the signs of velocity and transducer reliably [encoder steps]."""
 _VELOCITY_SAMPLES = 50
-"""Number of samples over which a displacement is compared with a velocity."""
+"""Number of samples between two positions whose difference is compared with the reported velocity."""
 _VELOCITY_TOLERANCE = 0.25
-"""Largest error of the reported velocity [share of the velocity from the positions]"""
+"""Largest accepted error of the reported velocity [share of the velocity from the positions]"""
 _LEAST_CORRELATION = 0.3
-"""Least correlation of force and position for a clear sign."""
+"""Least |correlation| of force and position that shows the sign of the transducer."""
 
 _STEP_TOLERANCE = 0.01
 """Largest difference of encoder step and force limit from the expected ones [share]"""
 _DAMPING_TOLERANCE = 0.1
-"""Share by which measured damping and friction may be below the expected ones, because of noise."""
+"""Share by which measured damping and friction may be less than the expected ones, because of noise."""
 
 _TOO_LITTLE_MOTION = f"the handle moved by less than {_LEAST_MOTION_STEPS:g} encoder steps"
 _CABLE_ADVICE = "try another cable, another port, or no hub"
@@ -46,21 +46,21 @@ _CABLE_ADVICE = "try another cable, another port, or no hub"
 
 @dataclass(frozen=True)
 class Observation:
-    """One examined property of a device."""
+    """One examined property of a device: its name, the result and advice."""
 
     name: str
     text: str
     right: bool | None = None
-    """True: right; False: wrong; None: not judged"""
+    """True: the property is right; False: it is wrong; None: it was not judged"""
     advice: str = ""
     forbids_force: bool = False
-    """True if a wrong property forbids any force"""
+    """True if the device must not receive any force while this property is wrong"""
     detail: bool = False
-    """True if a summary shows it only when it is wrong"""
+    """True if a summary shows the property only when it is wrong"""
 
     @property
     def finding(self) -> Finding | None:
-        """Finding for a verdict; None if the observation is right or needs no advice."""
+        """Finding on the property for a verdict; None if the property is right or needs no advice."""
         if self.right or (self.right is None and not self.advice):
             return None
         return (usable if self.right is None else no)(
@@ -69,7 +69,7 @@ class Observation:
 
 
 def observe_at_rest(summary: Mapping[str, Any]) -> list[Observation]:
-    """Judges a summary of `measure` with its ticks, measured without force."""
+    """Judges rate, clock, losses, encoder and signs from a summary of `measure` with ticks, without force."""
     ticks, wanted = summary["kept"], summary["wanted_rate_hz"]
     step = summary["profile"].encoder_step
     observations = [
@@ -116,7 +116,8 @@ def _rate(rate_hz: float, wanted: float) -> Observation:
         "rate",
         f"{rate_hz:.1f} Hz of {wanted:g} Hz",
         bool(abs(rate_hz / wanted - 1.0) <= _RATE_TOLERANCE),
-        f"must be within {_RATE_TOLERANCE:.0%}: close other programs, or give the loop real-time priority",
+        f"the rate must be within {_RATE_TOLERANCE:.0%} of {wanted:g} Hz: close other programs, or give the "
+        "loop real-time priority",
     )
 
 
@@ -126,14 +127,14 @@ def _period(period: Mapping[str, float], wanted: float) -> Observation:
         "period",
         _percentiles(period),
         period["p999_us"] <= longest_us,
-        f"99.9 % must be below {longest_us:.0f} us: close other programs, or give the loop "
+        f"99.9 % of the periods must be below {longest_us:.0f} us: close other programs, or give the loop "
         "real-time priority",
         detail=True,
     )
 
 
 def _clock(ticks: Mapping[str, Any], wanted: float) -> Observation:
-    """Judges the device's clock between consecutive samples."""
+    """Judges the time between consecutive samples on the device's clock."""
     steps = np.diff(ticks["device_time"])[np.diff(ticks["sequence"].astype(np.int64)) == 1]
     if not steps.size:
         return Observation("device clock", "no two consecutive samples arrived", False, _CABLE_ADVICE)
@@ -142,7 +143,7 @@ def _clock(ticks: Mapping[str, Any], wanted: float) -> Observation:
         "device clock",
         f"{1e6 * mean:.1f} us per sample, spread {1e6 * float(steps.std()):.1f} us",
         bool(abs(mean * wanted - 1.0) <= _CLOCK_TOLERANCE),
-        f"must be within {_CLOCK_TOLERANCE:.1%} of {1e6 / wanted:.1f} us: the firmware does not "
+        f"the mean must be within {_CLOCK_TOLERANCE:.1%} of {1e6 / wanted:.1f} us: the firmware does not "
         "keep its stated rate",
         detail=True,
     )
@@ -154,12 +155,12 @@ def _losses(summary: Mapping[str, Any]) -> Observation:
         "samples",
         f"{lost} lost and {repeated} repeated of {ticks}",
         bool(lost + repeated <= _LARGEST_LOST_SHARE * ticks),
-        f"must be at most {_LARGEST_LOST_SHARE:.1%}: {_CABLE_ADVICE}",
+        f"at most {_LARGEST_LOST_SHARE:.1%} of the samples may be lost or repeated: {_CABLE_ADVICE}",
     )
 
 
 def _encoder(position: Float1D, step: float, unit: str, rate_hz: float) -> Observation:
-    """Judges the noise in the quietest piece. A parabola is subtracted, because hands drift."""
+    """Judges the encoder's noise in the piece with the least motion. A parabola removes the hand's drift."""
     length = max(10, round(_REST_DURATION_S * rate_hz))
     pieces = position[: len(position) // length * length].reshape(-1, length)
     if not len(pieces):
@@ -180,7 +181,7 @@ def _encoder(position: Float1D, step: float, unit: str, rate_hz: float) -> Obser
 
 
 def _velocity(ticks: Mapping[str, Any], step: float) -> Observation:
-    """Compares the velocity with the displacement: damping of a wrong sign would give energy."""
+    """Judges the sign of the reported velocity by the displacement: with a wrong sign damping adds energy."""
     name = "velocity"
     position, time, velocity = (np.asarray(ticks[key]) for key in ("position", "device_time", "velocity"))
     if np.ptp(position) < _LEAST_MOTION_STEPS * step or len(position) < 2 * _VELOCITY_SAMPLES:
@@ -195,8 +196,8 @@ def _velocity(ticks: Mapping[str, Any], step: float) -> Observation:
         name,
         f"{share:.2f} times the velocity from the positions",
         abs(share - 1.0) <= _VELOCITY_TOLERANCE,
-        f"must be within {_VELOCITY_TOLERANCE:.0%} of 1, a negative value is a reversed sign: correct the "
-        "firmware; do not enable force",
+        f"the ratio of both velocities must be within {_VELOCITY_TOLERANCE:.0%} of 1; a negative ratio is a "
+        "reversed sign: correct the firmware; do not enable force",
         share <= 0.0,
     )
 
@@ -217,21 +218,21 @@ def _transducer(position: Float1D, measured: Float1D, step: float) -> Observatio
             name,
             f"not clear: correlation of force and position {correlation:.2f}",
             None,
-            f"must be above {_LEAST_CORRELATION:g}: press a plain spring",
+            f"the correlation must be above {_LEAST_CORRELATION:g}: press a plain spring with the handle",
         )
     return Observation(
         name,
         f"{'correct' if correlation > 0.0 else 'reversed'}: correlation of force and position "
         f"{correlation:.2f}",
         correlation > 0.0,
-        "must be positive when an object is pressed: reverse the sign of the encoder or the transducer; do "
-        "not enable force",
+        "the correlation must be positive when an object is pressed: reverse the sign of the encoder or the "
+        "transducer; do not enable force",
         True,
     )
 
 
 def compare(expected: DeviceProfile, measured: Mapping[str, float | None], *, name: str) -> Observation:
-    """Judges if a device is at least as good as the expected one.
+    """Judges if a measured device is at least as good as the expected device.
 
     Parameters
     ----------
@@ -239,7 +240,7 @@ def compare(expected: DeviceProfile, measured: Mapping[str, float | None], *, na
         The profile, or the device of a certificate.
     measured : mapping
         ``period_s``, ``jitter_s``, ``delay_s``, ``encoder_step``, ``force_limit``,
-        ``viscous_damping``, ``coulomb_friction``; None if it was not measured.
+        ``viscous_damping``, ``coulomb_friction`` of the device; None if a number was not measured.
     name : str
         Name of the observation.
     """

@@ -14,33 +14,33 @@ from scipy.optimize import least_squares
 from .._typing import Float1D, Float2D
 
 _LARGE_PUSH_SHARE = 0.9
-"""Least push whose displacement is averaged for the sign of the force [share of the largest push]"""
+"""Least force of a push whose displacement shows the sign of the force [share of the largest push]"""
 _FEWEST_PUSHES = 3
-"""Least number of pushes with a standard error"""
+"""Least number of pushes from which a standard error is computed"""
 
 _LEAST_FITTED_STEPS = 10.0
-"""Least displacement of a push that is fitted [encoder steps]"""
+"""Least displacement of the handle by a push from which the mechanics are fitted [encoder steps]"""
 
 _LEAST_SIZE_RATIO = 1.25
-"""Ratio of the largest to the smallest push that separates friction from damping [-]"""
+"""Least ratio of the largest to the smallest push from which friction and damping are separated [-]"""
 
 _LARGEST_RESIDUAL_SHARE = 0.03
-"""Largest RMS residual of accepted mechanics [share of the RMS motion]"""
+"""Largest RMS error of the fitted displacement that is accepted [share of the RMS displacement]"""
 
 _ROUNDING_STEPS = 1.0
-"""RMS residual that is always accepted [encoder steps]"""
+"""RMS error of the fitted displacement that is always accepted [encoder steps]"""
 
 _FRICTION_RESERVE_SHARE = 0.05
-"""Reserve of the friction, because a real handle differs from the fitted one [share]"""
+"""Share subtracted from the fitted friction, because a real handle differs from the fitted law [-]"""
 
 _FRICTION_RESERVE_ERRORS = 3.0
-"""Reserve of the friction [standard errors]"""
+"""Number of standard errors subtracted from the fitted friction [-]"""
 
 _LARGEST_LOGARITHM = 40.0
-"""Range of the logarithms of J and b [-]"""
+"""Bound of the |logarithm| of the fitted inertia J and damping b, in SI units [-]"""
 
 _START_FRICTION_SHARES = (0.05, 0.4)
-"""Friction from which the search begins, over the largest push [-]"""
+"""Friction values from which the fit begins, over the force of the largest push [-]"""
 
 
 @dataclass(frozen=True)
@@ -70,28 +70,30 @@ class Mechanics:
 
 @dataclass(frozen=True)
 class Push:
-    """Response of a handle to pushes."""
+    """Response of a handle to pushes: displacement, sign, delay and mechanics."""
 
     displacement: float
-    """Mean displacement by a push, > 0 for a correct sign [m or rad]"""
+    """Mean displacement of the handle by a push; > 0 if the sign of the force is correct [m or rad]"""
     standard_error: float
-    """Standard error of that mean [m or rad]; infinite for fewer than three pushes"""
+    """Standard error of the mean displacement [m or rad]; infinite for fewer than three pushes"""
     reported_sign_agrees: bool
     """True if the force that the device reports has the sign of the commanded force"""
     delay_samples: int | None
-    """Whole samples from command to force"""
+    """Number of whole samples from the command of a force to the force; None if it was not found"""
     mechanics: Mechanics | None
-    """Inertia, damping and friction; None if they cannot be fitted"""
+    """Inertia, damping and friction of the handle; None if they cannot be fitted"""
     mechanics_problem: str = ""
-    """Reason why they cannot be fitted"""
+    """Reason why inertia, damping and friction cannot be fitted"""
 
 
 def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction: float | None = None) -> Push:
-    """Computes sign, delay and mechanics from the ticks of alternating pushes.
+    """Computes sign of the force, delay, and mechanics of the handle from the ticks of alternating pushes.
 
     A force F > 0 pushes towards smaller positions. A displacement is the difference to the motion without the
     push, because a hand may hold the handle. All results except the delay use the device's clock, so a late
-    host has no effect.
+    A force F > 0 pushes towards smaller positions. A displacement is the position minus the position expected
+    without the push, because a hand may hold the handle. All results except the delay use the device's clock,
+    so a late host has no effect.
 
     Parameters
     ----------
@@ -109,10 +111,10 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
     displacements: list[float] = []
     sizes: list[float] = []
     agreement = 0.0
-    # A reading reports the force that acted until then: a push begins one reading earlier.
+    # A sample of the device reports the force that acted before it: a push begins one sample earlier.
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
-    for begin in begins[begins > 2]:  # the motion before the first push is unknown
+    for begin in begins[begins > 2]:  # three samples before a push show the motion without it
         samples = int(np.argmin(pushing[begin + 1 :])) or len(pushing) - begin - 1
         commanded = float(np.sign(sent[max(0, begin + 1 - samples) : begin + 1 + samples].sum()))
         agreement += commanded * float(np.sign(applied[begin + 1]))
@@ -139,14 +141,14 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
 
 
 def _push_displacement(time: Float1D, position: Float1D, begin: int, samples: int) -> float:
-    """Returns the displacement of a push from the previous motion, a parabola because hands are slow."""
+    """Returns the handle's displacement by a push: position minus a parabola through the motion before."""
     before, end = slice(max(0, begin - 2 * samples), begin + 1), min(begin + samples, len(position) - 1)
     previous_motion = np.polynomial.Polynomial.fit(time[before], position[before], 2)
     return float(position[end] - previous_motion(time[end]))
 
 
 def _delay(ticks: Mapping[str, Any]) -> int | None:
-    """Returns the samples from a command to the first reading with its force, minus the usual one."""
+    """Returns the samples from a command to the first sample that reports its force, minus one; or None."""
     sent, applied = np.asarray(ticks["force"]), np.asarray(ticks["applied"])
     begins = np.flatnonzero((sent[1:] != 0.0) & (sent[:-1] == 0.0)) + 1
     delays = [int(np.argmax(applied[begin + 1 :] != 0.0)) for begin in begins if np.any(applied[begin + 1 :])]
@@ -156,7 +158,9 @@ def _delay(ticks: Mapping[str, Any]) -> int | None:
 def _mechanics(
     applied: Float1D, position: Float1D, time: Float1D, encoder_step: float, friction: float | None
 ) -> tuple[Mechanics | None, str]:
-    """Fits J dv/dt = -F - b v - f_c sgn(v) to the displacements of pushes that begin at rest.
+    """Fits J dv/dt = -F - b v - f_c sgn(v) to the displacements of the handle by pushes that begin at rest.
+
+    v is the velocity, F the force of a push, J the inertia, b the damping and f_c the Coulomb friction.
 
     Parameters
     ----------
@@ -165,14 +169,14 @@ def _mechanics(
     encoder_step : float
         [m or rad]
     friction : float, optional
-        f_c, if it is known; pushes of one size are then enough [N or N*m].
+        Coulomb friction f_c, if it is known; pushes of one size are then enough [N or N*m].
 
     Returns
     -------
     mechanics : Mechanics or None
-        None if they cannot be fitted.
+        Inertia, damping and friction; None if they cannot be fitted.
     reason : str
-        The reason; empty if they are fitted.
+        Reason why they cannot be fitted; empty if they are fitted.
     """
     applied, moved, seconds = _windows(applied, position, time)
     if len(applied) == 0:
@@ -218,7 +222,10 @@ def _mechanics(
 
 
 def _windows(applied: Float1D, position: Float1D, time: Float1D) -> tuple[Float2D, Float2D, Float2D]:
-    """Returns force (p, n), displacement (p, n + 1), duration (p, n) of each push and an equal time after."""
+    """Returns forces (p, n), displacements (p, n + 1) and time steps (p, n) in windows around p pushes.
+
+    Each window holds one push and an equal time after it.
+    """
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
     ends = np.flatnonzero(~pushing[1:] & pushing[:-1])
@@ -230,7 +237,7 @@ def _windows(applied: Float1D, position: Float1D, time: Float1D) -> tuple[Float2
 
 
 def _start_values(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[float, float]:
-    """Returns the logarithms of J and b from the impulse, displacement and duration of a push."""
+    """Returns first estimates of log J and log b (inertia J, damping b) from impulse and motion of a push."""
     impulse = float(np.median(np.abs((applied * seconds).sum(axis=1))))
     displacement = float(np.median(np.abs(moved).max(axis=1)))
     duration = float(np.median(seconds.sum(axis=1)))
@@ -242,7 +249,7 @@ def _start_values(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[f
 def _displacement(
     applied: Float2D, seconds: Float2D, inertia: float, damping: float, friction: float
 ) -> Float2D:
-    """Returns the displacement (p, n + 1) of a handle at rest under held forces (p, n), in closed form."""
+    """Returns the exact displacement (p, n + 1) of a handle, first at rest, under p series of held forces."""
     displacement = np.zeros((len(applied), applied.shape[1] + 1))
     velocity = np.zeros(len(applied))
     decay = inertia / damping

@@ -23,15 +23,15 @@ from ..errors import InputError
 from ..recording.files import replacing
 
 _TIMEOUT_MS = 500
-"""Longest wait for the answer to a request [ms]"""
+"""Longest time that a request to the device waits for the answer [ms]"""
 
 
 class DeviceError(Exception):
-    """Failure of a device: one sentence with its name, the reason and the likely cure."""
+    """Failure of a device: one sentence with the device's name, the reason and the likely cure."""
 
 
 def device_error(device: str, action: str, error: Any) -> DeviceError:
-    """Returns the sentence for an error of pyusb during an action on `device`."""
+    """Returns the `DeviceError` for an error of pyusb during an action on `device`."""
     cause = core.usb_cause(getattr(error, "backend_error_code", None) or 0)
     reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return DeviceError(f"{device}, {action}: {cause or f'{reason}; plug it in again'}")
@@ -78,7 +78,7 @@ class UsbSetup:
 
     @property
     def name(self) -> str:
-        """Product, serial number and place on the bus."""
+        """Product name, serial number and bus address of the device."""
         known = " ".join(part for part in (self.product, self.serial) if part)
         return f"{known} ({self.place})" if known else self.place
 
@@ -91,7 +91,7 @@ class UsbSetup:
         return info
 
     def zero(self) -> None:
-        """Sets the current position to 0."""
+        """Sets the zero of the device's position to the present position of the handle."""
         self._request(UsbRequest.Zero, "zeroing its encoder")
 
     def set_watchdog(self, milliseconds: int) -> None:
@@ -101,15 +101,15 @@ class UsbSetup:
         self._request(UsbRequest.Watchdog, "setting its watchdog", value=milliseconds)
 
     def enable(self) -> None:
-        """Enables force, which starts at 0."""
+        """Enables the device's motor force, which starts at 0."""
         self._request(UsbRequest.Enable, "enabling its force", value=1)
 
     def disable(self) -> None:
-        """Ends the force."""
+        """Disables the device's motor force."""
         self._request(UsbRequest.Enable, "disabling its force", value=0)
 
     def clear(self) -> None:
-        """Clears faults; required before `enable` after an emergency stop."""
+        """Clears the faults that the device has stored; required before `enable` after an emergency stop."""
         self._request(UsbRequest.Clear, "clearing its faults")
 
     def close(self) -> None:
@@ -146,7 +146,7 @@ class UsbSetup:
 
 @dataclass(frozen=True)
 class Found:
-    """Device on the bus: its identity, or the reason why it cannot be read."""
+    """USB device on the bus: its identity, or the reason why it cannot be used."""
 
     place: str
     product: str
@@ -176,7 +176,7 @@ def _candidates() -> Iterator[UsbSetup]:
 
 
 def find_devices() -> list[Found]:
-    """Finds every haptic USB device, unusable ones with the reason.
+    """Finds every haptic USB device; a device that cannot be used is returned with the reason.
 
     Raises
     ------
@@ -196,7 +196,7 @@ def find_devices() -> list[Found]:
 
 
 def open_usb(serial: str = "") -> UsbSetup:
-    """Opens the only device, or the one with a serial number, to set it up.
+    """Opens the only connected USB device, or the one with the given serial number, to set it up.
 
     Parameters
     ----------
@@ -243,14 +243,14 @@ _RELOAD = (("udevadm", "control", "--reload-rules"), ("udevadm", "trigger", "--s
 
 
 def install_rule(report: Callable[[str], None], *, folder: Path = FOLDER) -> None:
-    """Writes the rule and makes udev read it.
+    """Writes the udev rule, which gives users access to the device, and makes udev read it.
 
     Parameters
     ----------
     report : callable
         Called with a sentence for each step.
     folder : Path
-        Folder of the rules of this machine.
+        Folder of the udev rules of this machine.
 
     Raises
     ------

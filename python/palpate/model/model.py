@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model: an identified environment with its origin."""
+"""Model: the identified force law, with the recordings and settings from which it was identified."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from ..verdict import Verdict
 from .model_file import Fit, PathStep, describe, write_json
 
 _HELD_OUT_KEY = "held_out_every"
-"""Key in the notes of a file: every k-th row of the data was not used."""
+"""Key in the notes of a model file whose value is k if every k-th row of the recordings was held out."""
 
 _NUMBER_ARGUMENTS = ("bias", "bias_hysteresis", "period", "play_radius")
-"""Arguments that are one number."""
+"""Arguments of `Model` that are one number."""
 
 _OPTIONAL_ARGUMENTS = ("weight_hysteresis", "linear_hysteresis", "bias_hysteresis", "period", "play_radius")
-"""Arguments that may be None."""
+"""Arguments of `Model` that may be None."""
 
 
 class Model(ForceModel):
-    """A force identified from a recording (paper eq. 4), with its domain, units, data and history.
+    """Force law identified from recordings (paper eq. 4), with domain, units, source and fit.
 
     ``force``, ``slope``, ``energy``, ``predict``, ``play`` and ``extrapolated`` are those of the compiled
     :class:`palpate._core.model.ForceModel`, as are the network's arrays.
@@ -42,7 +42,7 @@ class Model(ForceModel):
     Parameters
     ----------
     kind : {"position", "hysteresis", "position_velocity", "general"}
-        "hysteresis": f(x, s) = g(x) + s h(x).
+        "hysteresis": f(x, s) = g(x) + s h(x), mean force g of both strokes, hysteresis h, direction state s.
     inputs : sequence of str
         One name for each dimension of the network, such as ("position",); without the direction of a
         hysteresis model.
@@ -54,21 +54,21 @@ class Model(ForceModel):
     linear : (d,) array_like
     bias : float
     weight_hysteresis, linear_hysteresis, bias_hysteresis : optional
-        (N,), (d,) and a number: h, on the wavelets of g; all three or none.
+        Weights (N,), slopes (d,) and constant of the hysteresis h, which has the wavelets of g; all or none.
     lower, upper : (d,) array_like
-        Domain: the box that the data covers.
+        Domain: least and largest value of each input in the recordings.
     below, above : {"linear", "free"}
-        Continuation outside the domain.
+        Continuation of the force below and above the domain.
     period : float, optional
-        Period of a model that repeats.
+        Period of a force that repeats over position [m or rad].
     play_radius : float, optional
         Play radius of the hysteresis [m or rad], if known.
     fit : Fit
         Result of the identification.
     data : Source
-        Data of the identification.
+        Files, fingerprints and columns of the recordings.
     mass, damping : float, optional
-        Mass and viscous damping that were fitted with the force.
+        Mass and viscous damping of the object, fitted together with the force.
     slope_bounds : (min, max), optional
         Bounds of df/dx over the domain; computed by default (d = 1).
     plan, certificate : mapping, optional
@@ -196,7 +196,7 @@ class Model(ForceModel):
 
     @property
     def n_parameters(self) -> int:
-        """Number of fitted real numbers, dilations and translations included."""
+        """Number of fitted real numbers of the model, including dilations and translations."""
         return self.fit.n_parameters
 
     @property
@@ -216,22 +216,22 @@ class Model(ForceModel):
 
     @property
     def path(self) -> Sequence[PathStep]:
-        """Networks that identification considered: number of wavelets, error and criterion."""
+        """Networks that identification compared: the number of wavelets, error and criterion of each."""
         return self.fit.path
 
     @property
     def domain(self) -> tuple[Float1D, Float1D]:
-        """(lower, upper), each (d,)."""
+        """Domain: least and largest value of each input, (lower, upper), each (d,)."""
         return self.lower, self.upper
 
     @property
     def planned(self) -> Model:
-        """Model that the plan renders: this one, or the one with the network of the plan."""
+        """Model that the plan renders: with the network stored in the plan, if any, else this model."""
         network = None if self.plan is None else self.plan["network"]
         return self if network is None else self.with_network(**network)
 
     def with_network(self, **network: Any) -> Model:
-        """Returns this model with other network numbers, without plan, certificate and slope bounds.
+        """Returns the model with other network parameters, without plan, certificate and slope bounds.
 
         Parameters
         ----------
@@ -326,7 +326,7 @@ class Model(ForceModel):
         )
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Writes the model file. It gets its name only when it is complete.
+        """Writes the model file. The file gets its final name only when it is completely written.
 
         Raises
         ------
@@ -342,7 +342,7 @@ class Model(ForceModel):
         return Model.from_dict, (self.to_dict(),)
 
     def __eq__(self, other: object) -> bool:
-        """Returns True if both would give the same model file."""
+        """Returns True if both models would be written as the same model file."""
         return self._text() == other._text() if isinstance(other, Model) else NotImplemented
 
     def __hash__(self) -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Text of a model: the parts of its file except the network, and a readable description.
+"""Parts of a model file except the network, and the description of a model as text.
 
 The core reads and checks model files; `model.schema.json` describes them.
 """
@@ -17,16 +17,16 @@ from ..errors import escaped
 from ..recording.files import replacing
 
 _MULTILINE_FIELDS = ("network", "fit", "plan", "certificate")
-"""Objects with one line for each field in the file."""
+"""Objects of a model file that are written with one line for each field."""
 
 
 class PathStep(TypedDict):
-    """One model that identification considered."""
+    """One network that identification compared: its number of wavelets, error and criterion."""
 
     n_wavelets: int
     rmse: float
     criterion: float | None
-    """Value of the stopping rule, smaller is better; None if the rule has no value"""
+    """Value of the criterion that stops adding wavelets; smaller is better; None if it has no value"""
     model_class: str
 
 
@@ -38,10 +38,10 @@ class Fit:
     """Simplest accepted model class: constant, linear, position, hysteresis, ..."""
     stop_reason: str
     nrmse: float
-    """RMSE over the population standard deviation of the force, on the rows of the identification"""
+    """RMS error over the population standard deviation of the force, on the rows that were fitted"""
     n_wavelets: int
     n_parameters: int
-    """Number of fitted real numbers, dilations and translations included"""
+    """Number of fitted real numbers of the model, including dilations and translations"""
     path: Sequence[PathStep] = ()
 
     def record(self) -> dict[str, Any]:
@@ -65,7 +65,7 @@ class Fit:
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
-    """Returns the certificate for a model file. Its scheme is stored in the plan."""
+    """Returns the certificate for a model file, without the scheme, which the plan stores."""
     record = certificate.to_dict()
     del record["scheme"]
     return {
@@ -78,7 +78,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> Path:
-    """Writes readable JSON; the file appears when it is complete."""
+    """Writes readable JSON; the file gets its name only when it is completely written."""
     with replacing(path) as temporary:
         temporary.write_text(f"{_lines(content, '')}\n", encoding="utf-8")
     return path
@@ -99,7 +99,7 @@ if TYPE_CHECKING:
 
 
 def describe(model: Model) -> str:
-    """Returns verdict, terms, domain, units and history of a model as text."""
+    """Returns verdict, terms, domain, units and fit of a model as text."""
     position, force = (model.units[role] or "SI" for role in ("position", "force"))
     fit, data = model.fit, model.data
     lines = [
@@ -132,7 +132,7 @@ def describe(model: Model) -> str:
 
 
 def _terms(model: Model, force: str) -> list[str]:
-    """Returns the force as a formula, and its wavelets as a table."""
+    """Returns the model's force as a formula, and the wavelets of its network as a table."""
     names = ["x"] if model.dimension == 1 else [f"x{k + 1}" for k in range(model.dimension)]
     linear = " ".join(f"{c:+.6g} {name}" for c, name in zip(model.linear, names, strict=True))
     network = "sum_i w_i psi(alpha_i (x - beta_i)) " if model.n_wavelets else ""

@@ -31,9 +31,9 @@ class Role:
     preferred_stems: tuple[str, ...]
     """Stems that are preferred, in this order, if several columns could take the role."""
     example: str
-    """Unit that a cure states if the unit is not known."""
+    """Unit that a suggested option states for a column of unknown unit."""
     words: tuple[str, ...]
-    """Parts of names by which a cure chooses among columns without a unit."""
+    """Parts of column names by which an error message suggests one of the columns without a unit."""
 
 
 POSITION = Role(
@@ -54,24 +54,27 @@ TIME = Role("time", TIME_UNITS, ("time", "timestamp", "t"), "s", ("time",))
 ROLES = (POSITION, FORCE, TIME)
 
 DIRECTION_NAMES = ("direction", "segment")
-"""Columns that give the direction of the stroke if the caller names none."""
+"""Names of columns that are read as the direction of the stroke if the caller names no such column."""
 
 
 _UNLIKELY_STEMS = (*TIME.preferred_stems, *DIRECTION_NAMES, "unnamed", "index", "sample", "id")
-"""Stems of columns without a unit that a cure names last."""
+"""Stems of column names that an error message suggests last as position or force."""
 
 _LIKELY_UNITS = {"angle": "rad", "torque": "Nm", "moment": "Nm", "current": "A"}
-"""Units that a cure states for columns without one, by a part of the name."""
+"""Unit that an error message suggests for a column without a unit, by a part of the column's name."""
 
 LONGEST_CURE = 1000
-"""Largest length of the options in a message [characters]. Longer names must be changed in the file."""
+"""Largest length of the options that an error message suggests [characters].
+
+Longer options are left out of the message.
+"""
 
 _NUMBER_WORDS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 
 
 @dataclass(frozen=True)
 class Column:
-    """Column and the unit it is read in. None: text or plain numbers."""
+    """Name of a column and the unit in which its values are read. None: text or numbers without a unit."""
 
     name: str
     stem: str
@@ -80,7 +83,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Choice:
-    """Chosen columns, and the reasons in sentences."""
+    """Columns chosen for position, force, time and direction, and sentences that state the reasons."""
 
     position: Column
     force: Column
@@ -92,7 +95,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class _Request:
-    """Columns and units that the caller or a cure states."""
+    """Columns and units that the caller states, or that an error message suggests."""
 
     roles: Mapping[str, str | None]
     direction: str | None
@@ -156,21 +159,21 @@ def choose_columns(
         return replace(choice, notes=(*choice.notes, note))
     message = "; ".join(problems.values())
     if "no column" in message:
-        message += f". Its columns are {listed(names)}"
+        message += f". The columns are {listed(names)}"
     raise InputError(f"{file}: {message}{_cure(names, request, unstated, text, steady, problems)}")
 
 
 def _attempt(
     names: Sequence[str], request: _Request, unstated: Collection[str]
 ) -> tuple[Choice | None, dict[str, str]]:
-    """Returns the choice, or the problems by role or option."""
+    """Returns the chosen columns, or the problems of the choice by role or option."""
     problems: dict[str, str] = {}
     options = [
         (f"--{role}", name) for role, name in (*request.roles.items(), ("direction", request.direction))
     ]
     for option, name in (*options, *(("inputs", name) for name in request.inputs)):
         if name is not None and name not in names:
-            problems[option.strip("-")] = f"it has no column {shortened(name)!r} for {option}"
+            problems[option.strip("-")] = f"there is no column {shortened(name)!r} for {option}"
     columns = _with_units(names, request, problems)
     notes: list[str] = []
     chosen: dict[str, Column | None] = {}
@@ -195,7 +198,7 @@ def _attempt(
 
 
 def _with_units(names: Sequence[str], request: _Request, problems: dict[str, str]) -> list[Column]:
-    """Gives every column the unit in its name, or the unit that the caller states."""
+    """Returns every column with the unit that the caller states, else with the unit in its name."""
     stated: dict[str, Unit] = {}
     for key, symbol in request.units.items():
         column = key if key in names else request.roles.get(key)
@@ -204,7 +207,7 @@ def _with_units(names: Sequence[str], request: _Request, problems: dict[str, str
             problems[key] = f"--units {key}={symbol} also needs --{key} NAME, which names its column"
         elif column is None:
             problems[f"units {key}"] = (
-                f"it has no column {shortened(key)!r} for --units; leave out this option"
+                f"there is no column {shortened(key)!r} for --units; leave out this option"
             )
         elif unit is None:
             problems[f"units {key}"] = (
@@ -216,7 +219,7 @@ def _with_units(names: Sequence[str], request: _Request, problems: dict[str, str
     for name in names:
         stem, unit = split_name(name)
         if name.endswith("_in") and f"{stem}_out" in names:
-            stem, unit = name, None  # an input and its output, not inches
+            stem, unit = name, None  # the ending "_in" means input, not inches
         columns.append(Column(name, stem, stated.get(name, unit)))
     return columns
 
@@ -265,7 +268,7 @@ def _best(candidates: Sequence[Column], notes: list[str]) -> list[list[Column]]:
 
 
 def _prefer_si(same_stem: list[Column], notes: list[str]) -> list[Column]:
-    """Keeps the columns of one stem whose unit is nearest to SI."""
+    """Keeps, of the columns of one stem, those in SI; else those in another unit; else those in counts."""
 
     def distance_from_si(column: Column) -> int:
         assert column.unit is not None, "candidates have units"
@@ -300,7 +303,7 @@ def _cure(
     steady: Collection[str],
     problems: Mapping[str, str],
 ) -> str:
-    """Returns the options to add. They are tried first."""
+    """Returns the options that make a refused file readable; tests the choice with these options first."""
     no_cure = ". A recording needs two columns of numbers, a position and a force"
     roles, units, direction = dict(request.roles), dict(request.units), request.direction
     inputs = tuple(name for name in request.inputs if name in names)
@@ -355,7 +358,7 @@ def _cure(
 
 
 def _time_without_unit(names: Sequence[str], request: _Request, text: Collection[str]) -> str | None:
-    """Returns a column that is named time but has no unit and is not used."""
+    """Returns a column that has the name of a time but no unit, and is therefore not used as time."""
     used = {*request.roles.values(), *request.inputs, *text}
     times = (name for name in names if stem_key(name) in TIME.preferred_stems and name not in used)
     return next(times, None)
@@ -366,7 +369,7 @@ def _time_options(name: str) -> list[str]:
 
 
 def _suggested(role: Role, columns: Sequence[Column], steady: Collection[str]) -> Column | None:
-    """Returns the column that a cure names: one with a unit of the role, else the likeliest one."""
+    """Returns the column that an error message suggests: one with a unit of the role, else the likeliest."""
     fitting = [column for column in columns if column.unit is not None and column.unit.si in role.si_units]
     if fitting:
         return _best(fitting, [])[0][0]

@@ -19,32 +19,35 @@ from .recording import Recording
 from .units import GRAVITY
 
 MOST_COMPARED_ROWS = 100_000
-"""Most rows that the comparison of cells uses. Longer recordings are thinned evenly."""
+"""Most rows of a recording that are compared. Of a longer recording every k-th moving row is used."""
 
 MOST_CELLS = 64
-"""Largest number of position cells."""
+"""Largest number of equal intervals (cells) into which the positions of a recording are divided."""
 
 LEAST_ROWS_PER_CELL = 8
-"""Least mean number of rows in a cell of one stroke."""
+"""Least mean number of rows in a position cell, for each of press and release."""
 
 LEAST_COMPARED_ROWS = 3
-"""Rows that a cell of one stroke needs to be compared with another."""
+"""Least number of rows of one stroke in a position cell whose mean force is used."""
 
 PLAY_RADIUS_SHARE = 0.02
-"""Play radius over the travel. A smaller motion back does not end a stroke."""
+"""Play radius that separates the strokes, as a share of the distance between least and largest position.
+
+A motion back by less than two play radii does not end a stroke.
+"""
 
 SPIKE_PERCENT = 0.5
-"""Percentage of the rows at each end that may be position spikes."""
+"""Percentage of the rows with the least, and with the largest, position that may be spikes of the sensor."""
 
 
 @dataclass(frozen=True)
 class Travel:
-    """Range of the position without spikes, and the rows inside it."""
+    """Least and largest position of a recording without spikes, and the rows between these positions."""
 
     lower: float
     upper: float
     inside: NDArray[np.bool_]
-    """(n,)"""
+    """(n,) True for rows between `lower` and `upper`"""
 
     @property
     def length(self) -> float:
@@ -52,7 +55,10 @@ class Travel:
 
     @staticmethod
     def of(position: Float1D) -> Travel:
-        """Returns the range of all rows within half a travel of the inner 99 % of the rows."""
+        """Returns least and largest position of a recording, without rows far outside the inner 99 % of rows.
+
+        A row is far outside if its distance exceeds half the width of the inner 99 %.
+        """
         low, high = np.percentile(position, (SPIKE_PERCENT, 100.0 - SPIKE_PERCENT))
         margin = 0.5 * (high - low)
         inside = (position >= low - margin) & (position <= high + margin)
@@ -62,26 +68,26 @@ class Travel:
 
 @dataclass(frozen=True)
 class CellRows:
-    """Rows by cell. A cell holds rows of one stroke at nearly the same position."""
+    """Rows of a recording by position cell. A cell holds rows of one stroke at nearly the same position."""
 
     row: NDArray[np.intp]
-    """(k,) the rows used, in their order"""
+    """(k,) indices of the compared rows, in their order"""
     cell: NDArray[np.intp]
-    """(k,) position cell, + `cells` in rows of a stroke out of the object"""
+    """(k,) index of the position cell of each row; rows of a release have the index plus `cells`"""
     place: Float1D
-    """(k,) position inside the cell, in cells: 0 to 1"""
+    """(k,) position of each row inside its cell: 0 at the lower edge, 1 at the upper edge"""
     residual: Float1D
-    """(k,) force minus the mean curve of the row's stroke"""
+    """(k,) force of each row minus the mean force of its stroke at the same position"""
     cells: int
-    """Position cells"""
+    """Number of position cells"""
     loop: Float1D
-    """(m,) press minus release force, if both are known"""
+    """(m,) press minus release force at the positions where both strokes have rows"""
     loop_error: Float1D
     """(m,) standard error of `loop`"""
 
 
 def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
-    """Returns the rows by cell, or None if too few rows move."""
+    """Returns the rows of a recording by position cell, or None if too few rows belong to a stroke."""
     side = sides(recording, travel)
     row = np.flatnonzero(travel.inside & (side != 0))
     row = row[:: max(1, -(-len(row) // MOST_COMPARED_ROWS))]
@@ -114,7 +120,7 @@ def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
 
 
 def sides(recording: Recording, travel: Travel) -> NDArray[np.int8]:
-    """Returns (n,) +1 in rows of a stroke into the object, -1 out of it, 0 if unknown."""
+    """Returns the direction of each row (n,): +1 for a press, -1 for a release, 0 if unknown."""
     if recording.direction is not None and recording.direction.any():
         return recording.direction
     if not travel.length > 0.0:
@@ -126,31 +132,31 @@ def sides(recording: Recording, travel: Travel) -> NDArray[np.int8]:
 
 
 SPLIT_BLOCKS = 32
-"""Blocks of rows between which a file is split."""
+"""Number of equal blocks of rows. A change of the object is searched only at the edges of these blocks."""
 
 LEAST_EXPLAINED_SHARE = 0.4
-"""Least share of the scatter about the mean curves that a split into two parts must explain."""
+"""Least share of the force's scatter about its mean over position that two parts of a file must explain."""
 
 LEAST_PART_DISTANCE = 0.02
-"""Least distance of the two parts, as a share of the force's spread."""
+"""Least RMS difference of the forces of two parts of a file, as a share of the force's standard deviation."""
 
 PATTERN_ROWS = 16
-"""Number of rows by which a repetition of the beginning is found."""
+"""Number of first rows of a file that are searched again later in the file, to find an appended copy."""
 
 LEAST_COPY_SHARE = 0.1
-"""Least share of the rows in a copy."""
+"""Least share of a file's rows that belong to a copy of the file's beginning."""
 
 MOST_COPY_STARTS = 4
-"""Most places that begin like the file and are compared to the end."""
+"""Most rows that may be the start of a copy of the file and are compared row by row to the end."""
 
 LARGEST_MEAN_OFFSET = 0.1
-"""Largest distance of the mean positions of two parts in a cell at which they are compared [cells]."""
+"""Largest difference of the mean positions of two parts in a cell whose forces are compared [cell widths]."""
 
 MOST_CURVE_POINTS = 64
-"""Largest number of points of a curve."""
+"""Largest number of points of a curve of force over position."""
 
 ROWS_PER_POINT = 4
-"""Mean number of rows that are averaged for a point of a curve."""
+"""Mean number of rows that are averaged for one point of a curve of force over position."""
 
 UNIT_RATIOS = {
     10.0: "mm and cm",
@@ -162,34 +168,34 @@ UNIT_RATIOS = {
     4.4482216: "N and lbf",
     180.0 / np.pi: "deg and rad",
 }
-"""Ratios of units that files mix up."""
+"""Ratio of two units that are often confused in files, and the names of these units."""
 
 LEAST_SHARED_TRAVEL = 0.3
-"""Least common share of the travel of two recordings that are compared."""
+"""Least share of the longer position range of two recordings that both cover, so that they are compared."""
 
 LEAST_CURVE_DIFFERENCE = 0.25
-"""RMS difference of two curves above which they differ, as a share of the force's spread."""
+"""Least RMS difference of the forces of two recordings that is reported, over the standard deviation."""
 
 LARGEST_EXPLAINED_DIFFERENCE = 0.1
-"""Largest RMS difference at which a ratio explains it, as a share of the force's spread."""
+"""Largest RMS force difference that may remain after a change of unit, over the standard deviation."""
 
 ONE_STROKE_SHARE = 0.99
-"""Least share of the moving rows with one direction in a recording of one stroke."""
+"""Least share of the moving rows with the same direction in a recording that holds one stroke only."""
 
 PRESS_ABOVE_SHARE = 0.9
-"""Least share of the shared positions at which the press is above the release of the same object."""
+"""Least share of the common positions at which the press force exceeds the release force of one object."""
 
 LARGEST_RANGE_RATIO = 2.0
-"""Largest ratio of the force ranges of two strokes of one object.
+"""Largest ratio of the force ranges (largest minus least force) of press and release of one object.
 
-The release begins where the press ends. 74 measured pairs have 0.9 to 1.2.
+The ratio is near 1, because the release begins where the press ends: 0.9 to 1.2 in 74 measured pairs.
 """
 
 MOST_COMPARED_RECORDINGS = 20
-"""Largest number of recordings in the search for the one that agrees best with the others."""
+"""Largest number of recordings that are searched for the one that agrees best with all others."""
 
 Curve = tuple[Float1D, Float1D]
-"""Mean positions in rising order, and mean forces."""
+"""Curve of force over position: mean positions in rising order, and the mean force at each."""
 
 
 def merged_findings(recording: Recording, cells: CellRows | None) -> list[Finding]:
@@ -207,7 +213,7 @@ def merged_findings(recording: Recording, cells: CellRows | None) -> list[Findin
 
 
 def _change_findings(recording: Recording, cells: CellRows) -> list[Finding]:
-    """Compares the parts before and after each block edge, cell by cell."""
+    """Returns a finding if the force at equal positions differs before and after one edge of a row block."""
     total = float(np.sum(cells.residual**2))
     spread = float(np.std(recording.force))
     if not total > 0.0 or not spread > 0.0:
@@ -252,7 +258,7 @@ def _change_findings(recording: Recording, cells: CellRows) -> list[Finding]:
 
 
 def _copy_start(recording: Recording) -> int | None:
-    """Returns the first row of a copy of the beginning that continues to the end of the file."""
+    """Returns the first row from which the file repeats its beginning exactly to its end, or None."""
     x, f = recording.position, recording.force
     n = len(x)
     least = int(LEAST_COPY_SHARE * n)
@@ -271,16 +277,19 @@ def _copy_start(recording: Recording) -> int | None:
 
 @dataclass(frozen=True)
 class _Strokes:
-    """Curves of one recording."""
+    """Curves of force over position of the strokes of one recording."""
 
     direction: int
-    """+1: all rows go into the object, -1: out of it, 0: both or unknown"""
+    """+1: the recording holds only presses, -1: only releases, 0: both or unknown"""
     curves: Mapping[int, Curve]
-    """Of the rows of each direction, and of all rows (0)"""
+    """Curve of the press rows (key +1), of the release rows (-1) and of all rows (0)"""
 
     @staticmethod
     def of(recording: Recording, side: Float1D | None) -> _Strokes:
-        """Returns the curves of a recording; `side` (n,) is the direction of its rows, None: as recorded."""
+        """Returns force over position of each stroke of a recording.
+
+        `side` (n,) is the direction of the rows; with None the recorded direction is used.
+        """
         travel = Travel.of(recording.position)
         signs = sides(recording, travel) if side is None else side
         into, out = signs > 0, signs < 0
@@ -346,7 +355,7 @@ def _name(recordings: Sequence[Recording], index: int) -> str:
 
 
 def _curve(recording: Recording, rows: NDArray[np.bool_]) -> Curve:
-    """Returns the mean force over position of the given rows."""
+    """Returns the mean force over position of the rows that are marked by True."""
     x, f = recording.position[rows], recording.force[rows]
     lower, length = float(x.min()), float(np.ptp(x))
     if not length > 0.0:
@@ -362,13 +371,13 @@ def _curve(recording: Recording, rows: NDArray[np.bool_]) -> Curve:
 
 
 def _shared_curves(one: _Strokes, other: _Strokes) -> tuple[Curve, Curve]:
-    """Returns the curves of the stroke that both recordings contain, or of all rows."""
+    """Returns force over position of both recordings for the stroke that both contain, else for all rows."""
     direction = 0 if one.direction * other.direction < 0 else one.direction or other.direction
     return one.curves.get(direction, one.curves[0]), other.curves.get(direction, other.curves[0])
 
 
 def _difference(one: _Strokes, other: _Strokes) -> float:
-    """Returns the difference of two recordings; 0 if they differ only by hysteresis."""
+    """Returns the RMS force difference of two recordings over the spread; 0 if hysteresis explains it."""
     difference = _curve_difference(*_shared_curves(one, other))
     if one.direction * other.direction < 0 and np.isfinite(difference):
         press, release = (one, other) if one.direction > 0 else (other, one)
@@ -382,7 +391,10 @@ def _difference(one: _Strokes, other: _Strokes) -> float:
 
 
 def _curve_difference(one: Curve, other: Curve) -> float:
-    """Returns the RMS difference over the spread of the first force; infinite without overlap."""
+    """Returns the RMS force difference of two curves over the standard deviation of the first curve's force.
+
+    The result is infinite if the positions of the curves overlap too little.
+    """
     (x, f), (at, force) = one, other
     shared = (at >= x[0]) & (at <= x[-1])
     reach = min(x[-1], at[-1]) - max(x[0], at[0])
@@ -398,7 +410,7 @@ def _curve_difference(one: Curve, other: Curve) -> float:
 
 
 def _ratio(one: Curve, other: Curve) -> tuple[str, float, str] | None:
-    """Returns the role and the ratio of two units that explain the difference best, or None."""
+    """Returns the column (position, force) and the unit ratio that best explain a difference, or None."""
     x, f = other
     candidates = []
     for ratio, units in UNIT_RATIOS.items():

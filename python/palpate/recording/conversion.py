@@ -22,7 +22,7 @@ from .table import Cells, Places, Table, parse_number, to_numbers
 from .units import COLUMN_SUFFIX, UNITS, Unit
 
 UNSTATED = ""
-"""Unit of an array that was given without one: SI, but not specified."""
+"""Unit symbol of an array given without a unit: an SI unit, but it is not known which one."""
 
 MIN_ROWS = 10
 """Least number of usable rows of a recording."""
@@ -42,18 +42,18 @@ Range = tuple[int | None, int | None]
 
 @dataclass(frozen=True)
 class Source:
-    """Origin of data: the files or arrays, their fingerprints and the columns."""
+    """Source of a recording: names and SHA-256 fingerprints of its files, and the columns that were read."""
 
     files: tuple[str, ...]
     sha256: str
     """SHA-256 of each file, or of arrays that were not read from a file; separated by spaces."""
     rows: int
     columns: Mapping[str, str]
-    """Role (position, force, time, direction, or the name of an input) to the column in the file."""
+    """Name of the column in the file for each role: position, force, time, direction, or an input's name."""
     held_out_every: int = 0
-    """k if the rows i with i mod k = k - 1 were separated; 0: no rows were separated."""
+    """k if the rows i with i mod k = k - 1 were held out; 0: no rows were held out."""
     held_out: bool = False
-    """True for the held-out rows, False for the other rows."""
+    """True if the recording contains the held-out rows, False if it contains the other rows."""
 
     @staticmethod
     def merged(sources: Iterable[Source]) -> Source:
@@ -70,9 +70,9 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """All rows of a measured motion; a recording contains some of them.
+    """Positions and times of all rows of a file; a recording can contain a part of these rows.
 
-    Velocity and play depend on the rows before and after a row. They are computed from all rows.
+    Velocity and play at a row depend on the rows around it, so they are computed from all rows of the file.
     """
 
     position: Float1D
@@ -80,7 +80,7 @@ class Motion:
     time: Float1D | None
     """(m,) [s]"""
     rows: NDArray[np.intp]
-    """(n,) rows that the recording contains"""
+    """(n,) indices of the rows that the recording contains"""
 
 
 @dataclass(frozen=True)
@@ -92,10 +92,10 @@ class Conversion:
     choice: Choice
     direction: str | None
     status: str | None
-    """Column that states for each row if its force was the model's alone"""
+    """Column that states for each row if the force was the model's, not changed by a guard or a fault"""
     negated: frozenset[str]
     drop: bool
-    """Drops and counts rows that cannot be used if True; else the first one refuses the table."""
+    """True: rows that cannot be used are dropped and counted. False: the first such row refuses the table."""
     metadata: Mapping[str, str]
 
     @staticmethod
@@ -145,7 +145,7 @@ class Conversion:
 
     @property
     def columns(self) -> list[Column]:
-        """The columns of numbers."""
+        """Columns of the table that are converted to numbers."""
         choice = self.choice
         return [each for each in (choice.position, choice.force, choice.time, *choice.inputs) if each]
 
@@ -167,13 +167,13 @@ class Conversion:
 
     @property
     def file_units(self) -> dict[str, Unit]:
-        """Unit of position and force in the table, where it is known."""
+        """Unit that position and force have in the table, if the unit is known."""
         roles = {"position": self.choice.position.unit, "force": self.choice.force.unit}
         return {role: unit for role, unit in roles.items() if unit is not None}
 
     @property
     def names(self) -> dict[str, str]:
-        """Role, or name of an input, to the name of its column."""
+        """Name of the column of each role (position, force, time, direction) and of each input."""
         choice = self.choice
         columns = {"position": choice.position.name, "force": choice.force.name}
         columns |= {"time": choice.time.name} if choice.time is not None else {}
@@ -183,7 +183,7 @@ class Conversion:
     def checked(
         self, table: Places, cells: Mapping[str, Cells], first: int = 0
     ) -> tuple[RowCheck, Int8Vector | None]:
-        """Checks the rows of a table from `first` on; returns the check and the direction of every row.
+        """Checks the rows of a table from row `first` on; returns the check and the direction of every row.
 
         Raises
         ------
@@ -211,7 +211,7 @@ class Conversion:
         return values if factor == 1.0 else values * factor
 
     def note(self, torque_constant: float | None = None, dialect: Sequence[str] = ()) -> str:
-        """Returns one sentence with the column of each role and the dialect of the table."""
+        """Returns one sentence that names the column of each role and the text format of the table."""
         choice = self.choice
         parts = [f"position is {choice.position.name}", f"force is {choice.force.name}"]
         if torque_constant is not None:
@@ -242,7 +242,7 @@ def converted(
     ----------
     table : Table
     name : str
-        Of the table, for messages.
+        Name of the table, for messages.
     file : Path, optional
         The file of the table. Without it the source is the fingerprint of the arrays.
     direction, rows, zero, torque_constant, options
@@ -256,7 +256,7 @@ def converted(
         and direction is None
         and all(parse_number(word) is not None for word in cells[direction_column])
     ):
-        # Numbered segments do not state a direction.
+        # A column with segment numbers does not state the direction of a stroke.
         cells[direction_column], conversion = (
             to_numbers(cells[direction_column]),
             replace(conversion, direction=None),
@@ -333,7 +333,7 @@ def digest_of(*arrays: NDArray[Any] | None) -> str:
 
 
 def mirror_notes(correlation: float, position_falls: bool = False) -> list[str]:
-    """Returns the note on a force that falls with position, or on a mirrored position."""
+    """Returns a note if the force falls with position, or if the position falls in rows of a press."""
     signs = []
     if correlation < FALLING_CORRELATION:
         signs.append(f"the force falls with position over the whole file (correlation {correlation:.2f})")
@@ -348,7 +348,7 @@ def mirror_notes(correlation: float, position_falls: bool = False) -> list[str]:
 
 
 def _sign_notes(x: Float1D, f: Float1D, directions: Int8Vector | None) -> list[str]:
-    """Reports once a force or position that looks mirrored. No sign changes without an option."""
+    """Adds one note on a force or position whose sign looks reversed. Only an option changes a sign."""
     x, f = _scaled(x), _scaled(f)
     correlation = float(np.corrcoef(x, f)[0, 1]) if np.ptp(f) > 0 else 0.0
     position_falls = directions is not None and len(x) > 1 and float((np.diff(x) * directions[1:]).sum()) < 0
@@ -356,13 +356,13 @@ def _sign_notes(x: Float1D, f: Float1D, directions: Int8Vector | None) -> list[s
 
 
 def _scaled(values: Float1D) -> Float1D:
-    """Returns the values divided by a power of two. No square overflows and no digit changes."""
+    """Returns the values divided by a power of two: squares cannot overflow, and no digit changes."""
     _, exponent = np.frexp(np.abs(values).max(initial=0.0))
     return np.asarray(np.ldexp(values, -exponent))
 
 
 def _motion(conversion: Conversion, cells: Mapping[str, Cells], rows: NDArray[np.intp]) -> Motion | None:
-    """Returns the motion of all rows of a file, or None without continuous time."""
+    """Returns positions and times of all rows of a file, or None if the time does not always increase."""
     if conversion.choice.time is None:
         return None
     position, time = (

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""CSV files. The dialect is recognised once, then pandas reads the rows; messages name their lines.
+"""CSV files: recognises the text format once, then reads the rows with pandas; messages name the line.
 
-Rows are counted, and ends of rows are found, without splitting rows into cells.
+Rows of a long file are counted, and their ends are found, without splitting the rows into cells.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .dialect import HEAD_BYTES, not_csv, recognise, refuse_marks
 from .table import MISSING, Cells, LongTable, parse_with, to_numbers
 
 _CHUNK_ROWS = 1_000_000
-"""Rows read at a time. Limits the memory in addition to the columns."""
+"""Number of rows that are read at a time, to limit the memory that is used besides the finished columns."""
 
 _EXACT_OPTIONS: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
@@ -38,16 +38,16 @@ _EXAMINED_ROWS = 1000
 """Rows that are examined for text columns before the fast reader starts."""
 
 _BLOCK_BYTES = 1 << 22
-"""Bytes in which rows are counted at a time."""
+"""Number of bytes that are read at a time to count rows."""
 
 _BLANK_LINE = re.compile(rb"\n[ \t\r\n]")
 """Start of a line that may be blank."""
 
 _CLOSING_QUOTE = re.compile(rb'(?:[^"]|"")*"(?!")')
-"""Rest of a quoted cell."""
+"""Pattern of the text of a quoted cell up to and including its closing quotation mark."""
 
 _OPENING_QUOTE = {separator: re.compile(rb'(?:^|%b)"' % separator) for separator in (b",", b";", b"\t")}
-"""Quote that opens a cell; it must be the first character of the cell."""
+"""Pattern, by separator, of a quotation mark that opens a cell: it is the first character of the cell."""
 
 
 class FileBytes(io.RawIOBase):
@@ -58,7 +58,7 @@ class FileBytes(io.RawIOBase):
         self._stream.seek(start)
         self._start, self._stop = start, stop
         self.failure: OSError | None = None
-        """Reason for a failed read. A parser in C reports only the failure."""
+        """Reason why reading the file failed. The C parser of pandas reports the failure without a reason."""
 
     def readable(self) -> bool:
         return True
@@ -67,7 +67,7 @@ class FileBytes(io.RawIOBase):
         return True
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        if whence == io.SEEK_CUR:  # `tell` of the base class uses it
+        if whence == io.SEEK_CUR:  # the base class's `tell` calls `seek(0, SEEK_CUR)`
             return self._stream.seek(offset, whence) - self._start
         if whence != io.SEEK_SET:
             raise io.UnsupportedOperation("only from the start or the current position")
@@ -133,7 +133,7 @@ class CsvFile(LongTable):
 
     @contextmanager
     def _lines(self) -> Iterator[io.TextIOWrapper]:
-        """Yields the lines of data."""
+        """Yields the lines of the file after the header and its units."""
         stream = self._bytes(self._dialect.start)
         with io.TextIOWrapper(stream, encoding=self._dialect.encoding, newline="") as lines:
             try:
@@ -144,14 +144,14 @@ class CsvFile(LongTable):
                 raise not_csv(str(self._path), error) from None
 
     def _rows(self, lines: io.TextIOWrapper) -> Iterator[tuple[int, list[str]]]:
-        """Yields line number and cells of each row. Slow: only for the first rows and for error messages."""
+        """Yields line number and cells of each row. Slow: for the first rows and error messages only."""
         reader = csv.reader(lines, delimiter=self._dialect.separator)
         for cells in reader:
             if len(cells) > 1 or (cells and cells[0].strip()):
                 yield self._dialect.lines_before + reader.line_num, cells
 
     def _examine_first_rows(self) -> tuple[set[str], set[str]]:
-        """Returns the names of the text columns, and of those with one or two values, in the first rows."""
+        """Returns the columns that hold text, and those with only one or two values, in the first rows."""
         text: set[str] = set()
         values: dict[str, set[str]] = {name: set() for name in self.names}
         columns = len(self.names) + self._dialect.trailing
@@ -184,7 +184,7 @@ class CsvFile(LongTable):
         except ValueError as error:
             if isinstance(error, InputError):
                 raise
-        # A number column contains text below the first rows. Find that column and read it as text.
+        # A column with numbers in its first rows contains text below them. Find it and read it as text.
         return self._read(as_text | self._columns_with_text(as_text), numbers, text)
 
     def _read(self, as_text: set[str], numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
@@ -219,7 +219,7 @@ class CsvFile(LongTable):
 
     def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
         if not self._dialect.single_bytes:
-            encoding = self._dialect.encoding.upper().replace("16-", "16")  # name for iconv
+            encoding = self._dialect.encoding.upper().replace("16-", "16")  # for iconv
             raise InputError(
                 f"{self._path} is {encoding}, which cannot be read part by part; convert it: "
                 f"iconv -f {encoding} -t UTF-8 OLD.csv > NEW.csv"
@@ -240,7 +240,7 @@ class CsvFile(LongTable):
         self, part: tuple[int, int], rows: int, *, numbers: Collection[str], text: Collection[str]
     ) -> Iterator[tuple[int, dict[str, Cells]]]:
         wanted = [name for name in self.names if name in numbers or name in text]
-        # Most files contain only numbers in number columns and are read fast. If a block does not, the part
+        # Most files have only numbers in columns of numbers and are read fast. If a block has text, the part
         # is read again as text, without the rows that were already returned.
         returned = 0
         for as_text in ({*text}, {*text, *numbers}):
@@ -320,7 +320,7 @@ class CsvFile(LongTable):
             raise self._wrong_encoding() from None
         except pd.errors.ParserError as error:
             if "source failed" in str(error):
-                # pandas hides the exception: a disk error or Ctrl-C.
+                # pandas hides the exception of the file object, a disk error or Ctrl-C; raise that one.
                 raise (raw.failure or KeyboardInterrupt()) from None
             if cells := re.search(r"in line (\d+), saw (\d+)", str(error)):
                 raise self._too_many_cells(self._line(int(cells[1]), part), int(cells[2])) from None
@@ -335,7 +335,7 @@ class CsvFile(LongTable):
             raise self._too_many_cells(line, len(found))
 
     def _line(self, line: int, part: tuple[int, int] | None) -> int:
-        """Returns the line of the file for a line of the data or of a part."""
+        """Returns the line number in the file for a line number counted from the first row or from a part."""
         if part is not None:
             with self._bytes(self._dialect.start, part[0]) as stream:
                 line += sum(1 for _ in stream)
@@ -359,11 +359,11 @@ class CsvFile(LongTable):
 
 @dataclass
 class RowCount:
-    """Number of rows of a stream."""
+    """Number of rows in a stream of bytes, and positions of ends of rows."""
 
     rows: int = 0
     ends: list[int] = field(default_factory=lambda: [0])
-    """Bytes from the start to ends of rows that are at least one step apart, and to the end"""
+    """Bytes from the start of the stream to some ends of rows, at least `step` bytes apart, and to its end"""
     too_wide: tuple[int, int] | None = None
     """First row that has more cells than the table has columns, and its number of cells"""
 
@@ -398,7 +398,7 @@ def count_rows(stream: BinaryIO, separator: str, *, columns: int = 0, step: int 
             for line in block.removesuffix(b"\n").split(b"\n"):
                 if b'"' in line:
                     quoted = _ends_quoted(line, quoted, mark)
-                # Limits memory if a quote is never closed.
+                # A cell whose quotation mark is never closed would otherwise fill the memory.
                 row += line[: _BLOCK_BYTES - len(row)]
                 if quoted:
                     row += b"\n"
@@ -422,7 +422,7 @@ def _cell_count(row: bytes, mark: bytes) -> int:
 
 
 def _ends_quoted(line: bytes, quoted: bool, mark: bytes) -> bool:
-    """Returns True if a line ends within a quoted cell; `quoted` is the state at its beginning."""
+    """Returns True if a line ends within a quoted cell; `quoted` is True if it begins within one."""
     offset = 0
     while True:
         found = (_CLOSING_QUOTE.match if quoted else _OPENING_QUOTE[mark].search)(line, offset)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dialect of a text file: encoding, separator, decimal mark, header, line of units, first row."""
+"""Recognition of the dialect of a text file: encoding, separator, decimal mark, header, units, first row."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ LEAST_NUMBERS = 2
 """Least number of cells with numbers in a row of data: position and force."""
 
 LEAST_CONSECUTIVE_ROWS = 3
-"""Least number of consecutive rows of data, or all rows of a shorter table."""
+"""Least number of consecutive rows of numbers that mark the data of a table; all rows of a shorter table."""
 
 THOUSANDS_SEPARATED = re.compile(
     r"[-+]?(\d{1,3}(,\d{3})+\.\d*|\d{1,3}(\.\d{3})+,\d*|\d{1,3}(,\d{3}){2,}|\d{1,3}(\.\d{3}){2,}"
@@ -54,7 +54,7 @@ AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 
 @dataclass(frozen=True)
 class Dialect:
-    """Dialect of a text file."""
+    """Dialect of a text file: how its bytes are divided into names, numbers and words."""
 
     encoding: str
     separator: str
@@ -64,15 +64,15 @@ class Dialect:
     start: int
     """Bytes before the first line after the header and its units"""
     lines_before: int
-    """Lines before that line"""
+    """Number of lines before the first line after the header and its units"""
     trailing: bool
-    """Each row ends with a separator"""
+    """True if each row ends with a separator"""
     notes: tuple[str, ...]
-    """Differences from a plain CSV file, in parts of a sentence"""
+    """Differences of this file from a plain CSV file, as parts of one sentence"""
 
     @property
     def single_bytes(self) -> bool:
-        """True if line feeds, separators and quotes are single bytes: the file can be divided."""
+        """True if line feeds, separators and quotes are single bytes, so the file can be read in parts."""
         return not self.encoding.startswith("utf-16")
 
 
@@ -104,7 +104,7 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
         raise _json_refusal(file, text)
     lines = list(io.StringIO(text, newline=""))
     if not whole and len(lines) > 1:
-        lines.pop()  # the last line may be cut
+        lines.pop()  # the last line of the examined bytes may be incomplete
     found = _header(file, lines)
     separator, spans = found.separator, found.spans
     before, header_line = spans[found.header.row]
@@ -182,14 +182,14 @@ def _json_refusal(file: str, text: str) -> InputError:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """Header for one separator."""
+    """Header that is found if the lines are split at one separator."""
 
     header: Header
     separator: str
     spans: list[tuple[int, int]]
-    """First and last line of each row, counted from 0"""
+    """First and last line in the file of each row, counted from 0"""
     sample: list[list[str]]
-    """First rows of data; empty without rows of numbers"""
+    """First rows of data; empty if no row holds numbers"""
 
 
 def _header(file: str, lines: list[str]) -> _Candidate:
@@ -255,18 +255,18 @@ def _metadata(lines: list[str], separator: str) -> Iterator[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class Header:
-    """Positions of the parts of a table, as indices of the given rows."""
+    """Header of a table: its column names, and the indices of the rows with names, units and first data."""
 
     row: int
     names: tuple[str, ...]
     """Column names. Control characters are escaped; a unit from a line of units is added in brackets."""
     first: int
-    """First row of data"""
+    """Index of the first row of data"""
     units_row: int | None = None
     trailing: bool = False
-    """Each row ends with a separator; the last column has no name and is ignored"""
+    """True if each row ends with a separator; the last column then has no name and is ignored"""
     numbers: int = 0
-    """Columns that hold numbers in the first row of data"""
+    """Number of columns that hold numbers in the first row of data"""
 
 
 def find_header(rows: Sequence[Row]) -> Header | None:
@@ -358,7 +358,7 @@ def decimal_mark(where: str, rows: Sequence[Row], separator: str) -> str:
 
 
 def refuse_marks(where: str, cells: Iterable[object], decimal: str, separator: str) -> None:
-    """Refuses numbers whose marks differ from those of the first rows.
+    """Refuses numbers whose decimal or thousands marks differ from those in the first rows of the file.
 
     Raises
     ------
@@ -386,7 +386,7 @@ def _ambiguous_comma(finding: str, separator: str) -> InputError:
 
 
 def _sed_command(mark: str, separator: str, by: str) -> str:
-    """Returns a command that replaces a mark between digits; in a comma-separated file only within quotes."""
+    """Returns a sed command that replaces a mark between digits; in comma-separated files only in quotes."""
     escaped = {".": "[.]", "'": "\\x27"}.get(mark, mark)
     digits = "[0-9]" if by else "[0-9]{3}"
     if mark == separator:
@@ -416,9 +416,10 @@ def _starts_data(rows: Sequence[Row], k: int) -> bool:
 
 
 def _may_be_header(rows: Sequence[Row], k: int, first: int) -> bool:
-    """Returns True if row k can be the header of row `first`: it has an equal number of cells.
+    """Returns True if row k can be the header above the data row `first`: both have the same number of cells.
 
-    Directly above, it may have one cell less if each row ends with a separator, or more if cells are missing.
+    A row directly above `first` may have one cell less if each data row ends with a separator, or more if
+    cells of the data row are missing.
     """
     cells, needed = len(rows[k]), len(rows[first])
     if cells == needed:

@@ -2,7 +2,8 @@
 """Fingerprints of files, atomic writing, and recordings as CSV files.
 
 The CSV file states the role of each column and can be read without options. A flight record has the
-additional role "status": the column states for every row if its force was the model's alone.
+additional role "status": its column states for every row if the force was the model's force, or if a guard
+changed it.
 """
 
 from __future__ import annotations
@@ -37,13 +38,13 @@ def sha256_of_file(path: Path) -> str:
 
 
 def require_file(path: Path) -> None:
-    """Refuses a path that is not a readable, non-empty file."""
+    """Raises InputError if a path does not name a readable file with content."""
     if not path.exists():
         raise InputError(f"there is no file {path}")
     if path.is_dir():
         raise InputError(f"{path} is a folder, not a file")
     if not path.is_file():
-        # Opening a pipe without a writer would block forever.
+        # Opening a pipe that no program writes would block forever.
         raise InputError(f"{path} is a pipe, a device or a socket; save its contents to a file first")
     try:
         with path.open("rb") as stream:
@@ -123,7 +124,7 @@ def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator
 
 
 def require_absent(path: Path) -> None:
-    """Refuses a path that exists, also a broken symbolic link."""
+    """Raises InputError if a path exists; a broken symbolic link also counts as existing."""
     if os.path.lexists(path):
         raise InputError(f"{path} exists already; choose another name, or replace it with --force")
 
@@ -134,15 +135,15 @@ def _create(temporary: Path, replaced: os.stat_result | None) -> None:
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
     try:
         if replaced is not None:
-            with suppress(PermissionError):  # only root may change the owner
+            with suppress(PermissionError):  # only root may change the owner of a file
                 os.fchown(descriptor, replaced.st_uid, replaced.st_gid)
-            os.fchmod(descriptor, mode)  # without the umask
+            os.fchmod(descriptor, mode)  # the mode of `open` would be reduced by the umask
     finally:
         os.close(descriptor)
 
 
 def _sync(path: Path) -> None:
-    """Waits until a file or folder is on the disk, if the file system supports it."""
+    """Waits until the content of a file or folder is stored on the disk, if the file system supports this."""
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
         os.fsync(descriptor)
@@ -160,18 +161,18 @@ def _rename_to_free_name(temporary: Path, target: Path) -> None:
     except FileExistsError:
         require_absent(target)
         raise
-    except OSError:  # a file system without hard links
+    except OSError:  # the file system has no hard links
         require_absent(target)
         temporary.replace(target)
 
 
 _LAYOUT_KEY = "palpate-columns"
-"""Metadata key: ``# palpate-columns: {"position": "position_rad", ...}``."""
+"""Metadata key of the roles of the columns: ``# palpate-columns: {"position": "position_rad", ...}``."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Role to column name; empty if the file does not state it."""
+    """Column names of a file by role, and names of the inputs; empty if the file does not state its roles."""
 
     roles: dict[str, str] = field(default_factory=dict)
     inputs: tuple[str, ...] = ()

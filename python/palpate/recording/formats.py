@@ -20,20 +20,20 @@ from .files import readable
 from .table import MISSING, Cells, LongTable, Table, parse_with, to_numbers
 
 _BUFFER_BYTES = 1 << 20
-"""Bytes of each Parquet column that are read ahead."""
+"""Number of bytes of each Parquet column that are read at once, before they are needed."""
 
 MOST_HEADER_ROWS = 200
-"""Number of rows of a sheet that must contain its header."""
+"""Number of first rows of an Excel sheet among which the header is searched."""
 
 STEADY_ROWS = 1000
-"""Number of rows in which a column with one or two values counts as steady."""
+"""Number of first rows in which a column with only one or two distinct values counts as steady."""
 
 
 _MATLAB_HEADER_BYTES = 128
-"""Number of bytes before the first element."""
+"""Number of bytes before the first data element of a MATLAB file."""
 
 _MATRIX_TYPE, _COMPRESSED_TYPE = 14, 15
-"""Types of elements that contain an array, and a compressed array with a checksum."""
+"""Type numbers of a MATLAB element that holds an array, and of one that holds a compressed array."""
 
 _ITEM_BYTES = {
     **dict.fromkeys((1, 2, 14, 15, 16), 1),
@@ -41,17 +41,17 @@ _ITEM_BYTES = {
     **dict.fromkeys((5, 6, 7, 18), 4),
     **dict.fromkeys((9, 12, 13), 8),
 }
-"""Size of an item of each element type [bytes]."""
+"""Size of one number in a MATLAB element, by the type number of the element [bytes]."""
 
 _NUMERIC_CLASSES = range(6, 16)
-"""Classes of numeric arrays: flags, dimensions, name, values, and imaginary parts if complex."""
+"""Class numbers of numeric MATLAB arrays. An array holds flags, dimensions, name, values, imaginary parts."""
 
 _COMPLEX_FLAG = 1 << 11
-"""Bit of the flags of an array."""
+"""Bit of the flags of a MATLAB array that marks complex numbers."""
 
 
 def open_table(path: Path) -> Table:
-    """Opens a file of columns; the suffix gives its format.
+    """Opens a recording as a table of columns; the suffix of its name gives the format.
 
     Raises
     ------
@@ -79,7 +79,7 @@ class MemoryTable(Table):
         float64, or objects of str.
     metadata : mapping, optional
     notes : sequence of str, optional
-        How the file was read.
+        Sentences that state how the file was read.
     first : (str, int), optional
         Word for a row and number of the first one, for the sentences.
     decimal : str
@@ -150,7 +150,7 @@ class ParquetFile(LongTable):
         parquet = _import_library("pyarrow.parquet", path, "Parquet", "parquet")
         self._path = path
         with readable(path, "Parquet"):
-            # Read in small pieces: a file or one of its row groups may be larger than memory.
+            # The file is read in small pieces: the file or one of its row groups may be larger than memory.
             self._file = parquet.ParquetFile(path, buffer_size=_BUFFER_BYTES, pre_buffer=False)
             schema = self._file.schema_arrow
             self._stored = tuple(str(name) for name in schema.names)
@@ -163,7 +163,7 @@ class ParquetFile(LongTable):
             self.metadata = {
                 escaped(key.decode()): escaped(value.decode())
                 for key, value in (schema.metadata or {}).items()
-                # Notes of the writing libraries do not describe the measurement.
+                # Metadata of the libraries that wrote the file do not describe the measurement.
                 if key not in (b"pandas", b"ARROW:schema")
             }
         if len(set(self.names)) < len(self.names):
@@ -286,7 +286,7 @@ def _excel(path: Path) -> Table:
 
 
 def _cells(values: Sequence[Any], decimal: str) -> Cells:
-    """Returns numbers if every value is a number or missing, else text."""
+    """Returns the cells of a column as numbers if every cell is a number or missing, else as text."""
     if all(
         value is None or (isinstance(value, (int, float)) and not isinstance(value, bool)) for value in values
     ):
@@ -330,14 +330,14 @@ def _matlab(path: Path) -> Table:
 
 
 def _refuse_damaged(content: bytes) -> None:
-    """Refuses a MATLAB file of version 5 whose elements do not fit into each other; others pass.
+    """Refuses a MATLAB file of version 5 with an element longer than the element or file that contains it.
 
     `scipy.io.loadmat` crashes on some of them.
 
     Raises
     ------
     ValueError
-        Names the byte at which the first such element begins.
+        An element is too long; the message names the byte at which it begins.
     """
     if len(content) < _MATLAB_HEADER_BYTES or 0 in content[:4] or content[125] + content[124] != 1:
         return
@@ -345,7 +345,7 @@ def _refuse_damaged(content: bytes) -> None:
 
 
 def _elements(content: bytes, offset: int, end: int, order: str) -> list[tuple[int, int]]:
-    """Checks the elements from one byte to another; returns the type and first byte of the data of each."""
+    """Checks the MATLAB elements between two bytes; returns type and first data byte of each element."""
     found = []
     while offset < end:
         start = offset
@@ -433,7 +433,7 @@ def _mcap(path: Path) -> Table:
 
 
 def _named_values(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Yields numbers and words of a message by names like ``wrench.force_N``."""
+    """Yields the numbers and words of a JSON message; a nested field has a name like ``wrench.force_N``."""
     if isinstance(value, dict):
         for key, item in value.items():
             yield from _named_values(item, f"{name}.{key}" if name else str(key))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motion of a recording: strokes by the order of rows, pieces on an even time grid, zero-phase derivatives.
+"""Motion of a recording: direction of strokes, pieces on an even time grid, derivatives without delay.
 
 Velocity and acceleration are central differences, which have no phase. One low-pass L then runs forward and
 backward, which also has no phase. L is two real poles twice, |L| = 1 / (1 + (w/w_c)^2)^2.
@@ -21,34 +21,43 @@ from ..errors import InputError
 from .recording import Recording
 
 TURN_SHARE = 0.02
-"""Least share of the travel by which the position must move back for a turn [-]."""
+"""Least motion back that counts as a reversal of the stroke, as a share of the position range [-]."""
 
 TURN_NOISE = 8.0
-"""Standard deviations of the position noise by which it must move back; excludes turns by noise [-]."""
+"""Least motion back that counts as a reversal, in standard deviations of the position noise [-].
+
+Noise alone moves the position back by less.
+"""
 
 TURN_STEPS = 1.5
-"""Steps of a quantised position by which it must move back; excludes jitter between two steps [-]."""
+"""Least motion back that counts as a reversal, in steps of a quantised position [-].
+
+A position that alternates between two neighbouring steps moves back by less.
+"""
 
 LARGEST_TURN = 0.4
-"""Largest of these limits as a share of the travel; above it turns cannot be separated from noise [-]."""
+"""Largest least motion back, as a share of the position range [-].
+
+If noise or steps require more, reversals cannot be distinguished from noise.
+"""
 
 GRID_STEPS = 8.0
-"""Steps of that limit to which positions are rounded to find the turns."""
+"""Number of grid steps in the least motion back of a reversal. Positions are rounded to this grid."""
 
 MOST_DIFFERENCES = 100_000
-"""Approximate largest number of differences of adjacent rows from which the noise is estimated."""
+"""Approximate largest number of differences of adjacent positions from which the noise is estimated."""
 
 LEAST_STROKE_ROWS = 4
-"""Least number of rows between two turns; fewer rows are a jump, for example between two strokes."""
+"""Least number of rows between two reversals; fewer rows are a jump, for example between two strokes."""
 
 JUMPING_SHARE = 0.1
-"""Share of the rows in jumps above which the rows have no order [-]."""
+"""Share of the rows in jumps above which the rows are taken as not ordered in time [-]."""
 
 HOLD_SHARE = 0.1
-"""Least share of a stroke's rows that rest at its end for a hold [-]."""
+"""Least share of a stroke's rows that stay at the stroke's last position and are a hold [-]."""
 
 HOLD_ROWS = 10
-"""Least number of rows of a hold."""
+"""Least number of rows that stay at the last position of a stroke, so that these rows are a hold."""
 
 
 def strokes_from_order(position: Float1D) -> Int8Vector | None:
@@ -91,7 +100,7 @@ def strokes_from_order(position: Float1D) -> Int8Vector | None:
         direction[begin : last + 1] = sign
         near = min(TURN_NOISE * noise, 1.0)
         held, moving = _rest(around, reached, near)
-        # A sinusoidal motion spends this share of a half-period within a distance of its end.
+        # Share of a half-period in which a sinusoidal motion is nearer to its end than the distance `near`.
         slow_share = 2.0 * np.arccos(1.0 - 2.0 * near) / np.pi
         if moving - held >= max(HOLD_ROWS, (HOLD_SHARE + slow_share) * reached):
             holds.append(slice(begin + held, begin + moving + 1))
@@ -117,20 +126,23 @@ def turns_of(direction: Int8Vector) -> int:
 
 
 def _noise(x: Float1D) -> float:
-    """Returns the standard deviation of the noise from third differences; turns are too few to matter."""
+    """Returns the standard deviation of the position noise from third differences of adjacent positions.
+
+    Reversals are too few to change their median.
+    """
     differences = np.abs(x[3:] - x[:-3] - 3.0 * (x[2:-1] - x[1:-2]))
     return float(np.median(differences[:: max(1, len(x) // MOST_DIFFERENCES)]) / (0.6745 * math.sqrt(20.0)))
 
 
 def _resolution(x: Float1D) -> float:
-    """Returns the smallest step between adjacent rows, without rounding errors."""
+    """Returns the smallest change of position between adjacent rows that is not a rounding error."""
     steps = np.abs(np.diff(x))
     return float(np.min(steps[steps > 1e-9]))
 
 
 def _stroke_ends(x: Float1D, turn: float) -> list[tuple[int, int]]:
-    """Returns last row and direction of each stroke; a stroke ends if x moves back by more than `turn`."""
-    # On a grid few rows are local extremes, at any noise.
+    """Returns last row and direction of each stroke. A stroke ends if x moves back by more than `turn`."""
+    # Positions rounded to a grid have few local extremes, even with much noise.
     grid = np.rint(x * (GRID_STEPS / turn))
     steps = np.diff(grid)
     moves = np.flatnonzero(steps)
@@ -162,7 +174,7 @@ def _stroke_ends(x: Float1D, turn: float) -> list[tuple[int, int]]:
 
 
 def _rest(x: Float1D, row: int, within: float) -> tuple[int, int]:
-    """Returns the first and last of the adjacent rows within a distance of the position of one row."""
+    """Returns first and last row of the run around `row` in which |x - x[row]| is at most `within`."""
     away = np.abs(x - x[row]) > within
     before, after = np.flatnonzero(away[:row]), np.flatnonzero(away[row:])
     first = int(before[-1]) + 1 if len(before) else 0
@@ -171,33 +183,33 @@ def _rest(x: Float1D, row: int, within: float) -> tuple[int, int]:
 
 
 GAP_RATIO = 2.5
-"""Ratio to the median time step above which a step is a gap. Derivatives and filters stop at gaps."""
+"""Time step above which a recording has a gap, over the median step. Derivatives and filters stop there."""
 
 LARGEST_STEP_DEVIATION = 0.01
-"""Largest difference of the time steps of a piece, as a share of the period, without resampling."""
+"""Largest difference of the time steps of a piece that is not resampled, as a share of the period."""
 
 MARGIN_TIME_CONSTANTS = 3.0
-"""Time constants of L, 2/w_c for its two poles, that are removed at both ends of a piece."""
+"""Time removed at both ends of a filtered piece, in time constants 2/w_c of the low-pass filter."""
 
 HIGHEST_CUTOFF = 0.25
-"""Highest cutoff that is tried [1/period]; above it L would not filter."""
+"""Highest cutoff frequency of the low-pass that is tried [1/period]; a higher one would not filter."""
 
 NOISE_SHARE = 0.01
-"""Largest share of position noise in the variance of a derivative after L."""
+"""Largest share of position noise in the variance of a velocity or acceleration after the low-pass."""
 
 CUTOFF_RATIO = 0.85
-"""Ratio of successive cutoffs."""
+"""Ratio of each cutoff frequency of the low-pass to the one tried before."""
 
 LEAST_TIME_CONSTANTS = 200.0
-"""Least duration of the recording in units of 1/w_c; slower changes are not motion."""
+"""Least duration of a recording in units of 1/w_c, with the cutoff w_c [rad/s] of the low-pass."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Rows without a gap, on an even grid of time."""
+    """Rows of a recording between two gaps in time, with an even time grid."""
 
     rows: slice
-    """Rows of the recording"""
+    """Rows of the recording that belong to the piece"""
     time: Float1D
     """(k,) [s]"""
     position: Float1D
@@ -205,9 +217,9 @@ class Piece:
     row_time: Float1D
     """(rows,) [s]"""
     period: float
-    """Period of the grid [s]"""
+    """Time step of the grid [s]"""
     even: bool
-    """True if the grid is the recording's rows; False if it was interpolated between them"""
+    """True if the grid times are the times of the rows; False if values are interpolated between the rows"""
 
     def on_grid(self, values: Float1D) -> Float1D:
         """Returns values at the piece's rows, interpolated to the grid."""
@@ -219,28 +231,28 @@ class Piece:
 
     @property
     def velocity(self) -> Float1D:
-        """Central difference (k,) [position/s]"""
+        """Velocity: central difference of the position on the grid (k,) [position/s]"""
         return velocity_of(self.position, self.period)
 
     @property
     def acceleration(self) -> Float1D:
-        """Second central difference (k,) [position/s^2]"""
+        """Acceleration: second central difference of the position on the grid (k,) [position/s^2]"""
         return acceleration_of(self.position, self.period)
 
 
 @dataclass(frozen=True)
 class LowPass:
-    """L, forward and backward."""
+    """Low-pass L, two real poles, which runs over a signal forward and then backward, so it has no delay."""
 
     cutoff: float
-    """w_c [rad/s]"""
+    """Cutoff frequency w_c [rad/s]"""
 
     def margin(self, period: float) -> int:
-        """Returns the number of samples at each end that the ends of a signal disturb."""
+        """Returns the number of samples at each end of a filtered signal that are inaccurate."""
         return math.ceil(2.0 * MARGIN_TIME_CONSTANTS / (self.cutoff * period))
 
     def __call__(self, signal: Float1D, period: float) -> Float1D:
-        """Returns the signal (k,) below the cutoff without delay. Its ends are mirrored."""
+        """Returns the low-passed signal (k,) without delay. The signal is first mirrored at both ends."""
         pole = math.exp(-self.cutoff * period)
         response = TransferFunction([(1.0 - pole) ** 2, 0.0, 0.0], [1.0, -2.0 * pole, pole * pole])
         mirrored = min(len(signal) - 1, self.margin(period))
@@ -252,9 +264,9 @@ class LowPass:
 
 
 def pieces(recording: Recording) -> list[Piece]:
-    """Divides the recording at its gaps; each piece has an even grid of the motion's median time step.
+    """Divides the recording at its gaps in time; the grid step of each piece is the median time step.
 
-    Positions are from the whole motion, forces from the rows of the recording.
+    Positions include held-out rows; forces are those of the recording's rows only.
 
     Raises
     ------
@@ -288,12 +300,12 @@ def pieces(recording: Recording) -> list[Piece]:
 
 
 def velocity_of(position: Float1D, period: float) -> Float1D:
-    """Returns the central difference (k,), one-sided at the ends."""
+    """Returns the velocity: central difference of the position (k,), one-sided at both ends."""
     return np.gradient(position, period) if len(position) > 1 else np.zeros_like(position)
 
 
 def acceleration_of(position: Float1D, period: float) -> Float1D:
-    """Returns the second central difference (k,), constant at the ends."""
+    """Returns the acceleration: second central difference of the position (k,), repeated at both ends."""
     if len(position) < 3:
         return np.zeros_like(position)
     inner = np.diff(position, 2) / period**2
@@ -301,7 +313,7 @@ def acceleration_of(position: Float1D, period: float) -> Float1D:
 
 
 def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
-    """Returns the highest L whose derivative of that order contains at most NOISE_SHARE of noise, or None.
+    """Returns the low-pass with the highest cutoff that leaves at most NOISE_SHARE of noise in a derivative.
 
     Sixth differences of the position estimate its noise, because a hand's motion leaves almost nothing in
     them. The noise of the derivative follows from the impulse response of both filters.
@@ -333,14 +345,14 @@ def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
 
 
 def long_enough(parts: Sequence[Piece], low_pass: LowPass) -> list[Piece]:
-    """Returns the pieces that are longer than their margins."""
+    """Returns the pieces that have samples left after the inaccurate ones at both ends are removed."""
     return [part for part in parts if len(part.time) > 2 * low_pass.margin(part.period) + 2]
 
 
 def at_rows(
     parts: Sequence[Piece], low_pass: LowPass, derive: Callable[[Piece], Float1D], n: int
 ) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Returns a derivative after L at the n rows of the pieces (n,), and which rows have one (n,)."""
+    """Returns a low-passed derivative at the n rows of the pieces (n,), and True if it is accurate (n,)."""
     result, defined = np.zeros(n), np.zeros(n, dtype=np.bool_)
     for part in long_enough(parts, low_pass):
         margin = low_pass.margin(part.period)
@@ -351,7 +363,7 @@ def at_rows(
 
 
 def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Returns the velocity [position unit per second] at the rows (n,), and which rows have one (n,).
+    """Returns the velocity [position unit per second] of each row (n,), and True for rows that have one (n,).
 
     Raises
     ------
@@ -362,7 +374,7 @@ def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
 
 
 def acceleration(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Returns the acceleration [position unit per second squared]; see :func:`velocity`."""
+    """Returns the acceleration [position unit per second squared] of each row; else as :func:`velocity`."""
     return _derivative(recording, 2)
 
 

@@ -20,40 +20,40 @@ from .motion import GAP_RATIO
 from .recording import Recording
 
 PLAUSIBLE_TRAVEL = {"m": (1e-7, 0.5), "rad": (1e-3, 100.0 * np.pi)}
-"""Least and largest plausible travel by unit: from the tip of a microscope to an arm, and up to 50 turns."""
+"""Least and largest plausible position range by unit: from microscope tip to arm; up to 50 revolutions."""
 
 PLAUSIBLE_FORCE_RANGE = {"N*m": (1e-6, 1e3), "A": (1e-5, 1e3)}
-"""Least and largest plausible force range by unit; that of N depends on the travel."""
+"""Least and largest plausible difference of two forces by unit; for N it depends on the position range."""
 
 MICROSCOPE_TRAVEL = 1e-4
-"""Travel below which a recording is from a microscope [m]."""
+"""Position range below which a recording is taken to be from a force microscope [m]."""
 
 MICROSCOPE_FORCE_RANGE, USUAL_FORCE_RANGE = (1e-10, 0.1), (1e-3, 1e4)
-"""Plausible force range below that travel, and above it [N]."""
+"""Plausible least and largest force range, for a force microscope and for other recordings [N]."""
 
 LEAST_SAME_SIGN_SHARE = 0.8
-"""Share of the positions at which a loop has the sign of its mean."""
+"""Least share of positions at which press minus release force has the same sign as its mean."""
 
 LEAST_LOOP_SHARE = 0.02
-"""Least mean of press minus release force for a loop, as a share of the force's spread."""
+"""Least mean of press minus release force that counts as hysteresis, over the force's standard deviation."""
 
 LEAST_LOOP_ERRORS = 5.0
-"""Least mean of press minus release force for a loop, over its standard error."""
+"""Least mean of press minus release force that counts as hysteresis, over the standard error of this mean."""
 
 LEAST_CLIPPED_ROWS = 5
-"""Least number of rows with a clipped force or position."""
+"""Least number of rows with the same extreme force or position that are reported as clipped."""
 
 LEAST_CLIPPED_POSITIONS = 3
-"""Least number of positions of a clipped force. A tool at rest has one."""
+"""Least number of positions in rows with a clipped force. A tool at rest has one position."""
 
 LEAST_CLIPPED_RATIO = 5.0
-"""Least ratio of rows at the extreme value to rows at any near value. A rounded force rarely exceeds 3."""
+"""Least number of rows at a clipped value over the rows at any near value; rounding alone gives at most 3."""
 
 NEAR_EXTREME_SHARE = 0.1
-"""Distance from the extreme that counts as near, as a share of the force's range."""
+"""Largest distance of a value from the extreme value to count as near to it, as a share of the range."""
 
 CONTACT_FORCE_SHARE = 0.2
-"""Share of the largest |force| below which the extreme belongs to a tool without contact."""
+"""Share of the largest |force| below which an extreme force belongs to a tool without contact."""
 
 LEAST_FORCE_CHANGE_SHARE = 0.1
 """Least change of force at a constant position, as a share of the force's range."""
@@ -65,34 +65,34 @@ LEAST_STUCK_FORCE_SHARE = 0.005
 """Least change of force before a jump of the position, as a share of the force's range."""
 
 LEAST_JUMP_RATIO = 5.0
-"""Least ratio of that jump to the usual step."""
+"""Least jump of the position after a stuck sensor, over the median change of position between rows."""
 
 LEAST_REGULAR_SHARE = 0.8
-"""Least share of the rows in runs of one length or its multiples."""
+"""Least share of rows in runs of equal values whose lengths are multiples of one number of rows."""
 
 LEAST_CHANGE_RATIO = 1.5
-"""Least ratio of the changes of the other column to those of the held column."""
+"""Least number of changes of one column (position or force) over those of the column that repeats values."""
 
 LEAST_REPORTED_LAG = 0.005
-"""Least change of force from run to run for which a lag is reported, as a share of its spread."""
+"""Least change of force between two new samples that is reported as late, over the force's spread."""
 
 LONGEST_HELD_ROWS = 1000
-"""Rows of a run above which it is a pause, not a held sample."""
+"""Number of rows with an equal value above which the motion paused and no sample was repeated."""
 
 LEAST_GAP_SHARE = 0.02
-"""Least width of a gap, as a share of the travel."""
+"""Least width of a gap in position, as a share of the position range."""
 
 LEAST_GAP_RATIO = 8.0
-"""Least width of a gap over the 90th percentile of the distances between adjacent positions."""
+"""Least width of a gap in position, over the 90th percentile of the distances of adjacent positions."""
 
 MOST_NAMED_GAPS = 2
-"""Largest number of gaps whose ends a finding gives."""
+"""Largest number of gaps in position whose ends a finding states."""
 
 LARGEST_END_GAP = 0.05
-"""Largest share of the travel that one stroke may omit at an end."""
+"""Largest share of the position range that one stroke may leave out at one end without a finding."""
 
 LEAST_LOST_SHARE = 0.05
-"""Least share of the duration for which missing samples are reported."""
+"""Least share of a recording's duration without samples that is reported."""
 
 
 def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
@@ -157,7 +157,7 @@ def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) 
     """Returns findings on a reversed direction, an active loop, and a force that falls with position."""
     signs = recording.direction
     if signs is not None and len(signs) > 1:
-        # a spike goes both ways and does not count
+        # a spike of the position moves it both up and down and does not count
         step = np.where(travel.inside[1:] & travel.inside[:-1], np.diff(recording.position) * signs[1:], 0.0)
         if step.sum() < 0:
             against = float(np.mean(step[step != 0.0] < 0))
@@ -187,7 +187,7 @@ def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) 
 
 
 def _loop(recording: Recording, cells: CellRows | None) -> tuple[float, bool]:
-    """Returns the mean of press minus release force, and True if it is clearly not zero."""
+    """Returns the mean of press minus release force, and True if this mean is clearly not zero."""
     if cells is None or len(cells.loop) < 4:
         return 0.0, False
     mean = float(np.mean(cells.loop))
@@ -273,13 +273,13 @@ def _constant_position_findings(recording: Recording, travel: Travel, force_rang
 
 
 def _usual_count(x: Float1D, value: float, travel: Travel) -> float:
-    """Returns the number of rows at the values next to an extreme one."""
+    """Returns the median number of rows with one position, for positions near an extreme position."""
     near = x[(np.abs(x - value) <= NEAR_EXTREME_SHARE * travel.length) & (x != value)]
     return float(np.median(np.unique(near, return_counts=True)[1])) if len(near) else 1.0
 
 
 def _change_inside(f: Float1D, rows: NDArray[np.intp]) -> float:
-    """Returns the largest distance of the force inside a run of consecutive rows from both ends of the run.
+    """Returns how far the force inside a run of rows leaves the interval between its first and last force.
 
     A hand is at rest when it reverses, while friction changes its sign. The force then changes from one end
     of the run to the other, but does not leave that range.
@@ -294,15 +294,15 @@ def _change_inside(f: Float1D, rows: NDArray[np.intp]) -> float:
 
 
 def _inner_range(values: Float1D) -> float:
-    """Returns the range of the inner 90 %."""
+    """Returns the difference between the 95th and the 5th percentile of the values."""
     low, high = np.percentile(values, (5.0, 95.0))
     return float(high - low)
 
 
 def hold_findings(recording: Recording) -> list[Finding]:
-    """Returns findings on columns that change only once in several rows.
+    """Returns findings if position or force changes only once in several rows: a repeated, slower sensor.
 
-    Both columns together matter only with time, which then belongs to other rows.
+    If both columns change in the same rows, this is a defect only with time: the time of most rows is wrong.
     """
     x, f = recording.position, recording.force
     rows = {"position": _held_for(x), "force": _held_for(f)}
@@ -338,7 +338,7 @@ def _held_findings(recording: Recording, subject: str, rows: int, other: str) ->
 
 
 def _held_for(values: Float1D) -> int:
-    """Returns the number of rows for which a column is held; 1 without a common length."""
+    """Returns the number of rows in which a column repeats a value; 1 if this number is not regular."""
     edges = np.flatnonzero(np.diff(values)) + 1
     lengths = np.diff(edges)
     lengths = lengths[lengths < LONGEST_HELD_ROWS]
@@ -381,7 +381,7 @@ def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
 
 
 def _gaps(recording: Recording, travel: Travel, name: str, gaps: list[tuple[float, float]]) -> Finding:
-    """Returns one finding on all intervals of position without rows, the longest ones named."""
+    """Returns one finding on all position intervals without rows; it states the ends of the longest ones."""
     unit = recording.file_unit("position")
     share = sum(stop - start for start, stop in gaps) / travel.length
     longest = sorted(gaps, key=lambda gap: gap[0] - gap[1])[:MOST_NAMED_GAPS]

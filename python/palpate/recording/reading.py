@@ -197,15 +197,15 @@ def recordings_from(
 
 
 PART_ROWS = 4_000_000
-"""Rows of a part, which one worker reads at a time."""
+"""Number of rows of one part of a long file, which one process reads."""
 
 BLOCK_ROWS = 500_000
-"""Rows in memory at a time."""
+"""Number of rows of a long file that one process holds in memory at a time."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Rows of a part that are in memory at a time."""
+    """Rows of a long file that are in memory at a time."""
 
     position: Float1D
     """[SI]"""
@@ -213,7 +213,7 @@ class Block:
     """[SI]"""
     direction: Int8Vector | None
     rows: int
-    """Rows of the file, ignored rows included"""
+    """Number of rows that were read from the file, including ignored rows"""
     left_out: LeftOut
 
 
@@ -225,16 +225,16 @@ class LongRecording:
     conversion: Conversion
     """Conversion of position, force and direction"""
     parts: tuple[tuple[int, int], ...]
-    """Places between which the file is read in parts"""
+    """Start and end of each part of the file"""
     rows: int
-    """Rows of the file, counted without reading their cells"""
+    """Number of rows of the file, counted without reading their cells"""
     source: Source
-    """Source without the number of used rows"""
+    """Source of the recording; its number of used rows is not yet known"""
     notes: tuple[str, ...]
 
     @property
     def direction(self) -> str | None:
-        """Column of the direction."""
+        """Column that states the direction of the stroke in each row, or None."""
         return self.conversion.direction
 
     @property
@@ -271,7 +271,7 @@ class LongRecording:
 
 
 class _PartPlaces:
-    """Places of the rows of a part. The rows before the part are counted only when a place is needed."""
+    """Line numbers of the rows of a part. Rows before the part are counted if a line number is needed."""
 
     def __init__(self, table: LongTable, part: tuple[int, int]) -> None:
         self._table, self._part = table, part
@@ -317,7 +317,7 @@ def open_long_recording(
         drop=invalid == "drop",
     )
     if conversion.direction == "segment" and direction is None and "segment" not in table.text_names:
-        conversion = replace(conversion, direction=None)  # numbered segments do not state the stroke
+        conversion = replace(conversion, direction=None)  # segment numbers state no direction
     notes = conversion.note(dialect=table.notes), *conversion.choice.notes
     conversion = replace(conversion, choice=replace(conversion.choice, time=None, inputs=()))
     rows, parts = _require_long_table(table, file).parts(part_rows)

@@ -39,22 +39,22 @@ class Recording:
     time: Float1D | None
     """(n,) [s], strictly increasing, or None"""
     direction: Int8Vector | None
-    """(n,) +1 into the object, -1 out of it, 0 neither; None if the file does not state it"""
+    """(n,) direction of motion: +1 into the object, -1 out of it, 0 neither; None if the file has none"""
     inputs: Float2D
-    """(n, d) further inputs, SI if their names contain a unit"""
+    """(n, d) further inputs on which the force depends, in SI if their names contain a unit"""
     input_names: tuple[str, ...]
     columns: Mapping[str, Cells]
-    """Every other column, unconverted: float64, or str objects for text"""
+    """Every other column of the file, without conversion: float64 numbers, or str objects for text"""
     metadata: Mapping[str, str]
     units: Mapping[str, str]
     """"position": "rad" | "m" | "count" | "", "force": "N*m" | "N" | "A" | "" ("": SI, not specified)"""
     source: Source
     notes: tuple[str, ...] = field(default=())
-    """Choices, dropped rows and observations of the reader, in sentences"""
+    """Sentences that state the chosen columns, the dropped rows and other observations of the reader"""
     part_of: Motion | None = field(default=None, repr=False)
-    """Motion that contains the rows; None if the recording contains all of it"""
+    """All rows of the motion of which the recording is a part; None if the recording contains all rows"""
     file_units: Mapping[str, Unit] = field(default_factory=dict, repr=False)
-    """Units of "position" and "force" in the file, for messages; a missing one is that of `units`"""
+    """Units of "position" and "force" in the file, for messages; a missing one is taken from `units`"""
 
     def __post_init__(self) -> None:
         n = len(self.position)
@@ -223,7 +223,7 @@ class Recording:
 
     @property
     def motion(self) -> Motion:
-        """The whole motion, held-out rows included."""
+        """Positions and times of all rows of the motion, including the rows that were held out."""
         if self.part_of is not None and len(self.part_of.rows) == len(self):
             return self.part_of
         return Motion(self.position, self.time, np.arange(len(self)))
@@ -275,7 +275,7 @@ class Recording:
         )
 
     def without(self, rows: npt.NDArray[np.bool_]) -> Recording:
-        """Returns the recording without the marked rows (n,)."""
+        """Returns the recording without the rows that are True in the argument (n,)."""
         return self._rows(~rows)
 
     def with_force_earlier(self, late_s: float) -> Recording:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of every row of the chosen columns. Bad rows refuse the file, or are dropped and counted."""
+"""Checks of every row of the chosen columns. A row that cannot be used refuses the file, or is dropped."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ DIRECTION_WORDS: dict[str, int] = {
 
 @dataclass
 class LeftOut:
-    """Numbers of ignored rows by reason."""
+    """Number of rows of a file that are not used, by reason."""
 
     status: Counter[str] = field(default_factory=Counter)
-    """Rows whose force was not the model's alone, by the word of their status"""
+    """Number of rows whose force was not the model's force, by the word in the status column"""
     dropped: dict[str, tuple[int, int]] = field(default_factory=dict)
-    """Number of dropped rows and the first one, by reason"""
+    """Number of dropped rows and index of the first dropped row, by reason"""
 
     @property
     def rows(self) -> int:
@@ -43,7 +43,7 @@ class LeftOut:
         self.dropped[reason] = earlier_count + count, min(earlier_first, first)
 
     def add(self, other: LeftOut, rows_before: int) -> None:
-        """Adds the counts of a part that begins after `rows_before` rows."""
+        """Adds the numbers of unused rows in one part of a file; the part begins after `rows_before` rows."""
         self.status += other.status
         for reason, (count, first) in other.dropped.items():
             self.drop(reason, count, rows_before + first)
@@ -60,20 +60,20 @@ class LeftOut:
 
 
 class RowCheck:
-    """Marks the rows that can be used.
+    """Marks the rows of a file that can be used.
 
     Parameters
     ----------
     file : str
         The file's name, for the sentences.
     table : Places
-        Gives lines and cells for messages.
+        Gives line numbers and texts of cells for messages.
     first_row : int
         Data row of the file at which the arrays begin.
     rows : int
         Number of rows.
     drop : bool
-        Drops and counts bad rows if True; else refuses the file at the first one.
+        True: drops and counts rows that cannot be used. False: refuses the file at the first such row.
     """
 
     def __init__(self, file: str, table: Places, first_row: int, rows: int, drop: bool) -> None:
@@ -96,7 +96,7 @@ class RowCheck:
             self.kept &= ~others
 
     def finite(self, name: str, values: Float1D) -> None:
-        """Requires a finite number in every row of this column."""
+        """Refuses or drops each row without a finite number in this column."""
         bad = self.kept & ~np.isfinite(values)
         self._refuse_or_drop(
             bad, name, "holds {cell}, which is not a finite number", "without a finite number in " + name
@@ -125,7 +125,7 @@ class RowCheck:
         return values[codes]
 
     def increasing(self, name: str, time: Float1D) -> None:
-        """Requires in every usable row a later time than in all usable rows before it."""
+        """Refuses or drops each row whose time is not later than the times of all usable rows before it."""
         rows = np.flatnonzero(self.kept)
         usable = time[rows]
         latest_before = np.maximum.accumulate(usable)[:-1]
@@ -135,7 +135,7 @@ class RowCheck:
             not_later,
             name,
             "holds {cell}, must be later than the time before it",
-            "with a time that repeats or decreases",
+            "with a time that is not later than in a row before",
         )
 
     def _refuse_or_drop(self, bad: NDArray[np.bool_], name: str, sentence: str, reason: str) -> None:

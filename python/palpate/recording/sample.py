@@ -11,27 +11,27 @@ from ..errors import InputError
 from .recording import Recording
 
 STIFFNESS = 2.0
-"""Stiffness of the soft part [N*m/rad]."""
+"""Stiffness of the sample's soft spring [N*m/rad]."""
 WALL_STIFFNESS = 58.0
-"""Stiffness that the wall adds [N*m/rad]."""
+"""Stiffness that the sample's wall adds to the spring [N*m/rad]."""
 WALL_POSITION = 0.4
-"""Position at which the wall begins [rad]."""
+"""Position of the sample's wall [rad]."""
 WALL_WIDTH = 0.01
-"""Length over which the wall begins [rad]."""
+"""Width of the transition from soft spring to wall [rad]."""
 LOWER, UPPER = -0.2, 0.469
-"""Range of the sweep [rad]."""
+"""Least and largest position of the simulated hand's motion [rad]."""
 FORCE_LIMIT = 5.0
 """Force limit of the simulated device [N*m]."""
 ENCODER_STEP = 2 * np.pi / 65536
-"""16-bit encoder [rad]."""
+"""Step of the simulated 16-bit encoder: one revolution divided by 65536 [rad]."""
 FORCE_NOISE = 0.02
 """Standard deviation of the force sensor's noise [N*m]."""
 SAMPLE_PERIOD = 1e-3
-"""[s]"""
+"""Time between two samples of the simulated recording [s]."""
 SLOWEST_HZ, FASTEST_HZ = 0.2, 2.0
-"""Range of the frequency of the hand's sweep [Hz]."""
+"""Lowest and highest frequency at which the simulated hand moves to and fro [Hz]."""
 WANDER_HZ = (0.031, 0.073, 0.127)
-"""Slow, incommensurate frequencies that modulate the sweep [Hz]."""
+"""Frequencies of the slow changes of the hand's frequency [Hz]; incommensurate, so no motion repeats."""
 
 
 def sample_force(x: npt.ArrayLike) -> Float1D:
@@ -52,7 +52,7 @@ def sample_recording(seed: int, duration_s: float = 60.0) -> Recording:
     seed : int
         Seed of the hand's motion and of the noise. Seed 1 is for identification, seed 2 for verification.
     duration_s : float
-        Length [s].
+        Duration of the recording [s].
 
     Returns
     -------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables that read names first and cells later, parsing of numbers, and a DataFrame as a table."""
+"""Tables whose column names are read before their cells; parsing of numbers; a DataFrame as a table."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Cells: TypeAlias = NDArray[Any]
 
 
 class Places(Protocol):
-    """Places of the rows of a table."""
+    """Line numbers of the rows of a table, and texts of its cells, for messages."""
 
     def place(self, row: int) -> str: ...
 
@@ -29,18 +29,18 @@ class Places(Protocol):
 
 
 class Table(ABC):
-    """Table with a header, read in two steps: choosing columns needs only the header."""
+    """Table that is read in two steps: first its header, to choose the columns, then the chosen columns."""
 
     names: tuple[str, ...]
     metadata: Mapping[str, str]
     torn = 0
-    """Number of torn lines at the end that are ignored"""
+    """Number of incomplete lines at the end of the file that are ignored"""
     notes: Sequence[str] = ()
-    """Differences from a plain table, in parts of a sentence"""
+    """Differences of the file from a plain table, as parts of one sentence"""
     text_names: Collection[str] = ()
     """Columns that are known to hold text before the rows are read"""
     steady_names: Collection[str] = ()
-    """Columns that have one or two values at the start of the table, as read until then"""
+    """Columns that have only one or two distinct values in the first rows of the table"""
 
     @abstractmethod
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
@@ -50,7 +50,7 @@ class Table(ABC):
 
     @abstractmethod
     def place(self, row: int) -> str:
-        """Returns the place of a row for messages: "line 12"."""
+        """Returns the place of a row in the file, for messages: "line 12"."""
 
     @abstractmethod
     def cell(self, row: int, name: str) -> str:
@@ -58,7 +58,7 @@ class Table(ABC):
 
 
 class LongTable(Table):
-    """Table that can also be read in parts."""
+    """Table in a file that can also be read in parts, because it may be larger than memory."""
 
     @abstractmethod
     def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
@@ -86,7 +86,7 @@ class LongTable(Table):
 def parse_number(text: str) -> float | None:
     """Returns the number in a cell, or None. NaN and infinity count as numbers."""
     try:
-        # float() would accept 1_000, which other readers of the file refuse.
+        # Python's float() accepts "1_000", which other programs do not read as a number.
         return None if "_" in text else float(text)
     except ValueError:
         return None
@@ -100,7 +100,7 @@ def parse_with(text: str, decimal: str) -> float | None:
 
 
 MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "#N/A", "n/a", "NULL", "null", "None")
-"""Texts of a missing value in a numeric column."""
+"""Texts that mean a missing value in a column of numbers."""
 
 
 def to_numbers(cells: Cells, decimal: str = ".") -> NDArray[np.float64]:
@@ -119,7 +119,7 @@ FRAME = "the frame"
 
 @contextmanager
 def python_arguments() -> Iterator[None]:
-    """Names arguments of Python instead of command line options in a message about a file."""
+    """Replaces command line options by the names of Python arguments in a message about a file."""
     try:
         yield
     except InputError as error:

@@ -16,20 +16,20 @@ POUND = 0.45359237
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit of the table: symbol, SI unit of its quantity, and factor."""
+    """Unit of a column: its symbol, the SI unit of the same quantity, and the factor between both."""
 
     symbol: str
     si: str
-    """Unit inside the package: m, rad, count, N, N*m, A or s."""
+    """SI unit to which values in this unit are converted: m, rad, count, N, N*m, A or s."""
     factor: float
-    """value in SI = factor * value in this unit"""
+    """Factor of the conversion: value in SI = factor * value in this unit"""
 
     def text(self, value: float) -> str:
-        """Returns an SI value in this unit, with four significant digits and the symbol."""
+        """Returns a value given in SI as text in this unit, with four significant digits and the symbol."""
         return f"{value / self.factor:.4g} {self._shown}".rstrip()
 
     def interval(self, low: float, high: float) -> str:
-        """Returns two SI values in this unit, as "0.1 to 0.3 mm"."""
+        """Returns the interval of two values given in SI as text in this unit: "0.1 to 0.3 mm"."""
         return f"{low / self.factor:.4g} to {self.text(high)}"
 
     @property
@@ -38,7 +38,7 @@ class Unit:
 
     @staticmethod
     def of_si(symbol: str) -> Unit:
-        """Returns an SI unit; an empty symbol is a unit that is not stated."""
+        """Returns the SI unit with this symbol; the empty symbol is a unit that is not stated."""
         return Unit(symbol, symbol, 1.0)
 
 
@@ -68,17 +68,17 @@ _FACTORS: dict[str, dict[str, float]] = {
 UNITS: dict[str, Unit] = {
     symbol: Unit(symbol, si, factor) for si, symbols in _FACTORS.items() for symbol, factor in symbols.items()
 }
-"""All units of columns. The table is closed: a units library would read `Nm` as nanometre."""
+"""All units that columns can have. No units library is used: it would read `Nm` as nanometre."""
 
 POSITION_UNITS = ("m", "rad", "count")
 FORCE_UNITS = ("N", "N*m", "A")
 TIME_UNITS = ("s",)
 
 COLUMN_SUFFIX = {"m": "m", "rad": "rad", "count": "count", "N": "N", "N*m": "Nm", "A": "A", "s": "s"}
-"""SI units at the end of a column name."""
+"""End of a column name for each SI unit."""
 
 MINUTE_STEMS = ("time", "t", "timestamp", "elapsed", "elapsed_time")
-"""Stems after which ``_min`` means minute. After other stems it usually means minimum."""
+"""Column names after which the ending ``_min`` means minute; after other names it usually means minimum."""
 
 _SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "·": "*", "⋅": "*", "∙": "*", ".": "*"})
 
@@ -86,7 +86,7 @@ _BRACKETS = re.compile(r"(?P<stem>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round
 
 
 def unit_of(symbol: str) -> Unit | None:
-    """Returns the unit of a symbol, or None. ``µm`` is um, ``°`` is deg, ``N·m`` and ``N.m`` are Nm."""
+    """Returns the unit with this symbol, or None. ``µm`` is um, ``°`` is deg, ``N·m`` and ``N.m`` are Nm."""
     text = symbol.strip()
     if text == "°":
         return UNITS["deg"]
@@ -114,7 +114,7 @@ def split_name(column: str) -> tuple[str, Unit | None]:
 
 
 def _stated(column: str) -> list[tuple[str, str]]:
-    """Returns the stem and the text in the place of a unit: one pair or none."""
+    """Returns the stem of a column name and the text where a unit can be: a list of one pair, or empty."""
     if brackets := _BRACKETS.fullmatch(column):
         return [(brackets["stem"], brackets["square"] or brackets["round"] or "")]
     if "," in column:

@@ -51,7 +51,7 @@ def test_help_fits_a_narrow_terminal(verb: str) -> None:
     completed = run(verb, "--help", env={**os.environ, "COLUMNS": "40"})
     assert completed.returncode == 0
     wide_lines = [line for line in completed.stdout.splitlines() if len(line) > 40]
-    # Names of options and their values are not wrapped.
+    # In the help, the name of an option and the name of its value must be on one line.
     assert [line for line in wide_lines if not line.lstrip().startswith("-")] == []
 
 

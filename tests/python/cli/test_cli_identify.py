@@ -37,7 +37,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def spring(path: Path, *, n: int = 400, seed: int = 0) -> Path:
-    """Writes a recording of 3 N*m/rad with a little noise."""
+    """Writes a recording of a spring of 3 N*m/rad with a little force noise."""
     random = np.random.default_rng(seed)
     position = random.uniform(0.0, 1.0, n)
     force = 3.0 * position + random.normal(0.0, 0.01, n)
@@ -74,7 +74,7 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
 def test_only_rows_with_a_velocity_are_held_out_for_a_model_over_velocity(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """At 100 Hz every fifth row alone gives no velocity: it is computed before the rows are split."""
+    """Every fifth row at 100 Hz gives no velocity, so velocity is computed before rows are held out."""
     time = 0.01 * np.arange(2000)
     position = 0.3 - 0.3 * np.cos(2.0 * np.pi * 0.5 * time)
     speed = np.gradient(position, time)
@@ -93,7 +93,7 @@ def test_only_rows_with_a_velocity_are_held_out_for_a_model_over_velocity(
 def test_held_out_rows_receive_the_verdict_of_verify(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Only the held-out rows have a force: the model is a constant, and the verdict is no."""
+    """Only the held-out rows have a force other than 0, so the model is a constant and its verdict is no."""
     position = np.linspace(0.0, 1.0, 400)
     force = np.where(np.arange(400) % 5 == 4, 3.0 * position, 0.0)
     Recording.from_arrays(position, force, units={"position": "rad", "force": "N*m"}).write(folder / "a.csv")

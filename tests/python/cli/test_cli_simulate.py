@@ -119,7 +119,7 @@ def test_a_model_in_ampere_is_refused(folder: Path, capsys: pytest.CaptureFixtur
 def test_a_diverged_rendering_exits_with_code_1(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No known plan passes the checks and diverges; the verdict must not depend on that."""
+    """No known plan passes the checks and then diverges, so the test makes the rendering diverge."""
 
     def diverging_simulate(*arguments: Any) -> Recording:
         recording = simulate(*arguments)

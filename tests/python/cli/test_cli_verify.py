@@ -22,7 +22,7 @@ UNITS = {"position": "rad", "force": "N*m"}
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Returns a folder with a model and a recording that it explains except for noise."""
+    """Returns a folder with a model and a recording whose force is the model's force plus noise."""
     monkeypatch.chdir(tmp_path)
     model = model_by_hand()
     model.save("m.json")

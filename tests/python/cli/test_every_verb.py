@@ -24,7 +24,7 @@ VERBS = {
     "show": "show m.json",
     "demo": "demo -o demo",
 }
-"""Short command for each verb."""
+"""One command line of each verb that ends quickly."""
 
 UNWRITABLE = {
     "stdout closed": ">&-",
@@ -43,7 +43,7 @@ def folder(tmp_path: Path) -> Path:
 
 def run(command: str, folder: Path, redirection: str = "") -> subprocess.CompletedProcess[str]:
     program = f"'{sys.executable}' -m palpate {command}"
-    if redirection.startswith("|"):  # the reader has ended before the first word
+    if redirection.startswith("|"):  # the program that reads the pipe ends before the first output
         program = f"(sleep 0.2; {program}; echo $? > code) {redirection}; sleep 0.2; wait"
         script = f"{program}; while ! test -s code; do sleep 0.05; done; exit $(cat code)"
     else:

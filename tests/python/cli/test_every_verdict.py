@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verdict of every verb: printed first, a field in --json, and in the exit code."""
+"""The verdict of every verb is the first printed line, a field of the --json output, and in the exit code."""
 
 import json
 from pathlib import Path

@@ -24,7 +24,7 @@ from usb_emulation import emulated, frames, needs_emulation
 OBJECT = ROOT / "tests" / "models" / "good" / "position.json"
 STIFFNESS = 3.0
 SPRING = ["--lock-step", "--spring", str(STIFFNESS)]
-MOST_PACKETS_IN_FLIGHT = 5  # packets between device and host in lock-step
+MOST_PACKETS_IN_FLIGHT = 5  # largest number of packets between the device and a host in lock-step
 
 
 def run_record(out: Path, *arguments: Any, device: list[str]) -> subprocess.CompletedProcess[str]:
@@ -33,7 +33,7 @@ def run_record(out: Path, *arguments: Any, device: list[str]) -> subprocess.Comp
 
 
 def stiffness(model: Model) -> float:
-    """Returns the stiffness over the inner four fifths of the range; the mean of both strokes."""
+    """Returns the stiffness between 10 % and 90 % of the domain, as the mean of press and release."""
     lower, upper = model.lower[0], model.upper[0]
     positions = np.array([0.9 * lower + 0.1 * upper, 0.1 * lower + 0.9 * upper])
     lower_force, upper_force = np.mean([model.force(positions, direction=sign) for sign in (1, -1)], axis=0)
@@ -51,7 +51,7 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
     assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
     assert summary["recorded"] == summary["ticks"] == 3000
-    assert not any(frame.enabled for frame in frames(trace))  # moved by a hand, without force
+    assert not any(frame.enabled for frame in frames(trace))  # only the hand moves the handle
     recording = read_recording(recording_file)
     assert recording.metadata["force"].endswith("from the device's force transducer")
     model = identify(recording)
@@ -74,7 +74,7 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
         *device, "--duration-s", 3, "--record", rendered_file, device=["--lock-step", "--trace", str(trace)]
     )
     assert completed.returncode == 0, completed.stderr
-    # After the ramp the device receives a torque towards smaller positions, proportional to the position.
+    # After the start ramp the device receives a torque towards smaller positions, proportional to position.
     sent_frames = frames(trace)
     active = [index for index, frame in enumerate(sent_frames) if frame.torque != 0.0]
     pressed = [frame for frame in sent_frames[active[0] + 300 : active[-1]] if frame.position > 0.1]
@@ -95,7 +95,7 @@ def test_a_probe_measures_the_stiffness_of_a_spring_without_a_hand(tmp_path: Pat
     assert np.ptp(recording.position) == pytest.approx(0.3, rel=0.1)
     # The motor also compensates the handle's damping: 0.018 N*m at this speed, of 0.72 N*m between the ends.
     model = identify(recording)
-    assert "velocity" not in model.inputs  # one speed cannot identify velocity
+    assert "velocity" not in model.inputs  # damping cannot be identified at one speed
     assert model.damping is None
     assert stiffness(model) == pytest.approx(STIFFNESS, rel=2 * 0.018 / 0.72)
     assert max(abs(frame.torque) for frame in frames(trace)) <= 1.2
@@ -105,7 +105,7 @@ def test_a_probe_measures_the_stiffness_of_a_spring_without_a_hand(tmp_path: Pat
 @needs_emulation
 @pytest.mark.parametrize("arguments", [[], ["--force-limit", 0.05]], ids=["default", "the device's own"])
 def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], tmp_path: Path) -> None:
-    """50000 uNm are 0.05 N*m, although 1e-6 * 50000 is slightly less; the usual limit is above that."""
+    """The probe may use 50000 uNm = 0.05 N*m, although 1e-6 * 50000 is rounded to slightly less."""
     trace, out = tmp_path / "trace.csv", tmp_path / "a.csv"
     probe = ["--probe", "--upper", 0.1, "--stiffness", 1, "--lowest-rate-share", 0, *arguments]
     weak_device = ["--lock-step", "--no-hand", "--spring", 0.3, "--max-torque-uNm", 50000, "--trace", trace]
@@ -122,7 +122,7 @@ def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], 
         ([], ["--no-transducer"], "EMU-1 has no force transducer"),
         (["--probe"], [], "a probe on a real device needs upper"),
         (["--probe", "--upper", 0.3, "--force-limit", 6], [], "force_limit is 6: must be at most 5"),
-        (["--object", OBJECT], [], "an object needs device simulated; usb has a real one"),
+        (["--object", OBJECT], [], "object needs device simulated; usb has a real object"),
         ([], ["--no-device"], "no USB device 1209:0001 with this protocol is connected"),
     ],
 )
@@ -153,7 +153,7 @@ def test_rows_recorded_before_an_unplug_are_kept(tmp_path: Path) -> None:
     rows = every_row(out)
     assert len(rows) == summary["recorded"] == summary["ticks"]
     assert summary["lost_records"] == 0
-    # The number of samples before the first row, or lost, depends on the machine; each is counted.
+    # The number of samples that are lost or come before row 1 depends on the machine; the test counts them.
     samples = rows["sequence"].drop_duplicates().to_numpy()
     lost = np.diff(samples) - 1
     assert (lost >= 0).all()

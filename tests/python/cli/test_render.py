@@ -23,7 +23,7 @@ COMMAND = [sys.executable, "-m", "palpate", "render", str(MODEL)]
 
 
 def render(scheme: Scheme, **settings: Any) -> dict[str, Any]:
-    """Accepts any rate, because the test machine may be busy."""
+    """Runs `palpate render`, which accepts any loop rate here, because the test machine may be busy."""
     return dict(_core.run.render(load_model(MODEL), scheme, **settings, lowest_rate_share=0.0))
 
 
@@ -144,7 +144,7 @@ def test_a_signal_ends_the_verb_with_exit_code_0_and_a_complete_recording(
     command = [*COMMAND, "--duration-s", "inf", "--record", str(out), "--json", *ANY_RATE]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     wait_for_rows(Path(f"{out}.part"), process)
-    time.sleep(0.8)  # longer than the ramp, whose rows are not used
+    time.sleep(0.8)  # longer than the start ramp, whose rows are not used
     process.send_signal(signal_number)
     output, messages = process.communicate(timeout=30)
     assert process.returncode == 0, output + messages
@@ -152,7 +152,7 @@ def test_a_signal_ends_the_verb_with_exit_code_0_and_a_complete_recording(
 
 
 def test_a_missed_rate_ends_the_run_unless_any_rate_is_accepted(tmp_path: Path) -> None:
-    """Stopped for most of a second, it misses the deadlines of a window of half a second."""
+    """The process is stopped for most of a second and misses the deadlines of more than half a second."""
     for any_rate in (False, True):
         out = tmp_path / f"{any_rate}.csv"
         command = [

@@ -15,10 +15,10 @@ from palpate.cli.main import main
 from palpate.recording.units import GRAVITY
 
 MOST_LINES = 10
-"""Lines of a summary below the verdict and its reasons."""
+"""Largest number of lines that a summary prints below the verdict and its reasons."""
 
 MOST_OPTION_LINES = 15
-"""Lines of the help of identify with options and their headings before those for experts."""
+"""Largest number of lines in the help of identify for the options that are not for experts."""
 
 SUMMARIES = {
     "identify": "identify dome.csv -o dome.json --hold-out-every 5",

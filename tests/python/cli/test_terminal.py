@@ -39,7 +39,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
             while True:
                 try:
                     received = os.read(reading_end, 65536)
-                except OSError:  # the other end is closed
+                except OSError:  # the program has closed the terminal
                     return
                 output.extend(received)
 
@@ -103,7 +103,7 @@ def test_a_message_is_not_wrapped_without_a_terminal(
 
 
 ESCAPES = "\x1b[2J\x1b]0;owned\x07\u202e\x9b31m"
-"""Clears a screen, names its window, reverses the direction of writing."""
+"""Control characters that clear the screen, set the window title and reverse the direction of writing."""
 
 
 def control_characters_of(text: str) -> list[str]:
@@ -206,7 +206,7 @@ def test_ctrl_c_ends_a_long_library_computation_within_3_s() -> None:
         sent_at_s = time.monotonic()
         process.send_signal(signal.SIGINT)
         _, messages = process.communicate(timeout=60)
-        # The computation alone takes a minute; 0.2 s are intended, but other tests run at the same time.
+        # The computation takes a minute. Ctrl-C ends it in 0.2 s, or later if other tests load the machine.
         assert time.monotonic() - sent_at_s < 3.0
     assert process.returncode == 130
     assert messages == "error: interrupted; nothing was written\n"

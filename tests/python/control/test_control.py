@@ -26,7 +26,7 @@ def changed_model(folder: Path, **fields: Any) -> Path:
 
 
 def rows_of(recording: Path) -> list[str]:
-    """Returns the rows without comments and header."""
+    """Returns the rows of a recording without its comments and header."""
     lines = recording.read_text(encoding="utf-8").splitlines()
     return [line for line in lines if not line.startswith("#")][1:]
 
@@ -149,7 +149,7 @@ def test_a_signal_ends_the_run_with_exit_code_0_and_a_complete_recording(
     out = tmp_path / "rendered.csv"
     process = start_control(MODEL, "--duration-s", "inf", "--record", out, "--json", *ANY_RATE)
     wait_for_rows(tmp_path / "rendered.csv.part", process)
-    time.sleep(0.8)  # longer than the ramp, which has no usable row
+    time.sleep(0.8)  # longer than the start ramp, whose rows cannot be used
     process.send_signal(signal_number)
     output, messages = process.communicate(timeout=20)
     assert process.returncode == 0, messages
@@ -194,7 +194,7 @@ def test_a_short_fault_is_counted_and_the_run_continues(fault: str) -> None:
     assert (
         sum(json.loads(completed.stdout)["ticks_by_status"].values()) == json.loads(completed.stdout)["ticks"]
     )
-    assert len(json.loads(completed.stdout)["ticks_by_status"]) == 3  # Ok, Ramp and that of the fault
+    assert len(json.loads(completed.stdout)["ticks_by_status"]) == 3  # Ok, Ramp, the fault's status
 
 
 def test_a_rate_too_low_is_reported_and_ends_the_run(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from palpate.planning import Plan
 
 pytestmark = needs_program
 
-# Certificate that holds on a busy machine: its longest period is a tenth of a second.
+# The longest period of this certificate is a tenth of a second, so that a busy machine keeps it.
 SLOW_PERIOD_KNOB = DeviceProfile(id="knob", inertia=0.05, viscous_damping=50.0, coulomb_friction=0.01)
 
 
@@ -40,7 +40,7 @@ def metadata(record: Path) -> str:
 def test_the_stored_plan_is_rendered(tmp_path: Path) -> None:
     scheme = Scheme(structure="massless", coupling_stiffness=70.0, coupling_damping=0.0)
     path = Plan(model_by_hand(), scheme).stored().save(tmp_path / "planned.json")
-    # A limit of the user does not replace the plan.
+    # A force limit that the user sets does not replace the plan.
     for options in ([], ["--uncertified"], ["--slew-s", 0.1]):
         completed = control(path, "--duration-s", 0.2, "--lowest-rate-share", 0, *options)
         assert completed.returncode == 0, completed.stderr
@@ -50,7 +50,7 @@ def test_the_stored_plan_is_rendered(tmp_path: Path) -> None:
 
 @pytest.fixture
 def limited(tmp_path: Path) -> Path:
-    """Writes a plan that renders another network than the identified one; its device allows long periods."""
+    """Writes a model whose plan renders another network than the identified one; the device may be slow."""
     knob = DeviceProfile(
         id="weak knob",
         inertia=0.05,

@@ -52,7 +52,7 @@ def render_on_service(
             "--priority",
             0,
         ]
-        device += ["--wait-ms", 200]  # the service shares a busy machine
+        device += ["--wait-ms", 200]  # the server runs on the same, busy machine
         yield control(model, *device, *arguments), running_service
 
 
@@ -69,9 +69,9 @@ def test_a_spring_is_rendered_along_one_axis_against_the_displacement(spring: Pa
     assert recording.metadata["service"] == "force gate 0.3, damping 0.5"
     assert recording.position.max() > 0.003
     after_ramp = slice(300, None)
-    expected_force = STIFFNESS * np.maximum(recording.position[after_ramp], 0.0)  # no contact below zero
+    expected_force = STIFFNESS * np.maximum(recording.position[after_ramp], 0.0)  # no force at positions < 0
     assert recording.force[after_ramp] == pytest.approx(expected_force, abs=1e-6)
-    # The force is along the axis only, out of the object, and zero at the end.
+    # The sent force has a component along the axis only, points out of the object, and is zero at the end.
     assert all(force["x"] == force["y"] == 0.0 for force in service.forces)
     assert min(force["z"] for force in service.forces) < -0.2
     assert service.forces[-1]["z"] == 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Flight records of palpate-control after every kind of ending, and their further use."""
+"""Flight records of palpate-control after each reason to end a run; reading and identifying them."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_after_kill_the_part_file_is_complete_except_for_100_ms(tmp_path: Path) 
     generator = random.Random(5)
     out = tmp_path / "rendered.csv"
     part = tmp_path / "rendered.csv.part"
-    as_modelled = ["--ramp-s", 0, "--slew-s", 0]  # every row is usable
+    as_modelled = ["--ramp-s", 0, "--slew-s", 0]  # without start ramp and slew limit every row can be used
     for _ in range(KILLS):
         process = start_control(MODEL, "--duration-s", "inf", "--record", out, *as_modelled, *ANY_RATE)
         first_rows_at_s = wait_for_rows(part, process)
@@ -265,7 +265,7 @@ def test_a_full_standard_output_exits_with_code_1_and_one_sentence(arguments: li
 def test_the_verdict_is_the_first_line(
     tmp_path: Path, arguments: list[Any], level: str, sentence: str, code: int
 ) -> None:
-    """On a busy machine deadlines are missed, which is also reported."""
+    """The first line is the verdict, also on a busy machine, where it reports missed deadlines."""
     arguments = [
         MODEL,
         *(["--duration-s", 1.2] if "--duration-s" not in arguments else []),
@@ -307,7 +307,7 @@ def test_a_file_size_limit_stops_the_recording_but_not_the_loop(tmp_path: Path) 
 
 @pytest.fixture
 def full_disk(tmp_path: Path) -> Path:
-    """Returns a private disk of 64 KiB."""
+    """Returns a folder on a file system of 64 KiB that only this test uses."""
     if os.geteuid() != 0 or shutil.which("unshare") is None:
         pytest.skip("needs root and unshare, to mount a small disk")
     folder = tmp_path / "disk"
@@ -366,7 +366,7 @@ def test_a_long_run_loses_no_row_and_its_memory_is_constant(tmp_path: Path) -> N
         lines = []
         while process.poll() is None:
             time.sleep(0.25)
-            with contextlib.suppress(OSError, StopIteration):  # it may have just ended
+            with contextlib.suppress(OSError, StopIteration):  # the process may have just ended
                 memory.append(resident_kib(process))
             while True:
                 try:
@@ -387,7 +387,7 @@ def test_a_long_run_loses_no_row_and_its_memory_is_constant(tmp_path: Path) -> N
 
 
 def test_rows_with_a_force_changed_by_a_guard_are_dropped_and_counted(tmp_path: Path) -> None:
-    """The ramp, clipped rows and rows after a fault do not describe the object."""
+    """Rows of the start ramp, rows with a clipped force and rows after a fault do not describe the object."""
     out = tmp_path / "rendered.csv"
     arguments = ["--duration-s", 2, "--structure", "direct", "--force-limit", 1.2, "--fault", "nan@0.5x3"]
     assert control(MODEL, *arguments, "--record", out, "--json", *ANY_RATE).returncode == 0
@@ -429,7 +429,7 @@ def test_a_rendered_model_is_identified_as_the_same_model(tmp_path: Path) -> Non
     palpate("identify", rendered, "-o", second)
     output = palpate("show", first, "--beside", second, "--plot", figure)
     assert output.startswith("verdict: good\n")
-    rows = output.partition("largest difference, in just noticeable ones\n")[2].splitlines()
+    rows = output.partition("largest force difference, in just noticeable differences\n")[2].splitlines()
     shares = [float(row.split()[-1]) for row in rows]
     print(f"largest difference in just noticeable ones: {shares}")
     assert shares

@@ -62,7 +62,7 @@ class Terminal:
             if select.select([self._reading_end], [], [], 0.1)[0]:
                 try:
                     self.output += os.read(self._reading_end, 4096).decode()
-                except OSError:  # the other side is closed
+                except OSError:  # the program has closed the terminal
                     return
 
     def press(self, key: bytes) -> None:
@@ -97,20 +97,20 @@ def test_a_terminal_shows_one_live_line_that_is_removed_at_the_end() -> None:
             assert LIVE_LINE.fullmatch(line), line
         seconds = [float(line.split()[0]) for line in session.lines]
         assert seconds == sorted(seconds)
-        ticking = [second for second in seconds if second > 0.0]  # a busy machine starts late
+        ticking = [second for second in seconds if second > 0.0]  # 0 s is repeated during a slow start
         assert len(set(ticking)) == len(ticking) >= 3
         assert session.output.endswith(CLEAR_LINE)
 
 
 @pytest.mark.parametrize("columns", [40, 12, 5])
 def test_the_live_line_is_not_wrapped_in_a_narrow_terminal(columns: int) -> None:
-    """One character above the width of the terminal would leave a part of the old line."""
+    """A live line that is one character wider than the terminal would leave a part of the line before."""
     with terminal(columns, MODEL, "--duration-s", 0.8) as session:
         session.watch()
         assert session.process.wait() == 0
         lines = session.lines
         assert all(len(line) < columns for line in lines)
-        if columns > 5:  # too narrow for any content
+        if columns > 5:  # 5 columns are too few for any value
             assert len(lines) >= 2
             assert all(re.match(r"[\d.]+ s", line) for line in lines)
 

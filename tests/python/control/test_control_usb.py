@@ -26,7 +26,7 @@ PROGRAM = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "p
 SCALE = max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
 
-# The transfers are the clock: the speed and the rate of this machine have no effect.
+# The emulated time advances with each USB transfer, so the speed of this machine has no effect.
 LOCK_STEP = ["--lock-step"]
 ANY_RATE = ["--wait-ms", "10000", "--lowest-rate-share", "0", "--priority", "0"]
 
@@ -79,7 +79,7 @@ def test_a_model_certified_for_this_device_requires_no_option(tmp_path: Path) ->
     completed = control(
         "--wait-ms", "10000", "--duration-s", 0.2, "--json", device=LOCK_STEP, model=certified
     )
-    assert completed.returncode in (0, 1), completed.stderr  # a busy machine may end it
+    assert completed.returncode in (0, 1), completed.stderr  # 1: a deadline was missed on a busy machine
     assert json.loads(completed.stdout)["ticks"] > 0
     refused = control("--structure", "massless", device=LOCK_STEP, model=certified)
     assert refused.returncode == 2
@@ -97,7 +97,7 @@ def test_a_certified_model_is_rendered_as_planned(tmp_path: Path) -> None:
     record = tmp_path / "rendered.csv"
     arguments = ["--wait-ms", 500, "--duration-s", 0.6, "--record", record]
     completed = control(*arguments, device=LOCK_STEP, model=planned(tmp_path))
-    # On a busy machine the first late packet ends the run: a later one is not certified.
+    # On a busy machine the first late packet ends the run, because the certificate allows no later packet.
     assert completed.returncode == 0 or "zero force sent" in completed.stderr, completed.stderr
     assert "direct, predict 1; emulated knob EMU-1" in completed.stderr
     assert "uncertified" not in completed.stderr
@@ -195,13 +195,13 @@ def test_a_run_is_recorded_and_ends_with_zero_torque_and_a_disabled_device(tmp_p
     assert summary["usb"]["delay_samples"]["p50"] == pytest.approx(1.0, abs=0.01)
     recording = read_recording(record)
     assert recording.force.max() > 0.02
-    # The object pushes back: the device receives a torque against the position.
+    # The object pushes back: the device receives a torque towards smaller positions.
     sent_frames = frames(trace)
     strongest = min(sent_frames, key=lambda frame: frame.torque)
     assert strongest.torque == pytest.approx(-2.0 * strongest.position, rel=0.2)
     assert sent_frames[-1].torque == 0.0
     assert not sent_frames[-1].enabled
-    # The sent force is applied two rows later: one sample of delay, and the latch.
+    # The device applies a sent force two rows later: one sample of delay, and one sample in its latch.
     force, applied = recording.force, recording.columns["applied_Nm"]
     assert abs(force[300:-2] - applied[302:]).max() < 2e-6
 
@@ -230,8 +230,8 @@ def test_a_signal_sends_zero_torque_disables_the_device_and_is_reported(
     assert process.stderr is not None
     assert "emulated knob" in process.stderr.readline()
     wait_for_rows(Path(f"{part}.part"))
-    time.sleep(0.8)  # so that the handle moves
-    process.send_signal(signal_number)  # the emulator passes it on
+    time.sleep(0.8)  # time in which the handle moves
+    process.send_signal(signal_number)  # the emulator forwards the signal to palpate-control
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 0
     assert "stopped on request" in output
@@ -254,7 +254,7 @@ def test_after_kill_the_watchdog_of_the_device_sets_zero_torque(tmp_path: Path) 
     sent_frames = frames(trace)
     assert min(frame.torque for frame in sent_frames) < -0.01
     assert sent_frames[-1].torque == 0.0
-    assert sent_frames[-1].status & 2  # the watchdog
+    assert sent_frames[-1].status & 2  # bit of the device's watchdog
 
 
 # Kind -> number of frames of the fault, True if nothing can follow it, frames until the torque is zero. The
@@ -316,8 +316,8 @@ def test_faults_in_random_order_end_in_zero_torque_with_a_complete_record(tmp_pa
         for row in record.read_text(encoding="utf-8").splitlines():
             cells = row.split(",")
             if cells[-1] in FAULT_STATUSES:
-                assert float(cells[2]) == 0.0, context  # in the tick that detected it
-        packets_in_flight = round(summary["usb"]["delay_samples"]["p50"]) - 1  # in packets; on a busy machine
+                assert float(cells[2]) == 0.0, context  # the tick with the fault sends zero force
+        packets_in_flight = round(summary["usb"]["delay_samples"]["p50"]) - 1  # varies with the load
         sent_frames = frames(trace)
         by_start = {frame.started: index for index, frame in enumerate(sent_frames)}
         for kind, frame in script:

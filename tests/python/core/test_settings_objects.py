@@ -58,7 +58,7 @@ def test_a_copy_equals_the_original(name: str, make_copy: Callable[[Any], Any]) 
 
 @pytest.mark.parametrize("name", SETTINGS)
 def test_a_copy_has_every_argument_of_the_constructor(name: str) -> None:
-    """A field in the constructor but not in the list would be lost in a copy."""
+    """A field that the constructor takes but the list of fields leaves out would be lost in a copy."""
     value = SETTINGS[name]
     constructor, arguments = value.__reduce__()
     assert arguments == ()

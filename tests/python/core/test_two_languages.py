@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 NETWORKS = 1000 * int(os.environ.get("PALPATE_TEST_SCALE", "1"))
 CONTINUATIONS = ("linear", "free")
 TOLERANCE = 1e-12
-"""Relative to the sum of the absolute terms."""
+"""Largest difference between the results of C++ and Python, relative to the sum of the absolute terms."""
 
 DIFFICULT = [0.0, -0.0, np.nan, np.inf, -np.inf, 5e-324, -2e-310, 1e300, -1e300, np.finfo(float).max]
 
@@ -43,7 +43,7 @@ class Case:
     x: Array
 
     def stream(self) -> bytes:
-        """Returns the input of forces.cpp."""
+        """Returns the text that the test program forces.cpp reads: networks and positions."""
         header = [len(self.alpha), len(self.x), self.linear, self.bias, self.lower, self.upper]
         parts = [[*header, self.below, self.above], self.alpha, self.beta, self.weight, self.x]
         return np.concatenate(parts).astype(np.float64).tobytes()
@@ -69,7 +69,7 @@ def cases() -> Iterator[Case]:
         travel = 10.0 ** random.uniform(-6, 3)
         lower = travel * random.uniform(-2, 1)
         x = lower + travel * random.uniform(-0.2, 1.2, 8)
-        # random bits of doubles, four in every network
+        # each network also has four positions made of random bits
         bits = random.integers(-(2**63), 2**63 - 1, 4, dtype=np.int64).view(np.float64)
         yield Case(
             np.exp(random.uniform(0.0, 5.0, size)) / travel,
@@ -136,7 +136,7 @@ def test_inside_the_domain_the_force_is_equation_4(program: Path) -> None:
         x = case.x[(case.x >= case.lower) & (case.x <= case.upper)]
         u = case.alpha * (x[:, None] - case.beta)
         expected = ((u**2 - 1.0) * np.exp(-0.5 * u**2)) @ case.weight + case.linear * x + case.bias
-        # a rounding error in u corresponds to alpha eps |x| in the argument
+        # a rounding error of the wavelet's argument u = alpha (x - beta) is about alpha eps |x|
         largest_position = max(abs(case.lower), abs(case.upper))
         magnitude = magnitudes(case)[0] + magnitudes(case)[1] * largest_position
         assert np.abs(case.model().force(x) - expected).max(initial=0.0) <= TOLERANCE * magnitude

@@ -118,7 +118,7 @@ def test_a_wrong_property_is_named_and_forbids_force_if_it_is_unsafe(
 
 def test_a_device_whose_check_forbids_force_has_no_profile() -> None:
     found = judge(summary_without_force(velocity=-summary_without_force()["kept"]["velocity"]))
-    with pytest.raises(InputError, match="a wrong result of its check forbids force"):
+    with pytest.raises(InputError, match="its check found a wrong property that makes force unsafe"):
         found.profile()
 
 
@@ -143,7 +143,8 @@ def test_a_reversed_sign_is_detected_before_any_force(quantity: str, monkeypatch
     found = check_device(push=True)
     assert not found.suitable
     assert all("push" not in settings for settings in calls)
-    assert observed(found, "sign of the force").text == "not measured: a wrong result forbids force"
+    text = observed(found, "sign of the force").text
+    assert text == "not measured: no force is sent while another property is wrong"
 
 
 def push_ticks(
@@ -153,7 +154,7 @@ def push_ticks(
     friction: float = 0.0,
     smaller_share: float = 0.6,
 ) -> dict[str, np.ndarray]:
-    """Returns ticks of alternating pushes on a free handle of 2e-4 kg m^2 and 0.06 N m s/rad."""
+    """Returns ticks of alternating pushes on a free handle: inertia 2e-4 kg m^2, damping 0.06 N m s/rad."""
     sent, position, speed = np.zeros(2000), np.zeros(2000), 0.0
     sent[np.arange(2000) % 200 >= 170] = 0.025
     sent *= np.where(np.arange(2000) // 200 % 2, -1.0, 1.0)
@@ -280,7 +281,7 @@ def test_the_measured_profile_of_the_simulated_device_gives_a_certified_direct_p
 ) -> None:
     path = tmp_path / "knob.toml"
     words = ["--push", "--duration-s", "5", "--write-profile", str(path), "--json"]
-    assert main(["check-device", *words]) in (0, 1)  # a busy machine may be too late for its rate
+    assert main(["check-device", *words]) in (0, 1)  # a busy machine may not keep the loop's rate
     result = json.loads(capsys.readouterr().out)
     assert result["written"] == str(path)
     assert result["coulomb_friction"] == pytest.approx(0.01, rel=0.1)
@@ -345,7 +346,7 @@ def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> Non
     assert result["inertia"] == pytest.approx(2e-4, rel=0.05)
     assert result["viscous_damping"] == pytest.approx(0.06, rel=0.05)
     assert result["delay_p50_us"] == pytest.approx(1000.0, rel=0.02)
-    assert 1e-3 < result["delay_s"] < 3e-3  # largest of a thousand: the machine may be busy
+    assert 1e-3 < result["delay_s"] < 3e-3  # largest delay of a thousand samples; the machine may be busy
     assert result["round_trip_p50_us"] > 0.0
     assert (result["lost_samples"], result["repeated_samples"]) == (0, 0)
     written = DeviceProfile.load(profile)
@@ -381,7 +382,7 @@ def test_a_reversed_motor_is_detected_by_a_push_of_half_a_percent_of_its_force(
     assert findings["sign of the force"]["right"] is False
     assert "sign of the force: reversed" in result["verdict"]
     assert "do not enable force" in result["verdict"]
-    assert not profile.exists()  # so nothing is certified for it
+    assert not profile.exists()  # without a profile, nothing is certified for the device
     assert max(abs(frame.torque) for frame in frames(trace)) <= 1.001 * SHARE_OF_FORCE * 5.0
 
 

@@ -15,7 +15,7 @@ from palpate.devices import DeviceError, install_rule, usb
 
 @pytest.fixture
 def commands_run(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
-    """Returns the commands that would run."""
+    """Records the commands of the installation instead of running them; returns the list."""
     commands: list[tuple[str, ...]] = []
 
     def run(command: tuple[str, ...], **_: Any) -> subprocess.CompletedProcess[str]:

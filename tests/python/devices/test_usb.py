@@ -27,7 +27,7 @@ COUNTS_PER_TURN = 65536
 
 @pytest.fixture(scope="module")
 def reported() -> dict[str, Any]:
-    """Returns the results of one session with the device, by action."""
+    """Returns the results of all setup actions in one session with the emulated device, by action."""
     answer = emulated(sys.executable, "-W", "error", ROOT / "tests" / "usb" / "set_up_over_pyusb.py")
     assert answer.returncode == 0, answer.stderr
     result: dict[str, Any] = json.loads(answer.stdout)
@@ -83,7 +83,7 @@ def test_after_an_emergency_stop_enabling_stalls_until_the_fault_is_cleared(repo
 
 def test_a_halted_endpoint_stalls_until_it_is_cleared(reported: dict[str, Any]) -> None:
     assert reported["stalls"][0] == errno.EPIPE
-    assert len(reported["stalls"]) == 2  # reading again gives no data
+    assert len(reported["stalls"]) == 2  # a second read without a clear also fails
     assert reported["bytes after the stall"] == 32
 
 

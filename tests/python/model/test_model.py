@@ -21,7 +21,7 @@ N = 5
 
 
 def content(hysteresis: bool = False, wavelets: int = N, **change: Any) -> dict[str, Any]:
-    """Returns the arguments of a model with awkward numbers."""
+    """Returns the arguments of a model whose numbers have no short decimal form."""
     random = np.random.default_rng(7)
     given: dict[str, Any] = {
         "kind": "hysteresis" if hysteresis else "position",
@@ -176,7 +176,7 @@ def test_a_model_of_two_inputs_predicts_and_is_saved(tmp_path: Path) -> None:
         fit=Fit("network", "bic", 0.1, 1, 8),
     )
     again = load_model(Model(**given).save(tmp_path / "a.json"))
-    # psi is radial: (|u|^2 - 2) exp(-|u|^2 / 2) is 0 at u = (1, 1).
+    # The mother wavelet of two inputs, (|u|^2 - 2) exp(-|u|^2 / 2), is 0 at u = (1, 1).
     assert again.predict([[1.0, 1.0]])[0] == pytest.approx(2.0 + 3.0 + 1 / 3, rel=1e-15)
     assert again.slope_bounds is None
 

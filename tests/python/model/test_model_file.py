@@ -59,7 +59,7 @@ def bad_bytes(entry: dict[str, Any]) -> bytes:
 
 
 def refusal(path: Path, content: bytes) -> str:
-    """Returns the refusal of a file with this content, without the file name."""
+    """Returns the error message of reading a model file with this content, without the file name."""
     path.write_bytes(content)
     with pytest.raises(InputError) as refused:
         load_model(path)
@@ -70,7 +70,7 @@ def refusal(path: Path, content: bytes) -> str:
 
 
 def refused(path: Path) -> str | None:
-    """Returns the refusal of a file, or None."""
+    """Returns the error message of reading a model file, or None if the file is read."""
     try:
         load_model(path)
     except InputError as error:
@@ -133,7 +133,7 @@ def test_a_long_value_is_shortened(tmp_path: Path) -> None:
 
 
 def objects(schema: dict[str, Any], content: Any, path: str) -> Iterator[tuple[str, dict[str, Any], Any]]:
-    """Yields each object in a file with its path and its schema."""
+    """Yields each JSON object in a model file with the object's path and schema."""
     if "$ref" in schema:
         schema = SCHEMA["$defs"][schema["$ref"].split("/")[-1]]
     for choice in schema.get("anyOf", ()):
@@ -150,7 +150,7 @@ def objects(schema: dict[str, Any], content: Any, path: str) -> Iterator[tuple[s
 
 
 def violations(schema: dict[str, Any], content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yields changes of an object that its schema forbids: JSON patches without the path of the object."""
+    """Yields JSON patches of an object in a model file after which the object violates the schema."""
     yield "unknown_key", {"op": "add", "value": 0}
     for name in schema["required"]:
         yield name, {"op": "remove"}

@@ -96,12 +96,12 @@ FORCE_SYMBOLS = "N, mN, uN, nN, kN, gf, kgf, lbf, ozf, Nm, mNm, uNm, kNm, N*mm, 
         (
             "x,y",
             f"press.csv: no column name has a unit of position ({POSITION_SYMBOLS}); "
-            f"no column name has a unit of force ({FORCE_SYMBOLS}). Its columns are x, y. "
+            f"no column name has a unit of force ({FORCE_SYMBOLS}). The columns are x, y. "
             "If x is in mm and y is in N, add: --position x --units x=mm --force y --units y=N",
         ),
         (
             "depth_mm,y",
-            f"press.csv: no column name has a unit of force ({FORCE_SYMBOLS}). Its columns are depth_mm, y. "
+            f"press.csv: no column name has a unit of force ({FORCE_SYMBOLS}). The columns are depth_mm, y. "
             "If y is in N, add: --force y --units y=N",
         ),
         (
@@ -109,7 +109,7 @@ FORCE_SYMBOLS = "N, mN, uN, nN, kN, gf, kgf, lbf, ozf, Nm, mNm, uNm, kNm, N*mm, 
             "press.csv: two columns could be the position (a_mm, b_mm); "
             f"no column name has a unit of force ({FORCE_SYMBOLS}); "
             "two columns could be the time (start_s, stop_s). "
-            "Its columns are a_mm, b_mm, load cell, start_s, stop_s. If load cell is in N, add: "
+            "The columns are a_mm, b_mm, load cell, start_s, stop_s. If load cell is in N, add: "
             "--position a_mm --force 'load cell' --units 'load cell=N' --time start_s",
         ),
     ],
@@ -169,15 +169,15 @@ def test_a_column_with_an_unknown_unit_is_read_in_the_stated_unit() -> None:
     [
         (
             {"position": "deep_mm"},
-            "it has no column 'deep_mm' for --position; no column name has a unit of force",
+            "there is no column 'deep_mm' for --position; no column name has a unit of force",
         ),
         (
             {"position": "deep_mm"},
-            "Its columns are depth_mm, y. If y is in N, add: --position depth_mm --force y",
+            "The columns are depth_mm, y. If y is in N, add: --position depth_mm --force y",
         ),
-        ({"direction": "stroke"}, "has no column 'stroke' for --direction"),
-        ({"inputs": ("load",)}, "has no column 'load' for inputs"),
-        ({"units": {"z": "N"}}, "has no column 'z' for --units"),
+        ({"direction": "stroke"}, "no column 'stroke' for --direction"),
+        ({"inputs": ("load",)}, "no column 'load' for inputs"),
+        ({"units": {"z": "N"}}, "no column 'z' for --units"),
         (
             {"units": {"force": "N"}},
             "--units force=N also needs --force NAME, which names its column",

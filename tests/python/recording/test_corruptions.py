@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Corrupted recordings never give a good verdict on an error that is far below the true one."""
+"""A model of corrupted recordings whose reported error is far below its true error has no good verdict."""
 
 import os
 

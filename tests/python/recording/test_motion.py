@@ -20,7 +20,7 @@ def test_strokes_of_a_quantised_position_end_at_its_reversal(scale: float, step:
     position = np.round(IN_AND_OUT / step) * step if step else IN_AND_OUT
     found = strokes_from_order(scale * position)
     assert found is not None
-    # Rows within one step of the reversal may belong to either stroke.
+    # Rows within one position step of a reversal may belong to the press or to the release.
     assert np.count_nonzero(found != STATED) <= 200 * step
     assert turns_of(found) == 1
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading of recordings: accepted, converted, chosen and kept data."""
+"""Reading of recordings: accepted files, conversion to SI, choice of columns, and kept metadata."""
 
 from pathlib import Path
 

@@ -24,7 +24,7 @@ def comma(value: float) -> str:
 ROWS = [f"{0.5 * k},{10 * k}" for k in ROW_NUMBERS]
 SEMICOLONS = [f"{comma(0.5 * k)};{comma(10 * k)}" for k in ROW_NUMBERS]
 
-# Program -> (its lines, the report of the first note, the metadata).
+# Name of a program -> (lines of a file that it writes, text of the recording's first note, metadata).
 FILES: dict[str, tuple[list[str], str, dict[str, str]]] = {
     "header in a comment, as numpy.savetxt writes it": (
         ["# bench: 3", "# depth_mm,force_N", *ROWS],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files in their states: growing, cut off while growing, and Parquet."""
+"""Recordings that are still being written, recordings that were cut off, and Parquet files."""
 
 import importlib
 from pathlib import Path

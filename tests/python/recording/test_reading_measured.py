@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every file of the measured data: read without options, or with those of its refusal."""
+"""Every measured file is read without options, or with the options that the error message suggests."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ VOLTAGE_OPTIONS = {
     "units": {"speed_out": "rad", "input_V": "Nm"},
 }
 
-# File or set -> the main columns of the set.
+# Measured file, or folder of files -> options of reading that choose position, force and their units.
 OPTIONS: dict[str, dict[str, object]] = {
     "davinci_grip": {"position": "back_angle_rad", "force": "back_torque_Nm"},
     "palpation_continuous": {"position": "pos_z_mm", "force": "force_z_N"},
@@ -80,7 +80,7 @@ OPTIONS: dict[str, dict[str, object]] = {
     },
 }
 
-# Table of published figures in the folder of the recordings: text, not a recording.
+# This file in the folder of the recordings is a table of published values, not a recording.
 TEXT_TABLE = "sysid_benchmarks/published_results.csv"
 
 MOST_REFUSALS = 3

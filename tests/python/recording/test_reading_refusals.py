@@ -23,7 +23,7 @@ def lines(*parts: str | list[str]) -> str:
 
 PLAIN = [f"{k},{k}" for k in range(40)]
 
-# Case: (text of the file, options of reading, whole sentence).
+# Name of a case -> (text of the file, options of reading, sentence of the error).
 REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "empty": ("", {}, "press.csv is empty"),
     "metadata only": (
@@ -237,7 +237,7 @@ def test_a_decimal_comma_below_the_examined_rows_is_refused_with_the_cure(csv_fi
 
 
 def assert_sed_cures(path: Path, row: int, force: float, before: str = ": ") -> None:
-    """Checks that the command in a refusal, with the file names filled in, gives a file with this force."""
+    """Checks that the sed command in an error message changes the file so that it has the expected force."""
     command = refusal(path).split(f"{before}sed -E ")[1].split(" OLD.csv > NEW.csv")[0]
     new = path.with_name("new.csv")
     new.write_bytes(
@@ -246,7 +246,7 @@ def assert_sed_cures(path: Path, row: int, force: float, before: str = ": ") -> 
     assert read_recording(new).force[row] == force
 
 
-# Case of a bad row: (header, bad row, its name).
+# Cases of a row that cannot be used: (header of the file, the row, name of the case).
 BAD_ROWS = {
     "not a number": (HEADER, "nan,1,press", "column depth_mm holds 'nan', which is not a finite number"),
     "infinity": (HEADER, "1,-inf,press", "column force_gf holds '-inf', which is not a finite number"),
@@ -293,4 +293,7 @@ def test_time_must_be_later_than_all_times_before_it(csv_file: Write) -> None:
     lines = [*timed_rows(12), "50,90,1", "60,91,1", "nan,92,1", "120,93,1"]
     recording = read_recording(csv_file("time_ms,depth_mm,force_N", lines), invalid="drop")
     np.testing.assert_allclose(recording.position[11:], [5.5e-3, 93e-3])
-    assert recording.notes[2] == "dropped 2 rows with a time that repeats or decreases (first: line 14)"
+    assert (
+        recording.notes[2]
+        == "dropped 2 rows with a time that is not later than in a row before (first: line 14)"
+    )

@@ -70,16 +70,16 @@ def thinned(recording: Recording) -> Recording:
 
 @dataclass(frozen=True)
 class Variant:
-    """Text file, and the clean recording with the columns of the file."""
+    """Text file, and the recording that reading the file must give."""
 
     data: bytes
     clean: Recording
     dialect_parts: tuple[str, ...]
-    """Reports of the first note"""
+    """Parts that the first note of the recording must contain"""
 
 
 def variant(clean: Recording, random: np.random.Generator) -> Variant:
-    """Returns one random way to write a recording."""
+    """Returns a recording written as text with a random separator, decimal mark, header and units."""
 
     def pick(*choices: str) -> str:
         return str(random.choice(np.array(choices)))
@@ -157,7 +157,7 @@ def quoted(cell: str, separator: str) -> str:
 
 
 def read(path: Path) -> Recording:
-    """Returns the recording, after at most one refusal whose cure is applied literally."""
+    """Reads a file. If it is refused, reads it again with the options that the error message suggests."""
     with contextlib.suppress(InputError):
         recording = read_recording(path)
         unitless = [note for note in recording.notes if "has no unit and is not used" in note]

@@ -9,7 +9,7 @@ from palpate.recording import sample_force, sample_recording
 
 
 def test_the_force_follows_the_formula() -> None:
-    # f(x) = 2x + 58*0.01*softplus((x - 0.4)/0.01), by hand: softplus(0) = ln 2.
+    # Force at the wall, computed by hand: f(x) = 2x + 58*0.01*softplus((x - 0.4)/0.01), softplus(0) = ln 2.
     assert sample_force(0.4) == pytest.approx(0.8 + 0.58 * np.log(2), rel=1e-15)
     assert sample_force(-0.2) == pytest.approx(-0.4, rel=1e-12)
     assert sample_force(0.469) == pytest.approx(0.938 + 0.58 * (6.9 + np.log1p(np.exp(-6.9))), rel=1e-15)
@@ -34,12 +34,13 @@ def test_the_recording_is_sampled_as_described() -> None:
 
 def test_the_force_noise_has_the_stated_deviation() -> None:
     recording = sample_recording(1)
-    # The encoder adds 28e-6 rad of noise times a slope of up to 60 N*m/rad: at most 0.002 N*m.
+    # The encoder's noise of 28e-6 rad times a slope of up to 60 N*m/rad adds at most 0.002 N*m of noise.
     assert np.std(recording.force - sample_force(recording.position)) == pytest.approx(0.02, rel=0.02)
 
 
 def test_the_encoder_rounds_to_the_nearest_count() -> None:
-    # A bias of half a count would be visible on the wall: 0.003 N*m against 0.0003 of noise on the mean.
+    # A position bias of half an encoder step would change the mean force on the wall by 0.003 N*m; the
+    # noise of the mean is 0.0003 N*m.
     recording = sample_recording(1)
     wall = recording.position > 0.42
     assert abs(np.mean((recording.force - sample_force(recording.position))[wall])) < 1e-3

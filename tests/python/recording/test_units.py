@@ -7,7 +7,7 @@ import pytest
 
 from palpate.recording.units import UNITS, split_name, symbols_of, unit_of
 
-# value of one unit in SI, from the SI brochure; g_n = 9.80665 m/s^2 (CGPM 1901);
+# Value of each unit in SI, from the SI brochure; standard gravity g_n = 9.80665 m/s^2 (CGPM 1901);
 # lb = 0.45359237 kg and in = 25.4 mm (1959).
 EXPECTED = {
     "m": ("m", 1.0),
