@@ -7,7 +7,7 @@ import typing
 __all__: list[str] = ['DeviceProfile', 'UsbRequest', 'decode_info', 'longest_watchdog_ms', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_to_device', 'usb_to_host', 'usb_vendor']
 class DeviceProfile:
     """
-    Properties of a haptic device of one degree of freedom; SI units, rotary or linear.
+    Properties of a haptic device of one degree of freedom, in SI units; a knob (rad) or a straight handle (m).
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -21,12 +21,12 @@ class DeviceProfile:
         ...
     def to_dict(self) -> dict:
         """
-        Returns the fields that are written to a file, by name, without optional ones that are not set.
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
         """
     @property
     def coulomb_friction(self) -> float:
         """
-        f_c, friction without control [N or N*m]; at most the true value.
+        f_c, Coulomb friction of the handle without control [N or N*m]; not more than the true value.
         """
     @property
     def delay_s(self) -> float:
@@ -36,17 +36,17 @@ class DeviceProfile:
     @property
     def encoder_step(self) -> float:
         """
-        Delta, step of the encoder [m or rad]; 0 = not quantised.
+        Delta, smallest change of position that the encoder reports [m or rad]; 0 = not quantised.
         """
     @property
     def force_limit(self) -> float:
         """
-        Largest force [N or N*m].
+        Largest force of the device [N or N*m].
         """
     @property
     def force_step(self) -> float:
         """
-        Delta_F, step of the command [N or N*m]; 0 = not quantised.
+        Delta_F, smallest change of the commanded force [N or N*m]; 0 = not quantised.
         """
     @property
     def id(self) -> str:
@@ -56,17 +56,17 @@ class DeviceProfile:
     @property
     def inertia(self) -> float:
         """
-        Inertia of handle and motor [kg or kg*m^2].
+        Inertia of handle and motor together [kg or kg*m^2].
         """
     @property
     def jitter_s(self) -> float:
         """
-        Largest excess of the time between two samples over T [s].
+        Largest time between two samples, minus the period T [s].
         """
     @property
     def late_samples(self) -> int:
         """
-        Smallest number of whole samples that is not shorter than the delay.
+        Delay in periods, rounded up to a whole number.
         """
     @property
     def longest_period_s(self) -> float:
@@ -86,11 +86,11 @@ class DeviceProfile:
     @property
     def viscous_damping(self) -> float:
         """
-        b, damping without control [N*s/m or N*m*s/rad]; at most the true value.
+        b, viscous damping of the handle without control [N*s/m or N*m*s/rad]; not more than the true value.
         """
 class UsbRequest:
     """
-    bRequest of a control transfer.
+    Numbers of the control requests to a USB device (field bRequest of a control transfer).
     
     Members:
     
@@ -146,14 +146,15 @@ class UsbRequest:
         ...
 def decode_info(data: bytes) -> dict:
     """
-    Returns the properties in a USB device's answer to GET_INFO. InputError names the wrong field.
+    Returns the properties in a USB device's answer to the request GET_INFO, by name. Raises
+    InputError with the wrong field.
     
-    firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms, transducer,
-    measures_velocity, uid.
+    firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms,
+    transducer, measures_velocity, uid.
     """
 def usb_cause(code: typing.SupportsInt | typing.SupportsIndex) -> str:
     """
-    Returns cause and cure for an error code of libusb; empty for a code without a known cause.
+    Returns cause and cure for an error code of libusb; empty for a code without a text.
     """
 longest_watchdog_ms: int = 1000
 shortest_watchdog_ms: int = 2

@@ -10,7 +10,7 @@ import typing
 __all__: list[str] = ['EnvironmentFilters', 'TransferFunction', 'environment_filters', 'paper_sample_time_s']
 class TransferFunction:
     """
-    H(z) = (b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2) with its state.
+    Filter H(z) = (b0 z^2 + b1 z + b2) / (z^2 + a1 z + a2) and its state.
     """
     def __init__(self, numerator: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"], denominator: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]) -> None:
         ...
@@ -20,17 +20,18 @@ class TransferFunction:
         """
     def filter(self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Returns the response to a signal (n,) from this state, and does not change the state.
+        Returns the filtered signal for an input signal (n,). The filter starts from its present
+        state and keeps this state.
         """
     def poles(self) -> typing.Annotated[list[complex], "FixedSize(2)"]:
         ...
     def reset(self) -> None:
         """
-        Sets the state to zero.
+        Sets the state of the filter to zero.
         """
     def step(self, input: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
-        Returns the next output sample.
+        Filters the next input sample and returns the output sample.
         """
     @property
     def denominator(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
@@ -40,7 +41,7 @@ class TransferFunction:
         ...
 class EnvironmentFilters:
     """
-    Integrators I1, I2 and differentiators G1, G2 of the paper's figures 10 to 14.
+    The paper's discrete integrators I1, I2 and differentiators G1, G2 (figures 10 to 14).
     """
     @property
     def g1(self) -> TransferFunction:
@@ -56,6 +57,7 @@ class EnvironmentFilters:
         ...
 def environment_filters(pair: str, design: str = 'paper') -> EnvironmentFilters:
     """
-    Returns the paper's filters for T = 1 ms (its section 4.3): as published, or with unit gain at low frequency.
+    Returns the paper's integrators and differentiators for the period T = 1 ms (section 4.3): as published,
+    or with unit gain at low frequency.
     """
 paper_sample_time_s: float = 0.001

@@ -11,24 +11,25 @@ import typing
 __all__: list[str] = ['check_model', 'checked_certificate', 'profile_of', 'read_json', 'scheme_of']
 def check_model(content: typing.Any) -> None:
     """
-    Checks the content of a model file and recomputes its certificate. ValueError names the path of the
-    first wrong field, its value and the correct ones.
+    Checks the content of a model file and computes its certificate again. Raises ValueError with
+    the path of the first wrong field, its value and the correct values.
     """
 def checked_certificate(model: palpate._core.model.ForceModel, plan: typing.Any, certificate: typing.Any) -> palpate._core.stability.Certificate:
     """
-    Returns the certificate of a model file after recomputing it from the rendered model. ValueError
-    names the field that differs, its value and the correct one.
+    Computes the certificate of a model file again from the rendered model and returns it. Raises
+    ValueError with the field that differs, its value and the correct value.
     """
 def profile_of(content: typing.Any) -> palpate._core.device.DeviceProfile:
     """
-    Returns the device profile in the content of a file. ValueError names the first wrong field, its
-    value and the correct ones.
+    Returns the device profile in the content of a file. Raises ValueError with the first wrong
+    field, its value and the correct values.
     """
 def read_json(path: str) -> typing.Any:
     """
-    Returns the content of a JSON file. ValueError has one sentence that begins with the name of the file.
+    Returns the content of a JSON file. Raises ValueError with one sentence that begins with the
+    name of the file.
     """
 def scheme_of(plan: typing.Any) -> palpate._core.rendering.Scheme:
     """
-    Returns the scheme of the plan of a model file.
+    Returns the scheme (structure and its numbers) in the plan of a model file.
     """

@@ -9,69 +9,74 @@ import typing
 __all__: list[str] = ['ForceModel', 'derivative_bounds', 'fingerprint', 'play', 'slope_bounds', 'wavelet_columns', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_slope_columns', 'wavelet_steps']
 class ForceModel:
     """
-    A force identified over d inputs, with its domain and continuations.
+    A force law of d inputs x, with its domain and the continuation of the force outside the
+    domain.
     
-    f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4); with hysteresis
-    f(x, s) = g(x) + s h(x), where h has separate weights for the same wavelets.
+    f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4). With hysteresis the force
+    is f(x, s) = g(x) + s h(x), with the mean force g of press and release, the direction state s
+    from -1 to 1, and the hysteresis h, which has separate weights for the same wavelets.
     """
     def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.SupportsFloat | typing.SupportsIndex, weight_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, linear_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, bias_hysteresis: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], below: str = 'linear', above: str = 'linear', period: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, of_velocity: bool = False) -> None:
         """
-        alpha, beta (N, d); weight (N,); linear, lower, upper (d,). of_velocity: the second of two inputs is the velocity. ValueError names the wrong field.
+        Makes the model of N wavelets and d inputs: alpha, beta (N, d); weight (N,); linear, lower,
+        upper (d,). of_velocity is true if the second of two inputs is the velocity. Raises ValueError
+        with the wrong field.
         """
     @typing.overload
     def energy(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
         """
-        Returns the stored energy [J] up to a constant; arguments as for force.
+        Returns the stored energy, up to a constant [J]; the arguments are those of force().
         """
     @typing.overload
     def energy(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
-        The same for an array of positions, of any shape.
+        The same method for an array of positions of any shape; returns an array of this shape.
         """
     def extrapolated(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
         """
-        Returns True if a position lies outside the identified domain.
+        Returns True for a position outside the domain of the model.
         """
     @typing.overload
     def force(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
         """
-        Returns the force of the object against the tool [N or N*m]: a number for a number, an array for an
-        array.
+        Returns the force of the object against the tool [N or N*m]: a number for one position, an
+        array for an array of positions.
         
-        A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius, `play`,
-        the state of the play operator. Inputs that the model does not use are ignored; ValueError names a
-        missing one.
-        A position that is not finite gives NaN.
+        A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius,
+        `play`, the state of the play operator. Arguments that the model does not use are ignored.
+        Raises ValueError with the name of a missing argument. A position that is not finite gives NaN.
         """
     @typing.overload
     def force(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
-        The same for an array of positions, of any shape.
+        The same method for an array of positions of any shape; returns an array of this shape.
         """
     def play(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start: typing.SupportsFloat | typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Returns the state of the play operator along a motion (n,). Without `start` it begins at rest.
+        Returns the states (n,) of the model's play operator along the positions of a motion (n,). Without
+        `start` the first state is the first position.
         """
     def predict(self, X: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Returns the force (n,) at X (n, d). A hysteresis model takes the direction as one more column. A row
-        with a value that is not finite gives NaN.
+        Returns the force (n,) for the n rows of inputs X (n, d). A hysteresis model takes the
+        direction as one more column. A row with a value that is not finite gives NaN.
         """
     @typing.overload
     def slope(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
         """
-        Returns the local stiffness df/dx; arguments as for force.
+        Returns the slope df/dx of the force [N/m or N*m/rad]; the arguments are those of force().
         """
     @typing.overload
     def slope(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
-        The same for an array of positions, of any shape.
+        The same method for an array of positions of any shape; returns an array of this shape.
         """
     def slope_range(self, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None) -> tuple[float, float]:
         """
-        Returns the proved (smallest, largest) slope inside the domain while sliding in either direction,
-        within 1 % of the steepest. With a play radius it also holds while a hysteresis model sticks, which
-        adds h / r.
+        Returns proved bounds (smallest, largest) of the slope of the force inside the domain, in press
+        and in release. They are wider than the true range by at most 1 % of the steepest slope. With a
+        play radius r they include the slope h / r (hysteresis h), with which the force of a hysteresis
+        model changes after a reversal.
         """
     @property
     def above(self) -> str:
@@ -112,7 +117,7 @@ class ForceModel:
     @property
     def of_velocity(self) -> bool:
         """
-        True if the second of two inputs is the velocity.
+        True if the model has two inputs, of which the second is the velocity.
         """
     @property
     def period(self) -> float | None:
@@ -131,44 +136,47 @@ class ForceModel:
         ...
 def derivative_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], order: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Returns proved bounds (k,) of |f^(order)| of a network of one input, for orders up to 9, over the
-    cells [lower, upper], each (k,).
+    Returns proved upper bounds (k,) of the absolute derivative of a network of one input,
+    for orders up to 9, in k intervals of positions from lower (k,) to upper (k,).
     """
 def fingerprint(model: ForceModel) -> str:
     """
-    Returns 16 hexadecimal digits that change with every number of the model's force.
+    Returns a fingerprint of a model: 16 hexadecimal digits, computed from all numbers that determine the force.
     """
 def play(position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], radius: typing.SupportsFloat | typing.SupportsIndex, start: typing.SupportsFloat | typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Returns the state (n,) of the play operator of a radius along a motion (n,):
-    play_k = min(x_k + r, max(x_k - r, play_{k-1})). Without `start` it begins at rest.
+    Returns the states (n,) of a play operator of radius r along the positions x of a motion (n,):
+    play_k = min(x_k + r, max(x_k - r, play_{k-1})). Without `start` the first state is the first
+    position.
     """
 def slope_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.SupportsFloat | typing.SupportsIndex, upper: typing.SupportsFloat | typing.SupportsIndex, relative: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> tuple[float, float]:
     """
-    Returns the proved (smallest, largest) slope of a network of one input over [lower, upper], at most
-    `relative` times max|f'| wider than the true range.
+    Returns proved bounds (smallest, largest) of the slope f' of a network of one input from lower
+    to upper. They are wider than the true range by at most `relative` times the largest |f'|.
     """
 def wavelet_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Returns psi(alpha_i o (x_k - beta_i)) of the radial Mexican hat: (n, N), column by column in memory.
+    Returns the values psi(alpha_i o (x_k - beta_i)) of N wavelets (radial Mexican hats) at n samples: (n, N),
+    column by column in memory.
     
     x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.
     """
 def wavelet_curvature_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> list[numpy.typing.NDArray[numpy.float64]]:
     """
-    Returns the second derivatives of the wavelet columns along each input: a list of d arrays (n, N).
+    Returns the second derivatives of the wavelets' values by each input: a list of d arrays (n, N).
     """
 def wavelet_jacobian(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], list[numpy.typing.NDArray[numpy.float64]], list[numpy.typing.NDArray[numpy.float64]]]:
     """
-    Returns the wavelet columns and their derivatives by the dilations and the translations:
-    (value, by_alpha, by_beta), value (n, N), the others lists of d arrays (n, N).
+    Returns the values of the wavelets (n, N), and their derivatives by the dilations alpha and by the
+    translations beta, each as a list of d arrays (n, N): (value, by_alpha, by_beta).
     """
 def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Returns d psi(alpha_i (x_k - beta_i)) / dx for one input: (n, N).
+    Returns the derivatives d psi(alpha_i (x_k - beta_i)) / dx of wavelets of one input: (n, N).
     """
 def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Returns the derivatives of the wavelet columns by steps without a unit, d log(alpha) and alpha d(beta):
-    (n, 2 d N), ordered (quantity, input, wavelet), column by column in memory.
+    Returns the derivatives of the wavelets' values by changes without a unit, d log(alpha) of the
+    dilations and alpha d(beta) of the translations: (n, 2 d N), columns ordered by quantity,
+    input, wavelet.
     """

@@ -8,7 +8,7 @@ import typing
 __all__: list[str] = ['Scheme', 'compensated_share', 'default_play_radius', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'solver_name', 'structure_names']
 class Scheme:
     """
-    Structure that renders a model, with its numbers in SI units.
+    Structure that renders a model, with the numbers of the structure in SI units.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -22,22 +22,24 @@ class Scheme:
         ...
     def steepest_slope(self, model: palpate._core.model.ForceModel) -> float:
         """
-        Returns the largest slope of the model in the structure, at least 0. It includes h / r, the slope
-        that a hysteresis model adds while it sticks.
+        Returns the largest slope of the rendered force, at least 0 [N/m or N*m/rad]. For a
+        hysteresis model it includes h / r (hysteresis by play radius), the slope that is added
+        after a reversal.
         """
     def to_dict(self) -> dict:
         """
-        Returns the fields that are written to a file, by name, without optional ones that are not set.
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
         """
     def validate(self, model: palpate._core.model.ForceModel, period_s: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
         """
-        Raises ValueError with the field, its value and the bound for this model. With a period it also
-        refuses a scheme that diverges at this period.
+        Checks that the scheme can render a model. Raises ValueError with the wrong field, its
+        value and its bound. With period_s also raises ValueError if the scheme diverges at this
+        period.
         """
     @property
     def compensated(self) -> bool:
         """
-        True if the compliance of the coupling's spring is subtracted from the model.
+        True if the model is made stiffer, so that model and coupling in series give the recorded force.
         """
     @property
     def coupling_damping(self) -> float:
@@ -52,12 +54,12 @@ class Scheme:
     @property
     def has_coupling(self) -> bool:
         """
-        True if the object is behind a virtual coupling.
+        True if the structure has a virtual coupling between device and object.
         """
     @property
     def has_mass(self) -> bool:
         """
-        True if the object has mass and damping.
+        True if the virtual object of the structure has mass and damping.
         """
     @property
     def mass(self) -> float:
@@ -72,12 +74,12 @@ class Scheme:
     @property
     def play_radius(self) -> float:
         """
-        r of a hysteresis model [m or rad]; 0 = that of the model.
+        Play radius r of a hysteresis model [m or rad]; 0 = the play radius of the model.
         """
     @property
     def predict(self) -> int:
         """
-        m: samples used to predict the position half a sample ahead, 0 to 16; 0 = none.
+        m, number of past samples that predict the position half a period ahead, 0 to 16; 0 = no prediction.
         """
     @property
     def structure(self) -> str:
@@ -86,17 +88,18 @@ class Scheme:
         """
 def default_play_radius(model: palpate._core.model.ForceModel, encoder_step: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Returns the default play radius of a model that does not define one; otherwise 0.
+    Returns the default play radius for a hysteresis model that does not define one; otherwise 0.
     """
 def explicit_slope_limit(scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex, *, coupled: bool = True) -> float:
     """
-    Returns the slope of the model below which the explicit structure is stable at a held device, or,
-    with coupled=False, driven by a force.
+    Returns the slope limit of a model: below it the explicit structure is stable while the device
+    is held still, or, with coupled=False, while a force drives the object without coupling.
     """
 def solver_name(model: palpate._core.model.ForceModel, scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex) -> str | None:
     """
-    Returns the method that solves the load line: 'table' if certified tables are used at least in part,
-    otherwise 'newton'; None for a structure without a load line.
+    Returns the method that solves the load line of a scheme: 'table' if a table of solutions is
+    used for at least a part of the positions, otherwise 'newton'; None for a structure without a
+    load line.
     """
 compensated_share: float = 0.9
 fewest_encoder_steps_in_play: float = 4.0

@@ -11,7 +11,7 @@ import typing
 __all__: list[str] = ['LoopSettings', 'measure', 'render', 'smallest_domain_share', 'tolerated_change', 'usual_telemetry_hz']
 class LoopSettings:
     """
-    Default rate, duration and limits of a session.
+    Default rate, duration and least rate of a run.
     """
     def __init__(self) -> None:
         ...
@@ -29,7 +29,7 @@ def measure(*, object: palpate._core.model.ForceModel | None = None, position_un
     Measures a real object in real time; on the simulated device the model `object` is mounted.
     
     A hand moves the handle. With `probe` the device moves it slowly between `lower` and `upper`. With
-    `push` the device gives short pushes of that force to either side. Options are keywords, None for
+    `push` the device gives short pushes of this force to either side. Options are keywords, None for
     the default:
     
     - device (simulated or usb[:SERIAL]), wait_s.
@@ -40,26 +40,27 @@ def measure(*, object: palpate._core.model.ForceModel | None = None, position_un
     
     Calls progress(ticks, position, force, lost) ten times a second.
     
-    Returns the summary by name; with `keep` it contains the ticks. Raises InputError if it is refused
-    before anything moves.
+    Returns the values of the summary by name; with `keep` the columns of all ticks are under `kept`.
+    Raises InputError if the measurement is refused, before the device moves.
     """
 def render(model: palpate._core.model.ForceModel, plan: palpate._core.rendering.Scheme | None = None, *, limited: palpate._core.model.ForceModel | None = None, certificate: palpate._core.stability.Certificate | None = None, position_unit: str = 'rad', force_unit: str = 'N*m', model_name: str = '', progress: collections.abc.Callable | None = None, **kwargs) -> dict:
     """
     Renders a model in real time on a device: the loop of palpate-control.
     
-    `plan`, `limited` and `certificate` are those of the model. Without a plan the default scheme is
-    used. Options are keywords, None for the default:
+    `plan`, `limited` and `certificate` are read from the model file; `limited` is the model that the plan
+    renders instead. Without a plan the default scheme is used. Options are keywords, None for the default:
     
     - device (simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]), wait_s, uncertified, faults.
     - rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.
     - force_limit and the fields of a scheme.
     - record, force, telemetry_port, telemetry_hz.
     
-    `record` names the recording, which grows as record.part. An existing one is refused, or replaced with
-    `force`. Calls progress(ticks, position, force, lost) ten times a second.
+    `record` is the name of the recording, which is written as record.part and renamed at the end. If the
+    recording exists, it is replaced with `force`, otherwise the call is refused. Calls
+    progress(ticks, position, force, lost) ten times a second.
     
-    Returns the summary by name, and its text under `lines`. Raises InputError if it is refused before
-    anything moves.
+    Returns the values of the summary by name, and the text of the summary under `lines`. Raises InputError
+    if the rendering is refused, before the device moves.
     """
 smallest_domain_share: float = 0.1
 tolerated_change: float = 0.01

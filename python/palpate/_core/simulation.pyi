@@ -13,7 +13,8 @@ import typing
 __all__: list[str] = ['Hand', 'TestRig', 'force_driven', 'force_error', 'motion_driven', 'rig_for', 'simulate']
 class Hand:
     """
-    Simulated hand: a spring to a target that moves between lower and upper, and a damper to ground.
+    Simulated hand: a spring to a target that moves between lower and upper, and
+    a damper between handle and ground.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -27,36 +28,36 @@ class Hand:
         ...
     def to_dict(self) -> dict:
         """
-        Returns the fields that are written to a file, by name, without optional ones that are not set.
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
         """
     @property
     def damping(self) -> float:
         """
-        Damping to ground [N*s/m or N*m*s/rad].
+        Damping between handle and ground [N*s/m or N*m*s/rad].
         """
     @property
     def frequency_hz(self) -> float:
         """
-        Sweeps a second [Hz].
+        Frequency of the target's motion from lower to upper and back [Hz].
         """
     @property
     def lower(self) -> float:
         """
-        Smallest target [m or rad].
+        Smallest position of the spring's target [m or rad].
         """
     @property
     def stiffness(self) -> float:
         """
-        Stiffness of the spring [N/m or N*m/rad].
+        Stiffness of the spring between target and handle [N/m or N*m/rad].
         """
     @property
     def upper(self) -> float:
         """
-        Largest target [m or rad].
+        Largest position of the spring's target [m or rad].
         """
 class TestRig:
     """
-    Simulated device and hand scaled to a model.
+    Simulated device and hand, scaled to a model.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -70,12 +71,12 @@ class TestRig:
         ...
     def scheme(self, model: palpate._core.model.ForceModel, **kwargs) -> palpate._core.rendering.Scheme:
         """
-        Returns the scheme with the given fields of Scheme, in the model's units. None: the default at the
-        model's scale.
+        Returns a scheme with the given fields of Scheme, in the model's units. Other fields, and fields
+        with the value None, have the default, multiplied by the scale of the model.
         """
     def to_dict(self) -> dict:
         """
-        Returns the fields that are written to a file, by name, without optional ones that are not set.
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
         """
     @property
     def device(self) -> palpate._core.device.DeviceProfile:
@@ -83,7 +84,7 @@ class TestRig:
     @property
     def force(self) -> float:
         """
-        Forces, relative to those of the default knob.
+        Factor of forces, relative to those of the default knob [-].
         """
     @property
     def hand(self) -> Hand:
@@ -91,33 +92,35 @@ class TestRig:
     @property
     def length(self) -> float:
         """
-        Positions, relative to those of the default knob.
+        Factor of positions, relative to those of the default knob [-].
         """
 def force_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, force: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> dict:
     """
-    Returns the motion of the environment alone under a recorded force (n,) (paper figures 12 and 14).
-    Arrays (n,) by name: force, environment_position, evaluations, status.
+    Returns the motion of the virtual object, without device and coupling, when a recorded force
+    (n,) drives the object (paper figures 12 and 14). Arrays (n,) by name: force,
+    environment_position, evaluations, status.
     """
 def force_error(model: palpate._core.model.ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex, *, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], middle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], end: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], mean_applied: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
-    Returns errors of a simulated rendering against a model, by name. RMS [N or N*m]: at the end of the
-    tick, at its sampling instant, of the mean over the tick, and of the mean below 50 Hz. Also the work
-    of the error [J]. Takes arrays (n,) from simulate; play_radius 0 is that of the model.
+    Returns errors of the force of a simulated rendering, compared with a model, by name. RMS
+    errors [N or N*m]: `end`, at the end of each tick; `instant`, at the time of the sample;
+    `mean`, mean error over a tick; `band`, mean error below 50 Hz. `work` is the work of the error
+    [J]. The arrays (n,) are those of simulate(); play_radius 0 means the play radius of the model.
     """
 def motion_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex) -> dict:
     """
-    Returns the force that is rendered while a recorded motion (n,) moves the device.
+    Returns the force that a scheme renders while the device follows a recorded motion (n,).
     Arrays (n,) by name: force, environment_position, evaluations, status.
     """
 def rig_for(model: palpate._core.model.ForceModel, is_angle: bool, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> TestRig:
     """
-    Returns the test rig for a model of position, or of position and velocity. An angle is rendered on
-    the default knob. For any other unit its lengths and forces are scaled to the travel and the largest
-    force of the model.
+    Returns the test rig for a model of position, or of position and velocity. With is_angle
+    (positions in rad) it is the default knob. For any other unit, lengths and forces of the knob
+    and its hand are scaled to the travel and the largest force of the model.
     """
 def simulate(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0, progress: collections.abc.Callable | None = None) -> dict:
     """
-    Renders a model on a simulated device with a simulated hand, in virtual time.
+    Renders a model on a simulated device with a simulated hand, in simulated time.
     
     The handle starts at rest at start_position. Calls progress(ticks) about ten times a second.
     Ctrl-C raises KeyboardInterrupt. Raises ValueError for more than 3 600 000 ticks.

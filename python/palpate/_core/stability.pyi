@@ -11,10 +11,11 @@ import typing
 __all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'certify', 'certify_bounds', 'device_difference', 'explicit_scheme', 'force_bounds', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share']
 class ForceBounds:
     """
-    Proved bounds of a force over all positions, continuations included.
+    Proved bounds of a model's force and slope at all positions, inside and outside the domain.
     
-    With hysteresis, f = g + s h with a play of radius r, the slope of a path is g' + s h'. While it
-    sticks, h / r is added.
+    With hysteresis the force is f = g + s h: the mean force g of press and release, the hysteresis
+    h and the direction state s. During a stroke the slope is g' + s h'; after a reversal h / r is
+    added, with the play radius r.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -28,7 +29,7 @@ class ForceBounds:
         ...
     def to_dict(self) -> dict:
         """
-        Returns the fields that are written to a file, by name, without optional ones that are not set.
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
         """
     @property
     def drag(self) -> float:
@@ -82,7 +83,7 @@ class ForceBounds:
         """
 class Inequality:
     """
-    One line of a certificate: left >= right, or left > right if it is strict.
+    One inequality of a certificate: left >= right, or left > right if `strict` is true.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -96,7 +97,7 @@ class Inequality:
         ...
     def to_dict(self) -> dict:
         """
-        Returns the fields that are written to a file, by name, without optional ones that are not set.
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
         """
     @property
     def basis(self) -> str:
@@ -148,7 +149,7 @@ class Inequality:
         """
 class Certificate:
     """
-    Proved properties of a model that a scheme renders on a device.
+    Proved inequalities and verdict for a model that a scheme renders on a device.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -162,11 +163,11 @@ class Certificate:
         ...
     def check(self, model: palpate._core.model.ForceModel) -> Certificate:
         """
-        Computes the certificate again and returns the result. ValueError names the first field that differs.
+        Computes the certificate again from the model and returns it. Raises ValueError with the first field that differs.
         """
     def to_dict(self) -> dict:
         """
-        Returns the fields that are written to a file, by name, without optional ones that are not set.
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
         """
     @property
     def bounds(self) -> ForceBounds:
@@ -221,61 +222,65 @@ class Certificate:
         """
 def certify(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> Certificate:
     """
-    Certifies a model that a scheme renders on a device. A refusal is a result with a reason; an
-    impossible scheme or device raises ValueError.
+    Returns the certificate of a model that a scheme renders on a device. If stability is not
+    proved, the certificate states the reason. Raises ValueError for an invalid scheme or device.
     """
 def certify_bounds(bounds: ForceBounds, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> Certificate:
     """
-    Certifies any force within bounds.
+    Returns the certificate of every force within the bounds, rendered by a scheme on a device.
     """
 def device_difference(certified: palpate._core.device.DeviceProfile, device: palpate._core.device.DeviceProfile) -> str:
     """
-    Returns a sentence about the first field in which a device differs from the certified one; empty
-    without a difference.
+    Returns a sentence about the first field in which a device profile differs from the certified profile;
+    empty without a difference.
     """
 def explicit_scheme(bounds: ForceBounds, device: palpate._core.device.DeviceProfile, **kwargs) -> palpate._core.rendering.Scheme:
     """
-    Returns the explicit structure with the stiffest coupling, then the least object damping, for which
-    it is stable; otherwise the last one tried. Keywords: mass, object_damping, coupling_stiffness,
-    coupling_damping and play_radius; None: chosen by the search.
+    Searches the explicit structure with the stiffest coupling, then the least object damping, for
+    which the structure is stable, and returns its scheme. If none is stable, returns the last
+    scheme that was tried. Keywords: mass, object_damping, coupling_stiffness, coupling_damping and
+    play_radius; None: the search chooses the value.
     """
 def force_bounds(model: palpate._core.model.ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> ForceBounds:
     """
-    Returns proved bounds of a model of one position, or of position and velocity, on a device with a
-    force limit. A play_radius above 0 replaces the model's own.
+    Returns proved bounds of the force of a model of position, or of position and velocity, limited to
+    force_limit. A play_radius above 0 replaces the play radius of the model.
     """
 def narrowest_play(sliding: ForceBounds, device: palpate._core.device.DeviceProfile, least: typing.SupportsFloat | typing.SupportsIndex, most: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Returns the narrowest play radius from `least` to `most` for which hysteresis is certified;
-    infinite without one. `sliding` are bounds of the model with a play so wide that sticking adds
-    no slope.
+    Returns the smallest play radius from `least` to `most` for which a hysteresis model is
+    certified; infinity if there is none. `sliding` are bounds of the model's force with a play
+    radius so large that a reversal adds no slope.
     """
 def passive_shift(model: palpate._core.model.ForceModel, force_limit: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Returns the shift of a periodic force for which the mean of the limited force is not active; 0
-    for other models. Add it to the bias of the network.
+    Returns the force to add to the bias of a periodic model, so that its force, limited to
+    force_limit, gives no energy over a period [N or N*m]; 0 for other models.
     """
 def renderable_slopes(device: palpate._core.device.DeviceProfile, stick: typing.SupportsFloat | typing.SupportsIndex = 0.0, *, rising: typing.SupportsFloat | typing.SupportsIndex = ..., falling: typing.SupportsFloat | typing.SupportsIndex = ...) -> tuple[float, float]:
     """
-    Returns the (lowest, highest) slope for which direct rendering is certified; infinite without a
-    limit.
+    Returns the (lowest, highest) slope of a model for which direct rendering on a device is
+    certified; infinite if every slope is certified.
     
-    First finds the largest k for which slopes of -k and k are certified together, limited to `falling`
-    and `rising`. Then finds the largest falling slope, and after that the largest rising one. With
-    hysteresis these are slopes while sliding; sticking adds h / r = `stick`.
+    First finds the largest k for which slopes from -k to k are certified, with at most `falling`
+    and `rising`. Then finds the steepest falling slope, and after that the steepest rising slope.
+    With hysteresis these are slopes during a stroke; after a reversal h / r = `stick` is added
+    (hysteresis by play radius).
     """
 def slope_behind_coupling(slope: typing.SupportsFloat | typing.SupportsIndex, coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
-    Returns K_c k / (K_c + k), the slope of an object of slope k > -K_c behind a coupling.
+    Returns K_c k / (K_c + k), the slope that the device feels for an object of slope k > -K_c behind a coupling
+    of stiffness K_c.
     """
 def steepest_stick(device: palpate._core.device.DeviceProfile) -> float:
     """
-    Returns the slope h / r that leaves half of the device's largest slope for sliding.
+    Returns the largest slope h / r (hysteresis by play radius) for which half of the
+    largest slope that the device can render remains for the model's strokes.
     """
 def stiffest_coupling(*, coupling_damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: palpate._core.device.DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 0.95) -> float:
     """
-    Returns the largest coupling stiffness K_c for which a share of the device's damping is sufficient; 0
-    if no stiffness is certified. `coupling_damping` is B_c; `falling` is the steepest falling slope of
-    the object's force.
+    Returns the largest coupling stiffness K_c that is certified with only the given share of the
+    device's damping; 0 if no stiffness is certified. `coupling_damping` is B_c; `falling` is the
+    steepest falling slope of the object's force.
     """
 usual_coupling_share: float = 0.95

@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Results of steps.
+Status of a tick of the control loop or of a solver.
 """
 from __future__ import annotations
 import typing
 __all__: list[str] = ['Status', 'status_meanings']
 class Status:
     """
-    Result of a step; the same words in C++ and in records.
+    Result of one step of the control loop or of a solver. C++ and recordings use the same words.
     
     Members:
     
-      Ok : the step is exact to its tolerance
+      Ok : the step was computed to its tolerance, without an error or limit
     
-      MaxIterations : the solver used all its evaluations; the position is its best one
+      MaxIterations : the solver of the load line used all its evaluations; the position is its best approximation
     
-      NotUnique : the force falls more steeply than the load line rises; another solution may exist
+      NotUnique : the model's force falls too steeply; the equation of the virtual object may have a second solution
     
-      NonFinite : an input or the environment was not a finite number; the force sent is zero
+      NonFinite : the position or the force of the model was not a finite number; the force sent is zero
     
       Timeout : the device did not answer in time
     
-      Lost : a sample of the device was lost or repeated
+      Lost : a sample of the device or a command to it was lost or repeated
     
       Fault : the device reported a fault or was disconnected; the force sent is zero
     
@@ -33,7 +33,7 @@ class Status:
     
       Ramp : the force is scaled up from zero after the start
     
-      EnergyLimited : the rendering had given all energy that it may give; the force was scaled down
+      EnergyLimited : the rendering had given all the energy that the energy tank allows; the force was scaled down
     
       LimitCycleScaled : a limit cycle was detected; all forces are scaled down until the end of the run
     """
@@ -85,4 +85,4 @@ class Status:
     @property
     def value(self) -> int:
         ...
-status_meanings: dict = {'Ok': 'the step is exact to its tolerance', 'MaxIterations': 'the solver used all its evaluations; the position is its best one', 'NotUnique': 'the force falls more steeply than the load line rises; another solution may exist', 'NonFinite': 'an input or the environment was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device was lost or repeated', 'Fault': 'the device reported a fault or was disconnected; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stopped within one sample during fast motion; the force sent is zero', 'Ramp': 'the force is scaled up from zero after the start', 'EnergyLimited': 'the rendering had given all energy that it may give; the force was scaled down', 'LimitCycleScaled': 'a limit cycle was detected; all forces are scaled down until the end of the run'}
+status_meanings: dict = {'Ok': 'the step was computed to its tolerance, without an error or limit', 'MaxIterations': 'the solver of the load line used all its evaluations; the position is its best approximation', 'NotUnique': "the model's force falls too steeply; the equation of the virtual object may have a second solution", 'NonFinite': 'the position or the force of the model was not a finite number; the force sent is zero', 'Timeout': 'the device did not answer in time', 'Lost': 'a sample of the device or a command to it was lost or repeated', 'Fault': 'the device reported a fault or was disconnected; the force sent is zero', 'Limited': 'the force was clipped to the limit of the host or of the device', 'Jump': 'the position moved farther in one sample than the device can; the force sent is zero', 'Frozen': 'the position stopped within one sample during fast motion; the force sent is zero', 'Ramp': 'the force is scaled up from zero after the start', 'EnergyLimited': 'the rendering had given all the energy that the energy tank allows; the force was scaled down', 'LimitCycleScaled': 'a limit cycle was detected; all forces are scaled down until the end of the run'}
