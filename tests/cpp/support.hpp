@@ -80,7 +80,7 @@ struct Spring {
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
 
-/// The comparison scene of spec section 6: a spring, a click and a wall, f(x) = 2x + 0.6
+/// The comparison scene: a spring, a click and a wall, f(x) = 2x + 0.6
 /// exp(-((x - 0.15)/0.03)^2) + 60 * 0.004 softplus((x - 0.4)/0.004) N*m over rad.
 struct ClickAndWall {
     using State = Stateless;

@@ -62,7 +62,7 @@ void check_with_random_hand(test::Random& random, const Scene& scene, Check chec
     }
 }
 
-// spec section 7, "energy account": E_port(t) + S(0) - S_min + m v(0)^2 / 2 >= -rounding at every substep
+// Energy account: E_port(t) + S(0) - S_min + m v(0)^2 / 2 >= -rounding at every substep
 TEST(CertifiedScenes, NeverGiveMoreEnergyThanTheObjectStored) {
     test::Random random{20};
     std::map<std::string, int> tried;
@@ -141,7 +141,7 @@ double resting_energy(const VelocityNetwork& force, double x) {
     return sum * step / 6.0;
 }
 
-// spec section 7, velocity models: b >= T M/2 + t_d L + B_v, f_c >= L_x Delta/2 + B_v Delta/T
+// Velocity models: b >= T M/2 + t_d L + B_v, f_c >= L_x Delta/2 + B_v Delta/T
 TEST(CertifiedScenes, NeverGiveEnergyWithForcesOfVelocity) {
     constexpr double quadrature = 1e-6;  // tolerance [J]; the objects store tenths of a joule
     test::Random random{22};

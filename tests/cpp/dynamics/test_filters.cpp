@@ -23,7 +23,7 @@ double degrees(std::complex<double> value) {
     return std::arg(value) * 180.0 / std::numbers::pi;
 }
 
-// spec section 4: "poles 0.836 and 0.819 (179 and 199 rad/s)"
+// Required: "poles 0.836 and 0.819 (179 and 199 rad/s)"
 TEST(Filters, DifferentiatorsHaveThePolesOfThePaper) {
     const auto poles = environment_filters(FilterPair::Implicit).g1.poles();
     EXPECT_NEAR(poles[0].real(), 0.836, 5e-4);
@@ -32,7 +32,7 @@ TEST(Filters, DifferentiatorsHaveThePolesOfThePaper) {
     EXPECT_NEAR(-std::log(poles[1].real()) / paper_sample_time, 199.0, 1.0);
 }
 
-// spec section 4: "the paper's 31 makes the explicit G1 I1 4.8 % too large at low frequency (1.048; 29.58 is
+// Required: "the paper's 31 makes the explicit G1 I1 4.8 % too large at low frequency (1.048; 29.58 is
 // exact); 14.8379 gives 1.0032"
 TEST(Filters, LowFrequencyGainOfThePaperIsSlightlyAboveOne) {
     constexpr double low = 1e-3;
@@ -48,7 +48,7 @@ TEST(Filters, MatchedGainIsExactAtLowFrequency) {
     EXPECT_NEAR(std::abs(product(FilterPair::Implicit, FilterDesign::Matched, low)), 1.0, 1e-9);
 }
 
-// spec section 4: "at 100 rad/s |G I| is 0.78 with -53 degrees (implicit pair), 0.82 with -62 degrees
+// Required: "at 100 rad/s |G I| is 0.78 with -53 degrees (implicit pair), 0.82 with -62 degrees
 // (explicit)"
 TEST(Filters, PaperGainIsLowAtHundredRadiansPerSecond) {
     const auto implicit = product(FilterPair::Implicit, FilterDesign::Paper, 100.0);

@@ -78,7 +78,7 @@ Scheme direct() {
     return scheme;
 }
 
-// In the click-and-wall scene of spec section 6, with encoder steps and without friction, the guards do not change the
+// In the click-and-wall scene, with encoder steps and without friction, the guards do not change the
 // force.
 TEST(Guards, DoNotChangeForcesOfTheComparisonScene) {
     const test::ClickAndWall object;

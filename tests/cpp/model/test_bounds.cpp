@@ -64,7 +64,7 @@ TEST(Bounds, HoldAtEveryPointOfRandomNetworks) {
     }
 }
 
-// spec section 7: slope bound by the mean-value form, at most 1 % above the largest slope L
+// Required: slope bound by the mean-value form, at most 1 % above the largest slope L
 TEST(Bounds, AreWithinOnePercentOfADenseSearch) {
     Random random{32};
     for (int k = 0; k < cases(20); ++k) {

@@ -47,7 +47,7 @@ double work(const HysteresisNetwork& object, HysteresisNetwork::State& state, do
     return sum;
 }
 
-// spec section 3: "h >= 0 makes every loop, inner ones and x-dependent h included, never generate energy"
+// Required: "h >= 0 makes every loop, inner ones and x-dependent h included, never generate energy"
 TEST(Hysteresis, NeverGivesMoreEnergyThanItStored) {
     Random random{11};
     for (int k = 0; k < cases(60); ++k) {

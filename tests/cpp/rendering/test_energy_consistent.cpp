@@ -31,7 +31,7 @@ TEST(EnergyConsistent, IsOfSecondOrderAndSwitchedOfFirstOrder) {
                 0.15);
 }
 
-// spec section 5: "undamped amplitude constant"
+// Required: "undamped amplitude constant"
 TEST(EnergyConsistent, KeepsTheEnergyOfAnUndampedObject) {
     const Hardening object;
     EnergyConsistent structure{object, {0.001, 0.0}, coupling, 1e-3, 1e-4, false};

@@ -37,7 +37,7 @@ struct ForceError {
 };
 
 /// Returns the RMS of the rendered force F_k minus the model force f(handle position), over 4000 ticks of the
-/// click-and-wall scene of spec section 6.
+/// click-and-wall scene.
 template <class S>
 ForceError force_error(S structure) {
     SimulatedDevice device{DeviceProfile{}, Hand{}};
@@ -63,12 +63,12 @@ void expect_within_5_percent(ForceError measured, double at_end, double at_insta
     EXPECT_NEAR(measured.at_instant, at_instant, 0.05 * at_instant);
 }
 
-// spec section 6, RMS force error of direct rendering: 0.00362 N*m at the end of the tick, 0.00037 N*m at the sample
+// RMS force error of direct rendering: 0.00362 N*m at the end of the tick, 0.00037 N*m at the sample
 TEST(Scene, Direct) {
     expect_within_5_percent(force_error(Direct{ClickAndWall{}}), 0.00362, 0.00037);
 }
 
-// spec section 6, RMS force error of massless, compensated rendering: 0.00362 N*m at the end of the tick, 0.00037 N*m
+// RMS force error of massless, compensated rendering: 0.00362 N*m at the end of the tick, 0.00037 N*m
 // at the sample
 TEST(Scene, MasslessCompensated) {
     const VirtualCoupling softer_damper{coupling.stiffness, 0.005};
@@ -76,26 +76,26 @@ TEST(Scene, MasslessCompensated) {
     expect_within_5_percent(force_error(Massless{object, softer_damper, period}), 0.00362, 0.00037);
 }
 
-// spec section 6, RMS force error of massless rendering: 0.1202 N*m at the end of the tick, 0.1202 N*m at the sample
+// RMS force error of massless rendering: 0.1202 N*m at the end of the tick, 0.1202 N*m at the sample
 TEST(Scene, Massless) {
     expect_within_5_percent(force_error(Massless{ClickAndWall{}, coupling, period}), 0.1202, 0.1202);
 }
 
-// spec section 6, RMS force error of the implicit structure with m = 0.001, B_o = 0: 0.1231 N*m at the end of the
+// RMS force error of the implicit structure with m = 0.001, B_o = 0: 0.1231 N*m at the end of the
 // tick, 0.1227 N*m at the sample
 TEST(Scene, ImplicitUndamped) {
     expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.0}, coupling, period}),
                             0.1231, 0.1227);
 }
 
-// spec section 6, RMS force error of the implicit structure with m = 0.001, B_o = 0.5: 0.2530 N*m at the end of the
+// RMS force error of the implicit structure with m = 0.001, B_o = 0.5: 0.2530 N*m at the end of the
 // tick, 0.2532 N*m at the sample
 TEST(Scene, ImplicitDamped) {
     expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}),
                             0.2530, 0.2532);
 }
 
-// spec section 6, RMS force error of the explicit structure with m = 0.001, B_o = 0.5: 0.2530 N*m at the end of the
+// RMS force error of the explicit structure with m = 0.001, B_o = 0.5: 0.2530 N*m at the end of the
 // tick, 0.2532 N*m at the sample
 TEST(Scene, ExplicitDamped) {
     expect_within_5_percent(force_error(Explicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}),
@@ -121,7 +121,7 @@ double growth(S structure, int ticks) {
     return std::isfinite(last) ? last / first : std::numeric_limits<double>::infinity();
 }
 
-// spec section 5: "f = Kx without coupling is stable iff 0 < K < (4m - 2 B_o T)/T^2 and B_o T < 2m: 3000 at
+// Required: "f = Kx without coupling is stable iff 0 < K < (4m - 2 B_o T)/T^2 and B_o T < 2m: 3000 at
 // m = 0.001, B_o = 0.5"
 TEST(ExplicitLimit, IsThreeThousandForThePapersMassAndDamping) {
     const auto free_motion = [](double stiffness) {
@@ -131,7 +131,7 @@ TEST(ExplicitLimit, IsThreeThousandForThePapersMassAndDamping) {
     EXPECT_GT(free_motion(3010.0), 10.0);
 }
 
-// spec section 5: "with B_o = 0 the poles lie on the unit circle for 0 < K < 4m/T^2 (the paper's
+// Required: "with B_o = 0 the poles lie on the unit circle for 0 < K < 4m/T^2 (the paper's
 // oscillation)"
 TEST(ExplicitLimit, UndampedOscillationKeepsItsAmplitude) {
     for (const double stiffness : {10.0, 400.0, 2000.0, 3900.0}) {
@@ -142,7 +142,7 @@ TEST(ExplicitLimit, UndampedOscillationKeepsItsAmplitude) {
     EXPECT_GT(growth(Explicit{Spring{4010.0}, Inertia{0.001, 0.0}, coupling, period}, 4000), 10.0);
 }
 
-// spec section 5: "with coupling, at a held device: K + K_c < (4m - 2(B_o + B_c)T)/T^2"
+// Required: "with coupling, at a held device: K + K_c < (4m - 2(B_o + B_c)T)/T^2"
 TEST(ExplicitLimit, IncludesTheCoupling) {
     const auto held = [](double stiffness) {
         Explicit structure{Spring{stiffness}, Inertia{0.001, 0.5}, coupling, period};
@@ -158,7 +158,7 @@ TEST(ExplicitLimit, IncludesTheCoupling) {
     EXPECT_GT(held(1.01 * limit), 1.0);
 }
 
-// spec section 5: "the implicit scheme is stable for every K >= 0"
+// Required: "the implicit scheme is stable for every K >= 0"
 TEST(Implicit, IsStableAtAMillion) {
     for (const double stiffness : {0.1, 3000.0, 1e6}) {
         for (const double damping : {0.0, 0.5}) {
@@ -272,7 +272,7 @@ double work_of_a_throw(S structure, double limit) {
     return hand.work;
 }
 
-// spec of the certificate: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
+// Required: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
 TEST(ForceLimit, InsideTheStepPreventsEnergyFromAThrownMass) {
     const Inertia mass{0.05, 0.0};
     const VirtualCoupling spring{90.0, 0.0};
@@ -289,7 +289,7 @@ TEST(ForceLimit, InsideTheStepPreventsEnergyFromAThrownMass) {
     EXPECT_GT(work_of_a_throw(consistent(5.0), 5.0), 0.0);
 }
 
-// spec of the certificate: "falling slopes with mass and limit fail: s = 0.31 K_c, m = 7 K_c T^2, F_max = 1.34 f_0,
+// Required: "falling slopes with mass and limit fail: s = 0.31 K_c, m = 7 K_c T^2, F_max = 1.34 f_0,
 // a 68-sample cycle gives 0.44 f_0^2 / K_c"; this one gives 0.416
 TEST(ForceLimit, FallingForceWithMassGivesEnergy) {
     const PushingOut object{1.0, 0.31, 7.5};
@@ -403,7 +403,7 @@ TEST(ForceLimit, OfAMasslessObjectLimitsItsForce) {
     }
 }
 
-// spec section 6: the compensated model f~ has the points (x - f(x)/K_c, f(x)) and the slope K_c f' / (K_c - f'), with
+// Required: the compensated model f~ has the points (x - f(x)/K_c, f(x)) and the slope K_c f' / (K_c - f'), with
 // coupling stiffness K_c
 TEST(Compensated, SubtractsTheComplianceOfTheSpring) {
     const ClickAndWall object;

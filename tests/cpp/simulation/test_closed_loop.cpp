@@ -37,7 +37,7 @@ double open_balance(const DeviceProfile& device, double start_velocity, const Cl
     return std::abs(off) / (end.energy.throughput + std::abs(kinetic));
 }
 
-// spec section 7, "energy account": the work of the hand equals the energy of the motor, the losses, and the increase
+// Energy account: the work of the hand equals the energy of the motor, the losses, and the increase
 // of the handle's kinetic energy.
 TEST(EnergyAccount, BalancesToRoundingForEveryHand) {
     test::Random random{11};

@@ -80,7 +80,7 @@ TEST(LoadLineSolver, FindsARootForAnySlopesInItsBracket) {
     }
 }
 
-// spec section 5: "from the previous solution, the first root met in the direction of -residual"
+// Required: "from the previous solution, the first root met in the direction of -residual"
 TEST(LoadLineSolver, EndsOnTheFirstRootInTheDirectionOfTheResidual) {
     // A force that falls with slope -15, more steeply than the load line rises (slope 5): up to three solutions.
     const test::ClickAndWall object;

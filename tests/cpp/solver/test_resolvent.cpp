@@ -276,7 +276,7 @@ TEST(Resolvent, KeepsItsCertifiedErrorOnEveryBranch) {
     EXPECT_GT(tabulated, 0.95 * range);
 }
 
-// spec section 5: "from the previous solution, the first root met in the direction of -residual". Tests 401 x 401 pairs
+// Required: "from the previous solution, the first root met in the direction of -residual". Tests 401 x 401 pairs
 // of start and right-hand side, for load lines that fold once, twice and in the steep wall of a knob's detent.
 TEST(Resolvent, FollowsTheBranchRuleAtEveryFold) {
     const WaveletNetwork network = two_clicks();
@@ -400,7 +400,7 @@ TEST(Resolvent, RepeatsWithEveryTurnOfAKnob) {
     EXPECT_GT(folded, cases(20) / 5);
 }
 
-// spec section 5: "with the predictor ..., 1.008 evaluations a step (textbook: 2.5 to 3.4)"
+// Required: "with the predictor ..., 1.008 evaluations a step (textbook: 2.5 to 3.4)"
 TEST(CertifiedSolver, NeedsOneEvaluationAStep) {
     const WaveletNetwork network = switch_and_wall();
     const Inertia inertia{0.001, 0.5};

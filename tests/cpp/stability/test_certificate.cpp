@@ -247,7 +247,7 @@ TEST(Certificate, CouplingAndDampingLimitTheFallingSlope) {
     EXPECT_TRUE(certify(slopes(-5000.0, 5.0), consistent, smooth(1.0)).certified());
 }
 
-// spec of the certificate: "Falling slopes with mass and limit fail", for s = 0.31 K_c, m = 7 K_c T^2, B_o = 0. The
+// Required: "Falling slopes with mass and limit fail", for s = 0.31 K_c, m = 7 K_c T^2, B_o = 0. The
 // test ForceLimit.DoesNotKeepAFallingForceWithMassFromGivingEnergy contains a motion that takes energy out.
 TEST(Certificate, RefusesAFallingObjectThatGivesEnergyAtAForceLimit) {
     const Scheme scheme = scheme_of(StructureKind::Implicit, {100.0, 0.0}, {7.0 * 100.0 * 1e-6, 0.0});
@@ -422,7 +422,7 @@ TEST(ExplicitScheme, IsStableWithTheStiffestCouplingAndThenTheLeastDamping) {
     EXPECT_GT(stable, 5);
 }
 
-// spec of the certificate, section 5: f_c >= ||g||_1 Delta / 2, "300 objects, bound over sum 1.000 to 1.009"
+// Required: f_c >= ||g||_1 Delta / 2, "300 objects, bound over sum 1.000 to 1.009"
 TEST(Certificate, GainOfAMassIsTheSumOfTheImpulseResponse) {
     test::Random random{19};
     for (int draw = 0; draw < test::cases(300); ++draw) {

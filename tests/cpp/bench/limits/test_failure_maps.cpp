@@ -36,12 +36,12 @@ void expect_between(const Interval& found, double least, double most) {
     EXPECT_LE(found.upper, most);
 }
 
-// spec section 5: "f = Kx without coupling is stable iff 0 < K < (4m - 2 B_o T)/T^2 and B_o T < 2m"
+// Required: "f = Kx without coupling is stable iff 0 < K < (4m - 2 B_o T)/T^2 and B_o T < 2m"
 TEST(FailureMaps, ExplicitBoundIsExactOverTwoDecadesOfMassAndDamping) {
     expect_between(ratios(explicit_map(test::cases(5)), 0, 2), 0.99, 1.01);
 }
 
-// spec section 7: the device damping b >= T M / 2 + t_d L is necessary, not only sufficient
+// Required: the device damping b >= T M / 2 + t_d L is necessary, not only sufficient
 TEST(FailureMaps, SpringJustAboveItsBoundOscillatesWithAHeavyHand) {
     expect_between(ratios(damping_map(3), 0, 2), 1.0, 1.02);
 }
@@ -66,7 +66,7 @@ TEST(FailureMaps, SlopeOfAHysteresisIncludesSticking) {
     expect_between(ratios(play_map(test::cases(4)), 0, 2), 1.0, 1.01);
 }
 
-// spec section 7, behind a coupling: "exact over all passive environments"
+// Behind a coupling: "exact over all passive environments"
 TEST(FailureMaps, CouplingBoundsAreExactWithAndWithoutDelay) {
     const FailureMap map = coupling_map(1);
     expect_between(ratios(map, 0, 0), 1.0, 1.002);
@@ -78,7 +78,7 @@ TEST(FailureMaps, FallingForcesDoNotFailBelowTheirBound) {
     EXPECT_GE(ratios(falling_map(test::cases(3)), 0, 1, 10.0).lower, 1.0);
 }
 
-// spec of the certificate: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
+// Required: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
 TEST(FailureMaps, ForceLimitOutsideTheStepMakesAMassActiveAndInsideItDoesNot) {
     const FailureMap map = limit_map(6);
     EXPECT_LT(map.lines[0].measured.back(), -1.9);
@@ -88,7 +88,7 @@ TEST(FailureMaps, ForceLimitOutsideTheStepMakesAMassActiveAndInsideItDoesNot) {
     }
 }
 
-// spec section 5: "uniqueness: p + min f' > 0; fixed-point iteration converges if L < p"
+// Required: "uniqueness: p + min f' > 0; fixed-point iteration converges if L < p"
 TEST(FailureMaps, SolversFailAtTheTheoreticalBound) {
     expect_between(ratios(solver_map(3), 0, 2), 0.999, 1.001);
 }
@@ -97,7 +97,7 @@ TEST(FailureMaps, BoundsAreExactForEverySampleTime) {
     expect_between(ratios(period_map(3), 0, 4), 0.999, 1.02);
 }
 
-// spec section 5: "pole (B_c/T - K/2)/(K_c + B_c/T + K/2) -> -1"
+// Required: "pole (B_c/T - K/2)/(K_c + B_c/T + K/2) -> -1"
 TEST(FailureMaps, EnergyConsistentStepOscillatesAndTheSwitchedOneDoesNot) {
     const FailureMap map = pole_map(7);
     for (std::size_t k = 0; k < map.lines[0].at.size(); ++k) {
@@ -148,7 +148,7 @@ TEST(FailureMaps, HeavyHandAllows18TimesTheStiffnessWithAPrediction) {
     EXPECT_NEAR(predicted.measured[2] / plain.measured[2], 18.3, 0.5) << "0.1 kg*m^2";
 }
 
-// spec section 7, quantised: "massless f_c >= gamma Delta/2; B_c = 0: L' Delta/2"
+// Quantised: "massless f_c >= gamma Delta/2; B_c = 0: L' Delta/2"
 TEST(FailureMaps, EncoderBoundOfACouplingIsExactWithoutADamperAndSufficientWithOne) {
     const FailureMap map = coupled_encoder_map(test::cases(3));
     expect_between(ratios(map, 0, 0, 10.0), 1.0, 1.01);
@@ -211,7 +211,7 @@ bool generates(const ForceModel& model, const DeviceProfile& device) {
     return false;
 }
 
-// spec section 7: "hysteresis, direct: M_h = max(0, max(g' + |h'| + h/r)); without the h/r term it fails"
+// Required: "hysteresis, direct: M_h = max(0, max(g' + |h'| + h/r)); without the h/r term it fails"
 TEST(Hysteresis, GeneratesEnergyOnlyIfStickingIsIgnored) {
     test::Random random{5};
     int without = 0;
