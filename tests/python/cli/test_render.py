@@ -40,7 +40,7 @@ def test_energy_given_during_the_ramp_is_reported_separately() -> None:
     energy = render(Scheme(structure="direct"), duration_s=2.0)["energy"]
     assert 0.0 <= energy["given_in_ramp_J"] <= energy["most_stored_J"]
     assert 0.0 <= energy["given_J"] <= 1.1 * energy["most_stored_J"]
-    assert energy["sentence"].startswith("given ")
+    assert energy["sentence"].startswith("the motor gave ")
     assert "J during the start ramp" in energy["sentence"]
 
 

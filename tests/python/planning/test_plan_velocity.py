@@ -135,7 +135,7 @@ def test_simulate_renders_a_force_of_velocity_without_a_plan(
     assert main(["simulate", "fluid.json", "--duration-s", "0.5", "--plot", "seen.png", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["structure"] == "direct"
     assert main(["simulate", "fluid.json", "--structure", "massless"]) == 2
-    assert "no bound is known" in capsys.readouterr().err
+    assert "only the direct structure can render a force of position and velocity" in capsys.readouterr().err
 
 
 @needs_program

@@ -221,7 +221,7 @@ def test_a_negative_damping_is_refused() -> None:
     model = identify(moved(2, damping=-0.03))
     assert model.damping is None
     (decision,) = (line for line in model.notes["model_selection"] if line.startswith("damping: "))
-    assert decision.startswith("damping: not accepted (its value is -0.0")
+    assert decision.startswith("damping: not accepted (the fitted damping is -0.0")
 
 
 def test_a_damping_that_the_last_fit_makes_negative_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
