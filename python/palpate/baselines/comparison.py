@@ -46,7 +46,7 @@ PASSIVE_SPLINE = "smoothing spline, two strokes, h >= 0"
 comparison with a passive model."""
 
 LEAST_STROKE_SHARE = 0.1
-"""Least share of the travel that a stroke must cover [-]."""
+"""Least share of the travel that press and release must each cover for separate fits [-]."""
 
 
 def baselines(strokes: bool) -> dict[str, Estimator]:
@@ -115,7 +115,8 @@ def _has_strokes(recording: Recording) -> bool:
 
 
 def _columns(recording: Recording, strokes: bool) -> tuple[Float2D, NDArray[np.bool_]]:
-    """Returns columns of position, velocity and acceleration (if known) and stroke, and the usable rows."""
+    """Returns the inputs of the baselines as columns (position; velocity, acceleration and stroke if known),
+    and the usable rows."""
     columns, rows = [recording.position], np.ones(len(recording), dtype=np.bool_)
     if recording.time is not None:
         try:

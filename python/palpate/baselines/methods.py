@@ -23,7 +23,7 @@ SIZES = (2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
 """Numbers of entries of a force table that are tried."""
 
 SMOOTHINGS = (30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.0, 0.9, 0.8)
-"""Largest residuals of a smoothing spline that are tried [multiples of the noise]."""
+"""Limits of the residual of a smoothing spline that are tried [multiples of the noise of the force]."""
 
 MOST_FITTED_ROWS = 20_000
 """Largest number of fitted rows; of longer data an evenly spread part is used."""
@@ -32,7 +32,8 @@ EXPONENTS = (0.5, 6.0)
 """Smallest and largest exponent of the tissue law of Hunt and Crossley [-]."""
 
 THRESHOLDS = (0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001)
-"""Largest residuals of linear zones that are tried [share of the range of the force]."""
+"""Limits of the residuals of zones with a linear force law that are tried [share of the range of the
+force]."""
 
 MOST_ZONE_BOUNDARIES = 256
 """Number of places at which a zone may be divided: quantiles of its positions."""
@@ -41,20 +42,21 @@ LEAST_ZONE_ROWS = 8
 """Least number of rows in a zone for each of its parameters."""
 
 RIDGE = 1e-10
-"""Ridge of the least squares [-]: keeps equal columns solvable, far below any noise."""
+"""Factor of the ridge in least squares: two equal columns stay solvable, and the ridge is far below any noise
+[-]."""
 
 C = TypeVar("C")
-"""Setting of a method."""
+"""Type of the values that are tried for one setting of a baseline."""
 
 
 class Estimator(Protocol):
-    """Interface with fit and predict as in scikit-learn."""
+    """Interface of a baseline: the methods fit and predict, as in scikit-learn."""
 
     n_parameters_: int
     """Number of fitted real numbers, known after fit"""
 
     def fit(self, X: Float2D, y: Float1D) -> Estimator:
-        """Fits to X (n, d) and y (n,)."""
+        """Fits the baseline to the inputs X (n, d) and the force y (n,)."""
 
     def predict(self, X: Float2D) -> Float1D:
         """Returns the force (n,) at the rows of X (n, d)."""
@@ -87,7 +89,8 @@ def best_of(
 
 
 def merged(x: Float1D, y: Float1D) -> tuple[Float1D, Float1D, Float1D]:
-    """Returns distinct rising positions, the mean of y at each, and the number of its rows."""
+    """Returns the distinct positions x in rising order, and the mean force y and the number of rows at
+    each."""
     distinct, place, count = np.unique(x, return_inverse=True, return_counts=True)
     return distinct, np.bincount(place, y) / count, count.astype(np.float64)
 
@@ -147,7 +150,7 @@ class LookupTable:
     size: int | None = None
 
     def fit(self, X: Float2D, y: Float1D) -> LookupTable:
-        """Fits to the first column of X (n, d), the position, and y (n,)."""
+        """Fits to the first column of X (n, d), the position, and the force y (n,)."""
         size = self.size or best_of(SIZES, lambda entries, A, b: LookupTable(entries).fit(A, b), X, y)
         x, mean, count = merged(X[:, 0], y)
         # Entries without rows near them are not determined by the data: leave these entries out.
@@ -191,7 +194,7 @@ class SmoothingSpline:
     smoothing: float | None = None
 
     def fit(self, X: Float2D, y: Float1D) -> SmoothingSpline:
-        """Fits to the first column of X (n, d), the position, and y (n,)."""
+        """Fits to the first column of X (n, d), the position, and the force y (n,)."""
         multiple = self.smoothing or best_of(
             SMOOTHINGS, lambda smoothing, A, b: SmoothingSpline(smoothing).fit(A, b), X, y
         )
@@ -214,10 +217,10 @@ class SmoothingSpline:
 
 
 def _noise(x: Float1D, y: Float1D) -> float:
-    """Returns the variance of the noise of y from neighbours along x."""
+    """Returns the noise variance of the force y, from rows that are neighbours in position x."""
     along = y[np.argsort(x, kind="stable")]
     apart = (along[1:-1] - 0.5 * (along[:-2] + along[2:])) ** 2 / 1.5
-    # 0.455 is the median of a squared standard normal; forces of coarse resolution have a median of 0
+    # 0.455 is the median of a squared standard normal variable; with a coarse force step the median can be 0.
     return max(float(np.median(apart)) / 0.455, 0.01 * float(np.mean(apart)), np.finfo(float).tiny)
 
 
@@ -230,7 +233,7 @@ class HuntCrossley:
     """
 
     def fit(self, X: Float2D, y: Float1D) -> HuntCrossley:
-        """Fits to X (n, 1 to 3), position and velocity, and y (n,)."""
+        """Fits to X (n, 1 to 3), position and velocity, and the force y (n,)."""
         X = X[:, :2]
         step = -(-len(y) // MOST_FITTED_ROWS)
         rows, force = X[::step], y[::step]
@@ -262,7 +265,8 @@ class HuntCrossley:
         return np.asarray(self._columns(X[:, :2], unknown) @ self.parameters_)
 
     def _linear(self, X: Float2D, y: Float1D, unknown: Float1D) -> tuple[Float1D, Float1D]:
-        """Returns F_0, k and k lambda for given contact and exponent, and the residuals."""
+        """Returns constant force F_0, stiffness k and damping k lambda for given contact and exponent, and
+        the residuals."""
         columns = self._columns(X, unknown)
         norm = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
         found = np.linalg.lstsq(columns / norm, y, rcond=None)[0] / norm
@@ -290,7 +294,7 @@ class TissueParameters:
     order: int = 3
 
     def fit(self, X: Float2D, y: Float1D) -> TissueParameters:
-        """Fits to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
+        """Fits to X (n, 1 to 3), position, velocity, acceleration, and the force y (n,)."""
         self.scale_ = np.maximum(np.abs(X).max(axis=0), np.finfo(float).tiny)
         self.parameters_ = np.linalg.lstsq(self._columns(X), y, rcond=None)[0]
         self.n_parameters_ = len(self.parameters_)
@@ -323,7 +327,7 @@ class LinearZones:
     threshold: float | None = None
 
     def fit(self, X: Float2D, y: Float1D) -> LinearZones:
-        """Fits to X (n, 1 to 3), position, velocity, acceleration, and y (n,)."""
+        """Fits to X (n, 1 to 3), position, velocity, acceleration, and the force y (n,)."""
         threshold = self.threshold or best_of(
             THRESHOLDS, lambda share, A, b: LinearZones(share).fit(A, b), X, y
         )
@@ -379,7 +383,7 @@ def _best_cut(x: Float1D, design: Float2D, y: Float1D, allowed: float) -> int | 
 
 
 def _explained(gram: Float2D, product: Float2D) -> Float1D:
-    """Returns the sum of squares that least squares explains, for each of several (k, k) systems."""
+    """Returns, for each of several least-squares problems, the sum of squares that its fit explains."""
     ridge = RIDGE * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(gram.shape[1])
     return np.asarray(
         np.einsum("nk,nk->n", product, np.linalg.solve(gram + ridge, product[:, :, None])[:, :, 0])

@@ -87,7 +87,7 @@ def devices(
 
 
 def _verdict(found: Sequence[Found]) -> Verdict:
-    """Returns good if every device can be used, no if none of the connected devices can."""
+    """Returns a verdict: good if all found devices can be used, no if none can; usable if none is found."""
     problems = [f"{one.serial or one.place}: {one.problem}" for one in found if one.info is None]
     if not found:
         return Verdict((usable("no haptic USB device is plugged in; --device simulated needs none"),))

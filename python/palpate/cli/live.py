@@ -75,7 +75,8 @@ class LiveLine:
         self._lower, self._upper = math.inf, -math.inf
 
     def show(self, rows: int, position: float, force: float, lost: int) -> None:
-        """Replaces the line by the current values."""
+        """Shows duration, number of rows, lost samples, position and force in place of the previous live
+        line."""
         self._lower, self._upper = min(self._lower, position), max(self._upper, position)
         self._line.show(
             f"{rows / self._rate_hz:6.1f} s  {rows} rows, {lost} lost  "
@@ -85,7 +86,7 @@ class LiveLine:
         )
 
     def end(self) -> None:
-        """Ends the line, so that the last values stay on the terminal."""
+        """Ends the live line, so that the last position and force stay on the terminal."""
         self._line.end()
 
 

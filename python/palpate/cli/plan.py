@@ -158,7 +158,7 @@ def plan(
     """Choose the structure that renders a model on a device, and certify it."""
     profile_path = profile_file(device)
     require_writable(plot, inputs=(model_file, profile_path))
-    require_writable(output, plot, inputs=(profile_path,))  # the model file may be replaced
+    require_writable(output, plot, inputs=(profile_path,))  # the output may replace the model file
     profile = DeviceProfile.load(profile_path)
     model = load_model(model_file, with_plan=False)
     talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")
@@ -216,7 +216,8 @@ def _summary(
     _, damping, force = mechanical_units(device.position_unit)
     units = {"b": ("device damping", damping), "f_c": ("device friction", force)}
     lines = () if certificate.refused else certificate.inequalities
-    for line in sorted(lines, key=lambda each: -each.margin):  # the least margin is printed
+    # Of several inequalities on one device property, the last one, with the least margin, is printed.
+    for line in sorted(lines, key=lambda each: -each.margin):
         name, unit = units.get(line.formula.split(" ")[0], ("", ""))
         if name:
             sign, judged = (">=", "OK") if line.holds else ("<", "not enough")

@@ -25,7 +25,7 @@ import click
 from ..verdict import Verdict
 
 TERMS = "Terms: docs/glossary.md"
-"""Last line of each help."""
+"""Last line of the help of each verb; it names the file that explains the terms."""
 
 WIDEST = 80
 """Largest width to which printed text is wrapped [columns]."""
@@ -82,7 +82,7 @@ def terminal_width(*, err: bool = False) -> int | None:
     stream = sys.stderr if err else sys.stdout
     try:
         on_terminal = stream.isatty()
-    except (AttributeError, ValueError):  # the stream is closed
+    except (AttributeError, ValueError):  # a closed stream is not a terminal
         return None
     return min(shutil.get_terminal_size().columns, WIDEST) if on_terminal else None
 
@@ -232,7 +232,7 @@ class OverwrittenLine:
         self._used = False
 
     def show(self, text: str) -> None:
-        """Replaces the line, cut to the width of the terminal."""
+        """Shows a text in place of the previous text of the line, cut to the width of the terminal."""
         if self.on_terminal:
             width = shutil.get_terminal_size().columns - 1
             echo(f"\r{visible(text):<{width}.{width}}", err=True, nl=False)
@@ -246,7 +246,7 @@ class OverwrittenLine:
             self._used = False
 
     def end(self) -> None:
-        """Ends the line, so that it stays on the terminal."""
+        """Ends the line with a line break, so that its text stays on the terminal."""
         if self._used:
             echo("", err=True)
             self._used = False
@@ -261,7 +261,7 @@ class Progress:
         self._start = self._shown = time.monotonic()
 
     def __call__(self, state: str) -> None:
-        """Prints how far the work is, if enough time has passed since the line before."""
+        """Prints how far the work is, if enough time has passed since the previous line of progress."""
         now = time.monotonic()
         if now - self._shown >= (_REFRESH_S if self._line.on_terminal else _EVERY_S):
             self._shown = now
@@ -272,7 +272,7 @@ class Progress:
                 talk(text)
 
     def clear(self) -> None:
-        """Removes the line from a terminal."""
+        """Removes the line of progress from a terminal."""
         self._line.clear()
 
 

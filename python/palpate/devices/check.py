@@ -41,7 +41,7 @@ _LEAST_SIGN_STEPS = 5.0
 _LEAST_SIGN_ERRORS = 3.0
 """Least displacement of the handle by a push that shows the sign of the force reliably [standard errors]"""
 _FORCE_SIGN = "sign of the force"
-"""Name of the observation"""
+"""Name of the observation on the sign of the device's force"""
 _SIMULATED_FRICTION_SHARE = 0.002
 """Coulomb friction of the simulated device [share of the device's largest force]"""
 
@@ -190,7 +190,7 @@ def check_device(
         "wait_s": wait_s,
         "progress": progress,
         "keep": True,
-        "lowest_rate_share": 0.0,  # the check continues at a low rate, which becomes an observation
+        "lowest_rate_share": 0.0,  # a low loop rate does not end the check; an observation reports it
         "friction_share": _SIMULATED_FRICTION_SHARE,
     }
     summary = measure(device, duration_s=duration_s * (NO_FORCE_SHARE if push else 1.0), **common)
@@ -328,7 +328,8 @@ def _sign(push: Push, step: float, unit: str) -> Observation:
 
 
 def _expected(profile: DeviceProfile | None, model: Model | None) -> dict[str, CoreProfile]:
-    """Returns the devices with which the measured one is compared, by the name of the observation."""
+    """Returns the expected properties of the device by their source: a device profile, or the model's
+    certificate."""
     devices: dict[str, CoreProfile] = {} if profile is None else {"profile": profile}
     if model is not None:
         if model.certificate is None:

@@ -113,7 +113,7 @@ def record(
         The recording was refused before any motion.
     """
     if not probe:
-        lowest_rate_share = 0.0  # without a probe a low rate is reported but does not stop the recording
+        lowest_rate_share = 0.0  # without `probe` a low loop rate is only reported; the recording goes on
     if lowest_rate_share is not None:
         sweep["lowest_rate_share"] = lowest_rate_share
     return measure(

@@ -19,9 +19,9 @@ _RATE_TOLERANCE = 0.01
 _CLOCK_TOLERANCE = 0.005
 """Largest accepted error of the device's clock [share of the period]; a quartz clock has a far smaller one"""
 _LARGEST_PERIOD_RATIO = 2.0
-"""Largest accepted 99.9th percentile of the loop's period, over the requested period."""
+"""Largest accepted 99.9th percentile of the measured periods of the control loop [requested periods]."""
 _LARGEST_LOST_SHARE = 1e-3
-"""Largest accepted share of lost and repeated samples."""
+"""Largest accepted share of lost and repeated samples from the device [-]."""
 _LARGEST_NOISE_STEPS = 2.0
 """Largest accepted RMS noise of the encoder while the handle is at rest [encoder steps]."""
 _REST_DURATION_S = 0.1
@@ -216,9 +216,11 @@ def _transducer(position: Float1D, measured: Float1D, step: float) -> Observatio
     if abs(correlation) < _LEAST_CORRELATION:
         return Observation(
             name,
-            f"not clear: correlation of force and position {correlation:.2f}",
+            "the sign of the transducer is not clear, because the correlation of force and position is "
+            f"{correlation:.2f}",
             None,
-            f"the correlation must be above {_LEAST_CORRELATION:g}: press a plain spring with the handle",
+            "press a plain spring with the handle and check the device again; the correlation must be above "
+            f"{_LEAST_CORRELATION:g}",
         )
     return Observation(
         name,

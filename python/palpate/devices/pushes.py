@@ -22,7 +22,7 @@ _LEAST_FITTED_STEPS = 10.0
 """Least displacement of the handle by a push from which the mechanics are fitted [encoder steps]"""
 
 _LEAST_SIZE_RATIO = 1.25
-"""Least ratio of the largest to the smallest push from which friction and damping are separated [-]"""
+"""Least ratio of the forces of the strongest and the weakest push that separates friction from damping [-]"""
 
 _LARGEST_RESIDUAL_SHARE = 0.03
 """Largest RMS error of the fitted displacement that is accepted [share of the RMS displacement]"""
@@ -37,7 +37,7 @@ _FRICTION_RESERVE_ERRORS = 3.0
 """Number of standard errors subtracted from the fitted friction [-]"""
 
 _LARGEST_LOGARITHM = 40.0
-"""Bound of the |logarithm| of the fitted inertia J and damping b, in SI units [-]"""
+"""Largest |logarithm| of the inertia J and of the damping b that the fit may reach, both in SI units [-]"""
 
 _START_FRICTION_SHARES = (0.05, 0.4)
 """Friction values from which the fit begins, over the force of the largest push [-]"""
@@ -114,7 +114,7 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
     # A sample of the device reports the force that acted before it: a push begins one sample earlier.
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
-    for begin in begins[begins > 2]:  # three samples before a push show the motion without it
+    for begin in begins[begins > 2]:  # three samples before a push show the motion without a push
         samples = int(np.argmin(pushing[begin + 1 :])) or len(pushing) - begin - 1
         commanded = float(np.sign(sent[max(0, begin + 1 - samples) : begin + 1 + samples].sum()))
         agreement += commanded * float(np.sign(applied[begin + 1]))
@@ -141,7 +141,8 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
 
 
 def _push_displacement(time: Float1D, position: Float1D, begin: int, samples: int) -> float:
-    """Returns the handle's displacement by a push: position minus a parabola through the motion before."""
+    """Returns the handle's displacement by a push: position minus a parabola that continues the motion before
+    the push."""
     before, end = slice(max(0, begin - 2 * samples), begin + 1), min(begin + samples, len(position) - 1)
     previous_motion = np.polynomial.Polynomial.fit(time[before], position[before], 2)
     return float(position[end] - previous_motion(time[end]))

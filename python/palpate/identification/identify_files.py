@@ -50,7 +50,7 @@ from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from
 
 LEAST_KNOWN_SHARE = 0.5
-"""Share of the rows whose direction must be known to test hysteresis [-]."""
+"""Least share of rows with a known direction for a test of hysteresis [-]."""
 
 MOST_CELLS = 8192
 """Largest number of position cells of a summary: enough for the resolution of an identification."""
@@ -172,7 +172,7 @@ class PartRead:
     summary: Summary | None = None
     """Summary of the usable rows; None if no row is usable"""
     rows: int = 0
-    """Rows that were read"""
+    """Number of rows that were read from the file"""
     left_out: LeftOut = field(default_factory=LeftOut)
 
     def add(self, summary: Summary | None, rows: int) -> None:
@@ -319,9 +319,9 @@ class Summary:
     """Sums over the rows of each cell: arrays (m,), sorted by cell, then by direction."""
 
     level: int | None
-    """Exponent of the cell width, 2^level [position]; None: each cell is a single position"""
+    """Cells of position are 2^level wide [position]; None: each distinct position is a cell"""
     cell: Float1D
-    """Number of the cell; the position if cells are single positions"""
+    """Number of the position cell, or the position itself if each distinct position is a cell"""
     side: NDArray[np.int8]
     """Direction: +1 into the object, -1 out of the object, 0 neither or not known"""
     count: Float1D
@@ -393,7 +393,7 @@ def summarise(
     side = np.zeros(len(position), dtype=np.int8) if side is None else side
     lower, upper = float(position.min()), float(position.max())
     level = None
-    # the first rows already have too many distinct positions: no need to sort all rows
+    # if the first rows already have too many distinct positions, the rows after them need no search
     if len(np.unique(position[: 4 * most_cells])) > most_cells or len(np.unique(position)) > most_cells:
         level = _level_for(lower, upper, most_cells)
     cell = position if level is None else np.floor(np.ldexp(position, -level))

@@ -65,7 +65,8 @@ class SearchOptions:
     """Largest number of distinct positions, doubled for each further input; with more, positions are gathered
     in this number of cells [-]"""
     filters: str = "matched"
-    """matched, or as published: paper-implicit (figure 11), paper-explicit (figure 13)"""
+    """Filters for the forces of mass and damping: matched, or as published with an assumed mass:
+    paper-implicit (figure 11), paper-explicit (figure 13)"""
     assumed_mass: float = 1e-3
     """Mass m of the paper's figures [force s^2/position]"""
     assumed_damping: float = 0.5
@@ -129,7 +130,8 @@ class IdentifyOptions:
     """Stiffness K_c of the virtual coupling: slope df/dx <= 0.9 K_c (`compensated_share`) is imposed over the
     domain [force/position]"""
     period: float | None = None
-    """Period of a periodic force law, such as of a knob [position]"""
+    """Period of a periodic force law: change of position after which the force repeats, such as one
+    revolution of a knob [position]"""
     search: SearchOptions = field(default_factory=SearchOptions)
     """Further settings of the search, which few identifications need to change"""
 

@@ -84,7 +84,8 @@ class Task:
     """B_o [force*s/position]"""
     play_radius: float | None = None
     predict: int | None = None
-    """Number of previous samples of the prediction. 0: no prediction; None: chosen by the plan"""
+    """Number of previous position samples that the prediction uses. 0: no prediction; None: chosen by the
+    plan"""
     may_limit: bool = True
     """True if a network with limited slopes may be rendered in place of the identified model"""
 
@@ -100,7 +101,7 @@ class Task:
 
     @property
     def longest_play(self) -> float:
-        """Largest play radius [position]."""
+        """Largest play radius that a plan may choose [position]."""
         return LONGEST_PLAY * float(self.model.upper[0] - self.model.lower[0])
 
     @property
@@ -166,7 +167,7 @@ def _direct(task: Task) -> Candidate | Refusal:
 
 
 def _direct_limited(task: Task) -> Candidate | Refusal:
-    """Renders the nearest force that the device can render."""
+    """Renders directly the force law nearest to the model that the device can render."""
     if refusal := task.not_direct():
         return refusal
     if not task.may_limit:

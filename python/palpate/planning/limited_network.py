@@ -66,7 +66,7 @@ _SCALE_STEP = 0.75
 """Translation step divided by the width of a wavelet in the frame of the candidates [-]."""
 
 _STICKLESS_PLAY = 1e9
-"""Very large play radius, which adds no slope after a reversal [travels]"""
+"""Play radius that is so large that the direction state adds no slope to the force [travels]"""
 
 
 @lru_cache(maxsize=8)
@@ -78,7 +78,7 @@ def sliding_bounds(model: ForceModel, force_limit: float = math.inf) -> ForceBou
 
 
 def sliding_slopes(model: ForceModel) -> tuple[float, float]:
-    """Returns the smallest and the largest slope of proved bounds."""
+    """Returns the smallest and the largest slope of the model's force over position, from proved bounds."""
     bounds = sliding_bounds(model)
     return bounds.slope_min, bounds.slope_max
 
@@ -105,7 +105,7 @@ def play_radius_for(model: ForceModel, device: DeviceProfile) -> float:
     longest = LONGEST_PLAY * float(model.upper[0] - model.lower[0])
     narrowest = fewest_encoder_steps_in_play * device.encoder_step
     radius = stability.narrowest_play(sliding_bounds(model, device.force_limit), device, narrowest, longest)
-    # The certificate computes the bounds again, with rounding errors.
+    # A slightly larger play radius: the certificate computes the slope bounds again, with rounding errors.
     return radius if radius == narrowest else 1.000001 * radius
 
 
@@ -151,7 +151,7 @@ def _limited_once(
     pushed_out = model.period is None and (middle[0] > 0.0 or middle[-1] < 0.0)
     if not restoring and pushed_out and np.abs(middle).max() > high * travel:
         return None
-    if len(changes) == 2:  # of g and h
+    if len(changes) == 2:  # from press and release force to mean force g and hysteresis h
         changes = np.array([0.5 * (changes[0] + changes[1]), 0.5 * (changes[0] - changes[1])])
     alpha, beta = _candidates(x, np.any(changes != 0.0, axis=0), sigma)
     close = min(
@@ -262,7 +262,8 @@ def _fitted(
 
 
 def _candidates(x: Float1D, changed: Float1D, finest: float) -> tuple[Float1D, Float1D]:
-    """Returns dilations and translations (k,) of wavelets near a change, from finest width to travel."""
+    """Returns dilations and translations (k,) of wavelets where the force changes, from width `finest` to the
+    travel."""
     travel = x[-1] - x[0]
     at = x[changed][::4] if changed.any() else x[:1]
     alpha, beta = [], []

@@ -49,7 +49,7 @@ NETWORK = (
 """Arguments of a force model that define its network"""
 
 _DOMAIN = ("lower", "upper", "below", "above", "period", "play_radius", "of_velocity")
-"""The other arguments"""
+"""Arguments of a force model that do not define its network"""
 
 
 @dataclass(frozen=True)
@@ -325,9 +325,9 @@ class StaticForceError:
     """
 
     largest: float
-    """Largest absolute value [force]"""
+    """Largest absolute value of the force error [force]"""
     rms: float
-    """[force]"""
+    """RMS value of the force error [force]"""
     share: float
     """Largest force error divided by the range of the identified force [-]"""
     rms_share: float

@@ -151,7 +151,8 @@ def plan(
 
 
 def _samples_of(predict: object) -> int | None:
-    """Returns the samples of a prediction, or None if the plan chooses them."""
+    """Returns the number of previous position samples that a prediction uses, or None if the plan chooses
+    it."""
     if predict in ("auto", "off"):
         return None if predict == "auto" else 0
     if isinstance(predict, int) and not isinstance(predict, bool) and 0 <= predict <= most_prediction_taps:
@@ -239,7 +240,7 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
 def _candidates(task: Task) -> tuple[str, ...]:
     """Returns the candidate structures that render the identified model and meet the requirements."""
     if task.dynamic:
-        return tuple(CANDIDATES)  # structures without mass do not apply
+        return tuple(CANDIDATES)  # structures without mass refuse an object with mass or damping
     if task.coupling:
         return ("massless", "explicit") if task.model.hysteretic else ("massless",)
     return ("direct",)
@@ -248,7 +249,7 @@ def _candidates(task: Task) -> tuple[str, ...]:
 def _properties(
     model: ForceModel, device: DeviceProfile
 ) -> tuple[_Property, _Property, _Property, _Property]:
-    """Returns damping, friction, rate and encoder as properties."""
+    """Returns damping, friction, rate and encoder of the device as properties that can be improved."""
     force, position = ("N*m", "rad") if device.position_unit == "rad" else ("N", "m")
     steepest = max(sliding_bounds(model).steepest, 1e-9)
     # A property that is 0 cannot be doubled: start with a value far below the need of the model.

@@ -136,9 +136,9 @@ class ForceError:
     """Error at the end of the tick in which the force is held; a force ahead of the motion makes it
     smaller"""
     instant: float
-    """Error at the sampling instant: contains only the effects of structure and encoder"""
+    """Force error at the instant of reading the position: only the effects of structure and encoder"""
     mean: float
-    """Error of the mean force over each tick"""
+    """Error of the force that is averaged over each tick"""
     band: float
     """Error of the mean force over each tick below 50 Hz: the part that a hand can follow"""
     work: float
@@ -280,7 +280,7 @@ class Comparison:
     recording: Recording | None
     error: ForceError | None
     refused: str | None
-    """One sentence, or None"""
+    """Reason why the structure was refused, in one sentence; None if it was rendered"""
 
     @property
     def name(self) -> str:

@@ -165,7 +165,7 @@ def draw_two_models(
 
 
 _MARKERS = "os^Dv<>p"
-"""Markers of the model classes, in order."""
+"""Markers of the points of each model class in a figure, in order."""
 
 
 def draw_path(

@@ -18,10 +18,10 @@ from ..planning import Plan
 from .look import grid, plain_decades, scale_for, thinned
 
 _LINES = ("-", "--", ":", "-.")
-"""Line styles of the slopes, in order."""
+"""Line styles of the object slopes in a figure of the root locus, in order."""
 
 _LOCUS_DAMPINGS = 801
-"""Number of dampings of a locus [-]"""
+"""Number of object dampings at which a root locus is computed [-]"""
 
 
 def draw_real_against_rendered(

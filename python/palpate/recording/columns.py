@@ -31,7 +31,7 @@ class Role:
     preferred_stems: tuple[str, ...]
     """Stems that are preferred, in this order, if several columns could take the role."""
     example: str
-    """Unit that a suggested option states for a column of unknown unit."""
+    """Unit in the option that an error message suggests for a column of unknown unit."""
     words: tuple[str, ...]
     """Parts of column names by which an error message suggests one of the columns without a unit."""
 
@@ -58,7 +58,7 @@ DIRECTION_NAMES = ("direction", "segment")
 
 
 _UNLIKELY_STEMS = (*TIME.preferred_stems, *DIRECTION_NAMES, "unnamed", "index", "sample", "id")
-"""Stems of column names that an error message suggests last as position or force."""
+"""Stems of column names that an error message suggests as position or force only after all other columns."""
 
 _LIKELY_UNITS = {"angle": "rad", "torque": "Nm", "moment": "Nm", "current": "A"}
 """Unit that an error message suggests for a column without a unit, by a part of the column's name."""

@@ -83,7 +83,7 @@ class CellRows:
     loop: Float1D
     """(m,) press minus release force at the positions where both strokes have rows"""
     loop_error: Float1D
-    """(m,) standard error of `loop`"""
+    """(m,) standard error of the differences in `loop`"""
 
 
 def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
@@ -377,7 +377,8 @@ def _shared_curves(one: _Strokes, other: _Strokes) -> tuple[Curve, Curve]:
 
 
 def _difference(one: _Strokes, other: _Strokes) -> float:
-    """Returns the RMS force difference of two recordings over the spread; 0 if hysteresis explains it."""
+    """Returns the RMS force difference of two recordings, divided by the standard deviation of the force; 0
+    if hysteresis explains the difference."""
     difference = _curve_difference(*_shared_curves(one, other))
     if one.direction * other.direction < 0 and np.isfinite(difference):
         press, release = (one, other) if one.direction > 0 else (other, one)

@@ -57,7 +57,7 @@ class Source:
 
     @staticmethod
     def merged(sources: Iterable[Source]) -> Source:
-        """Returns one source for data from several recordings."""
+        """Returns one source that names the files and rows of several recordings."""
         parts = list(sources)
         first = parts[0]
         return replace(

@@ -320,7 +320,8 @@ class CsvFile(LongTable):
             raise self._wrong_encoding() from None
         except pd.errors.ParserError as error:
             if "source failed" in str(error):
-                # pandas hides the exception of the file object, a disk error or Ctrl-C; raise that one.
+                # pandas hides the exception that interrupted the read (disk error or Ctrl-C): raise that
+                # exception.
                 raise (raw.failure or KeyboardInterrupt()) from None
             if cells := re.search(r"in line (\d+), saw (\d+)", str(error)):
                 raise self._too_many_cells(self._line(int(cells[1]), part), int(cells[2])) from None
@@ -398,7 +399,7 @@ def count_rows(stream: BinaryIO, separator: str, *, columns: int = 0, step: int 
             for line in block.removesuffix(b"\n").split(b"\n"):
                 if b'"' in line:
                     quoted = _ends_quoted(line, quoted, mark)
-                # A cell whose quotation mark is never closed would otherwise fill the memory.
+                # The row is cut: a cell whose quotation mark is never closed would otherwise fill the memory.
                 row += line[: _BLOCK_BYTES - len(row)]
                 if quoted:
                     row += b"\n"

@@ -104,7 +104,7 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
         raise _json_refusal(file, text)
     lines = list(io.StringIO(text, newline=""))
     if not whole and len(lines) > 1:
-        lines.pop()  # the last line of the examined bytes may be incomplete
+        lines.pop()  # the bytes read so far may end inside a line
     found = _header(file, lines)
     separator, spans = found.separator, found.spans
     before, header_line = spans[found.header.row]

@@ -137,7 +137,7 @@ def _create(temporary: Path, replaced: os.stat_result | None) -> None:
         if replaced is not None:
             with suppress(PermissionError):  # only root may change the owner of a file
                 os.fchown(descriptor, replaced.st_uid, replaced.st_gid)
-            os.fchmod(descriptor, mode)  # the mode of `open` would be reduced by the umask
+            os.fchmod(descriptor, mode)  # the umask reduces the mode given to `open`
     finally:
         os.close(descriptor)
 
@@ -161,7 +161,7 @@ def _rename_to_free_name(temporary: Path, target: Path) -> None:
     except FileExistsError:
         require_absent(target)
         raise
-    except OSError:  # the file system has no hard links
+    except OSError:  # the file system has no hard links: rename
         require_absent(target)
         temporary.replace(target)
 

@@ -353,7 +353,7 @@ def _elements(content: bytes, offset: int, end: int, order: str) -> list[tuple[i
             raise _damaged(start)
         kind, size = struct.unpack_from(f"{order}II", content, offset)
         data = offset + 8
-        if kind >> 16:  # a small element: type, size and data share 8 bytes
+        if kind >> 16:  # a small MATLAB element: type, size and data share 8 bytes
             kind, size, data = kind & 0xFFFF, kind >> 16, offset + 4
             offset += 8
         else:

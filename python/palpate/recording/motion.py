@@ -192,7 +192,7 @@ MARGIN_TIME_CONSTANTS = 3.0
 """Time removed at both ends of a filtered piece, in time constants 2/w_c of the low-pass filter."""
 
 HIGHEST_CUTOFF = 0.25
-"""Highest cutoff frequency of the low-pass that is tried [1/period]; a higher one would not filter."""
+"""Highest cutoff frequency of the low-pass that is tried [rad/time step]; a higher one would not filter."""
 
 NOISE_SHARE = 0.01
 """Largest share of position noise in the variance of a velocity or acceleration after the low-pass."""

@@ -223,7 +223,7 @@ class LongRecording:
 
     path: Path
     conversion: Conversion
-    """Conversion of position, force and direction"""
+    """Conversion of the columns position, force and direction to SI values"""
     parts: tuple[tuple[int, int], ...]
     """Start and end of each part of the file"""
     rows: int
@@ -243,7 +243,7 @@ class LongRecording:
         return self.conversion.units
 
     def file_unit(self, role: str) -> Unit:
-        """Returns the unit of "position" or "force" for messages, as that of a recording."""
+        """Returns the unit that the file uses for "position" or "force", for messages."""
         return self.conversion.file_units.get(role, Unit.of_si(self.units[role]))
 
     def blocks(self, part: tuple[int, int]) -> Iterator[Block]:
@@ -266,7 +266,7 @@ class LongRecording:
             yield Block(position, force, direction, len(check.kept), check.left_out)
 
     def places(self) -> Places:
-        """Returns the places of the rows of the file."""
+        """Returns the line numbers and cell texts of the rows of the file, for messages."""
         return open_table(self.path)
 
 
@@ -317,7 +317,7 @@ def open_long_recording(
         drop=invalid == "drop",
     )
     if conversion.direction == "segment" and direction is None and "segment" not in table.text_names:
-        conversion = replace(conversion, direction=None)  # segment numbers state no direction
+        conversion = replace(conversion, direction=None)  # segment numbers state no press or release
     notes = conversion.note(dialect=table.notes), *conversion.choice.notes
     conversion = replace(conversion, choice=replace(conversion.choice, time=None, inputs=()))
     rows, parts = _require_long_table(table, file).parts(part_rows)

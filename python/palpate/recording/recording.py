@@ -275,7 +275,7 @@ class Recording:
         )
 
     def without(self, rows: npt.NDArray[np.bool_]) -> Recording:
-        """Returns the recording without the rows that are True in the argument (n,)."""
+        """Returns a copy of the recording without the rows that `rows` (n,) marks with True."""
         return self._rows(~rows)
 
     def with_force_earlier(self, late_s: float) -> Recording:
@@ -348,7 +348,7 @@ class Recording:
 
 
 def _mapping(name: str, value: Mapping[str, T] | None) -> dict[str, T]:
-    """Returns a copy of an optional mapping."""
+    """Returns a copy of a dictionary, empty for None; any other type is refused."""
     given: object = {} if value is None else value
     if not isinstance(given, Mapping):
         raise InputError(f"{name} is {shown(given)}; it must be a dictionary")

@@ -49,7 +49,7 @@ class LeftOut:
             self.drop(reason, count, rows_before + first)
 
     def sentences(self, table: Places) -> list[str]:
-        """Returns one sentence for each reason, with the place of the first row."""
+        """Returns one sentence for each reason for unused rows, with the place of the first such row."""
         sentences = []
         if count := self.status.total():
             words = ", ".join(f"{number} {word}" for word, number in sorted(self.status.items()))

@@ -114,7 +114,7 @@ def to_numbers(cells: Cells, decimal: str = ".") -> NDArray[np.float64]:
 
 
 FRAME = "the frame"
-"""Name of the frame in messages, instead of a file name."""
+"""Name of a pandas frame in messages, because a frame has no file name."""
 
 
 @contextmanager

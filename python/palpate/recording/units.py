@@ -43,7 +43,7 @@ class Unit:
 
 
 UNSTATED_UNIT = Unit.of_si("")
-"""Unit of a quantity in SI whose unit is not stated."""
+"""Unit of a quantity in SI units whose source does not state the unit."""
 
 _FACTORS: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "cm": 1e-2, "in": 0.0254},
@@ -75,7 +75,7 @@ FORCE_UNITS = ("N", "N*m", "A")
 TIME_UNITS = ("s",)
 
 COLUMN_SUFFIX = {"m": "m", "rad": "rad", "count": "count", "N": "N", "N*m": "Nm", "A": "A", "s": "s"}
-"""End of a column name for each SI unit."""
+"""Ending of a column name that states its SI unit, by this unit."""
 
 MINUTE_STEMS = ("time", "t", "timestamp", "elapsed", "elapsed_time")
 """Column names after which the ending ``_min`` means minute; after other names it usually means minimum."""

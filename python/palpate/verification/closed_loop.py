@@ -37,7 +37,8 @@ class ClosedLoop:
 
     view: Literal["motion-driven", "force-driven"]
     scheme: Scheme
-    """Rendered scheme, after replacements"""
+    """Scheme that was rendered; it can differ from the requested scheme (implicit in place of unstable
+    explicit)"""
     period_s: float
     assumed_speed: float | None
     """Assumed speed of the motion if the recording has no time [position unit per second]; None if time is

@@ -28,13 +28,13 @@ FACTOR_TOLERANCE = 0.02
 reported [-]."""
 
 OFFSETS_PER_GRID = 41
-"""Number of position offsets that are tried on one grid."""
+"""Number of position offsets on one grid that are tried as the cause of a large error."""
 
 OFFSET_GRIDS = 3
 """Number of grids of position offsets, each finer than the previous one."""
 
 MOST_ROWS = 2000
-"""Number of rows that suffices to distinguish explanations."""
+"""Largest number of rows on which possible causes of an error are compared: enough to distinguish them."""
 
 
 @dataclass(frozen=True)

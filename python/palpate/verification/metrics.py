@@ -113,7 +113,7 @@ class Stroke:
     name: str
     """Name of the stroke, press or release; empty if neither model distinguishes press and release"""
     position: Float1D
-    """(n,) [m or rad]"""
+    """(n,) positions at which the forces of both models are computed [m or rad]"""
     first: Float1D
     """(n,) force of the first model [N or N*m]"""
     second: Float1D

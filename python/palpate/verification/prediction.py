@@ -25,7 +25,7 @@ NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are 
 """Note on rows without velocity, with their number."""
 
 _UNSTATED = ""
-"""Unit that is not stated."""
+"""Unit of a recording or a model that does not state its unit."""
 
 _STRUCTURE = "structure"
 """Metadata key of a flight record for the rendered structure."""
@@ -216,7 +216,7 @@ def require_same_units(model: Model, units: Mapping[str, str]) -> None:
 
 @dataclass(frozen=True)
 class FlightRecord:
-    """Statements of a flight record on its rendering; None for other recordings."""
+    """Statements of a flight record on its rendering, such as the play radius; None for other recordings."""
 
     play_radius: float | None = None
     """[position]"""

@@ -26,7 +26,7 @@ from ..recording import Recording
 from .verification import verify
 
 BLOCK_ROWS = 50_000
-"""Rows whose Jacobian is in memory at a time."""
+"""Number of rows whose Jacobian is in memory at a time."""
 
 SLOPE_STEP = 1e-5
 """Half the distance of the two positions whose Jacobians give, by their difference, the Jacobian of the slope
@@ -37,12 +37,13 @@ LEAST_EIGENVALUE_SHARE = 1e-12
 [-]."""
 
 LARGEST_RHO = 0.999
-"""Largest autocorrelation of residuals that is used [-]: one independent residual in two thousand."""
+"""Largest autocorrelation of neighbouring residuals that is used [-]: one of 2000 residuals is
+independent."""
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard errors of a model with one input, from :func:`uncertainty`."""
+    """Standard errors of force and slope of a model with one input, from :func:`uncertainty`."""
 
     model: Model
     covariance: Float2D
@@ -60,7 +61,8 @@ class Uncertainty:
         return self._error(_jacobian(self.model, inside, direction))
 
     def slope(self, position: Float1D, direction: Float1D | None = None) -> Float1D:
-        """Returns the standard error of the slope (n,) [force/position]."""
+        """Returns the standard error (n,) of the slope of the model's force over position
+        [force/position]."""
         step = SLOPE_STEP * float(self.model.upper[0] - self.model.lower[0])
         inside = np.clip(position, self.model.lower[0], self.model.upper[0])
         ahead = _jacobian(self.model, inside + step, direction)
@@ -72,7 +74,7 @@ class Uncertainty:
 
 
 def uncertainty(model: Model, recordings: Recording | Sequence[Recording]) -> Uncertainty:
-    """Returns the standard errors of a model from the recordings that identified it.
+    """Returns standard errors of a model's force and slope, from the recordings that identified the model.
 
     Raises
     ------

@@ -68,15 +68,15 @@ class Verification:
     """Share of position cells in which the stiffness of the model is within 23 % of the recorded stiffness;
     None if no cell has enough rows"""
     whiteness: float
-    """Lag-1 autocorrelation of the residuals in recorded order: 0 is white"""
+    """Lag-1 autocorrelation of the residuals in recorded order: 0 for white noise"""
     durbin_watson: float
     """2 is white"""
     n: int
-    """Evaluated rows"""
+    """Number of evaluated rows of the recording"""
     fresh: bool
-    """True if the model was not identified on this data"""
+    """True if the model was not identified on the rows of this recording"""
     extrapolated: int
-    """Evaluated rows outside the model's domain"""
+    """Number of evaluated rows outside the model's domain"""
     units: Mapping[str, str]
     notes: tuple[str, ...] = ()
     verdict: Verdict = GOOD
@@ -88,7 +88,7 @@ class Verification:
 
     @property
     def rows(self) -> NDArray[np.bool_]:
-        """Array over the rows of the recording: True for evaluated rows"""
+        """(n,) True for the evaluated rows of the recording"""
         return self.prediction.rows
 
     @property

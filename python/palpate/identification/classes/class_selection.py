@@ -41,7 +41,7 @@ HELD_OUT_STOP_REASON = "held-out rows"
 """Stop reason of growth if held-out rows refused a larger network."""
 
 VELOCITY_INPUTS = ("position", "velocity")
-"""Inputs of a force that depends on the motion."""
+"""Inputs of a network of the model class velocity."""
 
 NETWORK_CLASSES = {("position",): "position", VELOCITY_INPUTS: "velocity"}
 """Maps the inputs of a network to the name of its model class; "network" for all other inputs."""
@@ -88,18 +88,18 @@ class ClassSelection:
         if self.samples.used < given:
             self.report.notes.append(f"{self.samples.used} of {given} rows are used, evenly spread.")
         self.best = constant(self)
-        """Candidate of the most complex accepted model class"""
+        """Candidate of the most complex model class that has been accepted"""
         self.try_classes(classes)
 
     def try_classes(self, classes: Sequence[type[ModelClass]]) -> None:
-        """Tries model classes in order; each is compared with the best candidate so far."""
+        """Tries model classes in order; each is compared with the best candidate of the classes before it."""
         for model_class in classes:
             if model_class.possible(self):
                 self.best = model_class(self).better(self.best)
 
     def repeated(self, data: Rows, *, cells: int | None = None, keep: bool = False) -> ClassSelection:
-        """Repeats the model selection over changed rows. With `keep`, growth starts from the final
-        wavelets."""
+        """Repeats the model selection on changed rows. With `keep`, each network first has the final wavelets
+        of this model selection."""
         return ClassSelection(
             data,
             self.options,
@@ -111,7 +111,7 @@ class ClassSelection:
 
     @cached_property
     def rows(self) -> Compressed:
-        """Compressed rows without a direction state."""
+        """Rows of the recording, compressed without regard to the direction state."""
         return self.samples.rows()
 
     def candidate(
@@ -124,7 +124,8 @@ class ClassSelection:
         rows: Compressed | None = None,
         strokes: HysteresisInput | None = None,
     ) -> Candidate:
-        """Returns a candidate on compressed rows; by default these have no direction state."""
+        """Returns the candidate with a solution fitted to compressed rows; by default these have no direction
+        state."""
         n_parameters = problem.n_parameters(len(solution.basis))
         if strokes is not None and strokes.play_radius is not None:
             n_parameters += 1
@@ -211,7 +212,8 @@ class ClassSelection:
         )
 
     def _judged_on(self, problem: SeparableProblem, solution: Solution) -> float:
-        """Returns the criterion of a solution on the rows of another problem with the same wavelets."""
+        """Returns the criterion of a solution on the rows of another least-squares problem, without a new
+        fit."""
         moved = problem.with_coefficients(solution, solution.coefficients)
         return criterion_of(problem, moved, self.options.criterion)
 
@@ -230,7 +232,7 @@ class ClassSelection:
 
 
 class ModelClass(ABC):
-    """Model class: a kind of force law that is compared with candidates of simpler classes."""
+    """Kind of force law; its candidate is compared with the best candidate of the simpler model classes."""
 
     def __init__(self, selection: ClassSelection) -> None:
         self._selection = selection
@@ -258,7 +260,8 @@ class Linear(ModelClass):
 
 
 class Network(ModelClass):
-    """Model class of a wavelet network over the inputs; its name depends on the inputs."""
+    """Model class of a wavelet network over the inputs; the inputs decide its name: position, velocity,
+    network."""
 
     def __init__(self, selection: ClassSelection) -> None:
         super().__init__(selection)

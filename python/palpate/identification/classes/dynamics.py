@@ -26,7 +26,7 @@ from ..options import IdentifyOptions
 from ..search.evidence import CRITERIA, CRITERION_NAMES, ON_HELD_OUT_ROWS, Moving
 
 FOLDS = 10
-"""Number of sections of the recording; each section is held out once."""
+"""Number of sections of the recording for a test of damping and mass; each section is held out once."""
 
 TERMS = ("damping", "mass")
 """Names of the coefficients of velocity and acceleration."""
@@ -50,7 +50,8 @@ class FoldedRegression:
         self._n_static = n_static
 
     def value(self, two_sided: bool, names: Sequence[str], criterion: str) -> float:
-        """Returns the criterion of the regression with the named terms, with or without hysteresis."""
+        """Returns the criterion of the force regression with these terms (mass, damping), with or without
+        hysteresis."""
         columns = self._columns(two_sided, names)
         gram = self._grams.sum(axis=0)
         rss = _rss(gram, columns, self._solution(gram, columns))
@@ -66,7 +67,8 @@ class FoldedRegression:
     def held_out_gain(
         self, two_sided: bool, without: Sequence[str], with_it: Sequence[str]
     ) -> tuple[float, float]:
-        """Returns the relative decrease of the squared error on held-out sections, and its standard error."""
+        """Returns the relative decrease of the squared force error on held-out sections by added terms (mass,
+        damping), and its standard error."""
         errors = np.array(
             [
                 [self._left_out(fold, self._columns(two_sided, names)) for fold in range(FOLDS)]
@@ -103,7 +105,7 @@ SAMPLES_PER_TIME_CONSTANT = 2.0
 be nearly equal."""
 
 LEAST_INDEPENDENT_SAMPLES = 40.0
-"""Least number of independent samples for a decision on damping and mass."""
+"""Least number of independent rows of a recording for a decision on damping and mass."""
 
 LEAST_SPEED_SPREAD = 0.19
 """Least standard deviation of the speed along the motion divided by the mean speed [-]: that of speeds spread

@@ -37,10 +37,10 @@ ROWS_PER_PARAMETER_IF_FEW = 10
 the force."""
 
 FEW_ROWS = 500
-"""Number of rows below which ROWS_PER_PARAMETER_IF_FEW applies."""
+"""Number of rows below which each fitted number of the model needs ROWS_PER_PARAMETER_IF_FEW rows."""
 
 AMPLE_ROWS_PER_PARAMETER = 1000
-"""Number of rows for each parameter from which no search for repeated rows is needed."""
+"""Number of rows for each fitted number of the model from which no search for repeated rows is needed."""
 
 
 def error_findings(nrmse: float, rows: str) -> list[Finding]:
@@ -122,7 +122,7 @@ def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None
     Rows are in recorded order; neighbours are on the same stroke if `side` is given. A row whose neighbours
     in position are also its neighbours in time has no variance.
     """
-    shuffled = np.random.default_rng(0).permutation(len(position))  # equal positions: random order
+    shuffled = np.random.default_rng(0).permutation(len(position))  # random order of rows at equal position
     position, force = position[shuffled], force[shuffled]
     keys = (position,) if side is None else (position, side[shuffled])
     order = np.lexsort(keys)
@@ -136,7 +136,7 @@ def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None
     right = np.clip(right, 0.0, 1.0)[inner]
     between = (1.0 - right) * y[:-2][inner] + right * y[2:][inner]
     apart = y[1:-1][inner] - between
-    # successive rows of one stroke differ because the force changes with position
+    # forces of successive rows of one stroke differ because the position changes, not only because of noise
     steps = np.abs(np.diff(shuffled[order]))
     swept = ((steps[1:] == 1) & (steps[:-1] == 1))[inner]
     variance = np.where(swept, 0.0, apart**2 / (1.0 + right**2 + (1.0 - right) ** 2))
@@ -244,7 +244,7 @@ CELL_ERROR_RATIO = 1.5
 wide [-]."""
 
 REPORTED_NRMSE = 0.02
-"""NRMSE on the rows below which cells that are too wide are not reported [-]."""
+"""NRMSE on all rows below which no finding reports position cells that are too wide [-]."""
 
 MOST_SAMPLED_ROWS = 10_000
 """Largest number of rows, evenly spread, for the standard deviation of the force."""

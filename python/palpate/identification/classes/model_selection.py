@@ -27,7 +27,7 @@ from .findings import USABLE_NRMSE, large_unexplained_share, unexplained_share
 from .hysteresis import Hysteresis
 
 MOST_HALVINGS = 3
-"""Largest number of times that the width of the position cells is halved."""
+"""Largest number of times that position cells are halved because they are too wide for the force law."""
 
 MOST_DYNAMIC_SELECTIONS = 2
 """Number of times that the model is selected again, each time with better values of damping and mass."""
@@ -127,7 +127,8 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
     chosen = min(found, key=lambda each: each[0])[1]
     full = first.best.stop_reason == "max_wavelets"
     if full and 2 * chosen.best.n_wavelets > first.best.n_wavelets:
-        return first  # the residual of this network is an unfitted part of the force rather than noise
+        # The residual of this network is a part of the force that needs more wavelets, not noise.
+        return first
     return chosen
 
 
@@ -159,11 +160,12 @@ def no_finer_than_explained(first: ClassSelection) -> ClassSelection:
 
 
 class MassAndDamping(ModelClass):
-    """Model class dynamics: adds mass and damping, then selects the model again on forces without theirs."""
+    """Model class dynamics: fits mass and damping, then selects the model again on the force without their
+    forces."""
 
     @classmethod
     def possible(cls, selection: ClassSelection) -> bool:
-        """True if the motion may decide."""
+        """True if the motion of the recording is known well enough to fit mass and damping."""
         return selection.motion is not None
 
     def better(self, below: Candidate) -> Candidate:
@@ -258,7 +260,8 @@ STATIC_CLASSES = (Linear, Network, Hysteresis)
 """Model classes other than constant that do not depend on velocity, the simplest first."""
 
 REVISIONS = (correlated_noise, no_finer_than_explained)
-"""Functions that select a model without velocity, mass and damping again if its residual requires it."""
+"""Functions that repeat a selection without velocity, mass and damping if the residual is correlated or
+large."""
 
 DYNAMIC_CLASSES = (MassAndDamping, Velocity)
 """Model classes with velocity, mass or damping, tried last."""

@@ -60,12 +60,13 @@ class Compressed:
     samples: float
     """Number of represented rows of the recording, or the sum of their weights"""
     limits: RowLimits = NO_LIMITS
-    """Dependence, force resolution and position noise of the samples"""
+    """Share of independent rows, error that the force step hides, and noise of the position"""
     cells: int = 0
     """Largest number of distinct positions; with more, positions are gathered in this number of cells"""
 
     def reweighted_to(self, samples: float) -> Compressed:
-        """Returns the rows with weights multiplied such that they represent `samples` samples."""
+        """Returns the rows with weights scaled so that together they represent `samples` rows of the
+        recording."""
         more = samples / self.samples
         return replace(self, weight=more * self.weight, within=more * self.within, samples=samples)
 
@@ -101,7 +102,8 @@ class Compressor:
     ) -> None:
         self._within, self._limits, self._cells = within, limits, max_positions
         self.kept = np.arange(len(force)) if weight is None else np.flatnonzero(weight > 0.0)
-        """Indices of the rows that represent all rows."""
+        """Indices of the recorded rows that are used: rows with a weight above 0, or an even selection of
+        them."""
         self._key, self._per_axis = _position_key(positions[self.kept], max_positions)
         if 0 < self._per_axis < LEAST_CELLS_PER_AXIS:
             self.kept = self.kept[np.linspace(0, len(self.kept) - 1, max_positions).round().astype(np.int64)]
@@ -112,11 +114,12 @@ class Compressor:
 
     @property
     def rows_used(self) -> int:
-        """Number of rows that represent the recording."""
+        """Number of recorded rows that are used to represent the recording."""
         return len(self._force)
 
     def samples(self, only: NDArray[np.bool_] | None = None) -> float:
-        """Returns the number of samples of all rows, or of the rows selected by `only` (n,)."""
+        """Returns the number of recorded rows that all used rows, or those selected by `only` (n,),
+        represent."""
         return float(self._weight.sum() if only is None else self._weight[only[self.kept]].sum())
 
     def rows(self, side: Float1D | None = None, only: NDArray[np.bool_] | None = None) -> Compressed:
@@ -159,7 +162,8 @@ class Compressor:
         return Compressed(x, y, count, merged_side, spread, within, samples, self._limits, self._cells)
 
     def _part(self, rows: NDArray[np.bool_]) -> Compressor:
-        """Returns a compressor of some of the rows, with the same cells."""
+        """Returns a compressor of the rows that `rows` marks with True, with the position cells of this
+        compressor."""
         part = copy(self)
         part.kept = np.arange(np.count_nonzero(rows))
         part._key, part._positions = self._key[rows], self._positions[rows]
@@ -253,7 +257,7 @@ def around_seam(rows: Compressed) -> Compressed:
 
 
 HELD_OUT_EVERY = 5
-"""One of this number of rows, or of sections of the recording, is held out."""
+"""One of five rows, or one of five sections of the recording, is held out."""
 
 HELD_OUT_BLOCKS = 50
 """Number of sections of a recording, of which every fifth is held out as a whole: adjacent samples are

@@ -67,10 +67,10 @@ shuffled table."""
 
 @dataclass(frozen=True)
 class RowLimits:
-    """Limits of the information in rows; by default there is none."""
+    """Limits of the information in the rows of a recording; by default rows are independent and exact."""
 
     independent: float = 1.0
-    """Share of the samples that are independent (0, 1]"""
+    """Share of the rows that are independent (0, 1]"""
     force_error: float = 0.0
     """RMS error that the force step hides [force]; a criterion does not count smaller errors"""
     position_noise: float = 0.0
@@ -78,7 +78,7 @@ class RowLimits:
 
 
 NO_LIMITS = RowLimits()
-"""Limits of rows that are independent and exact."""
+"""Limits of the rows of a recording that are independent and exact."""
 
 LEAST_EQUAL_REPEATS = 0.99
 """Least share of rows with the same number of copies, in a file that was joined from copies of one recording

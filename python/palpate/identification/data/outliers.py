@@ -40,29 +40,30 @@ LEAST_ROWS = 100
 differences of values may grow by factors."""
 
 ISOLATED_GAP_RATIO = 10.0
-"""Ratio of the gap to the range of the other rows above which rows are dropped [-]."""
+"""Ratio of the gap between isolated and other rows to the range of the other rows, above which the isolated
+rows are dropped [-]."""
 
 SPARSE_GAP_RATIO = 1000.0
 """Ratio of the gap to the range of the other rows above which a row is dropped from a recording of few rows
 [-]."""
 
 REPORTED_GAP_SHARE = 0.2
-"""Ratio of a gap that is reported to a gap at which rows are dropped [-]."""
+"""Least gap between isolated and other rows that a finding reports [share of the gap that drops rows]."""
 
 LONGEST_RUN = 3
-"""Largest number of successive rows with a wrong reading."""
+"""Largest number of successive isolated rows that are dropped; more successive rows can be a real motion."""
 
 LEAST_OTHERS = 3
-"""Least number of distinct values of the rows that are not isolated."""
+"""Least number of distinct values that must remain without the isolated rows."""
 
 MOST_SAMPLED_ROWS = 10_000
-"""Largest number of rows, evenly spread, for the range of most values."""
+"""Largest number of evenly spread rows from which the range of most values is computed."""
 
 MOST_NAMED_ROWS = 3
 """Largest number of rows that a finding names."""
 
 
-@np.errstate(over="ignore", invalid="ignore")  # a range may overflow; such values are refused later
+@np.errstate(over="ignore", invalid="ignore")  # huge values, refused later, may overflow
 def without_isolated(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Finding]]:
     """Returns the recordings without isolated rows, and findings on the isolated rows."""
     counts = [len(recording) for recording in recordings]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows of an identification: selects usable rows and inputs, and takes positions modulo a period."""
+"""Rows of an identification: selects usable rows and inputs, and moves positions of a periodic force law into
+one repeat length."""
 
 from __future__ import annotations
 
@@ -57,32 +58,35 @@ class Rows:
     side: Float1D | None = None
     """(n,) direction: +1 press, -1 release, 0 neither; None if the direction is not known"""
     starts: Sequence[int] | None = None
-    """Indices of rows at which a continuous motion starts, for the play operator (d = 1)"""
+    """Indices of the rows at which a motion without gaps in time starts, for the play operator (only for one
+    input)"""
     parts: Sequence[Piece] = ()
-    """Continuous motions between gaps of time (d = 1); rows are numbered over all recordings"""
+    """Motions without gaps in time (only for one input); their row numbers count the rows of all
+    recordings"""
     weight: Float1D | None = None
-    """(n,) number of samples that each row represents in the fit; None: 1 each"""
+    """(n,) number of recorded rows that each row represents in the fit; None: 1 each"""
     within: float = 0.0
-    """Sum of squared differences of the samples from the mean force of their row [force^2]"""
+    """Sum of squared differences of recorded forces from the mean force of the row that represents them
+    [force^2]"""
     period: float | None = None
-    """Period of a periodic model [position]; None otherwise"""
+    """Repeat length of a periodic force law [position]; None if the force law is not periodic"""
     decisions: tuple[Decision, ...] = ()
     """Decisions on model classes that were made before the model selection"""
     notes: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     """Findings that can lower the verdict"""
     counted: Float1D | None = None
-    """(n,) number of samples that each row represents in the reported error; None: 1 each"""
+    """(n,) number of recorded rows that each row represents in the reported error; None: 1 each"""
     robust: Robust | None = None
     """Weights and outliers of Huber's loss; None for least squares"""
     limits: RowLimits = NO_LIMITS
-    """Dependence, force resolution and position noise of the rows"""
+    """Share of independent rows, error that the force step hides, and noise of the position"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) smallest and largest position of the unit box; None: those of the rows"""
     position_unit: Unit = UNSTATED_UNIT
-    """For messages"""
+    """Unit of position in messages"""
     force_unit: Unit = UNSTATED_UNIT
-    """For messages; not stated if the forces are scaled"""
+    """Unit of force in messages; not stated if the forces are scaled"""
 
     @cached_property
     def lower(self) -> Float1D:
@@ -100,7 +104,7 @@ class Rows:
 
     @cached_property
     def path(self) -> Float2D:
-        """(n, d) positions in units of the box, not taken modulo the period."""
+        """(n, d) positions in units of the box; those of a periodic force law may be outside [0, 1)."""
         return (self.positions - self.lower) / self.reach
 
     @cached_property
@@ -110,7 +114,7 @@ class Rows:
 
     @property
     def domain(self) -> Float2D:
-        """(n, d) positions modulo the period."""
+        """(n, d) positions; those of a periodic force law are moved into one repeat length."""
         return self.positions if self.period is None else self.lower + self.box * self.reach
 
     @property
@@ -126,7 +130,7 @@ class Rows:
             counted = np.flatnonzero(self.weight > 0.0)
             held_out &= self.weight > 0.0
             if 2 * HELD_OUT_EVERY * np.count_nonzero(held_out) < len(counted):
-                # with regular repeats most held-out rows can have weight 0
+                # if rows repeat at regular distances, most held-out rows can be repeats with weight 0
                 held_out[:] = False
                 held_out[counted] = held_out_rows(len(counted), self.starts)
         return held_out
@@ -329,7 +333,7 @@ def _input_names(recording: Recording, options: IdentifyOptions) -> tuple[str, .
 
 
 PERIOD_TOLERANCE = 0.01
-"""Largest relative deviation of a recording's sample time from the sample time of the paper's filters [-]."""
+"""Largest relative difference between the time step of a recording and that of the paper's filters [-]."""
 
 
 def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
@@ -359,14 +363,17 @@ def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
 
 
 USABLE_GAP = 0.05
-"""Share of the period without recorded positions above which the model is usable with a reservation [-]."""
+"""Width of a gap in the recorded positions above which a periodic model is usable with a reservation [share
+of the repeat length of its force]."""
 
 UNFIT_GAP = 0.5
-"""Share of the period without recorded positions above which the model is unfit [-]."""
+"""Width of a gap in the recorded positions above which a periodic model is unfit [share of the repeat length
+of its force]."""
 
 
 def period_notes(position: Float1D, period: float, unit: str = "") -> tuple[str, list[Finding]]:
-    """Returns the note and the findings on the part of a period that positions (n,) cover."""
+    """Returns the note and the findings on the part of the repeat length of a periodic force that positions
+    (n,) cover."""
     lower, travel = float(position.min()), float(np.ptp(position))
     note = (
         f"The positions span {travel / period:.4g} periods of {_exact(period, unit)} and are taken modulo "
@@ -399,5 +406,5 @@ def _exact(value: float, unit: str) -> str:
 
 
 def modulo(box: Float1D) -> Float1D:
-    """Returns positions (n,) [periods] modulo one period, in [0, 1)."""
+    """Returns positions (n,), in repeat lengths of a periodic force, moved by whole numbers into [0, 1)."""
     return np.asarray(box - np.floor(box))

@@ -37,7 +37,7 @@ WINDOW_ROWS = 16
 force."""
 
 LEAST_WINDOWS = 5
-"""Least number of windows for a finding on a difference between press and release."""
+"""Least number of windows of neighbouring positions for a finding that press and release force differ."""
 
 LEAST_GROUP_VARIANCE = 0.85
 """Least share of the force variance of a window between its two groups, for two forces at one position [-]:
@@ -143,7 +143,7 @@ class _Cells:
             for values in (None, f, x, x * x, x * f, f * f)
         )
         mean_x, mean_f = (total / np.maximum(count, 1) for total in (x_sum, f_sum))
-        # Both strokes of a cell share one slope of force over position.
+        # One slope of force over position is fitted to both strokes of a cell.
         xx, xf, ff = (
             np.sum(square - count * one * other, axis=1)
             for square, one, other in ((xx, mean_x, mean_x), (xf, mean_x, mean_f), (ff, mean_f, mean_f))
@@ -152,7 +152,7 @@ class _Cells:
         difference = mean_f[:, 1] - mean_f[:, 0] - slope * (mean_x[:, 1] - mean_x[:, 0])
         n_out, n_in = count.T
         used = (n_in >= 2) & (n_out >= 2) & (n_in + n_out > 4)
-        # Rounding errors are the least noise of a force.
+        # The noise of a force is taken to be at least its rounding error.
         floor = (1e-7 * float(np.ptp(f))) ** 2
         variance = np.maximum(ff - slope * xf, 0.0)[used] / (n_in + n_out - 3.0)[used] + floor
         return cls(difference[used], np.sqrt(variance * (1.0 / n_in[used] + 1.0 / n_out[used])))
@@ -160,7 +160,7 @@ class _Cells:
     @property
     def differ(self) -> bool:
         """True if press and release force differ on average, or in some cells."""
-        if not len(self.difference) or not self.error.all():  # the force is constant
+        if not len(self.difference) or not self.error.all():  # the recorded force is constant
             return False
         weight = self.error**-2.0
         mean = float(weight @ self.difference / np.sqrt(weight.sum()))
@@ -204,7 +204,7 @@ def _untested(position: Float1D, force: Float1D, unit: str, why: str | None) -> 
     one."""
     reason = why or "the position never turns back in the order of rows"
     decisions = (Decision("hysteresis", "not tested", reason),)
-    # Copies of a row would form a group with one force.
+    # Repeated rows are used once: their equal forces would look like one of the two strokes.
     rows = np.unique(position + 1j * force)
     if len(rows) < LEAST_WINDOWS * WINDOW_ROWS:
         return Strokes(None, decisions=decisions)

@@ -56,13 +56,15 @@ class Bound:
     and hysteresis."""
 
     readouts: tuple[float, ...]
-    """Factors of the mean force g (and the hysteresis h) in the reading"""
+    """Factors of the mean force g (and the hysteresis h) in the reading, the quantity that the constraint
+    limits"""
     of_slope: bool
-    """True if the reading is the slope of the combination [force/box]"""
+    """True if the constraint limits a slope [force/box]; False if it limits a force"""
     name: str
     """Name of the constraint in the notes"""
     sign: float
-    """+1: the reading stays above `limit`; -1: the reading stays below `limit`"""
+    """+1: the constrained force or slope stays above `limit`; -1: the constrained force or slope stays below
+    it"""
     limit: float
     unit: float
     """Change of the reading that weighs as much as a change of the force by 1; it is 1 if the reading is a
@@ -82,7 +84,7 @@ class Bound:
         return np.tile(upper - lower, (len(x), 1))
 
     def channels(self, problem: SeparableProblem) -> Float1D:
-        """Returns the factors of the problem's channels in the reading."""
+        """Returns the factor of each network of a least-squares problem in the constrained force or slope."""
         return np.asarray(np.array(self.readouts) @ problem.readout)
 
 

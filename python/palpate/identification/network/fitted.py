@@ -21,7 +21,8 @@ from .separable import Solution
 
 @dataclass(frozen=True)
 class PathPoint:
-    """Network that the model selection tested: its RMS error [force], and its criterion as a deviance."""
+    """Network that the model selection tested: its RMS error [force], and its criterion (a smaller value is
+    better)."""
 
     model_class: str
     n_wavelets: int

@@ -97,9 +97,10 @@ class Block:
     positions: Float2D
     """(m, d) positions in the unit box"""
     target: Float1D
-    """(m,) sqrt(weight) * force"""
+    """(m,) force of each row, multiplied by the square root of the row's weight"""
     channels: Float2D
-    """(m, channels) sqrt(weight) * channel"""
+    """(m, channels) factor of each network in the force of each row, multiplied by the square root of the
+    row's weight"""
 
     @staticmethod
     def weighted(positions: Float2D, force: Float1D, weight: Float1D, channels: Float2D) -> Block:
@@ -140,14 +141,15 @@ class Solution:
 
     basis: Basis
     coefficients: Float2D
-    """(channels, 1 + d + N) bias, slopes and weights of each channel of all blocks"""
+    """(channels, 1 + d + N) bias, slopes (d inputs) and weights (N wavelets) of the network of each
+    channel"""
     rss: float
-    """Residual sum of squares of the mean forces of the rows [force^2]"""
+    """Sum of squared differences between the mean forces of the rows and the fitted force [force^2]"""
     objective: float
     """Residual sum of squares plus the penalty on large weights [force^2]; refinement lowers this value"""
     designs: tuple[Float2D, ...]
     grams: tuple[Float2D, ...]
-    """Matrix design' design of every block, plus the penalty on large weights"""
+    """Normal matrix of least squares of each block of rows, plus the penalty on large weights"""
     residuals: tuple[Float1D, ...]
 
 
@@ -158,23 +160,25 @@ class SeparableProblem:
 
     blocks: tuple[Block, ...]
     readout: Float2D
-    """(1 or 2, channels) factors of the channels in the mean force g (and the hysteresis h)"""
+    """(1 or 2, channels) factors of each channel's network in the mean force g (and, in row 2, in the
+    hysteresis h)"""
     samples: float
-    """Number of samples of the compressed recording"""
+    """Number of recorded rows that the compressed rows represent"""
     within: float
-    """Sum of squared differences of the samples from the mean force of their row [force^2]"""
+    """Sum of squared differences of recorded forces from the mean force of the row that represents them
+    [force^2]"""
     force_range: float
     """Largest minus smallest force, above 0 [force]"""
     resolved_by: int
-    """Least number of distinct positions of every block that a wavelet's core must contain"""
+    """Least number of distinct positions, in every block of rows, that the core of a wavelet must contain"""
     held_out: HeldOutRows | None = None
     """Held-out rows, for the criteria that use held-out rows"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the samples: dependence, force resolution and position noise"""
+    """Share of independent rows, error that the force step hides, and noise of the position"""
     prior: float = 0.0
     """Penalty factor of a squared weight [-]; see :meth:`with_prior`"""
     resolutions: tuple[Resolution, ...] = ()
-    """Distances between positions for each stroke of all blocks; computed by default"""
+    """Distances between the positions of the rows of each stroke; computed if not given"""
 
     def __post_init__(self) -> None:
         known = self.resolutions or tuple(
@@ -185,12 +189,12 @@ class SeparableProblem:
 
     @property
     def dimension(self) -> int:
-        """Inputs of the force."""
+        """Number of inputs of the force."""
         return int(self.blocks[0].positions.shape[1])
 
     @property
     def n_channels(self) -> int:
-        """Channels of all blocks."""
+        """Number of channels (networks that are fitted together) of all blocks of rows."""
         return sum(block.n_channels for block in self.blocks)
 
     def n_parameters(self, n_wavelets: int) -> int:
@@ -206,15 +210,16 @@ class SeparableProblem:
 
     @property
     def independent(self) -> float:
-        """Number of independent samples."""
+        """Number of independent rows that the compressed rows represent."""
         return self.limits.independent * self.samples
 
     def rmse(self, solution: Solution) -> float:
-        """Returns the RMS error of a solution over all samples [force]."""
+        """Returns the RMS error of a solution over all recorded rows [force]."""
         return float(np.sqrt((solution.rss + self.within) / self.samples))
 
     def resolved_rmse(self, solution: Solution) -> float:
-        """Returns the RMS error of a solution over all samples, at least the force resolution [force]."""
+        """Returns the RMS error of a solution over all recorded rows [force], at least the force
+        resolution."""
         return float(np.sqrt(self.total(solution.rss) / self.samples))
 
     def evenness(self, solution: Solution) -> float:
@@ -298,7 +303,7 @@ class SeparableProblem:
         return Solution(basis, coefficients, rss, rss + penalty, designs, grams, residuals)
 
     def _tables(self, coefficients: Float2D) -> list[Float2D]:
-        """The coefficients of each block."""
+        """Returns the bias, slopes and weights of the channels of each block of rows."""
         ends = np.cumsum([block.n_channels for block in self.blocks])
         return np.split(coefficients, ends[:-1])
 

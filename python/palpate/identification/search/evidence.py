@@ -77,7 +77,7 @@ CRITERION_NAMES = {
     "fresh": "deviance on held-out rows",
     "perceptual": "deviance in just noticeable differences",
 }
-"""Maps the name of a criterion, as an option, to its name in messages."""
+"""Maps each criterion, as a value of the option --criterion, to its name in messages."""
 
 ON_HELD_OUT_ROWS = ("fresh", "perceptual")
 """Criteria that use the error on held-out rows."""
@@ -350,13 +350,14 @@ class Report:
     decisions: list[Decision] = field(default_factory=list)
     """Decisions on the model classes, in order"""
     notes: list[str] = field(default_factory=list)
-    """Sentences on constraints with their cost, and on unused rows"""
+    """Sentences on imposed constraints, with the rise of the error by them, and on unused rows"""
     findings: list[Finding] = field(default_factory=list)
     sign_findings: list[Finding] = field(default_factory=list)
     """Findings on a wrong sign of position or force"""
 
     def replaces(self, other: Report, note: str) -> None:
-        """Puts the tested networks of a replaced model selection and the reason of the replacement first."""
+        """Adds the tested networks of a replaced model selection, and the reason of the replacement, before
+        those of this one."""
         self.path[:0] = other.path
         self.notes.insert(0, note)
 

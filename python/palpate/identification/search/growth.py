@@ -64,7 +64,8 @@ GROWING_TOLERANCE = 0.4
 the penalty of one wavelet."""
 
 FINAL_TOLERANCE = 0.04
-"""Decrease of the deviance by one refinement step below which refinement of the accepted network ends [-]."""
+"""Decrease of the deviance (-2 log likelihood) by one step below which refinement of the accepted network
+ends [-]."""
 
 
 @dataclass(frozen=True)
@@ -255,7 +256,7 @@ class Growth:
         return replace(found, problem=replace(found.problem, resolved_by=problem.resolved_by))
 
     def _price(self, problem: SeparableProblem, solution: Solution) -> float:
-        """Returns the penalty of one wavelet of the solution in the criterion."""
+        """Returns by how much the last wavelet of the solution raises the penalty in the criterion."""
         penalty, n = CRITERIA[self._criterion], len(solution.basis)
         return penalty(problem.independent, problem.n_parameters(n)) - penalty(
             problem.independent, problem.n_parameters(n - 1)

@@ -49,9 +49,11 @@ class Library:
         resolved = np.all(candidates.alpha <= problem.finest(candidates.beta), axis=1)
         self.basis = Basis(candidates.alpha[resolved], candidates.beta[resolved])
         self.columns: list[NDArray[np.float32]] = []
-        """(channels, candidates, m) of every block"""
+        """For each block of m rows (channels, candidates, m): values of each candidate wavelet times the
+        channel"""
         self.grams: list[Float2D] = []
-        """(channels, channels, candidates) products of a candidate's columns"""
+        """For each block of rows (channels, channels, candidates): products of two columns of one candidate
+        wavelet"""
         for block in problem.blocks:
             self.columns.append(np.empty((block.n_channels, len(self), len(block.target)), np.float32))
             self.grams.append(np.empty((block.n_channels, block.n_channels, len(self))))
@@ -66,12 +68,13 @@ class Library:
         return len(self.basis)
 
     def members(self, order: Sequence[int] | NDArray[np.intp]) -> Basis:
-        """Returns the candidates with these indices."""
+        """Returns the candidate wavelets with these indices."""
         chosen = np.asarray(order, dtype=np.intp)
         return Basis(self.basis.alpha[chosen], self.basis.beta[chosen])
 
     def stretched(self, problem: SeparableProblem, order: Sequence[int] | NDArray[np.intp]) -> "Library":
-        """Returns the candidates with these indices, and copies with a changed dilation along one input."""
+        """Returns the candidate wavelets with these indices, and copies with a changed dilation along one
+        input."""
         chosen, d = self.members(order), problem.dimension
         combinations = [(factor, k) for k in range(d) for factor in STRETCH_FACTORS]
         factors = np.ones((1 + len(combinations), 1, d))
@@ -114,7 +117,7 @@ class OrthogonalSelection:
             self._products.append(products[:, -1])
 
     def gains(self) -> Float1D:
-        """Returns the decrease of the residual sum of squares (candidates,) if that candidate were taken
+        """Returns, for each candidate wavelet, the decrease of the residual sum of squares if it were taken
         next."""
         total = np.zeros(len(self._library))
         for gram, left, product in zip(self._library.grams, self._grams, self._products, strict=True):
@@ -122,13 +125,13 @@ class OrthogonalSelection:
         return total
 
     def take(self, index: int) -> float:
-        """Adds a candidate; returns the residual sum of squares over all blocks of rows."""
+        """Adds a candidate wavelet; returns the residual sum of squares over all blocks of rows."""
         rss = 0.0
         for b, columns in enumerate(self._library.columns):
             factor = self._factors[b]
             fresh = columns[:, index].T.astype(np.float64)
             norm = np.linalg.norm(fresh, axis=0)
-            for _ in range(2):  # two passes make the columns orthogonal up to rounding (Kahan)
+            for _ in range(2):  # two passes: orthogonal to the taken columns up to rounding (Kahan)
                 fresh = fresh - factor @ (factor.T @ fresh)
             basis, triangle = np.linalg.qr(fresh)
             basis = basis[
@@ -202,7 +205,7 @@ class SelectionPath:
     [force^2]"""
     criterion: tuple[float, ...]
     best: int
-    """Number of wavelets with the smallest criterion"""
+    """Number of wavelets at which the criterion is smallest"""
 
     @staticmethod
     def judged(
@@ -274,12 +277,13 @@ def select_backward(
 
 
 def _products(rows: Float2D, columns: NDArray[np.float32]) -> Float2D:
-    """(channels, k, candidates) products of rows (k, m) with columns (channels, candidates, m)."""
+    """Returns the scalar products of k vectors with the columns of all candidate wavelets (channels, k,
+    candidates)."""
     products = columns @ np.ascontiguousarray(rows.T, dtype=np.float32)
     return products.transpose(0, 2, 1).astype(np.float64, order="C")
 
 
 def _projected_gram(shadows: Float2D) -> Float2D:
-    """Returns the Gram matrices (channels, channels, candidates) of the candidates' projections (channels, k,
-    candidates)."""
+    """Returns the scalar products of each two projected columns (channels) of every candidate wavelet
+    (channels, channels, candidates)."""
     return np.asarray(np.einsum("kpn,lpn->kln", shadows, shadows))
