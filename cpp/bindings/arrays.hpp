@@ -118,7 +118,7 @@ void in_parts(std::size_t size, const Work& work) {
         try {
             others.emplace_back([&part, k] { part(k); });
         } catch (const std::system_error&) {
-            part(k);  // the system cannot start another thread
+            part(k);  // computes the part in this thread, because the system cannot start another one
         }
     }
     part(0);

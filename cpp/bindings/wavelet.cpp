@@ -40,7 +40,8 @@ struct Hats {
 /// arrays mean d = 1.
 struct Frame {
     std::size_t samples, wavelets, dimension;
-    std::vector<double> inputs;  ///< X, all samples of the first input first
+    /// X, the values of all inputs: first input 1 for all rows, then input 2, ...
+    std::vector<double> inputs;
     const double *alpha, *beta;
 
     Frame(const Array& x_array, const Array& alpha_array, const Array& beta_array) {

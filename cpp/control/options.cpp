@@ -227,7 +227,7 @@ std::string sentence_of(const CLI::ParseError& error) {
     if (error.get_name() == "ArgumentMismatch") {
         return message.substr(0, message.find(':')) + " needs a value";
     }
-    if (error.get_name() == "ConversionError") {  // such as "Could not convert: --cpu = 0.5"
+    if (error.get_name() == "ConversionError") {  // example of this error: "Could not convert: --cpu = 0.5"
         const std::size_t name = message.find("--");
         const std::size_t value = message.find(" = ", name);
         if (value != std::string::npos) {

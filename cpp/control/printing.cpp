@@ -23,7 +23,7 @@ namespace palpate::control {
 namespace {
 
 constexpr std::size_t shown_ticks = 8;
-constexpr int calls_a_line = 5;  ///< calls of show() for each update of the line, ten updates a second
+constexpr int calls_a_line = 5;  ///< calls of show() for each update of the status line, ten updates a second
 
 nlohmann::json json_of(const NamedValues& fields);
 

@@ -239,7 +239,7 @@ TEST(Certificate, CouplingAndDampingLimitTheFallingSlope) {
         const Certificate refused = certify(slopes(-400.1, 5.0), implicit, smooth(1.0));
         EXPECT_EQ(refused.verdict, Verdict::Refused);
         EXPECT_EQ(refused.reason,
-                  "no bound is known: falling force on a virtual object with mass, with a force limit: "
+                  "no bound is known: slope of a falling force with object mass and force limit: "
                   "proved only for s_ <= 2 B_o / T = 400, but the value is 400.1; use the energy-consistent "
                   "structure");
     }

@@ -13,16 +13,19 @@ namespace palpate {
 /// Command to a device: the force of the virtual object against the handle. A force > 0 pushes the handle towards
 /// smaller positions, out of the object.
 struct Command {
-    double force = 0.0;  ///< [N or N*m]
+    double force = 0.0;  ///< force on the handle [N or N*m]
 };
 
-/// One sample of a device.
+/// Position, velocity, forces, time and number that a device reports in one sample.
 struct Reading {
-    double position = 0.0;  ///< measured [m or rad]
-    double velocity = 0.0;  ///< measured, or a difference quotient of positions [m/s or rad/s]
-    double applied = 0.0;   ///< force that the device applies, sign as in `Command` [N or N*m]
-    double measured = std::numeric_limits<double>::quiet_NaN();  ///< force of the transducer; NaN without one
-    double device_time = 0.0;                                    ///< clock of the device [s]
+    double position = 0.0;  ///< measured position of the handle [m or rad]
+    /// Velocity of the handle: measured, or a difference quotient of positions [m/s or rad/s]
+    double velocity = 0.0;
+    double applied = 0.0;  ///< force that the device applies, sign as in `Command` [N or N*m]
+    /// Force that a transducer measures; NaN without a transducer
+    double measured = std::numeric_limits<double>::quiet_NaN();
+    /// Time of the sample by the device's clock [s]
+    double device_time = 0.0;
     std::uint64_t sequence = 0;  ///< number of this sample, counted by the device
     Status status = Status::Ok;
 };

@@ -43,12 +43,12 @@ struct DeviceProfile {
     [[nodiscard]] int whole_delay_samples() const noexcept {
         return static_cast<int>(std::floor(delay_s / period_s + 1e-9));
     }
-    /// Returns tau, the part of the delay that remains after n whole periods, 0 <= tau < 1 [periods].
+    /// Returns the part of the delay that remains after n whole periods T, divided by T: 0 <= result < 1.
     [[nodiscard]] double delay_fraction() const noexcept {
         const double rest = delay_s / period_s - whole_delay_samples();
         return rest > 1e-9 ? rest : 0.0;
     }
-    /// Returns the delay in periods, rounded up to a whole number.
+    /// Returns the delay divided by the period T of the control loop, rounded up to a whole number.
     [[nodiscard]] int late_samples() const noexcept {
         return whole_delay_samples() + (delay_fraction() > 0.0 ? 1 : 0);
     }

@@ -31,8 +31,9 @@ struct Inverse3Settings {
     std::uint16_t port = 10001;
     int axis = 2;                                  ///< 0 = x, 1 = y, 2 = z
     double direction = 1.0;                        ///< +1 or -1: sign of the direction into the object
-    std::chrono::milliseconds step_timeout{2000};  ///< longest wait in each step of opening
-    std::chrono::milliseconds answer_timeout{20};  ///< longest wait for a state
+    std::chrono::milliseconds step_timeout{2000};  ///< longest wait in each step of opening the device
+    /// Longest wait for a message of the service with position and force
+    std::chrono::milliseconds answer_timeout{20};
 };
 
 /// Properties of the Inverse3 that its service sent when the device was opened.
@@ -116,8 +117,8 @@ class Inverse3Device {
                 link_->run(std::chrono::milliseconds{200}, [&closed] { return closed; });
             }
         } catch (const std::exception&) {
-            link_->disconnected =
-                true;  // no zero force is needed: the service stops the force of a device without commands
+            // No zero force must be sent: the service ends the force of a device that gets no commands
+            link_->disconnected = true;
         }
         link_.reset();
     }
@@ -135,8 +136,8 @@ class Inverse3Device {
         boost::asio::io_context context;
         boost::beast::websocket::stream<boost::beast::tcp_stream> stream{context};
         boost::beast::flat_buffer buffer;
-        std::string message;       ///< text that is being sent
-        std::string command_head;  ///< start of each command, up to the force
+        std::string message;       ///< message to the service that is being sent
+        std::string command_head;  ///< text of each command before the force value
         bool sending = false;
         bool reading = false;
         bool disconnected = false;
@@ -146,7 +147,8 @@ class Inverse3Device {
         double velocity = 0.0;
         double echoed = 0.0;  ///< current force along the axis, from the service [N]
         std::uint64_t sequence = 0;
-        int states_without_effect = 0;  ///< consecutive states with zero force after a force command
+        /// Consecutive messages of the service with zero force although a force was commanded
+        int states_without_effect = 0;
         std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 
         /// Runs the handlers of network operations, until `done` returns true or the time `within` has passed. Returns
@@ -161,7 +163,8 @@ class Inverse3Device {
         }
     };
 
-    static constexpr double least_visible_force = 0.05;  ///< least force that a state must show [N]
+    /// Smallest commanded force that the service must report as not zero [N]
+    static constexpr double least_visible_force = 0.05;
     static constexpr int most_states_without_effect = 200;
 
     /// Connects to the service. Throws an error with the likely cure if no service answers.

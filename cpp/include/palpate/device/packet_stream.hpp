@@ -16,17 +16,20 @@ namespace palpate {
 
 /// Counters of the packets from and to a device since the device was opened.
 struct StreamHealth {
-    std::uint64_t packets = 0;         ///< valid packets
-    std::uint64_t lost = 0;            ///< samples of the device that did not arrive
-    std::uint64_t repeated = 0;        ///< samples that arrived twice or out of order
-    std::uint64_t malformed = 0;       ///< packets of a wrong size, first byte or version
-    std::uint64_t late_echoes = 0;     ///< packets that confirm a command of another session
+    std::uint64_t packets = 0;    ///< valid packets
+    std::uint64_t lost = 0;       ///< samples of the device that did not arrive
+    std::uint64_t repeated = 0;   ///< samples that arrived twice or out of order
+    std::uint64_t malformed = 0;  ///< packets of a wrong size, first byte or version
+    /// Packets that confirm a command sent before this program opened the device, or never sent
+    std::uint64_t late_echoes = 0;
     std::uint64_t watchdog_trips = 0;  ///< torques that the device's watchdog ended
 
     std::uint64_t refused_commands = 0;  ///< packets that report a command that the device did not understand
     std::uint64_t late_commands = 0;     ///< commands whose delay was longer than allowed
-    DurationHistogram round_trip;        ///< from sending a command to its confirmation, host clock [ns]
-    DurationHistogram delay;             ///< from a sample to the force computed from it, device clock [ns]
+    /// Time from sending a command to its confirmation, by the host's clock [ns]
+    DurationHistogram round_trip;
+    /// Time from a sample to the force computed from it, by the device's clock [ns]
+    DurationHistogram delay;
 };
 
 /// Converts the packets of one device to readings. Counters no longer restart at 0, encoder counts become SI units, and
@@ -188,9 +191,10 @@ class PacketStream {
     std::uint16_t sent_ = 0;
     std::uint16_t echoed_ = 0;
     bool is_acknowledged_ = false;
-    bool is_late_ = false;  ///< true if the command confirmed by the last packet was late
+    /// True if the delay of the command confirmed by the last packet was longer than allowed
+    bool is_late_ = false;
     bool was_enabled_ = false;
-    bool follows_ = false;  ///< true if no packet was discarded after the last one
+    bool follows_ = false;  ///< true if no packet was discarded after the last packet that was read
     std::uint16_t status_bits_ = 0;
     std::array<SentCommand, 64> sent_commands_{};
     Reading reading_;

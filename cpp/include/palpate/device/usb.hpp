@@ -24,7 +24,7 @@ struct UsbOptions {
     std::chrono::microseconds wait{5'000};  ///< longest wait of an exchange for a packet
     std::uint16_t time_to_live_ms = 10;     ///< time after which a torque ends without a new packet
     double longest_delay_s = std::numeric_limits<double>::infinity();  ///< allowed delay [s]
-    bool makes_force = true;  ///< false: the device is never enabled, only read
+    bool makes_force = true;  ///< false: the motor is never enabled; the device only sends samples
 };
 
 /// Counters of the packets and USB transfers of a device.
@@ -33,7 +33,7 @@ struct UsbHealth {
     /// Commands not sent, because the previous command was in flight or a newer sample had arrived.
     std::uint64_t skipped_commands = 0;
     std::uint64_t lost_commands = 0;  ///< commands that did not arrive at the device
-    std::uint64_t timeouts = 0;       ///< exchanges without a packet
+    std::uint64_t timeouts = 0;       ///< ticks in which no packet arrived in time
     std::uint64_t discarded = 0;      ///< received packets that the host did not process in time
     std::uint64_t stalls = 0;         ///< halts of a USB endpoint, which were cleared
     std::uint64_t bus_errors = 0;     ///< transfers that failed on the bus
@@ -127,7 +127,7 @@ class UsbDevice {
         open_.reset();
     }
 
-    // name(), info() and health() describe the open device, or the device that was open last.
+    // name(), info() and health() describe the open USB device, or after closing the USB device that was open last.
     [[nodiscard]] const UsbName& name() const noexcept {
         return open_ == nullptr ? last_name_ : open_->connection.name();
     }
@@ -163,12 +163,14 @@ class UsbDevice {
         profile.period_s = 1.0 / info().rate_hz;
         profile.encoder_step = wire::position_of(1, info().counts_per_rev);
         profile.force_step = 1e-6;
-        profile.force_limit = info().max_torque_uNm / 1e6;  // a product with 1e-6 would round twice
+        // Division by 1e6, because a multiplication by 1e-6 would round twice
+        profile.force_limit = info().max_torque_uNm / 1e6;
         return profile;
     }
 
   private:
-    static constexpr std::size_t most_waiting_packets = 4;  ///< with more packets, the host discards all
+    /// If more received packets wait, the host discards all of them
+    static constexpr std::size_t most_waiting_packets = 4;
     static constexpr int most_kept_packets = 2;  ///< old packets that a device may still send after opening
     static constexpr Nanoseconds first_packet_timeout = nanoseconds_a_second;
     static constexpr Nanoseconds write_timeout = nanoseconds_a_second / 50;

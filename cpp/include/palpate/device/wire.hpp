@@ -82,7 +82,8 @@ inline constexpr std::uint32_t measures_velocity = 2;
 inline constexpr int shortest_watchdog_ms = 2;
 inline constexpr int longest_watchdog_ms = 1000;
 
-inline constexpr std::size_t largest_packet = 64;  ///< limit of a full-speed interrupt endpoint [bytes]
+/// Largest packet of an interrupt endpoint of USB full speed [bytes]
+inline constexpr std::size_t largest_packet = 64;
 inline constexpr std::size_t in_size = 32;
 inline constexpr std::size_t out_size = 16;
 inline constexpr std::size_t info_size = 32;
@@ -91,12 +92,12 @@ inline constexpr std::size_t info_size = 32;
 struct InPacket {
     std::uint16_t sequence = 0;
     std::uint32_t clock_us = 0;  ///< device clock when the position was read; restarts at 0 after 71 minutes
-    std::int32_t count = 0;      ///< position of the encoder
+    std::int32_t count = 0;      ///< encoder position [counts]
     std::int32_t velocity_cps = 0;   ///< velocity [counts/s]; 0 if not measured
     std::int32_t torque_uNm = 0;     ///< applied torque
     std::uint16_t status = 0;        ///< status bits
     std::uint16_t out_sequence = 0;  ///< number of the last accepted command
-    std::uint16_t out_age_us = 0;    ///< time since that command was accepted, at most 65535
+    std::uint16_t out_age_us = 0;    ///< time since the last command was accepted, at most 65535 [us]
     std::uint16_t temperature_dC = 0;
     std::int32_t sensor_uNm = 0;  ///< torque at the transducer; 0 without a transducer
 };
@@ -105,7 +106,7 @@ struct InPacket {
 struct OutPacket {
     std::uint16_t sequence = 0;
     std::int32_t torque_uNm = 0;
-    std::uint16_t time_to_live_ms = 10;  ///< the torque ends after this time without a new command
+    std::uint16_t time_to_live_ms = 10;  ///< time after which the torque ends without a new command [ms]
     std::uint32_t host_us = 0;
 };
 

@@ -13,8 +13,8 @@ namespace palpate {
 ///
 /// F > 0 pushes the device back and moves the virtual object forward.
 struct VirtualCoupling {
-    double stiffness = 100.0;  ///< K_c [N/m]
-    double damping = 0.02;     ///< B_c [N*s/m]
+    double stiffness = 100.0;  ///< stiffness K_c of the virtual coupling [N/m]
+    double damping = 0.02;     ///< damping B_c of the virtual coupling [N*s/m]
 
     /// Returns the force of the coupling [N] for a difference of the positions and of the velocities of device and
     /// virtual object.
@@ -38,8 +38,8 @@ inline constexpr auto fields_of<VirtualCoupling> =
 /// Mass and damping of the virtual object. The paper adds a mass so that the virtual object has a position; the paper's
 /// spring and wall use the two default values.
 struct Inertia {
-    double mass = 0.001;   ///< m [kg]
-    double damping = 0.5;  ///< B_o [N*s/m]
+    double mass = 0.001;   ///< mass m of the virtual object [kg]
+    double damping = 0.5;  ///< damping B_o of the virtual object [N*s/m]
 
     /// Returns m / T^2 + B_o / T [N/m], the part of mass and damping in the slope of a load line with the backward
     /// Euler method.

@@ -42,7 +42,7 @@ class TransferFunction {
                ((z + denominator_[1]) * z + denominator_[2]);
     }
 
-    /// Returns the poles, the two roots of the denominator.
+    /// Returns the poles of the transfer function, that is the two roots of its denominator.
     [[nodiscard]] std::array<std::complex<double>, 2> poles() const noexcept {
         const double middle = -0.5 * denominator_[1];
         const std::complex<double> half = std::sqrt(std::complex<double>{middle * middle - denominator_[2]});

@@ -19,7 +19,7 @@
 // struct. Checks, files, fingerprints, comparisons and Python classes use these tables.
 namespace palpate {
 
-/// Rule that the number in a field must satisfy.
+/// Rule for the number in a field: any number, finite, >= 0, or > 0.
 enum class Rule : std::uint8_t { Any, Finite, NotNegative, Positive };
 
 /// Returns the rule as text for an error message, for example "> 0".

@@ -12,11 +12,12 @@ namespace palpate {
 
 /// Settings of an energy tank: bounds of the stored energy, and losses of the device that the tank counts.
 struct TankSettings {
-    StoredEnergySettings stored;     ///< numbers that bound the energy that the rendering stores
-    double device_damping = 0.0;     ///< device damping b that the tank counts [N*s/m or N*m*s/rad]
-    double device_friction = 0.0;    ///< Coulomb friction f_c that the tank counts [N or N*m]
-    double uncredited_motion = 0.0;  ///< part of each motion without counted losses [m or rad]
-    double period_s = 1e-3;          ///< time between two samples [s]
+    StoredEnergySettings stored;   ///< numbers that bound the energy that the rendering stores
+    double device_damping = 0.0;   ///< device damping b that the tank counts [N*s/m or N*m*s/rad]
+    double device_friction = 0.0;  ///< Coulomb friction f_c that the tank counts [N or N*m]
+    /// Length by which each motion is shortened before friction losses are counted [m or rad]
+    double uncredited_motion = 0.0;
+    double period_s = 1e-3;  ///< period T of the control loop [s]
 };
 
 /// Limits the energy that a rendering gives to the handle. The energy given since the last tick with G = 0, less the
@@ -60,7 +61,7 @@ class EnergyTank {
     /// Updates the bound of the stored energy with the positions of handle and virtual object.
     void visit(double handle, double object) noexcept { stored_.visit(handle, object); }
 
-    /// Reduces the force if the given energy exceeds the bound of the stored energy.
+    /// Reduces the force if the rendering has given more energy than the upper bound of the stored energy.
     [[nodiscard]] Status apply(double& force) const noexcept {
         const double excess = given_ - stored_.most();
         if (!(excess > 0.0) || force == 0.0) {

@@ -20,10 +20,11 @@ struct GuardSettings {
     double slew_s = 0.005;     ///< shortest time from zero force to the force limit; 0 = no slew limit [s]
     double ramp_s = 0.2;       ///< duration of the start ramp from zero force to the full force [s]
     double largest_speed = 100.0;  ///< handle speed above which a reading is a fault (jump) [m/s or rad/s]
-    double frozen_speed = 0.3;     ///< speed from which a handle cannot stop within one sample [m/s or rad/s]
+    /// Speed from which a handle cannot stop within one period T [m/s or rad/s]
+    double frozen_speed = 0.3;
     double frozen_s =
-        0.05;  ///< time without change of position after which the encoder is frozen; 0 = no check [s]
-    bool energy_tank = true;  ///< true: an energy tank limits the energy
+        0.05;  ///< time of constant position after fast motion that proves a frozen encoder; 0 = no check [s]
+    bool energy_tank = true;  ///< true: an energy tank limits the energy that the rendering may give
     double limit_cycle_force =
         0.05;  ///< smallest change of force in each swing of a limit cycle; 0 = no check [N or N*m]
     double device_damping = 0.0;   ///< device damping b [N*s/m or N*m*s/rad]
@@ -83,7 +84,7 @@ inline void validate(const GuardSettings& settings) {
     require_rule("encoder_step", settings.encoder_step, Rule::NotNegative);
 }
 
-/// Smallest number of equal position samples after which an encoder can count as frozen.
+/// Smallest number of consecutive ticks with equal position after which an encoder can count as frozen.
 inline constexpr std::uint64_t fewest_frozen_samples = 5;
 
 [[nodiscard]] inline ForceLimit force_limit(const GuardSettings& settings) noexcept {

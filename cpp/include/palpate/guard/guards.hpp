@@ -22,13 +22,15 @@ namespace palpate {
 /// Checks of each position sample before the rendering uses the sample, and limits of each force before it is sent. A
 /// simulation uses only the force limit, because other faults cannot occur in a simulation.
 struct Guards {
-    ReadingGuard reading{};             ///< checks each position sample
-    ForceLimit limit{};                 ///< limits the computed force, before all other limits
-    LimitCycleDetector limit_cycle{};   ///< scales all forces down after a limit cycle
+    ReadingGuard reading{};  ///< checks the position measured in each tick
+    /// Limits the computed force to the device's force limit, before all other limits of the force
+    ForceLimit limit{};
+    /// Detects limit cycles, and multiplies all later forces by a factor below 1
+    LimitCycleDetector limit_cycle{};
     ForceRamp ramp{};                   ///< increases the force from zero at the start
     SlewLimit slew{};                   ///< limits the change of the force in a tick
     EnergyTank tank{};                  ///< limits the energy that the rendering may give
-    ReadMotion motion{};                ///< computes the motion that the encoder readings prove
+    ReadMotion motion{};                ///< computes the motion of the handle that the encoder readings prove
     PassivityObserver ramp_observer{};  ///< energy that the rendering absorbed during the start ramp
     PassivityObserver observer{};       ///< energy that the rendering absorbed after the start ramp
 };

@@ -13,9 +13,10 @@ namespace palpate {
 /// Criteria by which an oscillation of the handle is a limit cycle. A swing is the motion between two reversals of the
 /// handle.
 struct LimitCycleSettings {
-    double force_swing =
-        std::numeric_limits<double>::infinity();  ///< smallest change of force in a swing [N or N*m]
-    std::uint64_t longest_swing = 25;  ///< longest duration of a swing [ticks]; hands oscillate below 20 Hz
+    /// Smallest change of force in each swing of a limit cycle [N or N*m]
+    double force_swing = std::numeric_limits<double>::infinity();
+    /// Longest duration of each swing of a limit cycle [ticks]; hands oscillate below 20 Hz
+    std::uint64_t longest_swing = 25;
     double encoder_step = 0.0;  ///< a backward motion of at most this length is not a reversal [m or rad]
 };
 
@@ -53,16 +54,17 @@ class LimitCycleDetector {
         return scale_ < 1.0 ? Status::LimitCycleScaled : Status::Ok;
     }
 
-    /// Returns the factor by which all forces are multiplied, 1 before the first limit cycle.
+    /// Returns the factor of all forces: 1 before the first limit cycle, smaller after each limit cycle.
     [[nodiscard]] double scale() const noexcept { return scale_; }
     /// Returns the number of limit cycles detected since the start.
     [[nodiscard]] std::uint64_t limit_cycles() const noexcept { return limit_cycles_; }
 
   private:
     static constexpr std::uint64_t swings_in_half = 5;  ///< swings in each half of a limit cycle
-    static constexpr double least_last_to_first =
-        0.8;  ///< smallest longest swing of the second half / longest swing of the first half
-    static constexpr double force_factor = 0.7;  ///< factor of all forces after each limit cycle
+    /// Smallest ratio in a limit cycle: longest of its last five swings / longest of its first five
+    static constexpr double least_last_to_first = 0.8;
+    /// Factor by which each limit cycle multiplies all later forces
+    static constexpr double force_factor = 0.7;
 
     void end_swing() noexcept {
         const double swing = std::abs(extreme_ - last_reversal_);
@@ -94,14 +96,15 @@ class LimitCycleDetector {
     double scale_ = 1.0;
     std::uint64_t limit_cycles_ = 0;
     double direction_ = 1.0;
-    double extreme_ = std::numeric_limits<double>::quiet_NaN();  ///< farthest position of the current swing
+    /// Farthest position of the handle in the current swing (motion since the last reversal)
+    double extreme_ = std::numeric_limits<double>::quiet_NaN();
     double last_reversal_ = 0.0;
     double least_force_ = std::numeric_limits<double>::infinity();  ///< smallest force in the current swing
     double largest_force_ = -std::numeric_limits<double>::infinity();  ///< largest force in the current swing
-    double first_ = 0.0;  ///< longest of the first five swings [m or rad]
-    double last_ = 0.0;   ///< longest of the next five swings [m or rad]
+    double first_ = 0.0;  ///< length of the longest of the first five swings [m or rad]
+    double last_ = 0.0;   ///< length of the longest of swings six to ten [m or rad]
     std::uint64_t swings_ = 0;
-    std::uint64_t ticks_ = 0;  ///< ticks since the last reversal
+    std::uint64_t ticks_ = 0;  ///< ticks since the handle last changed its direction
 };
 
 }  // namespace palpate

@@ -20,13 +20,14 @@ namespace palpate {
 /// exactly for `frozen_samples`, the encoder has failed. A failure while the handle rests cannot be detected.
 class ReadingGuard {
   public:
-    /// Limits for the change of position between two samples.
+    /// Largest change of position in a tick, and the criteria by which an encoder is frozen.
     struct Limits {
-        double largest_step = std::numeric_limits<
-            double>::infinity();  ///< largest change of position between two samples [m or rad]
-        double frozen_step =
-            0.0;  ///< smallest change of position in one sample before an encoder can be frozen [m or rad]
-        std::uint64_t frozen_samples = 0;  ///< number of equal samples of a frozen encoder; 0 = no check
+        double largest_step =
+            std::numeric_limits<double>::infinity();  ///< largest change of position in a tick [m or rad]
+        /// Change of position in a tick so fast that a stop in the next tick means a frozen encoder [m or rad]
+        double frozen_step = 0.0;
+        /// Consecutive ticks with equal position that prove a frozen encoder; 0 = no check
+        std::uint64_t frozen_samples = 0;
     };
 
     ReadingGuard() = default;
@@ -40,7 +41,8 @@ class ReadingGuard {
         }
         const std::uint64_t advanced = sequence - last_sequence_;
         const std::uint64_t expected = exchanges_;
-        if (started_ && static_cast<std::int64_t>(advanced) <= 0) {  // a repeated or an earlier sample
+        // The device sent the last sample again, or an earlier sample
+        if (started_ && static_cast<std::int64_t>(advanced) <= 0) {
             ++repeated_;
             return Status::Lost;
         }
@@ -65,7 +67,7 @@ class ReadingGuard {
 
   private:
     static constexpr std::uint64_t most_late_samples =
-        2;  ///< number of samples that may arrive after their exchange has ended
+        2;  ///< largest counted number of samples that arrive after their own tick
 
     [[nodiscard]] Status motion_status(double position, double samples) noexcept {
         const double step = std::isnan(last_position_) ? 0.0 : std::abs(position - last_position_);
@@ -88,8 +90,8 @@ class ReadingGuard {
     bool started_ = false;
     bool was_fast_ = false;
     std::uint64_t last_sequence_ = 0;
-    std::uint64_t exchanges_ = 0;        ///< exchanges since the last sample
-    std::uint64_t resting_samples_ = 0;  ///< consecutive samples with equal position
+    std::uint64_t exchanges_ = 0;        ///< ticks since the last valid sample
+    std::uint64_t resting_samples_ = 0;  ///< consecutive ticks with equal position of the handle
     std::uint64_t lost_ = 0;
     std::uint64_t repeated_ = 0;
     double last_position_ = std::numeric_limits<double>::quiet_NaN();

@@ -57,12 +57,13 @@ class StoredEnergy {
         return settings_.within + settings_.force_limit * (below_ + above_ + stretched_) +
                0.5 * settings_.mass * fastest_ * fastest_;
     }
-    /// Returns the part of the bound for positions inside the domain and speed zero [J].
+    /// Returns W_domain, the upper bound of the stored energy for positions inside the domain and speed zero [J].
     [[nodiscard]] double within() const noexcept { return settings_.within; }
 
   private:
     StoredEnergySettings settings_;
-    double stretch_ = std::numeric_limits<double>::infinity();  ///< stretch at the force limit [m or rad]
+    /// Stretch F_max / K_c of the coupling at the force limit [m or rad]
+    double stretch_ = std::numeric_limits<double>::infinity();
     double below_ = 0.0;
     double above_ = 0.0;
     double stretched_ = 0.0;

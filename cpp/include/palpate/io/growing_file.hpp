@@ -28,7 +28,7 @@ namespace detail {
     if (errno != EINVAL && errno != ENOSYS) {
         return errno;
     }
-    // For file systems without RENAME_NOREPLACE, such as NFS.
+    // A file system such as NFS cannot rename without replacing (RENAME_NOREPLACE): create a link instead.
     if (::link(from.c_str(), to.c_str()) != 0) {
         return errno;
     }
@@ -159,11 +159,11 @@ class GrowingFile {
         } else {
             sync_folder();
         }
-        close();  // the lock on the file ends here, after the file has its final name
+        close();  // unlocks the file, after the file has its final name
         return reason;
     }
 
-    /// Deletes NAME.part and closes the file.
+    /// Deletes the unfinished recording NAME.part and closes it.
     void discard() noexcept {
         if (detail::is_path_of(part(), descriptor_)) {
             (void)std::remove(part().c_str());
@@ -230,7 +230,7 @@ class GrowingFile {
                           " may belong to another run, because this file system has no locks; choose "
                           "another name, or rename it";
         } else if (detail::is_path_of(part(),
-                                      there)) {  // otherwise another run has just renamed its finished file
+                                      there)) {  // otherwise another run has just renamed NAME.part
             if (::fstat(there, &about) == 0 && about.st_size == 0) {
                 reason =
                     part() +

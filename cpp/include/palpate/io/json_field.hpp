@@ -72,7 +72,7 @@ class JsonField {
             }
         }
     }
-    /// Returns the elements of this list, each with its path.
+    /// Returns the elements of this JSON list, each with its place in the file for messages.
     [[nodiscard]] std::vector<JsonField> items() const {
         require(value_.is_array(), "a list");
         std::vector<JsonField> fields;
@@ -83,7 +83,7 @@ class JsonField {
         return fields;
     }
 
-    /// Returns this value as a finite number. Throws if the number does not satisfy the rule.
+    /// Returns this JSON value as a finite number. Throws if the number does not satisfy `rule`, for example > 0.
     [[nodiscard]] double number(Rule rule = Rule::Finite) const {
         require(value_.is_number(), "a number");
         const auto number = value_.get<double>();

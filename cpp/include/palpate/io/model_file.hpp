@@ -16,14 +16,14 @@
 
 namespace palpate {
 
-/// The part of the content of a model file that a rendering uses.
+/// Content of a model file that a rendering uses: model, units, plan and certificate.
 struct ModelFile {
     ForceModel model;                        ///< the identified model
     std::string position_unit;               ///< rad, m, count or "" (not stated)
     std::string force_unit;                  ///< N*m, N, A or ""
     std::vector<std::string> inputs;         ///< names of the model's inputs
     std::optional<Scheme> plan;              ///< structure and coupling for the model
-    std::optional<ForceModel> limited;       ///< model that the plan renders instead
+    std::optional<ForceModel> limited;       ///< model that the plan renders instead of the identified model
     std::optional<Certificate> certificate;  ///< certificate of the plan, recomputed on reading
 
     /// Returns the model that the plan renders.

@@ -84,7 +84,8 @@ class RecordingFile {
     [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
   private:
-    static constexpr std::size_t reserved_bytes = 512;  ///< space for each line written at the end [bytes]
+    /// Length of each metadata line that is rewritten when the recording ends [bytes]
+    static constexpr std::size_t reserved_bytes = 512;
 
     [[nodiscard]] static std::string line(const std::string& key, std::string value) {
         for (char& letter : value) {

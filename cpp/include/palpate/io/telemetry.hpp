@@ -21,7 +21,7 @@ namespace palpate {
 /// UDP packet that the operating system does not accept at once is dropped and counted.
 class Telemetry {
   public:
-    static constexpr double usual_hz = 50.0;  ///< default number of sent ticks a second
+    static constexpr double usual_hz = 50.0;  ///< default number of ticks a second that are sent over UDP
 
     Telemetry() = default;
     ~Telemetry() {

@@ -24,9 +24,9 @@ struct TickRecord {
     double environment_position = 0.0;  ///< position y of the virtual object [m or rad]
     double velocity = 0.0;              ///< velocity of the handle [m/s or rad/s]
     double device_time = 0.0;           ///< time by the device's clock [s]
-    double lateness = 0.0;              ///< wake-up minus its planned time [s]
-    std::uint64_t sequence = 0;         ///< number of the device's sample
-    std::int32_t evaluations = 0;       ///< evaluations of the model in this tick
+    double lateness = 0.0;              ///< actual minus planned time of the control loop's wake-up [s]
+    std::uint64_t sequence = 0;         ///< number of the sample, counted by the device
+    std::int32_t evaluations = 0;       ///< number of evaluations of the model's force in this tick
     Status status = Status::Ok;
     bool extrapolated = false;  ///< true if the model was evaluated outside its domain
 };

@@ -45,7 +45,7 @@ struct BoundedCell {
         range = {both.lower - remainder, both.upper + remainder};
     }
 
-    /// Orders the queue of cells: the cell with the largest possible |g| comes first.
+    /// Orders the queue of cells: first the cell in which the absolute value of the function g may be largest.
     [[nodiscard]] bool operator<(const BoundedCell& other) const noexcept {
         return range.largest() < other.range.largest();
     }

@@ -22,7 +22,8 @@ namespace palpate {
 struct CompileOptions {
     double relative_error = 1e-12;     ///< largest force error / max|f| over the domain; includes rounding
     std::size_t largest_table = 8192;  ///< largest number of table cells of 80 bytes
-    std::size_t fewest_wavelets = 2;   ///< with fewer wavelets the sum of eq. 4 is as fast as a table
+    /// Smallest number of wavelets for a table; the sum of fewer wavelets is as fast
+    std::size_t fewest_wavelets = 2;
 };
 
 namespace detail {

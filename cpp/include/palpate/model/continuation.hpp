@@ -16,15 +16,16 @@ namespace palpate {
 struct Curve {
     double value = 0.0;            ///< f(x)
     double slope = 0.0;            ///< f'(x)
-    double integral = 0.0;         ///< antiderivative of f at x
-    double double_integral = 0.0;  ///< antiderivative of `integral` at x
+    double integral = 0.0;         ///< integral of f up to x, plus a constant
+    double double_integral = 0.0;  ///< integral of `integral` up to x, plus a constant
 };
 
 /// Kind of force outside the positions of the recording. The network is never evaluated there, because the force of a
 /// fitted network can change its direction just outside the last recorded position.
 enum class Continuation : std::uint8_t {
-    Linear,  ///< a straight line of slope >= 0 through the force at the edge
-    Free,    ///< a straight line to zero force, then zero: the tool has lost contact
+    Linear,  ///< a straight line of slope >= 0 that starts with the force at the end of the domain
+    /// A straight line from the end of the domain to zero force, then zero: the tool has lost contact
+    Free,
 };
 
 template <>
@@ -34,9 +35,10 @@ inline constexpr auto words_of<Continuation> = std::array<std::string_view, 2>{"
 /// force at the distance `reach` from the edge. The force is continuous at the start and at the end of the line; the
 /// slope is not.
 struct EdgeLine {
-    double edge = 0.0;  ///< position of the edge [m]
-    Curve at_edge;      ///< force at the edge, and slope of the straight line
-    double reach = std::numeric_limits<double>::infinity();  ///< distance from the edge to zero force [m]
+    double edge = 0.0;  ///< end of the domain at which the line starts [m]
+    Curve at_edge;      ///< force at the end of the domain, and slope of the straight line
+    /// Distance from the end of the domain to zero force [m]
+    double reach = std::numeric_limits<double>::infinity();
 
     /// Returns force, slope and antiderivatives at a position x outside the domain, on the side of this edge.
     [[nodiscard]] Curve at(double x) const noexcept {
@@ -71,7 +73,7 @@ struct CurveExtent {
                                              Continuation continuation, const CurveExtent& extent) noexcept {
     EdgeLine line{edge, at_edge};
     const double mean_slope = extent.largest_force / extent.travel;
-    const double outward_force = -outward * at_edge.value;  // > 0: pushes the tool out of the domain
+    const double outward_force = -outward * at_edge.value;  // force > 0 pushes the tool out of the domain
     line.at_edge.slope = std::clamp(at_edge.slope, 0.0, extent.slope_cap);
     if (outward_force > 0.0) {
         line.at_edge.slope = std::max(line.at_edge.slope, mean_slope);

@@ -18,7 +18,7 @@ using Jet = std::array<double, 4>;
 /// Value and first four derivatives of a function at one position.
 using Derivatives = std::array<double, 5>;
 
-/// Returns value and first four derivatives of a network of one input at x, without continuation.
+/// Returns force and first four derivatives of a wavelet network of position at x, without continuation.
 [[nodiscard]] inline Derivatives derivatives(const NetworkParameters& network, double x) noexcept {
     const double c = network.linear[0];
     Derivatives sum{c * x + network.bias, c, 0.0, 0.0, 0.0};
@@ -36,7 +36,7 @@ using Derivatives = std::array<double, 5>;
     return sum;
 }
 
-/// Returns value and first three derivatives of a network of one input at x, without continuation.
+/// Returns force and first three derivatives of a wavelet network of position at x, without continuation.
 [[nodiscard]] inline Jet jet(const NetworkParameters& network, double x) noexcept {
     const Derivatives f = derivatives(network, x);
     return {f[0], f[1], f[2], f[3]};
@@ -114,7 +114,8 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
         }
     }
     for (double& bound : bounds) {
-        bound *= 1.0 + 1e-9;  // covers the rounding of the sum over the wavelets
+        // Increases each bound by more than the rounding error of the sum over the wavelets
+        bound *= 1.0 + 1e-9;
     }
     return bounds;
 }

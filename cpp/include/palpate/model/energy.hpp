@@ -13,10 +13,11 @@ namespace palpate {
 
 /// Smallest and largest energy that a virtual object can store.
 struct EnergyRange {
-    double least =
-        0.0;  ///< minimum over all positions, continuation included; -infinity for an active model [J]
-    double largest = 0.0;  ///< maximum over the domain, hysteresis included [J]
-    double missed = 0.0;   ///< upper bound of the error of both, from positions between the samples [J]
+    /// Smallest energy over all positions, continuation included; -infinity without a lower bound [J]
+    double least = 0.0;
+    double largest = 0.0;  ///< largest energy over the domain, hysteresis included [J]
+    /// Upper bound of the error of `least` and `largest`: both are computed at finitely many positions [J]
+    double missed = 0.0;
 
     /// Returns an upper bound of the energy that the object can give from any position in its domain [J].
     [[nodiscard]] double span() const noexcept { return largest - least + missed; }

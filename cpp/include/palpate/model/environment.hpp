@@ -9,9 +9,9 @@ namespace palpate {
 /// Force, slope and energy of a virtual object at one position x. The force is that of the object against the tool: a
 /// pressed spring gives force > 0 for position > 0.
 struct EnvironmentSample {
-    double force = 0.0;         ///< f(x) [N or N*m]
+    double force = 0.0;         ///< force f(x) of the virtual object [N or N*m]
     double slope = 0.0;         ///< df/dx, the local stiffness [N/m]
-    double energy = 0.0;        ///< stored energy [J] plus a constant
+    double energy = 0.0;        ///< energy stored in the virtual object, plus a constant [J]
     bool extrapolated = false;  ///< true if x lies outside the data from which the model was identified
 };
 

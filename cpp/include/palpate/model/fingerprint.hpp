@@ -76,7 +76,7 @@ class NumberHash {
     hash.add(domain.period.value_or(0.0));
     hash.add(model.play_radius().value_or(0.0));
     if (model.velocity() != nullptr) {
-        hash.add(std::uint64_t{1});  // the second input is the velocity
+        hash.add(std::uint64_t{1});  // distinguishes a model whose second input is the velocity
     }
     return hash.text();
 }

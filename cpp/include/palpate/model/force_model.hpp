@@ -36,7 +36,7 @@ class ForceModel {
         return ForceModel{VelocityNetwork{std::move(network), std::move(domain)}};
     }
 
-    /// Returns the force law as a variant of all kinds of networks.
+    /// Returns the force law: a network of position, with hysteresis, of position and velocity, or of more inputs.
     [[nodiscard]] const Kind& kind() const noexcept { return kind_; }
     /// Returns the wavelet network of one input, or null if the model is of another kind.
     [[nodiscard]] const WaveletNetwork* network() const noexcept {

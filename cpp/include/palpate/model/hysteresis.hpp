@@ -16,9 +16,9 @@ namespace palpate {
 
 /// Weights of the hysteresis h in a hysteresis network. The hysteresis h and the mean force g use the same wavelets.
 struct HysteresisParameters {
-    std::vector<double> weight;  ///< weights of the wavelets in h [N]
-    double linear = 0.0;         ///< slope of the straight line in h [N/m]
-    double bias = 0.0;           ///< constant in h [N]
+    std::vector<double> weight;  ///< weights of the wavelets in the hysteresis h [N]
+    double linear = 0.0;         ///< slope of the straight line in the hysteresis h [N/m]
+    double bias = 0.0;           ///< constant in the hysteresis h [N]
 };
 
 /// Returns the new position of the play operator of radius r, a slot of width 2r that the position x moves with its

@@ -27,9 +27,10 @@ struct NetworkParameters {
 struct Domain {
     std::vector<double> lower{0.0};             ///< smallest values of the d inputs
     std::vector<double> upper{1.0};             ///< largest values of the d inputs
-    Continuation below = Continuation::Linear;  ///< d = 1: continuation below lower
-    Continuation above = Continuation::Linear;  ///< d = 1: continuation above upper
-    std::optional<double> period;  ///< d = 1: period of a knob that repeats; equals upper - lower
+    Continuation below = Continuation::Linear;  ///< one input (d = 1): continuation below the domain
+    Continuation above = Continuation::Linear;  ///< one input (d = 1): continuation above the domain
+    /// One input (d = 1): length after which a periodic force repeats; equals upper - lower
+    std::optional<double> period;
 };
 
 namespace detail {

@@ -40,7 +40,7 @@ class PiecewiseSeptic {
         }
     }
 
-    /// Returns the index of the cell that contains x, for cells of this width.
+    /// Returns the index of the cell that contains x if all cells have the width `width`.
     [[nodiscard]] static std::int64_t cell(double x, double width) noexcept {
         return std::bit_cast<std::int64_t>(x / width + rounder) - std::bit_cast<std::int64_t>(rounder);
     }
@@ -121,7 +121,8 @@ class PiecewiseSeptic {
     /// bounds of the derivatives.
     [[nodiscard]] std::array<double, 2> rounding(std::size_t k) const noexcept {
         const auto c = coefficients(k);
-        Jet bounds{std::abs(c[0]), 0.0, 0.0, 0.0};  // bounds of value and derivatives by t
+        // Bounds of the polynomial and its derivatives by t = x / h, with the cell width h
+        Jet bounds{std::abs(c[0]), 0.0, 0.0, 0.0};
         for (std::size_t j = 1; j < c.size(); ++j) {
             double term = std::ldexp(std::abs(c[j]), -static_cast<int>(j));
             for (std::size_t d = 1; d <= std::min<std::size_t>(j, 3); ++d) {
@@ -179,7 +180,7 @@ class PiecewiseSeptic {
                 (at(6) + Pair{c[7], 0.0} * u1) * (u2 * Pair{1.0, 7.0} * u4));
     }
 
-    /// Converts the coefficients of a polynomial from powers of t = u / h to powers of u.
+    /// Converts the coefficients of a cell's polynomial from powers of t = u / h to powers of u (cell width h).
     [[nodiscard]] Piece by_x(const Piece& piece) const noexcept {
         Piece scaled = piece;
         double power = 1.0;
@@ -190,7 +191,7 @@ class PiecewiseSeptic {
         return scaled;
     }
 
-    /// Converts value and derivatives by x to value and derivatives by t = x / h.
+    /// Converts derivatives of a function by x to derivatives by t = x / h, with the cell width h.
     [[nodiscard]] Jet by_t(const Jet& jet) const noexcept {
         return {jet[0], jet[1] * width_, jet[2] * (width_ * width_), jet[3] * (width_ * width_ * width_)};
     }

@@ -118,7 +118,7 @@ class RadialEnclosure {
     std::vector<double> radius_;
 };
 
-/// Smallest and largest sampled value of a function, and the test for finished cells.
+/// Smallest and largest computed value of a function, and the test that a cell needs no further division.
 struct SampledRange {
     Interval range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
 

@@ -104,7 +104,7 @@ class RadialSum {
         kernel_.expansion(columns(), middle, radius, sums);
     }
 
-    /// Returns an empty expansion with enough memory for the results of `expand`.
+    /// Returns memory for the terms of Taylor's formula that `expand` computes.
     [[nodiscard]] detail::RadialExpansion expansion() const { return {dimension_, size_}; }
 
   private:
@@ -124,7 +124,7 @@ class RadialSum {
     std::size_t dimension_;
     std::size_t size_;
     std::vector<double> columns_;
-    std::vector<double> box_;  ///< lower edges of the box, then upper edges
+    std::vector<double> box_;  ///< lower ends of the box for all inputs, then the upper ends
 };
 
 }  // namespace palpate

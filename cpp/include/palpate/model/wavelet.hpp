@@ -45,7 +45,7 @@ struct MexicanHat {
 /// gradient.
 struct RadialMexicanHat {
     double value;            ///< (r^2 - d) E
-    double gradient_over_u;  ///< (d + 2 - r^2) E; the gradient is this times u
+    double gradient_over_u;  ///< (d + 2 - r^2) E; its product with u is the gradient
 
     /// Returns the second derivative d^2 psi / du_j^2 for a component u_j = `u` (2 E is `value` + `gradient_over_u`).
     [[nodiscard]] double curvature(double u) const noexcept {

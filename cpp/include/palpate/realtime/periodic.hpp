@@ -23,9 +23,10 @@ inline constexpr Nanoseconds nanoseconds_a_second = 1'000'000'000;
 
 /// One wake-up of a control loop.
 struct Wake {
-    Nanoseconds deadline = 0;   ///< planned time of the wake-up
-    Nanoseconds now = 0;        ///< actual time of the wake-up
-    std::uint64_t skipped = 0;  ///< later deadlines that have also passed; they get no tick
+    Nanoseconds deadline = 0;  ///< planned time of the wake-up
+    Nanoseconds now = 0;       ///< actual time of the wake-up
+    /// Number of later deadlines that had also passed at this wake-up; they get no tick
+    std::uint64_t skipped = 0;
 };
 
 /// Wakes up a loop at the fixed times (deadlines) t_0 + k T, with period T, so that a late tick does not delay later
@@ -61,10 +62,10 @@ class PacedByDevice {
   public:
     explicit PacedByDevice(Nanoseconds period) noexcept : period_{period} {}
 
-    /// Plans the first tick for the present time.
+    /// Sets the planned time of the control loop's first tick to the present time.
     void start() noexcept { last_ = monotonic_now() - period_; }
 
-    /// Returns at once, because `exchange` of the device waits for the sample.
+    /// Returns at once: the control loop waits for the device's sample in `exchange`, not here.
     [[nodiscard]] Wake wait() noexcept {
         const Nanoseconds deadline = last_ + period_;
         last_ = monotonic_now();

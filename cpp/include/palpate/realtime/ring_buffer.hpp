@@ -51,7 +51,8 @@ class RingBuffer {
     [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
 
   private:
-    static constexpr std::size_t cache_line = 64;  ///< distance of data that two cores change [bytes]
+    /// Distance in memory between data that different cores change [bytes]
+    static constexpr std::size_t cache_line = 64;
 
     std::vector<T> slots_;
     std::size_t mask_;

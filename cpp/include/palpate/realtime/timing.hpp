@@ -70,11 +70,11 @@ class DurationHistogram {
     Nanoseconds largest_ = 0;
 };
 
-/// Periods and delays of the wake-ups of a control loop.
+/// Times between the wake-ups of a control loop, and how late the wake-ups were.
 struct LoopTiming {
     DurationHistogram period;    ///< time between two wake-ups
-    DurationHistogram lateness;  ///< time from deadline to wake-up
-    std::uint64_t missed = 0;    ///< deadlines without a tick
+    DurationHistogram lateness;  ///< time from the planned to the actual wake-up
+    std::uint64_t missed = 0;    ///< number of planned ticks that were skipped because the loop was late
     Nanoseconds first = 0;       ///< time of the first wake-up
     Nanoseconds last = 0;        ///< time of the last wake-up
 

@@ -20,7 +20,7 @@ struct Scaled {
     const E& environment;
     double factor;
 
-    /// Returns force, slope and energy of the other environment, multiplied by the factor.
+    /// Returns force, slope and energy of `environment`, multiplied by `factor`.
     [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
         const EnvironmentSample sample = environment.at(x, state);
         return {factor * sample.force, factor * sample.slope, factor * sample.energy, sample.extrapolated};
@@ -42,7 +42,7 @@ class Compensated {
     Compensated(E environment, double coupling_stiffness)
         : environment_{std::move(environment)}, stiffness_{coupling_stiffness} {}
 
-    /// Returns the original environment, which the hand feels through the coupling.
+    /// Returns the virtual object without compensation, which the hand feels through the compensated coupling.
     [[nodiscard]] const E& uncompensated() const noexcept { return environment_; }
     /// Returns the stiffness K_c of the coupling [N/m or N*m/rad].
     [[nodiscard]] double stiffness() const noexcept { return stiffness_; }

@@ -19,7 +19,7 @@ class Direct {
   public:
     explicit Direct(E environment) : environment_{std::move(environment)} { reset(0.0); }
 
-    /// Sets the object at rest at a position.
+    /// Resets the state of the virtual object to that of an object at rest at this position.
     void reset(double position) noexcept { state_ = environment_.start(position); }
 
     /// Returns the force at the measured position.
@@ -43,7 +43,7 @@ class DirectVelocity {
   public:
     DirectVelocity(VelocityNetwork force, double period_s) : force_{std::move(force)}, period_s_{period_s} {}
 
-    /// Sets the object at rest at a position.
+    /// Resets the state of the virtual object to that of an object at rest at this position.
     void reset(double position) noexcept { last_ = position; }
 
     /// Returns the force at the measured position and velocity.
@@ -98,7 +98,7 @@ class HalfSamplePrediction {
         return position + share_ * moved;
     }
 
-    /// Adds a position to the past positions.
+    /// Stores a measured position in place of the oldest stored position.
     void advance(double position) noexcept {
         past_[next_] = position;
         next_ = next_ + 1 == taps_ ? 0 : next_ + 1;
@@ -121,7 +121,7 @@ class PredictedDirect {
         reset(0.0);
     }
 
-    /// Sets the object at rest at a position.
+    /// Resets the state of the virtual object to that of an object at rest at this position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
         prediction_.reset(position);

@@ -52,7 +52,7 @@ class EnergyConsistent {
         reset(0.0);
     }
 
-    /// Returns the slope p of the load line of every step behind the coupling.
+    /// Returns the slope p of the load line that each step solves for an object behind the coupling.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
         return inertia.midpoint_slope(period) + coupling.load_line_slope(period);
@@ -117,7 +117,7 @@ class EnergyConsistent {
             const double moved = y - from;
             const double quotient = mean(y, sample, state);
             if (!switched || (sample.force - quotient) * moved < 0.0) {
-                // D' = (f - D) / (y - from), and half of f' if both are zero.
+                // Slope of the quotient D: D' = (f - D) / (y - from), or f' / 2 for y = from.
                 sample.slope =
                     std::abs(moved) > shortest ? (sample.force - quotient) / moved : 0.5 * sample.slope;
                 sample.force = quotient;
@@ -161,7 +161,7 @@ class EnergyConsistent {
         return {environment_, position_, environment_.at(position_, state_).energy, shortest_, switched};
     }
 
-    /// Returns the solution of the step that a search from the position `start` finds first.
+    /// Returns the first solution of the step's load line that a search from the position `start` finds.
     [[nodiscard]] Solution search(VirtualCoupling coupling, double driving_force,
                                   double start) const noexcept {
         Solution solution =

@@ -122,12 +122,14 @@ class Implicit {
     E environment_;
     VirtualCoupling coupling_;
     double period_;
-    double force_limit_;       ///< F_max [N or N*m]
-    double inertial_;          ///< m/T^2
-    double coupled_slope_;     ///< slope p of the load line with the coupling
-    double uncoupled_slope_;   ///< slope p of the load line without the coupling
-    double coupled_factor_;    ///< factor of y_{k-1} in q: 2m/T^2 + B_o/T + B_c/T
-    double uncoupled_factor_;  ///< factor of y_{k-1} in q without the coupling: 2m/T^2 + B_o/T
+    double force_limit_;      ///< F_max [N or N*m]
+    double inertial_;         ///< m/T^2
+    double coupled_slope_;    ///< slope p of the load line with the coupling
+    double uncoupled_slope_;  ///< slope p of the load line without the coupling
+    /// Factor of the last position y_{k-1} in the load line's q: 2m/T^2 + B_o/T + B_c/T
+    double coupled_factor_;
+    /// Factor of y_{k-1} in the load line's q without the coupling: 2m/T^2 + B_o/T
+    double uncoupled_factor_;
     Solver coupled_;
     Solver uncoupled_;
     typename E::State state_;

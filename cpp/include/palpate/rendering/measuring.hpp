@@ -99,7 +99,8 @@ class Probe {
         const double velocity = (position - last_) / period_ - direction_ * settings_.speed;
         last_ = position;
         const double spring = settings_.stiffness * (position - sweep_);
-        if (std::abs(spring) > settings_.force_limit) {  // the object stops the handle
+        // A real object stops the handle, so the motion reverses
+        if (std::abs(spring) > settings_.force_limit) {
             const double held = std::copysign(settings_.force_limit, spring);
             sweep_ = position - held / settings_.stiffness;
             direction_ = std::copysign(1.0, spring);
@@ -122,10 +123,10 @@ class Probe {
 /// friction from damping: both reduce the motion, but only the damping force grows with speed.
 struct PulseSettings {
     double force = 0.02;    ///< force of a push [N or N*m]; the sign alternates
-    double smaller = 0.6;   ///< force of every second group of three pushes / `force`
+    double smaller = 0.6;   ///< factor of the force in every second group of three pushes [-]
     double push_s = 0.03;   ///< duration of a push [s]
     double rest_s = 0.17;   ///< pause after a push [s]
-    double farthest = 0.2;  ///< farther than this from the start no push acts [m or rad]
+    double farthest = 0.2;  ///< distance from the start position beyond which pushes have no force [m or rad]
 };
 
 /// Renders short pushes on the handle, alternately to either side.
@@ -139,7 +140,7 @@ class Pulses {
         rest_ = static_cast<std::uint64_t>(std::llround(settings.rest_s / period_s));
     }
 
-    /// Starts the pushes at a position.
+    /// Starts the sequence of pushes with the handle at this position.
     void reset(double position) noexcept {
         start_ = position;
         tick_ = 0;

@@ -15,8 +15,8 @@ namespace palpate {
 /// Size of a model's positions and forces, relative to a model that suits the default simulated knob. Default settings
 /// in m, rad, N or N*m are multiplied by these factors; times do not change.
 struct ModelScale {
-    double length = 1.0;  ///< factor of positions, relative to the default knob
-    double force = 1.0;   ///< factor of forces, relative to the default knob
+    double length = 1.0;  ///< factor of all default positions; 1 for the default simulated knob
+    double force = 1.0;   ///< factor of all default forces; 1 for the default simulated knob
 
     /// Returns the factor of stiffnesses: the factor of forces divided by the factor of positions.
     [[nodiscard]] double stiffness() const noexcept { return force / length; }
@@ -24,8 +24,10 @@ struct ModelScale {
 
 namespace detail {
 
-inline constexpr double knob_travel = 0.5;     ///< travel of a model that suits the default knob [rad]
-inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled device / model's largest force
+/// Length of the domain of a model that suits the default simulated knob [rad]
+inline constexpr double knob_travel = 0.5;
+/// Force limit of a simulated device divided by the model's largest force
+inline constexpr double force_reserve = 1.05;
 
 /// Returns the force of a model at a position during a long stroke in a direction, +1 for press and -1 for release. A
 /// model of position and velocity is evaluated at the largest velocity of its domain in that direction.
@@ -68,7 +70,7 @@ inline constexpr double force_reserve = 1.05;  ///< force limit of a scaled devi
     return {length, force};
 }
 
-/// Returns the profile of the default simulated knob, with its numbers multiplied by a model's scale.
+/// Returns the profile of the default simulated knob, with lengths and forces multiplied by a model's scale.
 [[nodiscard]] inline DeviceProfile scaled_knob(const ModelScale& scale, bool is_angle, double period_s) {
     DeviceProfile device;
     device.period_s = period_s;

@@ -37,14 +37,14 @@ struct StructureTraits {
     bool solved = false;                 ///< true: each step solves a load line
     bool velocity = false;               ///< true: can render a force of position and velocity
     bool predicts = false;               ///< true: can compute the force at a predicted position
-    bool may_reduce_hysteresis = false;  ///< true: may dissipate less energy than the hysteresis
+    bool may_reduce_hysteresis = false;  ///< true: may dissipate less energy than the model's hysteresis
 };
 
 /// Numbers from which a structure is built; the environment is given separately.
 struct StructureNumbers {
     VirtualCoupling coupling;
     Inertia inertia;
-    int predict = 0;            ///< number of past samples of the prediction
+    int predict = 0;            ///< number of past positions from which the prediction is computed
     double period_s = 1e-3;     ///< period T [s]
     double force_limit = 0.0;   ///< force limit [N or N*m]; infinity without a limit
     double finest_width = 0.0;  ///< width of the model's finest wavelet [m or rad]

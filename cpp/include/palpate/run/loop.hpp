@@ -31,7 +31,8 @@ struct LoopSettings {
 
 inline constexpr double lowest_rate_hz = 100.0;
 inline constexpr double highest_rate_hz = 10'000.0;
-inline constexpr double held_rate_share = 0.99;  ///< a rate below this share of rate_hz is reported
+/// Smallest measured rate / rate_hz that is not reported as too low [-]
+inline constexpr double held_rate_share = 0.99;
 
 /// Checks the settings of a control loop. Throws std::invalid_argument with the wrong field, its value and the rule.
 inline void validate(const LoopSettings& settings) {
@@ -48,7 +49,7 @@ inline void validate(const LoopSettings& settings) {
 enum class ExitReason : std::uint8_t {
     TimeUp,
     StopRequested,
-    Guard,        ///< a guard found a wrong sample or force
+    Guard,        ///< a guard found a wrong position or force
     DeviceFault,  ///< the device reported a fault or did not respond
     RateTooLow,
     NotCertified,  ///< the time between two ticks was longer than certified
@@ -63,9 +64,9 @@ enum class ExitReason : std::uint8_t {
 struct LoopProgress {
     std::atomic<std::uint64_t> ticks{0};
     std::atomic<std::uint64_t> missed{0};
-    std::atomic<std::uint64_t> lost{0};     ///< lost samples of the device
+    std::atomic<std::uint64_t> lost{0};     ///< number of the device's samples that did not arrive
     std::atomic<double> position{0.0};      ///< position of the handle [m or rad]
-    std::atomic<double> force{0.0};         ///< force on the handle [N or N*m]
+    std::atomic<double> force{0.0};         ///< force sent to the device [N or N*m]
     std::atomic<double> object_force{0.0};  ///< force of a real object on the handle [N or N*m]
     RateCheck rate;
 };
@@ -81,7 +82,8 @@ struct LoopReport {
     double given_in_ramp = 0.0;  ///< largest net energy that the motor gave during the start ramp [J]
     double given = 0.0;          ///< largest net energy that the motor gave after the start ramp [J]
     double most_stored = 0.0;    ///< upper bound of the energy stored in the object, above its minimum [J]
-    std::uint64_t limit_cycles = 0;  ///< detected limit cycles; each scaled all later forces down
+    /// Number of detected limit cycles; each multiplied all later forces by 0.7
+    std::uint64_t limit_cycles = 0;
 };
 
 /// Returns the record of a tick for a recording; `first` is the time of the first wake-up [ns].
@@ -131,7 +133,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
     const auto deadlines = static_cast<std::uint64_t>(
         std::clamp(std::round(settings.duration_s * settings.rate_hz), 1.0, most_ticks));
     std::uint64_t bad_in_a_row = 0;
-    (void)controller.start();  // the first tick checks the first sample
+    (void)controller.start();  // status ignored here: the first tick checks the first reading
     clock.start();
     for (bool running = true; running;) {
         const Wake wake = clock.wait();
@@ -140,7 +142,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
         report.timing.add(wake);
         if (too_late) {
             report.exit_reason = ExitReason::NotCertified;
-            break;  // no further tick: the device already held the last force for too long
+            break;  // no further tick: the device held the last force for longer than the certificate allows
         }
         const Tick tick = controller.tick();
         const TickRecord record = record_of(tick, wake, report.timing.first);

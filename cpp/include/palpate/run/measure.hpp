@@ -24,7 +24,8 @@ namespace palpate {
 struct MeasureOptions : RunOptions {
     RecordUnits units;
     bool probe = false;  ///< true: the device moves the handle slowly between lower and upper
-    std::optional<double> lower, upper, speed, stiffness, force_limit;  ///< settings of the probe
+    /// Settings of the slow motion; unset: default values scaled to the device
+    std::optional<double> lower, upper, speed, stiffness, force_limit;
     std::optional<double> push;   ///< force of short pushes to either side [N or N*m]
     bool keep = false;            ///< true: return every tick with the summary
     bool transducer = true;       ///< true: the simulated device has a force transducer

@@ -63,7 +63,7 @@ namespace detail {
                       " late echoes; " + number(health.timeouts) + " timeouts, " + number(health.stalls) +
                       " stalls, " + number(health.bus_errors) + " bus errors, " +
                       number(stream.watchdog_trips) + " watchdog trips"}}};
-    if (stream.delay.count() > 0) {  // a disabled device may refuse all commands
+    if (stream.delay.count() > 0) {  // without a confirmed command there are no delays to report
         report.fields.push_back({"round_trip", fields(stream.round_trip)});
         report.fields.push_back({"delay", fields(stream.delay)});
         report.fields.push_back(
@@ -92,8 +92,8 @@ namespace detail {
                                                           const PlannedModel& model) {
     UsbOptions usb = detail::usb_options(options);
     if (!options.uncertified && model.certificate) {
-        usb.longest_delay_s =
-            model.certificate->device.delay_s;  // the certificate does not hold for a longer delay
+        // The certificate does not hold if the delay is longer than the certified delay
+        usb.longest_delay_s = model.certificate->device.delay_s;
     }
     auto live = std::make_unique<LiveDeviceOf<UsbDevice>>(UsbDevice{std::move(usb)}, detail::usb_report);
     if (const Opened opened = live->open(); !opened) {

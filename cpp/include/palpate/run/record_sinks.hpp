@@ -18,7 +18,7 @@ struct Range {
     double lower = std::numeric_limits<double>::quiet_NaN();
     double upper = std::numeric_limits<double>::quiet_NaN();
 
-    /// Adds a value: extends the range if the value is outside.
+    /// Adds a value to those whose smallest and largest value are stored.
     void add(double value) noexcept {
         lower = std::fmin(lower, value);
         upper = std::fmax(upper, value);
@@ -33,7 +33,7 @@ struct RecordSinks {
     bool keeps = false;        ///< true if every tick is kept in memory
     bool real_object = false;  ///< true if the recorded force is that of a real object
 
-    /// Processes the records of some ticks, in the order of time.
+    /// Writes and sends the records of some ticks, in the order of time.
     void take(std::span<const TickRecord> ticks) noexcept {
         if (real_object) {
             recorded_.assign(ticks.begin(), ticks.end());
@@ -56,8 +56,9 @@ struct RecordSinks {
         }
     }
 
-    Range positions;                 ///< range of the handle's positions [m or rad]
-    Range forces;                    ///< range of the sent force, or of the force of a real object [N or N*m]
+    Range positions;  ///< smallest and largest position of the handle [m or rad]
+    /// Smallest and largest sent force, or force of a real object [N or N*m]
+    Range forces;
     std::uint64_t extrapolated = 0;  ///< number of ticks with a position outside the model's domain
 
   private:

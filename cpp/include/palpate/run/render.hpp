@@ -71,7 +71,7 @@ struct RenderOptions : RunOptions {
     double frozen_s = GuardSettings{}.frozen_s;
     bool energy_tank = true;
     bool uncertified = false;
-    std::vector<std::string> faults;  ///< faults of the simulated device
+    std::vector<std::string> faults;  ///< faults that the simulated device makes on request, for tests
 };
 
 template <>
@@ -140,7 +140,8 @@ namespace detail {
 [[nodiscard]] inline std::string certificate_mismatch(const RenderOptions& options, const PlannedModel& model,
                                                       const DeviceProfile& device) {
     const auto differs = [](double certified, double measured) {
-        constexpr double rounding = 1e-6;  // allowed relative rounding of a handwritten profile
+        // Largest relative difference of two numbers that counts as rounding of a handwritten profile
+        constexpr double rounding = 1e-6;
         return std::abs(certified - measured) > rounding * std::abs(measured);
     };
     if (!model.certificate) {
@@ -208,7 +209,7 @@ inline void apply_certificate(const Certificate& certificate, GuardSettings& gua
     loop.longest_period_s = certificate.longest_period_s;
 }
 
-/// Opens telemetry and recording. Returns a note if an interrupted earlier recording was renamed, otherwise "".
+/// Opens telemetry and recording. Returns a note if it renamed an earlier interrupted recording, otherwise "".
 inline std::string open_sinks(const RunOptions& options, const RecordUnits& units, const Metadata& metadata,
                               RecordSinks& sinks) {
     if (options.telemetry_port) {

@@ -26,17 +26,18 @@ namespace palpate {
 struct SessionSettings {
     LoopSettings loop{};
     RealTimeOptions real_time{};
-    std::chrono::milliseconds hand_over_every{20};  ///< interval at which records are written
-    double ring_s = 10.0;                           ///< recorded time that fits into the ring buffer [s]
-    std::size_t last_ticks = 500;                   ///< number of ticks saved to NAME.fault.csv after a fault
+    /// Interval at which tick records are written to the file
+    std::chrono::milliseconds hand_over_every{20};
+    double ring_s = 10.0;          ///< time whose tick records fit into the ring buffer [s]
+    std::size_t last_ticks = 500;  ///< number of ticks saved to NAME.fault.csv after a fault
 };
 
 /// State of a running session, for messages to the user.
 struct SessionView {
     const LoopProgress& progress;
     const std::vector<std::string>*
-        refused;     ///< requests that the system refused; null before they were made
-    int disk_error;  ///< error number of a failed write of the recording; 0 without
+        refused;     ///< messages on real-time requests that the system refused; null before the requests
+    int disk_error;  ///< system error number of a failed write of the recording; 0 without an error
 };
 
 /// Result of a session: result of the control loop, and its last ticks.
@@ -76,7 +77,8 @@ template <class Control>
     const auto period = static_cast<Nanoseconds>(std::llround(1e9 / settings.loop.rate_hz));
     const auto capacity = static_cast<std::size_t>(settings.ring_s * settings.loop.rate_hz) + 1;
     SessionReport report;
-    const auto loop_report = std::make_unique<LoopReport>();  // on the heap, because it is large
+    // The report is on the heap, because it is large
+    const auto loop_report = std::make_unique<LoopReport>();
     LoopProgress progress;
     std::atomic<bool> privileges_known{false};
     std::atomic<bool> finished{false};

@@ -21,14 +21,14 @@ namespace palpate {
 
 /// A defect of a run: a sentence with the measured value, the likely cause and the cure.
 struct SessionFinding {
-    std::string_view level;  ///< "usable", or "no" for an unusable result
+    std::string_view level;  ///< verdict on a run with this defect: "usable" or "no"
     std::string sentence;
 };
 
 /// Properties of a run that are needed to judge it.
 struct SessionExpectation {
     bool recorded = false;      ///< true if a recording was requested
-    double encoder_step = 0.0;  ///< encoder step of the device [m or rad]; 0 without
+    double encoder_step = 0.0;  ///< encoder step of the device [m or rad]; 0: the encoder has no steps
     Range domain{};             ///< domain of the rendered model [m or rad]; NaN for a real object
     std::string position_unit{};
     std::vector<std::string> warnings{};  ///< warnings of `finish_record`
@@ -36,10 +36,14 @@ struct SessionExpectation {
 
 namespace detail {
 
-inline constexpr double tolerated_loss = 0.001;     ///< largest good share of lost deadlines, samples or rows
-inline constexpr double tolerated_change = 0.01;    ///< largest good share of ticks with a changed force
-inline constexpr double fewest_encoder_steps = 50;  ///< least travel of a good recording [encoder steps]
-inline constexpr double smallest_domain_share = 0.1;  ///< least travel of a good rendering / domain [-]
+/// Largest share of missed ticks, lost samples or lost rows in a run with the verdict good
+inline constexpr double tolerated_loss = 0.001;
+/// Largest share of ticks in which guards changed the force, for the verdict good
+inline constexpr double tolerated_change = 0.01;
+/// Smallest travel of the handle in a good recording of a real object [encoder steps]
+inline constexpr double fewest_encoder_steps = 50;
+/// Smallest share of the domain that a good rendering covers [-]
+inline constexpr double smallest_domain_share = 0.1;
 
 /// Returns a part of a whole as a text such as "12 of 1000 (1.2 %)".
 [[nodiscard]] inline std::string share_text(std::uint64_t part, std::uint64_t whole) {

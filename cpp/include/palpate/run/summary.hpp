@@ -35,10 +35,11 @@ struct Summary {
     std::uint64_t telemetry_dropped = 0;
     Range positions;
     Range forces;
-    std::vector<TickRecord> kept;       ///< records of all ticks, if they are kept
-    std::vector<std::string> notes;     ///< messages from before the run
+    std::vector<TickRecord> kept;       ///< records of all ticks; empty unless the caller requires them
+    std::vector<std::string> notes;     ///< messages to the user from the time before the run
     std::vector<std::string> warnings;  ///< warnings about the recording
-    std::string last_ticks;             ///< message on the file of the last ticks; empty without a fault
+    /// Message on the file NAME.fault.csv of the last ticks; empty without a fault
+    std::string last_ticks;
     std::vector<SessionFinding> findings;
     std::string device;
     DeviceReport device_report;

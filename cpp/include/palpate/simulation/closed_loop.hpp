@@ -53,16 +53,16 @@ std::size_t closed_loop(D& device, S structure, const Guards& guards, std::size_
 /// Start position, integration and guards of a simulated run with an energy account.
 struct ClosedLoopSettings {
     int substeps = usual_substeps;  ///< integration steps in a tick
-    double start_position = 0.0;    ///< of the handle [m or rad]
-    double start_velocity = 0.0;    ///< of handle and hand [m/s or rad/s]
-    Guards guards{};                ///< default: only the device's force limit
+    double start_position = 0.0;    ///< start position of the handle [m or rad]
+    double start_velocity = 0.0;    ///< start velocity of handle and hand [m/s or rad/s]
+    Guards guards{};                ///< guards of the rendering; by default only the device's force limit
 };
 
 /// Energies and motion at the end of a simulated run.
 struct ClosedLoopEnd {
     EnergyAccount energy;
-    Motion at_first_force;  ///< motion of the handle when the first force acts on it
-    Motion handle;          ///< motion of the handle at the end
+    Motion at_first_force;  ///< position and velocity of the handle when the first force acts on it
+    Motion handle;          ///< position and velocity of the handle at the end
     std::size_t ticks = 0;  ///< number of ticks
 };
 

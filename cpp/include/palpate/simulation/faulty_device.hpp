@@ -20,11 +20,11 @@ namespace palpate {
 /// Kinds of simulated faults in the exchange between the host and a device.
 enum class FaultKind : std::uint8_t {
     Late,        ///< no sample arrives in time
-    Lost,        ///< one sample is missing
+    Lost,        ///< one sample of the device is missing
     Repeated,    ///< the device sends the last sample again
     NotANumber,  ///< the position is NaN
-    Frozen,      ///< the encoder repeats its last position
-    Jump,        ///< the position has an error of `jump`
+    Frozen,      ///< the encoder reports its last position again and again
+    Jump,        ///< the reported position has the error `jump`
     Saturated,   ///< the device applies half of the force and reports Limited
     Gone,        ///< the device reports Fault and makes no force until the end
 };

@@ -25,11 +25,12 @@ namespace palpate {
 /// The error `end` is small also for a force that wrongly leads the motion. The error `mean` is not, so it describes
 /// the error that a hand feels, because a hand is slow compared with the sample rate.
 struct ForceError {
-    double end = 0.0;      ///< RMS error at the end of the tick [N or N*m]
-    double instant = 0.0;  ///< RMS error at the sampling time [N or N*m]
-    double mean = 0.0;     ///< RMS of the mean error over a tick [N or N*m]
-    double band = 0.0;     ///< RMS of the mean error below 50 Hz [N or N*m]
-    double work = 0.0;     ///< work of the error [J]
+    double end = 0.0;  ///< RMS error of the rendered force at the end of the tick [N or N*m]
+    /// RMS error of the rendered force for the position at the start of the tick [N or N*m]
+    double instant = 0.0;
+    double mean = 0.0;  ///< RMS of the error of the rendered force, averaged over each tick [N or N*m]
+    double band = 0.0;  ///< RMS of the tick averages of the error, below 50 Hz [N or N*m]
+    double work = 0.0;  ///< work of the force error on the handle [J]
 };
 
 /// Largest frequency of the band-limited force error [Hz].

@@ -121,8 +121,10 @@ namespace palpate {
     live->profile = rig.device;
     live->scale = rig.scale;
     live->rate_hz = options.loop.rate_hz;
-    live->metadata = {{"simulated", "yes: device, hand and object; no value was measured"},
-                      {"device", rig.device.id}};
+    live->metadata = {
+        {"simulated",
+         "yes: the device, the hand and the object are simulated, and no value was measured on hardware"},
+        {"device", rig.device.id}};
     live->simulated = true;
     live->transducer = transducer;
     return live;

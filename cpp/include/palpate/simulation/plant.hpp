@@ -74,8 +74,10 @@ struct EnergyAccount {
     double hand = 0.0;        ///< work of the hand on the handle [J]
     double motor = 0.0;       ///< work of the handle against the motor [J]
     double dissipated = 0.0;  ///< energy lost by damping and friction [J]
-    double throughput = 0.0;  ///< sum of |work| of hand and motor, for rounding [J]
-    double least = 0.0;       ///< smallest hand + 1e-12 throughput so far [J]
+    /// Sum of the absolute work of hand and motor, for a bound of rounding errors [J]
+    double throughput = 0.0;
+    /// Smallest value since the start of: work of the hand + 1e-12 `throughput` [J]
+    double least = 0.0;
 };
 
 /// The midpoint rule, an integrator with an exact energy account. For a handle and hand of total mass M, with the mean
@@ -130,7 +132,8 @@ class Midpoint : public PlainPlant {
     [[nodiscard]] const EnergyAccount& account() const noexcept { return account_; }
 
   private:
-    static constexpr double rounding = 1e-12;  ///< bound of rounding errors / throughput
+    /// Bound of the rounding errors of the energies, divided by `throughput`
+    static constexpr double rounding = 1e-12;
 
     void stop(const Mechanics& handle, const Grip& grip, double applied, Motion& motion) noexcept {
         const double pull = grip.push + grip.stiffness * (grip.target - motion.position);

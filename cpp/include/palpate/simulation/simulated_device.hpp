@@ -103,7 +103,7 @@ class SimulatedHandle {
         return step > 0.0 ? step * std::round(limited / step) : limited;
     }
 
-    /// Stores the force commanded in this tick until the delay is over.
+    /// Stores the force commanded in this tick until the device's delay has passed and the motor applies it.
     void pend(double force) noexcept {
         const auto delay = static_cast<std::size_t>(profile_.whole_delay_samples());
         pending_[(tick_ + delay) % pending_.size()] = force;
@@ -112,7 +112,7 @@ class SimulatedHandle {
         return pending_[tick % pending_.size()];
     }
 
-    /// Moves the handle against the motor's force for a share of the tick.
+    /// Integrates the motion of the handle with a constant motor force over the part `share` of the tick.
     void move(const Grip& grip, double force, double share, int substeps) noexcept {
         applied_ = force;
         plant_.tick({profile_.inertia, profile_.viscous_damping, profile_.coulomb_friction}, grip, applied_,
@@ -128,7 +128,8 @@ class SimulatedHandle {
     double applied_ = 0.0;
     double last_reading_ = 0.0;
     std::uint64_t tick_ = 0;
-    std::array<double, longest_delay_samples + 2> pending_{};  ///< delayed forces, by tick
+    /// Commanded forces that the motor has not yet applied
+    std::array<double, longest_delay_samples + 2> pending_{};
 };
 
 /// Simulated device whose hand moves the handle back and forth, for demonstrations, tests and examples.

@@ -119,11 +119,12 @@ namespace detail {
 
 /// Returns the metadata about the simulated device and hand for a flight record.
 [[nodiscard]] inline Metadata simulated_metadata(const TestRig& rig) {
-    return {{"simulated", "yes: device and hand; no value was measured"},
-            {"device", rig.device.id},
-            {"hand", "spring " + readable(rig.hand.stiffness) + ", damper " + readable(rig.hand.damping) +
-                         ", to a point between " + readable(rig.hand.lower) + " and " +
-                         readable(rig.hand.upper) + " at " + readable(rig.hand.frequency_hz) + " Hz"}};
+    return {
+        {"simulated", "yes: the device and the hand are simulated, and no value was measured on hardware"},
+        {"device", rig.device.id},
+        {"hand", "spring " + readable(rig.hand.stiffness) + ", damper " + readable(rig.hand.damping) +
+                     ", to a point between " + readable(rig.hand.lower) + " and " + readable(rig.hand.upper) +
+                     " at " + readable(rig.hand.frequency_hz) + " Hz"}};
 }
 
 }  // namespace palpate

@@ -58,12 +58,13 @@ class CertifiedSolver {
     /// positions around it in which F is smooth.
     struct Memory {
         double position = 0.0;    ///< solution of the last call [m]
-        double at_zero = 0.0;     ///< position that the last tangent predicts for q = 0 [m]
+        double at_zero = 0.0;     ///< position at which the tangent to F at the last solution is zero [m]
         double compliance = 0.0;  ///< 1 / F' at the last solution [m/N]
         /// Lower end of the interval around the last solution in which F is smooth; low > high: no prediction [m]
         double low = std::numeric_limits<double>::infinity();
-        double high = -std::numeric_limits<double>::infinity();  ///< upper end of this interval [m]
-        double curvature = 0.0;  ///< c = max|F''| / (2 min F') of the cell of the last solution
+        /// Upper end of the interval around the last solution in which F is smooth [m]
+        double high = -std::numeric_limits<double>::infinity();
+        double curvature = 0.0;  ///< c = max|F''| / (2 min F') over the cell that contains the last solution
         double play = 0.0;       ///< position of the play operator at the last solution [m]
 
         Memory() = default;
@@ -158,12 +159,12 @@ class CertifiedSolver {
         NetworkParameters hysteresis;
     };
 
-    /// Result of one Newton step.
+    /// Result of one step of Newton's method.
     struct Trial {
         double position;
         double correction;
-        double compliance;  ///< 1 / F' at the evaluated position [m/N]
-        double steepest;    ///< largest F' of all sheets at the evaluated position [N/m]
+        double compliance;  ///< 1 / F' at the position of the evaluation [m/N]
+        double steepest;    ///< largest slope of press force, release force and sticking force, plus p [N/m]
         EnvironmentSample sample;
     };
 
@@ -202,7 +203,7 @@ class CertifiedSolver {
         return std::max(std::min(a, b), std::min(std::max(a, b), c));
     }
 
-    /// Returns true if the cell contains positions that leave the play operator at its position `play`.
+    /// Returns true if the cell contains positions for which the play operator does not move from `play`.
     [[nodiscard]] bool may_stick(const Cell& cell, double play) const noexcept {
         return radius_ > 0.0 && cell.low < play + radius_ && cell.high > play - radius_;
     }
@@ -222,7 +223,7 @@ class CertifiedSolver {
         return border.force + s * border.hysteresis + p * y;
     }
 
-    /// Returns cell k moved by `turn_offset` (whole periods of a periodic force).
+    /// Returns cell k moved by the distance `turn_offset`, whole repeat lengths of a periodic force.
     [[nodiscard]] Cell cell_at(std::size_t k, double turn_offset) const noexcept {
         return {k == 0 ? -infinity : borders_[k - 1].position + turn_offset,
                 k == borders_.size() ? infinity : borders_[k].position + turn_offset,
@@ -352,7 +353,7 @@ class CertifiedSolver {
             double turns = std::floor((line.intercept - first.force - line.slope * first.position) /
                                       (line.slope * period_));
             turn_offset = turns * period_;
-            // Hysteresis or rounding can place the solution some periods away from the computed one.
+            // Hysteresis or rounding can move the solution by some repeat lengths of a periodic force.
             constexpr int farthest = 4;
             for (int k = 0; k < farthest && !lies_below(first); ++k) {
                 turn_offset = --turns * period_;
@@ -544,10 +545,10 @@ class CertifiedSolver {
     double radius_;     ///< play radius r; 0 without hysteresis [m]
     double by_radius_;  ///< 1 / r; 0 without hysteresis [1/m]
     double travel_;
-    double period_;     ///< period of the force; 0 if the force is not periodic [m]
+    double period_;     ///< repeat length of a periodic force; 0 if the force is not periodic [m]
     double tolerance_;  ///< largest error of the solution's position [m]
     double least_slope_ =
-        infinity;  ///< smallest load-line slope p for which (C) is proved in every cell [N/m]
+        infinity;  ///< smallest load-line slope p for which F is proved to rise in every cell [N/m]
     std::vector<Border> borders_;
 };
 

@@ -30,22 +30,23 @@ struct RisingForce {
     const NetworkParameters& network;
     double p = 0.0;
     Interval positions;
-    Interval values;           ///< F at both ends of `positions`
-    bool folds_below = false;  ///< true: F falls below the lower end; false: F also rises there
-    bool folds_above = false;  ///< true: F falls above the upper end
+    Interval values;           ///< values of F(y) = f(y) + p y at both ends of `positions`
+    bool folds_below = false;  ///< true: F falls with y below the lower end of `positions`
+    bool folds_above = false;  ///< true: F falls with y above the upper end of `positions`
 };
 
 /// Table of polynomials of degree 7 that gives the position y for a value q = F(y) of a rising function F, with a
 /// proved error.
 struct InverseTable {
-    Interval values{std::numeric_limits<double>::infinity(),
-                    -std::numeric_limits<double>::infinity()};  ///< smallest and largest value q of the table
-    Interval positions;                                         ///< positions y for both values
-    double error = 0.0;  ///< proved bound of the position error |y - F^-1(q)|
+    /// Smallest and largest q for which the table contains the solution of F(y) = q
+    Interval values{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+    /// Solutions y for the smallest and the largest q
+    Interval positions;
+    double error = 0.0;  ///< proved bound of the error of the position y with F(y) = q
     PiecewiseSeptic table;
 
     [[nodiscard]] bool empty() const noexcept { return table.empty(); }
-    /// Returns true if the table contains the value q.
+    /// Returns true if the table contains the solution of F(y) = q.
     [[nodiscard, gnu::always_inline]] inline bool covers(double q) const noexcept {
         return q >= values.lower && q <= values.upper;
     }

@@ -54,9 +54,9 @@ struct Bracket {
 /// solution in this direction. A slow motion would reach the same solution.
 struct LoadLineSolver {
     int max_evaluations = 64;  ///< number of evaluations of the force after which the search stops
-    double tolerance = 1e-13;  ///< largest accepted |residual / slope| / (1 + |y|)
-    double longest_step =
-        std::numeric_limits<double>::infinity();  ///< largest change of y without a bracket [m]
+    double tolerance = 1e-13;  ///< largest accepted |residual / slope of the residual| / (1 + |y|)
+    /// Largest change of y in a step while no interval is known to contain the solution [m]
+    double longest_step = std::numeric_limits<double>::infinity();
 
     using Memory = WarmStart;
 
@@ -91,7 +91,7 @@ struct LoadLineSolver {
                                  double start, Bracket bracket) const noexcept {
         Solution at = search(environment, state, line, start, bracket);
         if (at.status == Status::NotUnique) {
-            at.status = Status::Ok;  // the solution is an end of the bracket
+            at.status = Status::Ok;  // the solution found is an end of the interval `bracket`
         }
         return at;
     }

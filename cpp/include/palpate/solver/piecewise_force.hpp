@@ -24,8 +24,8 @@ struct PiecewiseForce {
     double lower = 0.0;
     double upper = 0.0;
     bool periodic = false;
-    std::vector<OuterLine> below;  ///< straight lines below the domain, the nearest first
-    std::vector<OuterLine> above;  ///< straight lines above the domain, the nearest first
+    std::vector<OuterLine> below;  ///< straight lines of the force below the domain, beginning at the domain
+    std::vector<OuterLine> above;  ///< straight lines of the force above the domain, beginning at the domain
 };
 
 namespace detail {

@@ -28,9 +28,12 @@ struct Branch {
     Interval values{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     Interval positions{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     InverseTable table;
-    double line_slope = 0.0;      ///< slope p + f' if F is a straight line; otherwise 0 [N/m]
-    double curvature_low = 0.0;   ///< |f''| at the lower end if F falls below it; else 0
-    double curvature_high = 0.0;  ///< |f''| at the upper end if F falls above it; else 0
+    /// Slope p + f' if F is a straight line over the interval; otherwise 0 [N/m]
+    double line_slope = 0.0;
+    /// |f''| at the lower end of the interval if F falls below this end; else 0
+    double curvature_low = 0.0;
+    /// |f''| at the upper end of the interval if F falls above this end; else 0
+    double curvature_high = 0.0;
 
     /// Returns the position y with F(y) = q if F is a straight line over this interval, computed from a finite end of
     /// the interval.
@@ -72,8 +75,9 @@ class Resolvent {
     /// State between two calls of `solve`: the branch of the last solution, and the state of `CertifiedSolver`.
     struct Memory {
         CertifiedSolver::Memory newton;
-        std::size_t branch = 0;  ///< index of the branch; 0: unknown
-        double turns = 0.0;      ///< whole periods from the first branches to the position
+        std::size_t branch = 0;  ///< index of the branch with the last solution; 0: no branch found yet
+        /// Number of repeat lengths of the force from the first branches to the position
+        double turns = 0.0;
 
         Memory() = default;
         explicit Memory(double position) noexcept : newton{position} {}
@@ -88,7 +92,7 @@ class Resolvent {
     Resolvent(const NetworkCurve& curve, double p, const ResolventOptions& options = {})
         : Resolvent{piecewise(curve), p, options} {}
 
-    /// Returns true if at least one branch has a table.
+    /// Returns true if at least one branch (interval of rising F) has a table of solutions.
     [[nodiscard]] bool tabulated() const noexcept { return cells() > 0; }
     [[nodiscard]] std::size_t cells() const noexcept {
         std::size_t sum = 0;
@@ -271,7 +275,7 @@ class Resolvent {
     void find_branch(double q, Memory& memory) const noexcept {
         const double turn = slope_ * period_;
         if (repeats_) {
-            // Skips whole periods of the force that do not contain a solution.
+            // Skips repeat lengths of the periodic force that do not contain a solution.
             if (q > highest_ + memory.turns * turn) {
                 memory.branch = 1;
                 memory.turns = std::ceil((q - highest_) / turn);
@@ -375,8 +379,10 @@ class Resolvent {
     double slope_;
     double period_;
     bool repeats_ = false;
-    double highest_ = -std::numeric_limits<double>::infinity();  ///< largest F of the first period [N]
-    double lowest_ = std::numeric_limits<double>::infinity();    ///< smallest F of the first period [N]
+    /// Largest F over the first repeat length of a periodic force [N]
+    double highest_ = -std::numeric_limits<double>::infinity();
+    /// Smallest F over the first repeat length of a periodic force [N]
+    double lowest_ = std::numeric_limits<double>::infinity();
     std::vector<Branch> branches_ = std::vector<Branch>(1);
 };
 

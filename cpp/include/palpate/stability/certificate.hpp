@@ -28,7 +28,8 @@ namespace palpate {
 
 /// Result of a certificate.
 enum class Verdict : std::uint8_t {
-    Certified,      ///< proved: no motion of the handle can get more energy from the device than it gave
+    /// Proved: no motion of the handle can get more energy from the device than the motion gave
+    Certified,
     StableLocally,  ///< the linearised system is stable; nothing is proved about energy
     Refused,
 };
@@ -78,7 +79,8 @@ void hash_value(NumberHash& hash, const T& value) {
         for_each_field<T>([&](const auto& field) {
             const auto& part = field.of(value);
             if constexpr (is_optional<std::remove_cvref_t<decltype(part)>>) {
-                if (part) {  // an optional field without a value is left out, so older fingerprints remain valid
+                // An optional field without a value is not hashed, so older fingerprints of a scheme remain valid
+                if (part) {
                     hash.add(std::string_view{field.name});
                     hash_value(hash, *part);
                 }

@@ -181,14 +181,14 @@ inline constexpr double usual_coupling_share = 0.95;
     if (detail::limit_acts(device)) {
         lines.push_back(detail::coupling_inequality(coupling, 0.0, device));
         lines.push_back(detail::unknown("falling-slope-limit",
-                                        "falling force on a virtual object with mass, with a force limit",
+                                        "slope of a falling force with object mass and force limit",
                                         "proved only for s_ <= 2 B_o / T", damped, bounds.falling(),
                                         "use the energy-consistent structure"));
         lines.push_back(detail::uniqueness(uncoupled, bounds.falling(), "m / T^2 + B_o / T > s_"));
         detail::add_no_quantisation_of_a_mass(lines, bounds, device);
         return lines;
     }
-    lines.push_back({"falling-slope-coupling", "falling force behind the coupling",
+    lines.push_back({"falling-slope-coupling", "slope of a falling force behind the coupling",
                      "K_c + (B_c + 2 B_o) / T >= s_", coupled + damped, bounds.falling(), Basis::Proved,
                      "docs/certificate.md"});
     lines.push_back(detail::coupling_inequality(coupling, std::max(0.0, bounds.falling() - damped), device));

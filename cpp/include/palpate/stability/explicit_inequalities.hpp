@@ -46,8 +46,9 @@ namespace palpate {
                                           double period_s, int delay_samples) noexcept {
     constexpr int frequencies = 512;
     constexpr int slope_steps = 32;
-    constexpr int halvings = 20;     // halvings of the distance between samples
-    constexpr double lowest = 1e-4;  // lowest frequency [rad per sample]
+    // Number of times the search halves the distance between the tried frequencies and slopes
+    constexpr int halvings = 20;
+    constexpr double lowest = 1e-4;  // lowest tried frequency, angular frequency times T [rad]
     const double octaves = std::log(std::numbers::pi / lowest);
     const auto need = [&](double along, double slope) noexcept {
         return explicit_need_at(lowest * std::exp(octaves * along), slope, inertia, coupling, period_s,
@@ -104,8 +105,8 @@ namespace palpate {
          2.0 * inertia.mass, damping * T, Basis::Linear, poles, true},
         {"explicit-damping-positive", "positive damping of object and coupling", "B_o + B_c > 0", damping,
          0.0, Basis::Linear, poles, true},
-        {"explicit-falling-slope", "falling force behind the coupling", "K_c > s_", coupling.stiffness,
-         bounds.falling(), Basis::Linear, poles, true},
+        {"explicit-falling-slope", "slope of a falling force behind the coupling", "K_c > s_",
+         coupling.stiffness, bounds.falling(), Basis::Linear, poles, true},
         {"explicit-port-damping", "viscous damping for the linearised rendering",
          "b >= max T Re{(1 - 1/z) H} / (2 - 2 cos theta)", device.viscous_damping,
          device.longest_period_s() / T * explicit_need(slopes, inertia, coupling, T, device.late_samples()),

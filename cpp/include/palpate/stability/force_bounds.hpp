@@ -62,7 +62,7 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
                               Rule::NotNegative},
     Field<&ForceBounds::hysteresis>{"hysteresis", "True if the model has hysteresis.", Rule::Any, false}};
 
-/// Returns true if every bound is finite. Bounds that are not finite cannot be certified.
+/// Returns true if every bound of the force is finite. A model with an infinite bound cannot be certified.
 [[nodiscard]] inline bool finite(const ForceBounds& bounds) noexcept {
     bool all = true;
     for_each_field<ForceBounds>(
@@ -189,7 +189,7 @@ struct SlopeReading {
              {std::pair{g.below(), h.below()}, std::pair{g.above(), h.above()}}) {
             const Interval slopes = line_slopes(line);
             const double hysteresis_slope = std::abs(hysteresis.at_edge.slope);
-            if (std::isfinite(hysteresis.reach)) {  // the hysteresis decreases to zero
+            if (std::isfinite(hysteresis.reach)) {  // outside the domain the hysteresis decreases to zero
                 bounds.hysteresis_force.lower = std::min(bounds.hysteresis_force.lower, 0.0);
             }
             const double stick = std::max(0.0, hysteresis.at_edge.value) / radius;

@@ -77,7 +77,7 @@ namespace detail {
     return sum;
 }
 
-/// Returns the sum of the absolute filter coefficients |taps|.
+/// Returns the sum of the absolute values of the filter coefficients `taps`.
 [[nodiscard]] inline double size_of(std::span<const double> taps) noexcept {
     double size = 0.0;
     for (const double tap : taps) {
@@ -89,8 +89,8 @@ namespace detail {
 /// Method that computes the maximum over all frequencies of a trigonometric polynomial of degree N from its values at
 /// `resolution` N + 1 frequencies.
 enum class Maximum : std::uint8_t {
-    Likely,  ///< maximum of a parabola through the largest value and its neighbours
-    Proved,  ///< upper bound that is never below the true maximum, rounding included
+    Likely,  ///< maximum of the parabola through the largest computed value and its two neighbours
+    Proved,  ///< proved upper bound of the true maximum over all frequencies, rounding included
 };
 
 /// Returns the maximum over all frequencies of a trigonometric polynomial with the sampled values value(0) to
@@ -133,7 +133,7 @@ class FilterGain {
         }
     }
 
-    /// Returns the sum of |taps|, an upper bound of the frequency response |Q|.
+    /// Returns the sum of the absolute filter coefficients, an upper bound of the frequency response |Q|.
     [[nodiscard]] double size() const noexcept { return size_; }
 
     /// Returns the maximum over all frequencies of l Re Q + gamma |Q|^2 for the frequency response Q.
@@ -158,7 +158,7 @@ struct Minimum {
 /// Finds the minimum of a convex function between `low` and `high` by golden-section search.
 template <class Function>
 [[nodiscard]] Minimum minimum_between(double low, double high, Function function) {
-    constexpr int steps = 40;  // reduce the interval to a share of 4e-9
+    constexpr int steps = 40;  // number of steps, which together reduce the interval to 4e-9 of its length
     constexpr double golden = 0.6180339887498949;
     double left = high - golden * (high - low);
     double right = low + golden * (high - low);
@@ -365,7 +365,7 @@ namespace detail {
 /// remaining delay, at most nu T.
 [[nodiscard]] inline double jittered_need(double delay, double period, double jitter, SlopeRange slopes) {
     const double T = period + jitter;
-    if (delay <= period - jitter) {  // the force always acts before the next sample
+    if (delay <= period - jitter) {  // the force always acts before the next position is read
         return delayed_need(0, delay / T, slopes);
     }
     // Lambda^2 T: the time during which the delay after one sample overlaps the delays after all samples, this sample

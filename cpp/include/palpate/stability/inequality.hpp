@@ -18,7 +18,8 @@ namespace palpate {
 enum class Basis : std::uint8_t {
     Proved,  ///< proved for every motion and every passive hand
     Linear,  ///< valid for the linearised system only: stable near an equilibrium
-    None,    ///< nothing is proved for values above the left side; they are refused
+    /// Nothing is proved if the right side exceeds the left side, so the certificate refuses this case
+    None,
 };
 
 template <>
@@ -38,7 +39,7 @@ struct Inequality {
     /// Returns the left side minus the right side. If it is negative, the inequality does not hold.
     [[nodiscard]] double margin() const noexcept { return left - right; }
 
-    /// Returns the share of the left side that is not needed: (left - right) / |left|.
+    /// Returns the relative reserve of the inequality: (left side - right side) / |left side|.
     [[nodiscard]] double reserve() const noexcept { return margin() / std::abs(left); }
 
     /// Returns true if the inequality holds; returns false if its left or right side is not finite.

@@ -22,7 +22,7 @@ namespace detail {
 struct PeriodicStrokes {
     const NetworkCurve& g;
     const NetworkCurve* h = nullptr;
-    double steepest = 0.0;  ///< proved bound of |g'| + |h'|
+    double steepest = 0.0;  ///< proved bound of |g'| + |h'| (mean force g, hysteresis h) [N/m]
 
     /// Returns value and antiderivative of the force g + side h + shift at position x; `side` is 1 for press, -1 for
     /// release.
@@ -33,7 +33,7 @@ struct PeriodicStrokes {
                 force.integral + side * hysteresis.integral + shift * x};
     }
 
-    /// Returns a bound of the rounding error of the mean force over a period [N].
+    /// Returns a bound of the rounding error of the mean force over one repeat length of a periodic force [N].
     [[nodiscard]] double rounding() const noexcept {
         const double reach = std::max(std::abs(g.lower()), std::abs(g.upper()));
         const auto size = [&](const NetworkParameters& network) {
@@ -61,7 +61,7 @@ struct PeriodicStrokes {
     const double period = strokes.g.upper() - lower;
     const auto at = [&](double x) { return strokes.at(x, side, shift); };
     const double whole = at(strokes.g.upper()).second - at(lower).second;
-    double beyond = 0.0;  // integral of the force that the limit removes
+    double beyond = 0.0;  // integral over position of the part of the force that exceeds the force limit
     double uncertain = 0.0;
     if (std::isfinite(limit)) {
         std::vector<std::uint64_t> open(first_cells);
@@ -132,7 +132,7 @@ struct PeriodicStrokes {
         low = high;
         high *= 2.0;
     }
-    constexpr int halvings = 1100;  // sufficient for `low` and `high` to become adjacent doubles
+    constexpr int halvings = 1100;  // so many halvings that `low` and `high` become adjacent doubles
     for (int k = 0; k < halvings; ++k) {
         const double middle = 0.5 * (low + high);
         if (!(middle > low && middle < high)) {

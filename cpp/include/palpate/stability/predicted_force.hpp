@@ -70,7 +70,8 @@ namespace palpate {
         const double split = filtered_need(taps, (fraction * P + uncertain_s) / T, slopes,
                                            ((1.0 - fraction) * P + jitter) / T);
         return std::min(simple,
-                        std::max(filtered_need(taps, slopes), split));  // the true delay may be shorter
+                        // Also the need without remaining delay, because the true delay may be shorter
+                        std::max(filtered_need(taps, slopes), split));
     }
     if (jitter >= P) {
         return simple;

@@ -32,7 +32,7 @@ template <class Holds>
     }
     double low = 0.0;
     double high = most;
-    // The first loop finds the order of magnitude of the value, the second its 50 leading bits.
+    // The first loop finds the largest value to a factor of eight, the second loop to its 50 leading bits.
     constexpr int eighths = 20;
     for (int k = 1; k < eighths && low == 0.0; ++k) {
         const double guess = std::ldexp(most, -3 * k);

@@ -95,7 +95,7 @@ class UsbConnection {
   private:
     using Handle = std::unique_ptr<libusb_device_handle, CloseHandle>;
 
-    /// A device that this program can use, already open.
+    /// A suitable USB device that is already open.
     struct Candidate {
         Handle handle;
         UsbName name;
@@ -111,8 +111,8 @@ class UsbConnection {
         }
         const std::unique_ptr<libusb_device*, FreeList> list{found};
         std::vector<Candidate> suitable;
-        std::vector<std::string> others;   // serial numbers of devices that were not requested
-        std::vector<std::string> reasons;  // why a device is not suitable
+        std::vector<std::string> others;   // serial numbers of USB devices that were not requested
+        std::vector<std::string> reasons;  // reasons why the other USB devices are unsuitable
         for (libusb_device* device : std::span{found, static_cast<std::size_t>(count)}) {
             if (is_ours(device)) {
                 examine(device, serial, suitable, others, reasons);

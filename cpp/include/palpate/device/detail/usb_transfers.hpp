@@ -202,7 +202,7 @@ class UsbTransfers {
         const sched_param priority{90};
         (void)pthread_setschedparam(
             pthread_self(), SCHED_FIFO,
-            &priority);  // a refused priority is reported for the control loop's thread
+            &priority);  // an error is ignored here: the control loop's thread reports it
         while (runs_.load(std::memory_order_acquire)) {
             timeval wait{0, 100'000};
             const int code = libusb_handle_events_timeout_completed(context_, &wait, nullptr);
@@ -222,7 +222,8 @@ class UsbTransfers {
         if (reads_halted_) {
             if (reads_in_flight_.load(std::memory_order_acquire) > 0) {
                 for (Read& read : reads_) {
-                    (void)libusb_cancel_transfer(read.transfer.get());  // not found: it has already ended
+                    // Error NOT_FOUND: this USB transfer has already ended
+                    (void)libusb_cancel_transfer(read.transfer.get());
                 }
                 return;
             }
@@ -295,7 +296,7 @@ class UsbTransfers {
         arrival.size = static_cast<std::uint32_t>(read.transfer->actual_length);
         std::copy_n(read.bytes.begin(), arrival.size, arrival.bytes.begin());
         (void)arrivals_.push(
-            arrival);  // a full queue drops the packet: the loop then discards all old packets
+            arrival);  // a full queue drops the packet; the control loop then discards all old packets
         changes_.notify();
     }
 
@@ -317,8 +318,8 @@ class UsbTransfers {
             case LIBUSB_TRANSFER_STALL:
                 stalls_.fetch_add(1, std::memory_order_relaxed);
                 if (!stopping_.load(std::memory_order_acquire)) {
-                    writes_halted_ =
-                        true;  // the write counts as in flight until the endpoint's halt is cleared
+                    // The command counts as in flight until the halt of the USB endpoint is cleared
+                    writes_halted_ = true;
                     return;
                 }
                 break;
@@ -383,7 +384,7 @@ class UsbTransfers {
         }
     }
 
-    /// Stores `code` if it is the first error; the connection then counts as failed.
+    /// Stores the libusb error `code` if it is the first error of the connection, which then counts as failed.
     void store_error(int code) noexcept {
         if (code == 0) {
             return;
@@ -395,7 +396,8 @@ class UsbTransfers {
 
     void cancel_all() noexcept {
         for (Read& read : reads_) {
-            (void)libusb_cancel_transfer(read.transfer.get());  // not found: it has already ended
+            // Error NOT_FOUND: this USB transfer has already ended
+            (void)libusb_cancel_transfer(read.transfer.get());
         }
         (void)libusb_cancel_transfer(write_.get());
         (void)libusb_cancel_transfer(request_.get());
@@ -411,7 +413,7 @@ class UsbTransfers {
     std::atomic<int> answer_{0};
 
     RingBuffer<UsbArrival> arrivals_;
-    WakeUp changes_;  ///< a packet arrived, or a transfer ended or failed
+    WakeUp changes_;  ///< wakes the control loop after a packet, or the end or failure of a USB transfer
     std::atomic<int> reads_in_flight_{0};
     std::atomic<int> writes_in_flight_{0};
     std::atomic<int> requests_in_flight_{0};
@@ -421,9 +423,11 @@ class UsbTransfers {
     std::atomic<std::uint64_t> stalls_{0};
     std::atomic<std::uint64_t> bus_errors_{0};
     std::atomic<std::uint64_t> lost_writes_{0};
-    bool reads_halted_ = false;   ///< used by the event thread only
-    bool writes_halted_ = false;  ///< used by the event thread only
-    int errors_in_a_row_ = 0;     ///< used by the event thread only
+    /// True while the endpoint for packets is halted; for the event thread only
+    bool reads_halted_ = false;
+    /// True while the endpoint for commands is halted; for the event thread only
+    bool writes_halted_ = false;
+    int errors_in_a_row_ = 0;  ///< consecutive errors of the USB bus; for the event thread only
 
     std::thread events_;
 };

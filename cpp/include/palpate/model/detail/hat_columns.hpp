@@ -25,7 +25,8 @@ inline constexpr double hat_reach = 37.4;
 struct HatColumns {
     std::size_t count, size;
     const double *alpha, *beta, *weight;
-    const double *weight_by_width, *weight_width, *weight_width_squared;  ///< w alpha, w / alpha, w / alpha^2
+    /// w alpha, w / alpha, w / alpha^2 (weight w, dilation alpha)
+    const double *weight_by_width, *weight_width, *weight_width_squared;
 };
 
 /// Parameters of radial Mexican hats of several inputs, and the box to which inputs are limited. `alpha` and `beta`
@@ -33,10 +34,11 @@ struct HatColumns {
 struct RadialColumns {
     std::size_t dimension, size;
     const double *alpha, *beta, *weight;
-    const double* uncancelled;  ///< replaces |weight| in the remainder of Taylor's formula
+    /// `uncancelled_weights`: numbers in place of the weights in bounds of fourth derivatives
+    const double* uncancelled;
     const double *lower, *upper;
 
-    /// Returns component j of the point of the box that is nearest to x.
+    /// Returns coordinate j of the point in the box from `lower` to `upper` that is nearest to x.
     [[nodiscard]] double projected(const double* x, std::size_t j) const noexcept {
         return x[j] < lower[j] ? lower[j] : x[j] > upper[j] ? upper[j] : x[j];
     }
@@ -67,14 +69,15 @@ struct RadialExpansion {
           workspace((2 * d + 4) * size + d * d) {}
 
     double value = 0.0;
-    std::vector<double> gradient;           ///< gradient in the middle of the box, d numbers
-    std::vector<double> second_derivative;  ///< second derivatives, d x d numbers
-    std::vector<double> third_derivative;   ///< third derivatives, d x d x d numbers
-    std::vector<double> rest;               ///< bound of the fourth-order term, d numbers
-    std::vector<double> workspace;          ///< working memory of the computation
+    std::vector<double> gradient;           ///< gradient of the sum in the middle of the box, d numbers
+    std::vector<double> second_derivative;  ///< second derivatives in the middle of the box, d x d numbers
+    std::vector<double> third_derivative;   ///< third derivatives in the middle of the box, d x d x d numbers
+    /// Bound of the fourth-order term of Taylor's formula for each input, d numbers
+    std::vector<double> rest;
+    std::vector<double> workspace;  ///< memory for intermediate results
 };
 
-/// Functions for sums of Mexican hats, compiled for one instruction set of the processor.
+/// Functions that compute sums of Mexican hat wavelets, compiled for one instruction set of the processor.
 struct HatKernel {
     void (*at)(const HatColumns& of, double x, Curve& sum) noexcept;
     std::array<void (*)(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept, 3>

@@ -93,7 +93,7 @@ PALPATE_TARGET inline void at(const HatColumns& of, double x, Curve& sum) noexce
     sum.double_integral += total(double_integral);
 }
 
-/// Adds value, slope or antiderivative of all wavelets at the positions in one register.
+/// Adds value, slope or antiderivative of all wavelets at each position in one vector register.
 template <HatQuantity quantity>
 PALPATE_TARGET inline void sum_at(const HatColumns& of, const Lanes& position, Lanes& sum) noexcept {
     for (std::size_t i = 0; i < of.count; ++i) {
@@ -141,10 +141,11 @@ PALPATE_TARGET void batch(const HatColumns& of, const double* x, std::size_t n, 
 /// is null. The sum is computed at the point of the box that is nearest to x.
 PALPATE_TARGET inline void radial(const RadialColumns& of, const double* x, double& value,
                                   double* gradient) noexcept {
-    constexpr std::size_t block = 64;  // number of wavelets; a multiple of every PALPATE_LANES
+    // Wavelets computed together; a multiple of the numbers in a vector register
+    constexpr std::size_t block = 64;
     const auto inputs = static_cast<double>(of.dimension);
     const Lanes reach = Lanes{} + hat_reach;
-    double factors[block];  // w (d + 2 - r^2) E; times u: gradient by u
+    double factors[block];  // for each wavelet w (d + 2 - r^2) E; its product with u is the gradient by u
     Lanes values{};
     for (std::size_t first = 0; first < of.size; first += block) {
         const std::size_t count = of.size - first < block ? of.size - first : block;
@@ -190,7 +191,7 @@ PALPATE_TARGET inline void multiply(Lanes& product, const double* column) noexce
     product *= factor;
 }
 
-/// Returns the sum over all wavelets of the product of one entry from each column.
+/// Returns the sum over all wavelets of the product of the wavelet's numbers in all given columns.
 template <class... Columns>
 PALPATE_TARGET inline double sum_of(std::size_t size, const Columns*... columns) noexcept {
     Lanes sum{};
@@ -212,7 +213,8 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
     const std::size_t n = of.size;
     const std::size_t d = of.dimension;
     const auto inputs = static_cast<double>(d);
-    double* const first = sums.workspace.data();  // A_2 of each wavelet; then A_4, A_6
+    // Factor A_2 of each wavelet; the factors A_4 and A_6 follow
+    double* const first = sums.workspace.data();
     double* const second = first + n;
     double* const third = second + n;
     double* const rest = third + n;
