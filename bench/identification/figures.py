@@ -50,7 +50,7 @@ Row = Mapping[str, Any]
 
 
 def results_of(folder: Path, name: str) -> tuple[Any, str] | None:
-    """Returns the results of NAME.py with machine and date; None if it did not run."""
+    """Returns the results of the study NAME.py with machine and date; None if the study did not run."""
     path = folder / f"{name}.json"
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -71,7 +71,7 @@ def results_of(folder: Path, name: str) -> tuple[Any, str] | None:
 
 
 def problems(rows: Sequence[Row]) -> str:
-    """Returns medians for each problem and method, with the range over the draws in parentheses."""
+    """Returns median NRMSE, size and time for each problem and method, with the range over the draws."""
     return markdown_table(
         (
             "problem, method",
@@ -109,7 +109,7 @@ def with_range(row: Row, key: str, form: str) -> str:
 
 
 def measured_objects(sets: Mapping[str, Sequence[Row]]) -> str:
-    """Returns medians over the files of each set of recordings, for each method."""
+    """Returns a table of median NRMSE, size and time over the files of each set, for each method."""
     lines = []
     for name, files in sets.items():
         measured_rows = [row for row in files if "nrmse" in row]
@@ -132,7 +132,7 @@ def measured_objects(sets: Mapping[str, Sequence[Row]]) -> str:
 
 
 def crossings(sets: Mapping[str, Sequence[Row]]) -> str:
-    """Returns one row for each file of the sets that were also fitted with other options."""
+    """Returns one table row for each file that was also fitted with any sign of h, and with earlier force."""
     lines = []
     for name, files in sets.items():
         variants = [

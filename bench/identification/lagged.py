@@ -41,7 +41,7 @@ class Lagged:
         return linear + int(self._network.n_parameters_)
 
     def fit(self, u: Array, y: Array) -> Lagged:
-        """Fits inputs u (n,) and outputs y (n,)."""
+        """Fits the model to inputs u (n,) and outputs y (n,)."""
         X, target = self._lags(u, y), y[self.start :]
         if self._state is None:
             self._network.fit(X, target)
@@ -61,13 +61,13 @@ class Lagged:
         return self
 
     def one_step(self, u: Array, y: Array) -> Array:
-        """Predicts every row after the start from the measured outputs before this row."""
+        """Predicts every output after the start rows from the measured inputs and the outputs before it."""
         lags = self._lags(u, y)
         inputs = lags if self._state is None else lags[:, list(self._state)]
         return np.asarray(lags @ self._linear + self._sign * self._network.predict(inputs))
 
     def free_run(self, u: Array, y: Array) -> Array:
-        """Predicts all rows after the start from the first measured outputs and the input; NaN: diverged."""
+        """Predicts all later outputs from the inputs and the measured outputs of the start; NaN: diverged."""
         limit = DIVERGENCE_LIMIT * float(np.ptp(y))
         simulated = y.copy()
         simulated[self.start :] = np.nan

@@ -29,7 +29,7 @@ TOLERANCE = 0.05
 
 
 def spring(draw: int) -> Recording:
-    """Returns a recording of a linear spring: 100 to 3000 rows, noise of 0.01 to 100 % of its range."""
+    """Returns a recording of a linear spring: 100 to 3000 rows, noise of 0.01 to 100 % of the force range."""
     random = np.random.default_rng([7, draw])
     n = round(10.0 ** random.uniform(2.0, 3.5))
     x = 0.3 - 0.3 * np.cos(np.cumsum(random.uniform(0.5, 1.5, n)) * 40.0 / n)
@@ -80,7 +80,7 @@ CLAIMS: dict[str, tuple[int, Callable[[int], Recording], Callable[[Model], bool]
 
 
 def is_correct_draw(claim: str, draw: int) -> bool:
-    """Returns true if the model of one draw is correct."""
+    """Returns true if the model identified from the recording of one draw is correct."""
     _, recording, is_correct = CLAIMS[claim]
     return is_correct(identify(recording(draw)))
 

@@ -97,7 +97,7 @@ class Crossing:
 
     @staticmethod
     def of(recording: palpate.Recording, compared: Rows) -> Crossing | None:
-        """Evaluates the judged rows (n,); returns None without two strokes."""
+        """Returns the crossing of both strokes in the compared rows (n,); None without press and release."""
         x, direction, force = recording.position, recording.direction, recording.force
         if direction is None or not {-1, 1} <= set(direction.tolist()):
             return None
@@ -161,7 +161,7 @@ def row_of(path: Path, recording_set: Set) -> dict[str, Any]:
     try:
         recording = palpate.read_recording(path, **reading)
     except palpate.InputError as first_error:
-        # The files of one folder have different columns, so the reader chooses.
+        # The files of one folder have different columns, so the reader chooses the position column.
         reading.pop("position", None)
         try:
             recording = palpate.read_recording(path, **reading)
@@ -197,7 +197,7 @@ def _numbers(each: Compared) -> dict[str, Any]:
 
 
 def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Prints the medians of one set, refused files and diverged models."""
+    """Prints the median errors of one set of recordings, its refused files and diverged models."""
     measured_rows = [row for row in rows if "nrmse" in row]
     for row in rows:
         for prefix, numbers in (
@@ -222,7 +222,7 @@ def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _report_line(method: str, each: Sequence[Mapping[str, Any]], n_files: int) -> None:
-    """Prints medians, with the number of files if some are missing."""
+    """Prints NRMSE, size and time of one method, with the number of files if some are missing."""
     if each:
         name = method if len(each) == n_files else f"{method} ({len(each)} files)"
         nrmse, sizes, seconds = ([row[key] for row in each] for key in ("nrmse", "n_parameters", "seconds"))
@@ -230,7 +230,7 @@ def _report_line(method: str, each: Sequence[Mapping[str, Any]], n_files: int) -
 
 
 def _report_ratios(reference: str, pairs: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]]) -> None:
-    """Prints the ratio of errors, file by file."""
+    """Prints the ratio of the NRMSE of palpate to that of the reference method over the files."""
     ratios = {
         file: palpate_row["nrmse"] / spline_row["nrmse"]
         for file, (palpate_row, spline_row) in pairs.items()

@@ -89,7 +89,7 @@ inline constexpr double coupling_time = 0.2e-3;
 /// damping that the coupling needs, and the force limit of the device is never reached. The theoretical slopes are
 /// sufficient: K_c + B_c/T without mass, K_c + (B_c + 2 B_o)/T with mass and backward Euler.
 [[nodiscard]] inline FailureMap falling_map(int points) {
-    constexpr double width = 0.1;  // of the snap [rad]
+    constexpr double width = 0.1;  // half the travel of the object's snap [rad]
     const double period = smooth_knob().period_s;
     FailureMap map{"falling", "coupling stiffness K_c [N*m/rad]", "steepest fall s [N*m/rad]", {}};
     const auto gives = [&](auto build, double stiffness, double falling) {
@@ -239,8 +239,8 @@ template <Structure S>
 /// is K_c K / (K_c + K) without coupling damping. With damping gamma assumes the worst position of each edge between
 /// two counts, so it is sufficient only.
 [[nodiscard]] inline FailureMap coupled_encoder_map(int points) {
-    constexpr double stiffness = 40.0;  // K_c [N*m/rad]
-    constexpr double friction = 0.002;  // [N*m]
+    constexpr double stiffness = 40.0;  // coupling stiffness K_c [N*m/rad]
+    constexpr double friction = 0.002;  // Coulomb friction f_c [N*m]
     FailureMap map{"coupled-encoder", "stiffness K [N*m/rad]", "encoder step [rad]", {}};
     map.searched = 10.0;
     for (const double damping : {0.0, 0.008, 0.02}) {

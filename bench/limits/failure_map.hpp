@@ -14,16 +14,17 @@ namespace palpate::bench {
 /// Limit of one method as a function of one quantity, measured in simulation and computed by theory.
 struct FailureLine {
     std::string name;
-    std::vector<double> at;        ///< the quantity
-    std::vector<double> measured;  ///< largest tried value that did not fail; NaN: no value failed
-    std::vector<double> theory;    ///< NaN: unlimited or unknown
+    std::vector<double> at;  ///< values of the quantity on the horizontal axis
+    /// Largest tried value of the limited quantity that did not fail; NaN: no tried value failed.
+    std::vector<double> measured;
+    std::vector<double> theory;  ///< limit of the limited quantity by theory; NaN: unlimited or unknown
 };
 
-/// Lines with common axes.
+/// A figure of limits: several lines with common axes.
 struct FailureMap {
     std::string name;   ///< for file names
     std::string along;  ///< the quantity on the horizontal axis, with its unit
-    std::string limit;  ///< the quantity that is limited, with its unit
+    std::string limit;  ///< the quantity whose limit is drawn on the vertical axis, with its unit
     std::vector<FailureLine> lines;
     /// Largest tested value divided by the theoretical limit, for points at which no value failed.
     double searched = 0.0;

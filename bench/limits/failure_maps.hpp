@@ -19,7 +19,7 @@ struct NamedFailureMap {
     FailureMap (*measure)(int points);
 };
 
-/// All maps, in the order of the page.
+/// All failure maps, in the order of the documentation page.
 inline constexpr auto failure_maps = std::to_array<NamedFailureMap>({
     {"explicit", explicit_map},
     {"damping", damping_map},

@@ -102,7 +102,7 @@ def draw_map(axes: Axes, failure_map: Map) -> None:
 
 
 def label_decades(axis: Axis) -> None:
-    """Labels powers of ten; below two decades also 1, 2 and 5 as plain numbers."""
+    """Labels powers of ten on an axis; for less than two decades also 1, 2 and 5 as plain numbers."""
     lower, upper = axis.get_view_interval()
     axis.set_minor_formatter(NullFormatter())
     if upper < 100.0 * lower:
@@ -117,7 +117,7 @@ def printed_form(text: str) -> str:
 
 
 def map_table(failure_map: Map) -> str:
-    """Returns measured over theory for each line, or measured values if the theory is unknown."""
+    """Returns a table of measured over theoretical limits, or of measured limits without a theory."""
     lines = failure_map["lines"]
     if not failure_map["linear"] and any(np.isfinite(values(line, "theory")).any() for line in lines):
         return markdown_table(

@@ -72,7 +72,7 @@ namespace palpate::bench {
 struct GuardEffect {
     std::string guard;
     double cost = 0.0;  ///< RMS change of the force of a certified click, over the RMS force [-]
-    std::string wrong;  ///< the fault, and the measured quantity with its unit
+    std::string wrong;  ///< name of the fault, and the quantity that measures its effect, with unit
     double without = 0.0;
     double with = 0.0;
 };

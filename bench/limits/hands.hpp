@@ -13,10 +13,10 @@ namespace palpate {
 /// Passive hand: a mass on the handle, a spring and a damper between handle and a fixed point. All values are zero if
 /// there is no hand.
 struct PassiveHand {
-    double stiffness = 0.0;  ///< [N/m or N*m/rad]
-    double damping = 0.0;    ///< [N*s/m or N*m*s/rad]
-    double mass = 0.0;       ///< [kg or kg*m^2]
-    double rest = 0.0;       ///< the fixed point [m or rad]
+    double stiffness = 0.0;  ///< stiffness of the spring [N/m or N*m/rad]
+    double damping = 0.0;    ///< damping of the damper [N*s/m or N*m*s/rad]
+    double mass = 0.0;       ///< mass of the hand on the handle [kg or kg*m^2]
+    double rest = 0.0;       ///< position of the fixed point [m or rad]
 
     [[nodiscard]] Grip grip(double /*time*/, const Motion& /*handle*/) const noexcept {
         return {stiffness, damping, rest, 0.0, mass};
@@ -26,11 +26,11 @@ struct PassiveHand {
 /// Hand that oscillates at a share of the Nyquist frequency. At the Nyquist frequency the force of a sampled wall lags
 /// by half a cycle.
 struct ShakingHand {
-    double stiffness = 0.0;  ///< of the grip [N/m or N*m/rad]
-    double centre = 0.0;     ///< [m or rad]
-    double amplitude = 0.0;  ///< of the target [m or rad]
-    double share = 1.0;      ///< of the Nyquist frequency; 1: one cycle in two ticks
-    double period_s = 1e-3;  ///< of the tick [s]
+    double stiffness = 0.0;  ///< stiffness of the spring between hand and handle [N/m or N*m/rad]
+    double centre = 0.0;     ///< mean position of the hand [m or rad]
+    double amplitude = 0.0;  ///< amplitude of the hand motion [m or rad]
+    double share = 1.0;      ///< hand frequency over the Nyquist frequency; 1: one cycle in two ticks
+    double period_s = 1e-3;  ///< duration of a tick [s]
 
     [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
         const double target =
@@ -42,11 +42,12 @@ struct ShakingHand {
 /// Hand that extracts energy: it moves the handle through the steepest part of the object at constant speed in both
 /// directions. In this part the held force lags the object's force most during each tick.
 struct GreedyHand {
-    double grip_damping = 1.0;  ///< force for each error of the speed [N*s/m or N*m*s/rad]
-    double centre = 0.0;        ///< of the steepest part [m or rad]
-    double reach = 0.0;         ///< to either side [m or rad]
-    double speed = 0.0;         ///< [m/s or rad/s]
-    double direction = 1.0;     ///< of the motion now, 1 or -1
+    /// Force of the hand for each difference of desired and real handle speed [N*s/m or N*m*s/rad].
+    double grip_damping = 1.0;
+    double centre = 0.0;     ///< position of the object's steepest part [m or rad]
+    double reach = 0.0;      ///< distance from this position to either end of the motion [m or rad]
+    double speed = 0.0;      ///< desired speed of the handle [m/s or rad/s]
+    double direction = 1.0;  ///< present direction of the motion, 1 or -1
 
     [[nodiscard]] Grip grip(double /*time*/, const Motion& handle) noexcept {
         if (direction * (handle.position - centre) >= reach) {
@@ -63,13 +64,14 @@ struct GreedyHand {
 /// A turn is a reversal. With 1 tick between turns the hand moves at the Nyquist frequency. Several turns in `ticks`
 /// give frequencies between those of whole ticks.
 struct PacingHand {
-    double reach = 0.0;         ///< Distance between two turns [m or rad].
-    int ticks = 1;              ///< Number of ticks of `turns` turns, at least 1.
-    double grip_damping = 1e6;  ///< Far above every damping of device and object [N*s/m or N*m*s/rad].
-    double period_s = 1e-3;     ///< Of the tick [s].
+    double reach = 0.0;  ///< Travel of the handle between two reversals [m or rad].
+    int ticks = 1;       ///< Number of ticks in which the handle reverses `turns` times, at least 1.
+    /// Damping of the grip, far above that of device and object [N*s/m or N*m*s/rad].
+    double grip_damping = 1e6;
+    double period_s = 1e-3;  ///< Duration of a tick [s].
     /// Ticks before the first motion of the hand, in which the object is placed at the handle.
     int rests = 1;
-    int turns = 1;  ///< From 1 to ticks.
+    int turns = 1;  ///< Number of reversals in `ticks` ticks, from 1 to `ticks`.
 
     [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
         const double tick = std::round(time / period_s) - rests;

@@ -29,8 +29,8 @@ namespace palpate::bench {
 /// advances by 0.03 rad during the mean delay of the force, (1/2 + n_d) T. The spring fails at a stiffness just above
 /// the theoretical bound.
 [[nodiscard]] inline bool spring_oscillates(const DeviceProfile& device, double stiffness) {
-    constexpr double late_phase = 0.03;  // [rad]
-    constexpr double radians = 1000.0;   // of the simulated oscillation
+    constexpr double late_phase = 0.03;  // phase of the oscillation during the mean delay of the force [rad]
+    constexpr double radians = 1000.0;   // total phase of the simulated oscillation [rad]
     const double late = (0.5 + device.delay_s / device.period_s) * device.period_s;
     const double inertia = stiffness * late * late / (late_phase * late_phase);
     const PassiveHand heavy{0.0, 0.0, std::max(0.0, inertia - device.inertia), 0.0};
@@ -112,7 +112,7 @@ template <class Limit, class Fails>
 /// and the required damping is b >= T (g' + h/r) (1/2 + n_d). Without the term h/r the theory would not limit the
 /// hysteresis.
 [[nodiscard]] inline FailureMap play_map(int points) {
-    constexpr double spring = 10.0;  // g' [N*m/rad]
+    constexpr double spring = 10.0;  // slope g' of the mean force [N*m/rad]
     FailureMap map{"play", "play radius r [rad]", "hysteresis h [N*m]", {}};
     for (int delay = 0; delay <= 2; ++delay) {
         DeviceProfile device = smooth_knob();
@@ -186,7 +186,7 @@ template <class Limit, class Fails>
         map.lines.push_back(failure_line(
             name, logarithmic(1e-5, 1e-1, points), [&](double /*mass*/) { return bound; },
             [&](double mass, double stiffness) {
-                constexpr double radians = 1000.0;  // of the simulated oscillation
+                constexpr double radians = 1000.0;  // total phase of the simulated oscillation [rad]
                 const double slowness = std::sqrt((mass + device.inertia) / stiffness);
                 const auto ticks = static_cast<std::size_t>(radians * slowness / device.period_s);
                 const PassiveHand hand{0.0, damping, mass, 0.0};

@@ -35,7 +35,7 @@ from palpate.plotting.look import grid
 from palpate.recording.sample import sample_recording
 
 PREDICTIONS = (0, 1, 2, 4, 8, 16)
-"""Compared numbers of samples; 0 is rendering without prediction"""
+"""Compared numbers of past samples that the prediction uses; 0: rendering without prediction"""
 
 ERRORS = ("mean", "band", "end", "work")
 STEEPEST = 45.0
@@ -48,26 +48,26 @@ DURATION_S = 2.0
 
 @dataclass(frozen=True)
 class PredictionGain:
-    """Result of one number of samples over all objects and hands."""
+    """Result of a prediction from one number of past samples, over all objects and hands."""
 
     samples: int
     damping: tuple[float, float]
-    """Certified b / (T M): slopes from 0 to M, and from -M to M"""
+    """Required device damping b / (T M), for force slopes from 0 to M, and from -M to M"""
     friction: float
-    """Certified Coulomb friction f_c divided by the value without prediction"""
+    """Required Coulomb friction f_c divided by the required value without prediction"""
     knob: dict[str, float]
     """Force errors of the sample's knob at 2 Hz in 4 s [N*m], and the work of the error [J]"""
     ratio: dict[str, NDArray[np.float64]]
     """Force error without prediction divided by the error with prediction (cases,), for each kind of error"""
 
     def spread(self, error: str) -> tuple[float, float, float]:
-        """Returns the median, 10 % and 90 % quantile of a ratio."""
+        """Returns the median, 10 % and 90 % quantile of the force-error ratio of one kind of error."""
         lower, middle, upper = np.quantile(self.ratio[error], (0.1, 0.5, 0.9))
         return float(middle), float(lower), float(upper)
 
     @property
     def name(self) -> str:
-        """Returns the number of samples, or "none"."""
+        """Returns the number of past samples of the prediction, or "none"."""
         return str(self.samples) if self.samples else "none"
 
     def as_json(self) -> dict[str, Any]:
@@ -81,7 +81,7 @@ class PredictionGain:
 
 
 def measure() -> list[PredictionGain]:
-    """Renders identified and random objects under several hands with each number of samples."""
+    """Renders identified and random objects with several hands and each number of past samples."""
     device = DeviceProfile()
     knob = identify(sample_recording(seed=1))
     cases = [
@@ -111,7 +111,7 @@ def errors(
 
 
 def objects(knob: Model) -> Iterator[Model]:
-    """Yields two identified samples and random networks over the same travel."""
+    """Yields two models identified from sample recordings, and random networks over the same travel."""
     yield knob
     yield identify(sample_recording(seed=2))
     random = np.random.default_rng(0)
@@ -158,7 +158,7 @@ def friction(samples: int) -> float:
 
 
 def draw_prediction(axes: Axes, gains: Sequence[PredictionGain]) -> None:
-    """Draws the force errors relative to no prediction, with 10 % and 90 % quantiles, over the damping."""
+    """Draws force errors relative to no prediction (10 %, 50 %, 90 % quantiles) over the required damping."""
     x = np.array([gain.damping[1] for gain in gains])
     for name, error, marker, filled, sign in (
         ("mean of a tick", "mean", "o", "white", -1),

@@ -69,7 +69,7 @@ class Growth {
   public:
     explicit Growth(std::size_t ticks) noexcept : ticks_{ticks} {}
 
-    /// Returns false if the motion can be stopped.
+    /// Adds an amplitude. Returns false if the oscillation has diverged, so that the simulation can stop.
     [[nodiscard]] bool add(double quantity) noexcept {
         const std::size_t quarter = std::min<std::size_t>(3, 4 * tick_ / ticks_);
         ++tick_;
@@ -113,7 +113,7 @@ inline constexpr Guards unguarded{.limit = {1e9}};
 template <Structure S>
 [[nodiscard]] bool oscillates_with(S structure, DeviceProfile device, const PassiveHand& hand,
                                    double stiffness, std::size_t ticks) {
-    constexpr double endless = 1e150;  // without force limit, which would stop the growth [N*m]
+    constexpr double endless = 1e150;  // force limit so large that it does not stop the growth [N*m]
     device.force_limit = endless;
     const double inertia = device.inertia + hand.mass;
     Growth growth{ticks};
@@ -131,7 +131,7 @@ struct PacedWork {
     double whole = 0.0;     ///< [J]
     double rounding = 0.0;  ///< bound of the rounding error of the work [J]
 
-    /// Returns true if the hand takes energy out in the steady state.
+    /// Returns true if the hand takes energy out of the rendering in each repetition of the motion.
     [[nodiscard]] bool negative() const noexcept { return whole - half < -rounding; }
 };
 

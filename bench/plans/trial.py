@@ -21,9 +21,9 @@ from palpate.recording import Recording
 
 SAMPLES = 1001
 PUSH_SHARE = 0.01
-"""Displacement of the hand before it is released [share of the travel]"""
+"""Displacement of the handle from the steepest position at the start [share of the travel]"""
 LARGEST_OSCILLATION = 4.0
-"""Largest oscillation at rest after four seconds [encoder steps]"""
+"""Largest handle oscillation that counts as no oscillation, after four seconds [encoder steps]"""
 ROTARY_DEVICES = (
     DeviceProfile(id="knob", coulomb_friction=0.005),
     DeviceProfile(id="weak knob", viscous_damping=0.005, coulomb_friction=0.002),
@@ -49,22 +49,22 @@ class Row:
     verdict: str
     error: float
     best: str
-    """Best candidate that is certified, or stable at every equilibrium"""
+    """Structure with the least error among those that are certified, or stable at every equilibrium"""
     best_error: float
     best_at_rest: str
-    """Best candidate that comes to rest, proved or not"""
+    """Structure with the least error among those that do not oscillate in simulation, proved or not"""
     best_at_rest_error: float
     oscillates: bool
-    """The plan does not come to rest"""
+    """True if the handle keeps oscillating after a push when the plan is simulated"""
     direct_oscillates: bool
-    """The identified model, rendered directly, does not come to rest"""
+    """True if the handle keeps oscillating after a push when the model is rendered directly"""
     force_range: float
     force_error_rms: float | None
     force_error_largest: float | None
     unchanged_share: float | None
-    """Share of the travel without a limited slope"""
+    """Share of the travel in which the plan leaves the slope of the force unchanged"""
     unchanged_force_error: float | None
-    """Largest force error there"""
+    """Largest force error in the part of the travel with unchanged slope"""
 
     @property
     def ratio(self) -> float:
@@ -72,14 +72,14 @@ class Row:
 
 
 def model_of(force: np.ndarray, x: np.ndarray) -> Model:
-    """Returns the model of an object that is known exactly."""
+    """Returns the model identified from exact forces at the positions x."""
     return identify(
         Recording.from_arrays(x, force, units={"position": "rad", "force": "N*m"}), inputs=("position",)
     )
 
 
 def objects(switches: int) -> Iterator[tuple[str, Model, tuple[DeviceProfile, ...]]]:
-    """Yields name, model and the devices of its unit."""
+    """Yields name and model of an object, and the devices with its position unit."""
     x = np.linspace(0.0, 0.47, 3000)
     yield (
         "spring and wall",
@@ -99,7 +99,7 @@ def measured_switches(n_files: int) -> list[Path]:
 
 
 def strokes(model: Model, x: np.ndarray) -> np.ndarray:
-    """Returns the force (1, n), or press and release (2, n)."""
+    """Returns the model force (1, n), or press and release force (2, n), at the positions x."""
     return np.array(
         [model.force(x, direction=direction) for direction in ((1.0, -1.0) if model.hysteretic else (None,))]
     )
@@ -168,7 +168,7 @@ def oscillates(model: Model, rendered: Model, scheme: Scheme, device: DeviceProf
 
 
 def candidates(model: Model, device: DeviceProfile, play_radius: float, grid: int) -> Iterator[Scheme]:
-    """Yields every structure over couplings, masses and dampings around the limit of the device."""
+    """Yields each structure with several couplings, masses and dampings around their stability limits."""
     play = {"play_radius": play_radius}
     yield Scheme(structure="direct", **play)
     stiffness_limit = 2.0 * device.viscous_damping / device.period_s

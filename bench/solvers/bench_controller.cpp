@@ -19,7 +19,7 @@
 
 namespace {
 
-/// Plays back a motion repeatedly.
+/// Device whose handle position repeats a stored motion.
 class Playback {
   public:
     explicit Playback(std::vector<double> motion) : motion_{std::move(motion)} {}

@@ -24,7 +24,7 @@ struct Answer {
 
 /// The plain loop.
 struct ExpLoop {
-    static constexpr double largest_error = 1e-12;  ///< largest error of the value
+    static constexpr double largest_error = 1e-12;  ///< largest allowed error of the model force
     NetworkParameters p;
 
     explicit ExpLoop(const palpate::WaveletNetwork& network) : p{network.parameters()} {}
@@ -42,7 +42,7 @@ struct ExpLoop {
 };
 
 struct Network {
-    static constexpr double largest_error = 1e-12;  ///< largest error of the value
+    static constexpr double largest_error = 1e-12;  ///< largest allowed error of the model force
     palpate::WaveletNetwork network;
 
     explicit Network(const palpate::WaveletNetwork& given) : network{given} {}
@@ -54,7 +54,7 @@ struct Network {
 };
 
 struct Compiled {
-    static constexpr double largest_error = 1e-11;  ///< largest error of the value
+    static constexpr double largest_error = 1e-11;  ///< largest allowed error of the model force
     palpate::CompiledNetwork network;
 
     explicit Compiled(const palpate::WaveletNetwork& given) : network{given} {}
@@ -67,7 +67,7 @@ struct Compiled {
 
 constexpr std::size_t cells = 4096;
 
-/// Values and slopes at the borders of equal cells of [0, 0.6].
+/// Model force and slope at the borders of equal cells of [0, 0.6].
 struct Nodes {
     std::vector<Answer> at;
     double width = 0.6 / static_cast<double>(cells);
@@ -81,7 +81,7 @@ struct Nodes {
 };
 
 struct Table : Nodes {
-    static constexpr double largest_error = 1e-4;  ///< largest error of the value
+    static constexpr double largest_error = 1e-4;  ///< largest allowed error of the model force
     using Nodes::Nodes;
 
     Answer operator()(double x) const {
@@ -93,7 +93,7 @@ struct Table : Nodes {
 };
 
 struct CubicSpline : Nodes {
-    static constexpr double largest_error = 1e-8;  ///< largest error of the value
+    static constexpr double largest_error = 1e-8;  ///< largest allowed error of the model force
     using Nodes::Nodes;
 
     Answer operator()(double x) const {
@@ -134,7 +134,7 @@ void latency(benchmark::State& state) {
         const Answer answer = method(x);
         x = 0.3 + 0.01 * (answer.value + 1e-9 * answer.slope);
     }
-    benchmark::DoNotOptimize(x);  // not in the loop, because it would store x in memory at every step
+    benchmark::DoNotOptimize(x);  // this call in the loop would store x in memory at every step
     assert_answer(state, network, method);
 }
 
@@ -177,7 +177,7 @@ void throughput_batch(benchmark::State& state) {
     }
 }
 
-/// Network of several inputs, value and gradient, and the plain loop.
+/// Evaluates force and gradient of a network of several inputs.
 struct Radial {
     palpate::RadialNetwork network;
 

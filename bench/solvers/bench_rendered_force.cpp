@@ -64,7 +64,7 @@ double implicit_slope(palpate::Inertia inertia) {
 /// Force and motion of a structure in the closed loop.
 struct LoopResult {
     palpate::ForceError error;
-    double force = 0.0;  ///< RMS of f along the motion
+    double force = 0.0;  ///< RMS of the model force f along the motion
     double evaluations = 0.0;
     std::vector<double> motion;
     palpate::Status status = palpate::Status::Ok;

@@ -51,7 +51,7 @@ std::size_t size_of(const benchmark::State& state) {
     return static_cast<std::size_t>(state.range(0));
 }
 
-/// Measures the time of the steps of `initial` and compares their results with those of `reference`.
+/// Measures the time of a step of the structure `initial`, and compares its forces with those of `reference`.
 template <class S, class R>
 void step(benchmark::State& state, const WaveletNetwork& object, const S& initial, R reference,
           double allowed_error) {
@@ -155,7 +155,7 @@ void implicit_newton(benchmark::State& state) {
     }
 }
 
-/// Newton's method as above, but with the sum of wavelets instead of the cells.
+/// Implicit structure whose Newton's method evaluates the sum of wavelets, not the cells of a force table.
 void implicit_newton_network(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
     implicit<SpringWall>(state, object, object,

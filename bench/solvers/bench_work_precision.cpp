@@ -32,7 +32,7 @@ constexpr double duration_s = 2.0;
 constexpr double settled_s = 0.2;  // start time of the comparison, after the initial transient has decayed
 constexpr std::int64_t longest_ns = 4'000'000;
 constexpr std::int64_t shortest_ns = 62'500;
-constexpr int truth_steps = 64;  // of the exact motion, in each shortest period
+constexpr int truth_steps = 64;  // integration steps of the exact motion in each shortest period
 
 const CompiledNetwork& object() {
     static const CompiledNetwork compiled{palpate::bench::spring_and_wall(16)};
@@ -52,7 +52,7 @@ Motion hand(double time) {
             0.22 * slow * std::sin(slow * time) + 0.01 * fast * std::sin(fast * time)};
 }
 
-/// y at every multiple of the shortest period.
+/// Exact object position y at every multiple of the shortest period.
 const std::vector<double>& reference_positions() {
     static const std::vector<double> solution = [] {
         const auto acceleration = [](double time, double y, double v) {
@@ -84,7 +84,7 @@ const std::vector<double>& reference_positions() {
     return solution;
 }
 
-/// Returns the RMS of y_k - y(t_k) after settling; infinity if the motion diverges.
+/// Returns the RMS of simulated minus exact object position after settling; infinity if the motion diverges.
 template <class S>
 double motion_error(S structure, std::int64_t period_ns) {
     const auto stride = static_cast<std::size_t>(period_ns / shortest_ns);

@@ -60,7 +60,7 @@ def _nanoseconds(call: Callable[[], object], n_calls: int, clock: Callable[[], i
 
 
 def result_row(name: str, nanoseconds: float, **counters: float) -> dict[str, Any]:
-    """Returns one repetition in the format of Google Benchmark."""
+    """Returns the time of one measured repetition in the format of Google Benchmark."""
     return {
         "name": name,
         "run_name": name,
@@ -72,7 +72,7 @@ def result_row(name: str, nanoseconds: float, **counters: float) -> dict[str, An
 
 
 def write_results(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Writes a file in the format of Google Benchmark."""
+    """Writes the measured repetitions to a file in the format of Google Benchmark."""
     write_json(path, {"context": _context(), "benchmarks": list(rows)})
 
 

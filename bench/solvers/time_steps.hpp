@@ -10,7 +10,7 @@
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/newton.hpp"
 
-// Integration methods for the comparison only.
+// Integration methods of the virtual object that only serve for comparison.
 namespace palpate::bench {
 
 /// One step of Newton's method from the last position. With it `Implicit` is the linearly implicit Euler scheme. It
@@ -163,7 +163,7 @@ class Trapezoidal {
     double device_ = 0.0;        ///< x_{k-1}
     double position_ = 0.0;      ///< y_{k-1}
     double velocity_ = 0.0;      ///< v_{k-1}
-    double object_force_ = 0.0;  ///< -f(y_{k-1}) - B_o v_{k-1}
+    double object_force_ = 0.0;  ///< object force without the coupling, -f(y_{k-1}) - B_o v_{k-1}
     double force_ = 0.0;         ///< F_{k-1}
 };
 

@@ -62,7 +62,7 @@ void check_with_random_hand(test::Random& random, const Scene& scene, Check chec
     }
 }
 
-// Energy account: E_port(t) + S(0) - S_min + m v(0)^2 / 2 >= -rounding at every substep
+// At every substep: energy put in by the hand + stored energy S(0) - S_min + m v(0)^2 / 2 at the start >= -rounding
 TEST(CertifiedScenes, NeverGiveMoreEnergyThanTheObjectStored) {
     test::Random random{20};
     std::map<std::string, int> tried;
@@ -120,7 +120,7 @@ Scene random_scene_of_velocity(test::Random& random) {
         network.alpha[2 * i + 1] = std::exp(test::uniform(random, -1.0, 2.0)) / fastest;
         network.beta[2 * i + 1] = test::uniform(random, -1.0, 1.0) * fastest;
     }
-    network.linear[1] = test::uniform(random, -0.2, 0.2);  // also an object that pushes the handle away
+    network.linear[1] = test::uniform(random, -0.2, 0.2);  // damping of the object, also negative
     const double slowest = random() % 4 == 0 ? test::uniform(random, 0.0, 0.1) : -fastest;
     Scene scene{
         ForceModel::of_velocity(network, {{0.0, slowest}, {1.0, fastest}, {}, {}, std::nullopt}), {}, {}};

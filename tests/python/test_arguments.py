@@ -77,7 +77,7 @@ Call = Callable[[Any], object]
 
 # Calls of every public callable with one test value as one argument; some test values are right for it.
 CALLS: dict[str, tuple[Call, str, set[str]]] = {
-    # name: (call, argument that the message names, values that are right there)
+    # name: (call with one test value, argument that the error message names, valid test values)
     "identify": (identify, "recording|frame", set()),
     "identify in a list": (lambda v: identify([RECORDING, v]), "recording|frame", set()),
     "identify position": (lambda v: identify(v, X), "position|force", set()),

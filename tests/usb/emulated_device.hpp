@@ -43,7 +43,7 @@ class EmulatedDevice {
         const Setup setup{bytes};
         Answer answer = stalled();
         if ((setup.type & 0x60U) == 0) {
-            if (setup.request == 9 || setup.request == 11) {  // SET_CONFIGURATION, SET_INTERFACE
+            if (setup.request == 9 || setup.request == 11) {  // requests SET_CONFIGURATION and SET_INTERFACE
                 disarm();
                 answer = {};
             } else {
@@ -230,7 +230,7 @@ class EmulatedDevice {
     void latch() {
         const double counts = identity_.counts_per_rev / (2.0 * std::numbers::pi);
         const double moved = std::floor((plant_.position - zero_) * counts + 0.5);
-        // The count wraps around.
+        // The 32-bit encoder count wraps around after its largest value.
         const std::int64_t jump = faults_.used(FaultKind::Jump) ? identity_.counts_per_rev / 4 : 0;
         const auto count = static_cast<std::int32_t>(zero_count_ + static_cast<std::int64_t>(moved) + jump);
         const bool frozen = faults_.used(FaultKind::FrozenEncoder);

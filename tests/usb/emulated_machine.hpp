@@ -65,7 +65,7 @@ inline Reading settled(UsbDevice& device, double force = 0.0) {
         return reading.status != Status::Lost && device.in_flight() <= 2 && newest;
     };
     for (int k = 0; k < 1000 && reading.status != Status::Fault && !is_settled(); ++k) {
-        // A packet on its way to the host then waits for the next exchange.
+        // After this pause, a packet on its way to the host has arrived and is read in the next exchange.
         std::this_thread::sleep_for(std::chrono::milliseconds{2});
         if (!is_settled()) {
             reading = device.exchange({force});

@@ -22,9 +22,9 @@ struct Settings {
     bool lock_step = false;
     double rate_hz = 1000.0;
     std::chrono::milliseconds lock_step_timeout{3000};  ///< lock-step: longest wait of a frame for the host
-    std::string trace;                                  ///< CSV, one row for each frame
-    std::string preload_first;                          ///< library of a sanitizer, loaded first
-    bool denied = false;                                ///< true: opening the device file fails
+    std::string trace;          ///< path of the trace, a CSV file with one row for each frame
+    std::string preload_first;  ///< library of a sanitizer, loaded first
+    bool denied = false;        ///< true: opening the device file fails
     std::vector<std::string> command;
 };
 

@@ -21,9 +21,9 @@ enum class FaultKind : std::uint8_t {
     Short,            ///< IN packets have half the length.
     Freeze,           ///< Every transfer is refused with NAK; the time of the device continues.
     Unplug,           ///< The device is unplugged after this many frames.
-    Skip,             ///< Sequence numbers are skipped.
+    Skip,             ///< Sequence numbers of IN packets are skipped.
     Repeat,           ///< The last IN packet is sent again.
-    Magic,            ///< The first byte is wrong.
+    Magic,            ///< The first byte of IN packets is wrong.
     Version,          ///< The version is 2.
     Long,             ///< IN packets have 64 bytes.
     Deaf,             ///< OUT packets are accepted and ignored.
@@ -34,7 +34,7 @@ enum class FaultKind : std::uint8_t {
     EmergencyStop,    ///< Status emergency stop, torque off until CLEAR.
     Reset,            ///< The device restarts: disabled, torque off.
     Saturate,         ///< Half the torque, with the status bit for it.
-    Jump,             ///< The count has an error of a quarter turn.
+    Jump,             ///< The encoder count has an error of a quarter revolution.
     FrozenEncoder,    ///< The count repeats.
     Slow,             ///< Frames last three times longer.
     Busy,             ///< OUT packets are refused with NAK and arrive one frame late; IN packets continue.
@@ -84,7 +84,7 @@ class Faults {
 
     void inject(FaultKind kind, std::uint32_t count) { remaining(kind) = std::max(count, 1U); }
 
-    /// Begins a frame; the frame number of the script increases if `counts`.
+    /// Begins a USB frame; the frame number of the fault script increases if `counts`.
     void frame(bool counts) {
         started_ += counts ? 1 : 0;
         for (const Fault& fault : script_) {

@@ -83,11 +83,11 @@ def install_module(driver: Path, folder: Path) -> None:
 
 @dataclass
 class GuestOutput:
-    """Results of a guest."""
+    """Console text and files of one run of the guest Linux in QEMU."""
 
     console: str
     files: dict[str, str]
-    """Text of each file in its folder /out, by name"""
+    """Text of each file in the folder /out of the guest Linux, by file name"""
 
 
 def run(script: str, programs: dict[str, Path], files: dict[str, Path]) -> GuestOutput:

@@ -13,16 +13,16 @@ namespace emulator {
 /// Properties of an emulated device, and its choices for everything that the protocol leaves open.
 struct Identity {
     // GET_INFO
-    std::uint8_t magic = 'I';  ///< Another value makes it a foreign device.
+    std::uint8_t magic = 'I';  ///< First byte of the answer to GET_INFO; 'I' for devices of this project.
     std::uint16_t firmware = 0x0100;
     std::uint32_t counts_per_rev = 65536;
     std::int32_t max_torque_uNm = 5'000'000;
     std::uint16_t rate_hz = 1000;
     std::uint16_t watchdog_ms = 20;
-    std::uint32_t capabilities = 3;  ///< Bit 0 force transducer, bit 1 measured velocity.
+    std::uint32_t capabilities = 3;  ///< Bit 0: the device measures force, bit 1: it measures velocity.
     std::uint64_t uid = 0x5041'4C50'0001ULL;
-    std::size_t info_size = 32;            ///< Another value makes it a device of another protocol.
-    bool reports_current_watchdog = true;  ///< Otherwise it reports the initial one.
+    std::size_t info_size = 32;  ///< Bytes of the answer to GET_INFO; another value means another protocol.
+    bool reports_current_watchdog = true;  ///< False: GET_INFO reports the initial watchdog time.
 
     // Descriptors
     std::u16string manufacturer = u"palpate";
@@ -34,17 +34,17 @@ struct Identity {
     std::uint16_t release = 0x0100;
     std::uint8_t control_packet = 64;  ///< bytes
     std::uint8_t configuration = 1;    ///< bConfigurationValue
-    std::uint8_t power = 250;          ///< in 2 mA, from the bus
+    std::uint8_t power = 250;          ///< largest current from the USB bus [2 mA]
     bool out_endpoint_first = false;
     bool has_second_interface = false;
-    Bytes class_descriptor;  ///< between interface and endpoints
+    Bytes class_descriptor;  ///< descriptor between those of interface and endpoints
 
     // The counters begin close to their largest values, so that they overflow to zero in every run.
     std::uint16_t first_sequence = 65'500;
     std::uint32_t first_us = 4'294'867'296U;
     std::int32_t first_count = 0;
-    std::uint16_t first_out_sequence = 0;     ///< Echoed before the first OUT packet.
-    std::uint16_t first_out_age_us = 0xFFFF;  ///< Echoed before the first OUT packet.
+    std::uint16_t first_out_sequence = 0;  ///< OUT sequence number in IN packets before the first OUT packet.
+    std::uint16_t first_out_age_us = 0xFFFF;  ///< OUT age in IN packets before the first OUT packet.
 
     // Choices of the firmware
     bool reversed = false;  ///< The torque has the wrong sign.
@@ -54,11 +54,11 @@ struct Identity {
     bool ends_in_transfer_first = false;
     /// Number of IN packets that wait until the host reads them. With 0 the newest packet replaces an unread one.
     std::size_t held_packets = 0;
-    /// Otherwise OUT packets are accepted only while the device is enabled.
+    /// False: OUT packets are accepted only while the device is enabled.
     bool accepts_while_disabled = true;
-    bool refuses_by_stall = true;    ///< Otherwise ENABLE after an emergency stop is accepted without effect.
+    bool refuses_by_stall = true;    ///< False: ENABLE after an emergency stop is accepted without effect.
     bool stop_disables = true;       ///< An emergency stop also clears the enabled bit of the status.
-    std::uint16_t spare_status = 0;  ///< Bits without a meaning.
+    std::uint16_t spare_status = 0;  ///< Status bits without a meaning in the protocol.
     std::uint16_t temperature_dC = 253;
     std::int32_t torque_step_uNm = 1;  ///< Smallest change of the torque that the current control makes.
     std::uint32_t latch_jitter_us = 0;
@@ -72,8 +72,8 @@ struct Identity {
         return bytes;
     }
     [[nodiscard]] Bytes configuration_descriptor() const {
-        const Bytes in{7, 5, 0x81, 3, 64, 0, 1};   // interrupt, every frame
-        const Bytes out{7, 5, 0x01, 3, 64, 0, 1};  // the same
+        const Bytes in{7, 5, 0x81, 3, 64, 0, 1};   // IN endpoint: interrupt transfer in every frame
+        const Bytes out{7, 5, 0x01, 3, 64, 0, 1};  // OUT endpoint: interrupt transfer in every frame
         Bytes rest{9, 4, 0, 0, 2, 0xFF, 0x01, 0x01, 0};
         for (const Bytes& part :
              {class_descriptor, out_endpoint_first ? out : in, out_endpoint_first ? in : out}) {

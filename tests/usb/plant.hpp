@@ -14,14 +14,14 @@ namespace emulator {
 ///
 /// Positive torques accelerate towards growing positions, as on the wire.
 struct Plant {
-    double inertia = 2e-4;         ///< J, handle and motor [kg*m^2]
-    double damping = 0.06;         ///< b [N*m*s/rad]
-    double friction = 0.0;         ///< f_c, Coulomb [N*m]
-    double spring = 0.0;           ///< k, of the real object; 0: none [N*m/rad]
-    double hand_stiffness = 15.0;  ///< K_h; 0: without a hand [N*m/rad]
-    double hand_damping = 0.05;    ///< B_h [N*m*s/rad]
-    double hand_lower = 0.02;      ///< smallest target [rad]
-    double hand_upper = 0.47;      ///< largest target [rad]
+    double inertia = 2e-4;         ///< moment of inertia J of handle and motor [kg*m^2]
+    double damping = 0.06;         ///< damping b of the handle [N*m*s/rad]
+    double friction = 0.0;         ///< Coulomb friction f_c of the handle [N*m]
+    double spring = 0.0;           ///< stiffness k of the real object; 0: no object [N*m/rad]
+    double hand_stiffness = 15.0;  ///< stiffness K_h of the hand; 0: no hand [N*m/rad]
+    double hand_damping = 0.05;    ///< damping B_h of the hand [N*m*s/rad]
+    double hand_lower = 0.02;      ///< smallest target position of the hand [rad]
+    double hand_upper = 0.47;      ///< largest target position of the hand [rad]
     double hand_hz = 0.5;          ///< strokes of the hand back and forth in a second
 
     double position = 0.0;  ///< [rad]

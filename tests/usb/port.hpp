@@ -22,7 +22,7 @@ struct Transfer {
     Bytes data;              ///< outgoing or received data
     std::size_t length = 0;  ///< largest size of received data
     std::size_t actual = 0;  ///< transferred bytes
-    int status = 0;          ///< 0 or a negative errno
+    int status = 0;          ///< result of the transfer: 0 or a negative errno
 };
 
 /// USB port of the emulated device: transfers wait here until a frame executes them. The port is independent of the

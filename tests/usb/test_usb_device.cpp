@@ -86,7 +86,8 @@ TEST(UsbDevice, StreamsEverySampleOnceAndInOrder) {
     EXPECT_GE(health.stream.round_trip.count(), static_cast<std::uint64_t>(samples));
     // A slow computer sometimes misses a frame, so that a command arrives late or is skipped.
     EXPECT_LE(health.skipped_commands - before.skipped_commands, static_cast<std::uint64_t>(samples / 2));
-    EXPECT_NEAR(health.stream.delay.quantile(0.5), 1e6, 1e6 / 256);  // one sample; histogram resolution
+    // The median delay is one sample; the tolerance is the resolution of the histogram.
+    EXPECT_NEAR(health.stream.delay.quantile(0.5), 1e6, 1e6 / 256);
 }
 
 TEST(UsbDevice, APositiveForceMovesTheHandleBack) {

@@ -98,7 +98,7 @@ TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
         in_time_again += in_a_row >= commands / 2 ? 1 : 0;
     }
     EXPECT_GE(late, rounds);
-    EXPECT_GE(in_time_again, rounds / 2);  // every round, if this computer is fast enough
+    EXPECT_GE(in_time_again, rounds / 2);  // on a fast computer, ticks are in time again in every round
 }
 
 TEST(UsbDevice, CountsSkippedSamplesInTheSequence) {

@@ -87,13 +87,14 @@ TEST(UsbOtherFirmware, BehavesLikeTheUsualDevice) {
         last = reading;
     }
     const double step = wire::position_of(1, device.info().counts_per_rev);
-    // The reading is one or two samples late.
+    // The position that the host has read is one or two samples old.
     EXPECT_NEAR(last.position - state("position_rad"), began, 4.0 * step + 2e-3);
     EXPECT_EQ(device.health().stream.lost, before.stream.lost);
     EXPECT_EQ(device.health().stream.late_echoes, 0U);
     EXPECT_EQ(device.health().stream.watchdog_trips, 0U);
-    EXPECT_GE(device.health().stream.delay.count(), 195U);         // the last commands may wait in the device
-    EXPECT_LE(device.health().stream.delay.quantile(0.5), 2.1e6);  // two samples at most
+    // The last of 200 commands may still wait in the device; the median delay is at most two samples.
+    EXPECT_GE(device.health().stream.delay.count(), 195U);
+    EXPECT_LE(device.health().stream.delay.quantile(0.5), 2.1e6);
     EXPECT_NEAR(settled(device, 0.25).applied, 0.25, 1e-3);
     EXPECT_NEAR(state("torque_uNm"), -0.25e6, 1e3);
     device.close();
@@ -117,7 +118,8 @@ TEST(UsbOtherFirmware, StateOfAnEarlierProgramIsNotAFault) {
     settled(rendering, 0.2);
     send_order("fault emergency-stop 1");
     Status status = Status::Ok;
-    for (int k = 0; k < 3 && status == Status::Ok; ++k) {  // one or two packets may wait in the device
+    // One or two packets from before the fault may wait in the device.
+    for (int k = 0; k < 3 && status == Status::Ok; ++k) {
         status = rendering.exchange({0.2}).status;
     }
     ASSERT_EQ(status, Status::Fault);

@@ -57,7 +57,8 @@ class Emulation {
         changed_.notify_all();
         frames.join();
         if (trace_.is_open() && !places_.empty()) {
-            trace_ << places_.back()->node->port().device().trace_row();  // state after the command
+            // State of the device after the end of the command.
+            trace_ << places_.back()->node->port().device().trace_row();
         }
         return code;
     }

@@ -42,7 +42,7 @@ class UsbfsFiles {
     UsbfsFiles(const UsbfsFiles&) = delete;
     UsbfsFiles& operator=(const UsbfsFiles&) = delete;
 
-    /// Returns the real path of the node.
+    /// Returns the real path of the file that represents the USB device.
     [[nodiscard]] const std::string& node_file() const { return node_file_; }
 
     /// Makes the device file writable if a completed transfer can be collected.
@@ -86,7 +86,7 @@ class UsbfsFiles {
         return letters;
     }
 
-    /// Returns the description in the format of umockdev.
+    /// Returns the description of the USB device in the format of umockdev.
     [[nodiscard]] std::string description(const Identity& identity, int address) const {
         const Bytes configuration = identity.configuration_descriptor();
         Bytes descriptors = identity.device_descriptor();

@@ -122,7 +122,7 @@ class UsbfsNode {
         return target;
     }
 
-    /// Returns a result >= 0, or a negative errno.
+    /// Executes an ioctl of a client; returns a result >= 0, or a negative errno.
     int answer(UMockdevIoctlClient* client, unsigned long request) {
         UMockdevIoctlData* data = nullptr;
         int result = -EFAULT;

@@ -35,7 +35,7 @@ constexpr const char* controller = "/sys/devices/platform/vhci_hcd.0/";
 /// are 32 bits wide and big endian.
 class UsbIp {
   public:
-    /// Plugs the device in at full speed; throws without a controller.
+    /// Plugs the emulated device in at full speed; throws if the kernel has no virtual USB controller.
     explicit UsbIp(Port& port) : port_{port} {
         std::array<int, 2> ends{};
         if (::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()) != 0) {
@@ -44,7 +44,7 @@ class UsbIp {
         wire_ = ends[0];
         std::ofstream attach{std::string(controller) + "attach"};
         attach << "0 " << ends[1] << " " << device_id << " 2"
-               << std::flush;  // port, socket, device, full speed
+               << std::flush;  // port number, socket, device number, 2 for full speed
         ::close(ends[1]);
         if (!attach) {
             throw std::runtime_error("vhci_hcd refuses the device; check that its module is loaded");
@@ -221,7 +221,7 @@ int run(Settings settings) {
     over = true;
     bus.join();
     if (trace.is_open()) {
-        trace << port.device().trace_row();  // state after the command
+        trace << port.device().trace_row();  // state of the device after the end of the command
     }
     return code;
 }

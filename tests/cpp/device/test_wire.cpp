@@ -269,7 +269,7 @@ TEST(PacketStream, StatusIsThatOfTheMostSeriousBit) {
     EXPECT_EQ(status(1 | 16), Status::Fault);
     EXPECT_EQ(status(1 | 32), Status::Fault);
     EXPECT_EQ(status(1 | 64), Status::Fault);
-    EXPECT_EQ(status(0), Status::Fault);  // it was enabled before
+    EXPECT_EQ(status(0), Status::Fault);  // the enabled bit was set before and is now zero
 }
 
 TEST(PacketStream, IgnoresAWatchdogTripOfAnEarlierSession) {

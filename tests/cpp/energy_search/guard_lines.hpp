@@ -161,8 +161,8 @@ template <class MeanOf>
     HeldScene scene;
     scene.read = even_grid(0.0, 1.0 / nodes, nodes, 1, true);
     scene.table = play_table_of(Direct{pair}, scene.read, radius, sent_on(device));
-    scene.held.assign(static_cast<std::size_t>(nodes),
-                      10.0 * (size + largest_hysteresis));  // only endless motion counts
+    // So much stored energy that only a repeated motion can take out more energy.
+    scene.held.assign(static_cast<std::size_t>(nodes), 10.0 * (size + largest_hysteresis));
     return trial_of(std::move(scene), *need, device);
 }
 

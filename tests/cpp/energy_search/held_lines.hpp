@@ -264,7 +264,8 @@ template <class Force>
     }
     const auto stick = [&](double x) {
         const Curve g = pair.force().at(x);
-        return g.value + pair.hysteresis_force().at(x).integral / pair.play_radius();  // slope g' + h/r
+        // The slope of this function is g' + h/r, for the mean force g, hysteresis h and play radius r.
+        return g.value + pair.hysteresis_force().at(x).integral / pair.play_radius();
     };
     HeldScene scene;
     scene.read =

@@ -56,7 +56,7 @@ struct Sent {
 struct ReadGrid {
     Grid grid;
     std::vector<double> reading;
-    std::vector<int> count;  ///< index of the reading
+    std::vector<int> count;  ///< index of the encoder reading at each grid position
     std::vector<double> of_count;
 };
 

@@ -14,8 +14,8 @@ namespace palpate::energy_search {
 
 /// Damping and friction that a certificate requires of the device.
 struct Need {
-    double damping = 0.0;   ///< b [N*s/m or N*m*s/rad]
-    double friction = 0.0;  ///< f_c [N or N*m]
+    double damping = 0.0;   ///< device damping b [N*s/m or N*m*s/rad]
+    double friction = 0.0;  ///< Coulomb friction f_c [N or N*m]
 };
 
 /// Returns the least damping and friction that `certify` accepts; nothing if `certify` refuses every value.
@@ -68,7 +68,7 @@ template <class Certify>
 struct Trial {
     std::function<bool(double damping, double friction)> finds_energy;
     Need need;
-    std::string text{};  ///< the scene in words
+    std::string text{};  ///< description of the scene
 };
 
 enum class Part { Damping, Friction };

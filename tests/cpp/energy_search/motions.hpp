@@ -18,9 +18,10 @@ namespace palpate::energy_search {
 struct Motion {
     double centre = 0.0;
     double size = 1.0;
-    double period = 2.0;  ///< of the sines [samples]
+    double period = 2.0;  ///< repeat length of the sum of sines [samples]
     bool sines = false;
-    std::vector<double> shape;  ///< positions of one period, or cosine and sine amplitude of each harmonic
+    /// Positions of one repetition, or cosine and sine amplitude of each harmonic.
+    std::vector<double> shape;
     /// Position of the handle within the encoder step, from -1/2 to 1/2 of the step.
     std::vector<double> within;
 
@@ -63,14 +64,14 @@ struct Account {
     }
 };
 
-/// Positions and sizes of the motions that are tried.
+/// Start position, centres and sizes of the motions that are tried.
 struct Places {
     /// Start position of the motion, at rest, where the stored energy of the object is least.
     double start = 0.0;
     double held = 0.0;  ///< stored energy at the start minus the least stored energy, S_0 - S_min [J]
-    double low = 0.0;   ///< of the centres
+    double low = 0.0;   ///< smallest centre of a motion
     double high = 0.0;
-    double finest = 0.0;  ///< of the sizes
+    double finest = 0.0;  ///< smallest size of a motion
     double widest = 0.0;
     double encoder_step = 0.0;
     int delay = 0;      ///< whole samples
@@ -137,7 +138,7 @@ class MotionSearch {
         for (std::size_t k = 0; k < ticks + late; ++k) {
             sent_.push_back(std::clamp(structure_.step(read).force, -limit_, limit_));
             if (k < late) {
-                continue;  // handle at rest until the first force acts
+                continue;  // the handle stays at the start position until the first force acts
             }
             const std::size_t now = k - late;
             read = now < approach ? places_.start + (motion.wave(0) - places_.start) *

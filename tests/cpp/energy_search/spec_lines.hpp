@@ -111,7 +111,7 @@ namespace palpate::energy_search {
             step_g *= 0.5;
         }
     }
-    return best * (1.0 + 1e-4);  // for the angles between
+    return best * (1.0 + 1e-4);  // margin for angles between the evaluated ones
 }
 
 /// Returns the needed damping at a delay of n + late samples, with n whole samples and a fraction `late`.

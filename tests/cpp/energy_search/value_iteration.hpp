@@ -13,7 +13,7 @@ namespace palpate::energy_search {
 /// Grid of positions between which the handle moves. From position number i one move reaches the positions i - reach
 /// to i + reach.
 struct Grid {
-    std::vector<double> position;  ///< never decreasing [m or rad]
+    std::vector<double> position;  ///< positions of the handle, never decreasing [m or rad]
     int reach = 0;                 ///< longest move [nodes]
     /// Length of one revolution of a wheel; 0 for positions that do not repeat [m or rad].
     double turn = 0.0;
@@ -64,12 +64,12 @@ class Windows {
         return result;
     }
 
-    /// Returns false for a window with a position outside the grid.
+    /// Returns false if a window (consecutive handle positions) contains a position outside the grid.
     [[nodiscard]] bool exists(const Nodes& w) const noexcept {
         return std::all_of(w.node, w.node + older_ + 1, [&](int node) { return node >= 0 && node < nodes_; });
     }
 
-    /// Returns the number of the window that begins at position number `first` of another window.
+    /// Returns the number of the window (consecutive handle positions) that begins at element `first` of `w`.
     [[nodiscard]] std::size_t number(const Nodes& w, int first) const noexcept {
         auto window = static_cast<std::size_t>(w.node[first]);
         for (int k = 1; k <= older_; ++k) {
@@ -96,7 +96,7 @@ class Windows {
     }
 
   private:
-    /// Returns the grid index with this residue that one move from `near` can reach.
+    /// Returns the grid index with this remainder (division by `residues_`) that one move from `near` can reach.
     [[nodiscard]] int resolved(int residue, int near) const noexcept {
         int offset = (residue - near) % residues_;
         offset = offset < 0 ? offset + residues_ : offset;
@@ -119,7 +119,7 @@ class Windows {
 struct ForceTable {
     int memory = 0;              ///< number of older positions on which the force depends
     int plays = 1;               ///< number of play states
-    std::vector<double> of;      ///< [N or N*m]
+    std::vector<double> of;      ///< force for each play state and positions [N or N*m]
     std::vector<int> next_play;  ///< play state after the reading at grid position i: [play * nodes + i]
     std::vector<int> rest_play;  ///< play state at grid position i after a start at rest
 
@@ -130,9 +130,9 @@ struct ForceTable {
 
 /// Costs of a motion for the hand in addition to the work against the force.
 struct Cost {
-    double damping = 0.0;   ///< b / T [N/m or N*m/rad]
-    double friction = 0.0;  ///< f_c [N or N*m]
-    int delay = 0;          ///< n, whole samples
+    double damping = 0.0;   ///< device damping over period, b / T [N/m or N*m/rad]
+    double friction = 0.0;  ///< Coulomb friction f_c [N or N*m]
+    int delay = 0;          ///< delay n [whole samples]
     double late = 0.0;      ///< tau, fraction of a sample in which the previous command still acts
 
     /// Returns the least energy that the hand pays for a displacement d while the force changes from `old` to `now`
@@ -162,9 +162,9 @@ struct Cost {
 /// their samples. Each position of the grid has two consecutive entries, one for each u_k.
 struct Clock {
     double period = 1.0;   ///< [s]
-    double jitter = 0.0;   ///< below the period [s]
+    double jitter = 0.0;   ///< largest delay of a sample time, below the period [s]
     double delay = 0.0;    ///< [s]
-    double damping = 0.0;  ///< b [N*s/m or N*m*s/rad]
+    double damping = 0.0;  ///< device damping b [N*s/m or N*m*s/rad]
 
     /// Returns the number of earlier samples whose commands can still act.
     [[nodiscard]] int older() const noexcept {
@@ -172,11 +172,11 @@ struct Clock {
     }
 };
 
-/// Largest energy that a motion takes out, found by value iteration.
+/// Largest energy that a hand takes out of the rendering, found by value iteration.
 struct Finding {
     double taken = 0.0;      ///< largest energy taken out, -E - (S_0 - S_min), over starts at rest [J]
-    bool cycle = false;      ///< some motion takes energy out at each repetition
-    bool converged = false;  ///< no motion on the grid takes more energy out
+    bool cycle = false;      ///< in some repeated motion the hand takes energy out at each repetition
+    bool converged = false;  ///< in no motion on the grid the hand takes more energy out than `taken`
     double scale = 0.0;      ///< largest force times the range of the grid [J]
 
     [[nodiscard]] bool violated() const noexcept { return cycle || taken > 1e-6 * scale; }
@@ -320,8 +320,8 @@ class ValueIteration {
 
     /// Cost of one sample from each state, for each of the two sample-time shifts u_k of the next sample.
     struct Sample {
-        double force = 0.0;    ///< mean over the sample
-        double damping = 0.0;  ///< b over its length
+        double force = 0.0;    ///< mean force over the sample
+        double damping = 0.0;  ///< device damping b over the length of the sample
         double uneven = 0.0;   ///< energy gained by uneven motion while the force changes [J]
     };
 
@@ -365,7 +365,7 @@ class ValueIteration {
     [[nodiscard]] bool can_move(int from, int jump) const noexcept {
         return grid_.repeats() || (from + jump >= 0 && from + jump < nodes_);
     }
-    /// Return the distances from a node to both ends of the grid.
+    /// Return the distances from one grid position to both ends of the grid.
     [[nodiscard]] double down(int from) const noexcept {
         return grid_.repeats() ? -HUGE_VAL
                                : grid_.position.front() - grid_.position[static_cast<std::size_t>(from)];
@@ -492,7 +492,7 @@ class ValueIteration {
 
     const Grid& grid_;
     const ForceTable* table_;
-    const ForceTable* before_;  ///< of the previous command
+    const ForceTable* before_;  ///< forces of the previous command
     Cost cost_;
     Windows windows_;
     int nodes_;

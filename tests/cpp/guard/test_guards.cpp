@@ -159,7 +159,7 @@ TEST(EnergyTank, GivesAtMostTheEnergyOfTheObject) {
 TEST(EnergyTank, ScalesForcesDownWithinItsReserve) {
     EnergyTank tank{TankSettings{{.within = 1.0}, 0.0, 0.0, 0.0, period}};
     double force = -2.0;
-    tank.book(-1.0, 1.0);  // stored energy of the object; the tank keeps its reserve of 0.25
+    tank.book(-1.0, 1.0);  // the object gives its stored energy 1; the tank keeps its reserve of 0.25
     EXPECT_EQ(tank.apply(force), Status::Ok);
     tank.book(-0.15, 1.0);
     EXPECT_EQ(tank.apply(force), Status::EnergyLimited);
@@ -168,7 +168,7 @@ TEST(EnergyTank, ScalesForcesDownWithinItsReserve) {
     force = 2.0;
     EXPECT_EQ(tank.apply(force), Status::EnergyLimited);
     EXPECT_NEAR(force, 0.0, 1e-12);
-    tank.book(3.0, 1.0);  // never more than full
+    tank.book(3.0, 1.0);  // the tank is never more than full
     EXPECT_NEAR(tank.given(), 0.0, 1e-12);
     EXPECT_NEAR(tank.most_given(), 1.25, 1e-12);
 }
@@ -194,7 +194,7 @@ TEST(StoredEnergy, GrowsWithTheVisitedPositions) {
     stored.visit(-0.3, -0.2);
     EXPECT_NEAR(stored.most(), 1.0 + 5.0 * 0.3 + 0.5 * 0.02 * 660.0 * 660.0, 1e-6);
     stored = StoredEnergy{{.within = 1.0, .force_limit = 5.0, .stiffness = 50.0}};
-    stored.visit(0.0, 0.4);  // coupling stretched by 0.3 more than at the force limit of the device
+    stored.visit(0.0, 0.4);  // stretches the coupling by 0.3 more than the force limit of the device does
     EXPECT_NEAR(stored.most(), 1.0 + 5.0 * 0.3, 1e-12);
 }
 
@@ -236,7 +236,7 @@ TEST(EnergyTank, WithoutABoundNeverActs) {
 TEST(EnergyTank, IsSizedByTheModelAndItsCoupling) {
     const ForceModel model = wall(100.0);
     EXPECT_NEAR(largest_stored_energy(model, direct(), 20.0), 0.5, 1e-6);
-    EXPECT_NEAR(largest_stored_energy(model, direct(), 5.0), 0.125 + 0.25, 1e-6);  // of the clipped force
+    EXPECT_NEAR(largest_stored_energy(model, direct(), 5.0), 0.125 + 0.25, 1e-6);  // force limited to 5
     Scheme coupled;
     coupled.coupling.stiffness = 50.0;
     EXPECT_NEAR(largest_stored_energy(model, coupled, 5.0), 0.375 + 0.5 * 25.0 / 50.0, 1e-6);
@@ -294,7 +294,7 @@ TEST(LimitCycleDetector, IgnoresOtherMotions) {
     Watched faint;
     faint.shake(100.0, 1e-4, 0.0, 4000);
     EXPECT_EQ(faint.detector.limit_cycles(), 0U);
-    Watched turning;  // the detents pass quickly, but the knob never reverses
+    Watched turning;  // the force oscillates as detents pass, but the knob never reverses
     turning.shake(100.0, 2e-3, 0.0, 4000, 2e-3);
     EXPECT_EQ(turning.detector.limit_cycles(), 0U);
 }
@@ -426,7 +426,7 @@ Guards certified_guards(const ForceModel& model, const Scheme& scheme, const Dev
 struct Pressed {
     std::size_t energy_limited = 0;
     std::size_t limit_cycle_scaled = 0;
-    double least = 0.0;  ///< least energy of the independent account after the start ramp [J]
+    double least = 0.0;  ///< least energy that the hand has put in since the start ramp [J]
     std::uint64_t ticks = 0;
 };
 
@@ -548,7 +548,7 @@ TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
         test::Scene scene = test::random_certified_scene(random, 1.0 + 1e-9);
         scene.device.force_limit = std::exp(test::uniform(random, -2.0, 3.0));
         if (!certify(scene.model, scene.scheme, scene.device).certified()) {
-            continue;  // the proof does not cover a force limit for this structure
+            continue;  // the proof for this structure does not hold with a force limit
         }
         ++scenes[std::string(name_of(scene.scheme.structure))];
         Motions motion{random, scene};

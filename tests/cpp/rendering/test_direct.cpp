@@ -150,9 +150,10 @@ TEST(PredictedDirect, PlayFollowsTheMeasuredPosition) {
     structure.reset(0.0);
     // Predicted position x_hat = 0.225; the play operator follows the measured position: to 0.05, not 0.125.
     (void)structure.step(0.15);
-    EXPECT_NEAR(structure.step(0.15).force, 1.0, 1e-12);   // (0.15 - 0.05) / 0.1
-    EXPECT_NEAR(structure.step(0.05).force, -0.5, 1e-12);  // x_hat = 0: (0 - 0.05) / 0.1
-    EXPECT_NEAR(structure.step(0.05).force, 0.0, 1e-12);   // the play is still at 0.05
+    // Direction state: (predicted position - play 0.05) / play radius 0.1, for the predicted positions 0.15 and 0.
+    EXPECT_NEAR(structure.step(0.15).force, 1.0, 1e-12);
+    EXPECT_NEAR(structure.step(0.05).force, -0.5, 1e-12);
+    EXPECT_NEAR(structure.step(0.05).force, 0.0, 1e-12);  // the play operator is still at 0.05
 }
 
 TEST(PredictedDirect, SchemeBuildsItForEveryModelOfPosition) {

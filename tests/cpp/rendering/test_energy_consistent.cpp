@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the order and of the conserved quantities of the time steps.
+// Tests of the energy-consistent integration: order of convergence, conserved energy, choice of the solution.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -109,7 +109,7 @@ struct SwitchedStep {
         }
         return count;
     }
-    /// Returns the solution that the rule in the class comment of the energy-consistent structure selects.
+    /// Returns the next object position by the rule in the class comment of the energy-consistent structure.
     [[nodiscard]] double expected(double far) const {
         const double root = first_root([&](double y) { return by_energy(y); }, from, far);
         return generates(root) ? root : first_root([&](double y) { return by_force(y); }, from, root);

@@ -134,7 +134,7 @@ Rendering render(const std::vector<Fault>& faults, double duration_s, RecordingF
     return render(faults, settings, file);
 }
 
-/// Checks the properties that hold after any fault.
+/// Checks the force limit, the slew limit, and zero force in ticks with a fault status.
 void expect_safe(const Rendering& run) {
     const double step = slew_limit(run.guards, period_s).largest_step;
     double last = 0.0;
@@ -148,7 +148,7 @@ void expect_safe(const Rendering& run) {
         }
         last = tick.force;
     }
-    // Rows include the first sample and the last command, zero force.
+    // In addition to one force for each tick, the device receives one force at the start, and zero force at the end.
     ASSERT_EQ(run.observed.forces.size(), run.ticks.size() + 2);
     for (std::size_t k = 0; k < run.ticks.size(); ++k) {
         ASSERT_EQ(run.observed.forces[k + 1], run.ticks[k].force);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double period = 1e-3;
 
-/// Returns f = 10 x^2.
+/// Returns the force f = 10 x^2 at each position x of a motion.
 std::vector<double> square_law(std::span<const double> motion, double /*step_s*/) {
     std::vector<double> force;
     for (const double x : motion) {

@@ -40,7 +40,7 @@ TEST(TestRig, DefaultPlayRadiusCoversTravelShareAndEncoderSteps) {
     EXPECT_NEAR(rig.scheme(keyswitch(0.004)).play_radius, 4e-5, 1e-15);
     rig.device.encoder_step = 1e-4;
     EXPECT_NEAR(rig.scheme(keyswitch(0.004)).play_radius, 4e-4, 1e-15);
-    EXPECT_EQ(rig.scheme(keyswitch(0.004, 1e-5)).play_radius, 0.0);  // the model defines one
+    EXPECT_EQ(rig.scheme(keyswitch(0.004, 1e-5)).play_radius, 0.0);  // the model defines its own play radius
 }
 
 TEST(TestRig, KeepsChosenFieldsAndScalesTheOthers) {

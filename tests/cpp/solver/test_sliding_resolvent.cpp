@@ -207,7 +207,7 @@ TEST(SlidingResolvent, UsesNewtonIfTheLoadLineIsNotUnique) {
     EXPECT_EQ(memory.newton.position, before.newton.position);
 }
 
-/// Moves two structures along the same motion.
+/// Checks that two structures render equal forces along the same motion.
 template <class S, class T>
 void expect_same_rendering(Random& random, S structure, T reference, double tolerance) {
     structure.reset(0.4);

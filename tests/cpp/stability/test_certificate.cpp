@@ -297,8 +297,8 @@ TEST(Certificate, ReportsCasesWithoutAKnownBound) {
 }
 
 TEST(Certificate, TheGainOfTheEncoderIsTheLargestOfBothEnds) {
-    // K_c = 100, B_c / T = 20: p = 120. kappa = 300: 300 (120 + 20) / 420 = 100; kappa = -80: e = 80 / 20 = 4,
-    // 80 (120 + 80) / 40 = 400.
+    // K_c = 100, B_c / T = 20, load line slope p = 120. Gain for the force slope 300: 300 (120 + 20) / 420 = 100; for
+    // the force slope -80: 80 (120 + 80) / 40 = 400.
     EXPECT_NEAR(massless_gain(slopes(0.0, 300.0), {100.0, 0.02}, 1e-3), 100.0, 1e-9);
     EXPECT_NEAR(massless_gain(slopes(-80.0, 300.0), {100.0, 0.02}, 1e-3), 400.0, 1e-9);
 }
@@ -639,7 +639,7 @@ TEST(ForceBounds, HoldEverySlopeOfAForceOfVelocityContinuationIncluded) {
     }
 }
 
-// "where no bound is known it says so and refuses"
+// The certificate is refused if no bound of the required damping is known: force of velocity behind a coupling.
 TEST(Certificate, OfAForceOfVelocityIsRefusedBehindACoupling) {
     ForceBounds bounds = slopes(0.0, 1.0);
     for (const StructureKind kind : {StructureKind::Massless, StructureKind::Implicit,

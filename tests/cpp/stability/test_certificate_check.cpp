@@ -85,7 +85,7 @@ TEST(CertificateCheck, AcceptsWiderBoundsAndRefusesNarrowerOnes) {
             return [&widen, amount](ForceBounds& bounds) { widen(bounds, amount); };
         };
         EXPECT_EQ(disagreement(with_bounds(certificate, by(1e-3)), model), "") << name;
-        if (name != "mean_force") {  // this bound is 0 here and cannot be smaller
+        if (name != "mean_force") {  // the mean force of this model is 0 and cannot be smaller
             const std::string wrong = disagreement(with_bounds(certificate, by(-1e-3)), model);
             EXPECT_EQ(wrong.rfind("certificate.bounds." + name + " is ", 0), 0U) << name << ": " << wrong;
         }

@@ -74,7 +74,7 @@ struct Bumps {
     }
 };
 
-/// A scene with period 1 and coupling stiffness 1.
+/// A scene with the period T = 1 of the control loop and the coupling stiffness K_c = 1.
 struct CoupledScene {
     Bumps object;
     Scheme scheme;
@@ -98,7 +98,7 @@ std::ostream& operator<<(std::ostream& out, const CoupledScene& scene) {
 /// after the change.
 struct Account {
     double least = 0.0;
-    double last = 0.0;  ///< after the last sample
+    double last = 0.0;  ///< energy that the hand has put in after the last sample
     double throughput = 0.0;
 };
 

@@ -151,7 +151,7 @@ TEST(DirectLines, EncoderErrorOfHysteresisIncludesStickingOnce) {
     profile.coulomb_friction *= 0.999;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
     profile.coulomb_friction = (20.0 + 80.0) * 0.5e-3;
-    profile.viscous_damping = 0.5e-3 * 60.0;  // friction includes h / r twice: no slope is added
+    profile.viscous_damping = 0.5e-3 * 60.0;  // the friction includes h / r twice: the slope 60 suffices
     EXPECT_TRUE(certify(bounds, direct, profile).certified());
     profile.coulomb_friction *= 0.99;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
@@ -268,7 +268,7 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
             }
         }
     }
-    EXPECT_GE(found, 8);  // the search finds violations
+    EXPECT_GE(found, 8);  // with too little damping the search finds motions that take energy out
 }
 
 }  // namespace

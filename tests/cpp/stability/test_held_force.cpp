@@ -138,7 +138,8 @@ TEST(HeldForce, AFilterWithAFractionOfASampleIsContinuousInTheDelay) {
     for (const int m : {1, 4}) {
         for (const SlopeRange slopes : {SlopeRange{1.0, 0.0}, {1.0, 1.0}, {0.2, 1.0}}) {
             const std::vector<double> taps = prediction(m);
-            std::vector<double> late = taps;  // 1 + (prediction - 1) a sample later
+            // Filter weights of a prediction one sample later: 1, then `taps`.
+            std::vector<double> late = taps;
             late.insert(late.begin(), 1.0);
             EXPECT_NEAR(filtered_need(taps, 1e-9, slopes), filtered_need(taps, slopes), 1e-3);
             EXPECT_NEAR(filtered_need(taps, 1.0 - 1e-9, slopes), filtered_need(late, slopes), 1e-3);
@@ -160,9 +161,10 @@ TEST(HeldForce, WithoutAFilterBothLinesOfAFractionAreClose) {
 
 /// Sample times, command times and prediction filter, in nominal periods.
 struct Timing {
-    std::vector<double> taps;  ///< the command of sample k is f(x_k - sum of taps[j - 1] d_{k-j})
-    double delay = 0.0;        ///< delay from a sample to its command
-    double jitter = 0.0;       ///< samples are taken at k + u_k, 0 <= u_k <= jitter
+    /// Filter weights: the command of sample k is f(x_k - sum of taps[j - 1] d_{k-j}), where d_i = x_{i+1} - x_i.
+    std::vector<double> taps;
+    double delay = 0.0;   ///< delay from a sample to its command
+    double jitter = 0.0;  ///< sample k is taken at the time k + u_k, 0 <= u_k <= jitter
 };
 
 /// A closed motion that repeats after as many samples as `late` has elements.
@@ -178,8 +180,8 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
     const auto count = static_cast<int>(cycle.late.size());
     struct Event {
         double time;
-        int sample;   ///< taken here, or -1
-        int command;  ///< command that starts here, or -1
+        int sample;   ///< number of the sample taken at this time, or -1
+        int command;  ///< number of the command that starts to act at this time, or -1
     };
     std::vector<Event> events;
     for (int k = 0; k < count; ++k) {
@@ -318,7 +320,8 @@ TEST(HeldForce, NoMotionTakesEnergyOutOfADelayedForce) {
         return delayed_need(k % 3, tau, slopes);
     };
     EXPECT_EQ(violated(1.0, 40, need), 0);
-    EXPECT_GE(violated(0.6, 40, need), 10);  // the search finds violations
+    // With too little damping the search finds motions that take energy out.
+    EXPECT_GE(violated(0.6, 40, need), 10);
 }
 
 TEST(HeldForce, NoMotionTakesEnergyOutWithJitter) {

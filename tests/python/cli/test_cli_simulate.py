@@ -235,7 +235,7 @@ def test_progress_is_called_during_the_simulation() -> None:
         Scheme(structure="implicit"),
         DeviceProfile(),
         Hand(),
-        3000.0,  # longer than the time between two calls on a fast machine
+        3000.0,  # simulated seconds: long enough for several progress calls
         progress=ticks.append,
     )
     assert ticks[0] == 0

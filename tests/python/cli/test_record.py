@@ -51,7 +51,8 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
     assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
     assert summary["recorded"] == summary["ticks"] == 3000
-    assert not any(frame.enabled for frame in frames(trace))  # only the hand moves the handle
+    # the device is never enabled: only the hand moves the handle
+    assert not any(frame.enabled for frame in frames(trace))
     recording = read_recording(recording_file)
     assert recording.metadata["force"].endswith("from the device's force transducer")
     model = identify(recording)

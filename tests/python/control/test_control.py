@@ -194,7 +194,7 @@ def test_a_short_fault_is_counted_and_the_run_continues(fault: str) -> None:
     assert (
         sum(json.loads(completed.stdout)["ticks_by_status"].values()) == json.loads(completed.stdout)["ticks"]
     )
-    assert len(json.loads(completed.stdout)["ticks_by_status"]) == 3  # Ok, Ramp, the fault's status
+    assert len(json.loads(completed.stdout)["ticks_by_status"]) == 3  # Ok, Ramp, and that of the fault
 
 
 def test_a_rate_too_low_is_reported_and_ends_the_run(tmp_path: Path) -> None:

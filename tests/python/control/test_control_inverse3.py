@@ -89,7 +89,7 @@ def test_only_the_first_message_names_the_program_and_it_sends_zero_force(spring
     assert all(set(message) == {"inverse3"} for message in later_messages)
     assert (
         ticks <= len(later_messages) <= ticks + 2
-    )  # one message a tick, since the host paces; the last ones are zero
+    )  # one message a tick, since the host sets the rate; up to two more with zero force
 
 
 def test_a_negative_axis_reverses_the_force(spring: Path) -> None:

@@ -25,7 +25,7 @@ CASES = 100 * max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 
 
 def mexican_hat(u: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the radial Mexican hat over the last axis."""
+    """Returns the radial mother wavelet (|u|^2 - d) exp(-|u|^2 / 2) of vectors u (..., d)."""
     square = np.sum(u * u, axis=-1)
     return (square - u.shape[-1]) * np.exp(-0.5 * square)
 

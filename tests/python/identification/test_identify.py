@@ -56,7 +56,7 @@ def test_several_recordings_of_one_environment_are_identified_together() -> None
 
 
 def test_play_starts_at_rest_in_every_recording() -> None:
-    """A sweep, and twenty rests elsewhere: only a new start explains a rest between the strokes."""
+    """One recording moves; twenty others rest between the strokes, so each starts its own play operator."""
     random = np.random.default_rng(1)
     t = np.linspace(0.0, 4.0 * np.pi, 1600)
     x = 0.5 - 0.5 * np.cos(t)
@@ -116,7 +116,7 @@ def test_control_c_interrupts_identify_immediately(monkeypatch: pytest.MonkeyPat
 
 
 def held_out_nrmse(path: Path, **options: object) -> tuple[float, Model]:
-    """Holds out every fifth row; fits one model for both strokes."""
+    """Fits both strokes without every fifth row; returns the NRMSE on these rows, and the model."""
     kept, held = palpate.read_recording(path).split(every=5)
     model = identify(kept, **options)
     assert held.direction is not None
@@ -133,7 +133,7 @@ def held_out_nrmse(path: Path, **options: object) -> tuple[float, Model]:
 def test_error_of_measured_strokes_does_not_grow(
     data: Path, folder: str, every: int, median: float, bounded: bool
 ) -> None:
-    """Some files of each set, more in long runs; a benchmark covers the whole table."""
+    """Tests some files of each folder, more in long runs; bench/identification/real_data.py tests all."""
     errors = []
     apart = every if SCALE > 1 else 3 * every if bounded else 6 * every
     for path in sorted((data / folder).glob("*.csv"))[::apart]:

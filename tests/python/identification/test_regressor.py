@@ -29,7 +29,7 @@ def test_scikit_learn_estimator_checks_pass(estimator: Any, check: Any) -> None:
 
 
 def bump(n: int = 300, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Returns a hump and a slope with noise, one input."""
+    """Returns one input (n, 1), and a straight line plus a Gaussian of the input, with noise (n,)."""
     random = np.random.default_rng(seed)
     x = random.uniform(-1.0, 1.0, n)
     return x[:, None], x + np.exp(-(((x - 0.2) / 0.15) ** 2)) + random.normal(0.0, 0.01, n)

@@ -100,7 +100,7 @@ def test_plan_takes_the_simplest_certified_structure() -> None:
     ("damping", "samples"), [(1.0, 1), (0.049, 2), (0.036, 4), (0.030, 8), (0.0278, 16), (0.027, 0)]
 )
 def test_prediction_takes_fewest_samples_certified_for_a_late_tick(damping: float, samples: int) -> None:
-    """A slope of 40 needs 0.0400, 0.0303, 0.0255, 0.0231, 0.0218 for 1 to 16 samples; 1.25 times as much."""
+    """Slope 40: damping 0.0400, 0.0303, 0.0255, 0.0231, 0.0218 for 1 to 16 samples; 1.25 times if late."""
     device = DeviceProfile(viscous_damping=damping, coulomb_friction=0.02)
     model = model_by_hand(weight=[0.0], linear=[40.0])
     chosen = plan(model, device)
@@ -121,7 +121,7 @@ def test_prediction_changes_neither_network_nor_certificate() -> None:
 
 
 def test_late_device_gets_a_prediction_if_only_that_is_certified() -> None:
-    """A sample of delay: slopes up to 40 need 0.060 without prediction, 0.052 with that of one sample."""
+    """With one sample delay, slope 40 needs a damping of 0.060 without prediction, 0.052 with one sample."""
     model = model_by_hand(weight=[0.0], linear=[40.0])
     device = DeviceProfile(viscous_damping=0.055, coulomb_friction=0.02, delay_s=1e-3)
     chosen = plan(model, device)
@@ -284,7 +284,7 @@ def test_an_edited_model_is_refused_when_it_is_read(tmp_path: Path) -> None:
 
 
 def test_planned_rendering_is_stable_with_hands_on_its_device() -> None:
-    """The plan for a weak device keeps its error in the simulation, the model alone oscillates."""
+    """With a hand, the plan for a weak device is stable in simulation; direct rendering oscillates."""
     from palpate import Hand, simulate
     from palpate.planning import force_error
 

@@ -164,7 +164,8 @@ def test_friction_and_encoder_are_named_where_they_are_the_limit() -> None:
 def test_the_softness_of_a_coupling_is_a_force_error(structure: str, stiffness: float) -> None:
     model = model_by_hand()
     scheme = Scheme(structure=structure, coupling_stiffness=stiffness, mass=1e-3, object_damping=0.1)
-    x = np.linspace(0.0, 0.6, 200_001)  # of the object; its handle is further by the spring's deflection
+    # position of the virtual object; the position of the handle is larger by the deflection of the coupling
+    x = np.linspace(0.0, 0.6, 200_001)
     handle = x + model.force(x) / stiffness
     inside = handle <= 0.5
     error = np.abs(model.force(x) - model.force(handle))[inside].max()

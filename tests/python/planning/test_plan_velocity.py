@@ -98,7 +98,7 @@ def test_plan_is_read_from_its_file_and_an_edited_bound_is_refused(tmp_path: Pat
     path.write_text(json.dumps(content), encoding="utf-8")
     with pytest.raises(InputError, match=r"certificate\.bounds\.drag is .*must be at least"):
         load_model(path)
-    # Read as a force of another input than velocity, it is another force.
+    # With the kind `general` the second input is not a velocity: the certificate is for another force.
     content["certificate"]["bounds"]["drag"] /= 0.99
     content["kind"] = "general"
     path.write_text(json.dumps(content), encoding="utf-8")
@@ -117,7 +117,7 @@ def test_rendered_force_uses_the_last_difference_of_positions() -> None:
     expected = model.predict(np.column_stack([x, v])[inside])
     assert inside.mean() > 0.9
     assert np.abs(rendered.force[1:][inside] - expected).max() < 1e-9
-    # Half an encoder step of position, one of velocity.
+    # Allowed force error: from half an encoder step of position, and one encoder step a tick of velocity.
     step = KNOB.encoder_step
     assert force_error(chosen, rendered).instant < 6.0 * step + 0.06 * step / KNOB.period_s
 

@@ -50,7 +50,7 @@ def test_a_plan_names_its_structure_and_its_solver(structure: str, solver: str |
 
 
 def test_a_plan_does_not_claim_a_table_that_cannot_be_certified() -> None:
-    # At this distance from zero, the spacing of doubles exceeds the allowed error of a table.
+    # At positions near 1e6 rad, the rounding of positions exceeds the allowed error of a force table.
     far = model_by_hand(beta=[[1e6 + 0.3]], lower=[1e6], upper=[1e6 + 0.5])
     assert Plan(far, Scheme(structure="massless")).solver == "newton"
 
@@ -71,7 +71,7 @@ def test_a_force_in_ampere_is_not_rendered() -> None:
 
 
 def test_the_explicit_limit_is_the_paper_scene_s() -> None:
-    # Without a coupling: (4 m - 2 B_o T) / T^2 = 3000 at m = 0.001, B_o = 0.5, T = 1 ms.
+    # Largest stable slope without a coupling: (4 m - 2 B_o T) / T^2 = 3000 (m = 0.001, B_o = 0.5, T = 1 ms).
     scheme = Scheme(structure="explicit", mass=0.001, object_damping=0.5)
     assert explicit_slope_limit(scheme, 1e-3, coupled=False) == pytest.approx(3000.0, rel=1e-12)
     assert explicit_slope_limit(scheme, 1e-3) == pytest.approx(3000.0 - 40.0 - 100.0, rel=1e-12)
@@ -91,7 +91,7 @@ def test_an_explicit_plan_beyond_its_slope_limit_is_refused_with_both_numbers() 
     ids=["knob", "keyswitch", "both sides of 0"],
 )
 def test_a_hand_leads_the_handle_through_the_domain_and_not_beyond(model: Model, structure: str) -> None:
-    """The first second starts at 0, for any domain."""
+    """The handle starts at position 0 for any domain, so the first second is not checked."""
     _, recording = rendered(model, structure=structure)
     lower, upper = float(model.lower[0]), float(model.upper[0])
     travel = upper - lower
@@ -188,7 +188,7 @@ def test_play_radius_is_chosen_only_if_the_model_has_none() -> None:
 
 
 def test_structures_are_ordered_by_force_error() -> None:
-    """Compensated equals direct; softness of the coupling comes next; added damping has the largest error."""
+    """Force errors: compensated equals direct, then uncompensated coupling, and most with object damping."""
     model = model_by_hand(linear=[8.0])
     rows = compare_structures(model, rig_for(model), 4.0)
     assert [row.scheme.structure for row in rows] == [

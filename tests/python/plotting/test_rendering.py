@@ -46,10 +46,10 @@ def test_poles_are_those_of_the_step_and_leave_the_circle_at_the_certificate_lim
     assert reach[0] < 1.0
     assert reach[1] == pytest.approx(1.0, abs=1e-9)
     assert reach[2] > 1.0
-    # z^2 + a z + b: b is the product, and 1 - T (B_o + B_c) / m.
+    # The poles are the roots of z^2 + a z + b; their product b is 1 - T (B_o + B_c) / m.
     assert np.prod(locus.chosen[0]).real == pytest.approx(1.0 - T * 0.51 / 1e-3)
-    # A sample exists where two poles meet: the drawn path has its corner there.
+    # One computed slope is where two poles meet, because the drawn line of the poles has a corner there.
     assert np.abs(np.diff(locus.poles[0], axis=-1)).min() < 1e-6
-    # The undriven step: y_{k+1} = (1 + b) y_k - b y_{k-1} - T^2 K / m y_k.
+    # Handle at 0, total stiffness K: y_{k+1} = (1 + b) y_k - b y_{k-1} - T^2 K / m y_k.
     a, b = -np.sum(locus.chosen[0]).real, np.prod(locus.chosen[0]).real
     assert a == pytest.approx(T**2 / 1e-3 * (0.5 * limit + 60.0) - 1.0 - b)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Both ways to close the loop, and the assumed time of a recording without time."""
+"""Simulated rendering of recorded motions and of recorded forces, and recordings without time."""
 
 import re
 from typing import Any
@@ -78,7 +78,7 @@ def test_the_error_of_a_force_driven_loop_is_that_of_the_position() -> None:
 
 @pytest.mark.parametrize(("stiffness", "structure"), [(2990.0, "explicit"), (3010.0, "implicit")])
 def test_unstable_explicit_environment_is_replaced_and_reported(stiffness: float, structure: str) -> None:
-    # (4 m - 2 B_o T) / T^2 = 3000 at m = 0.001, B_o = 0.5, T = 1 ms.
+    # Largest slope of the explicit structure: (4 m - 2 B_o T) / T^2 = 3000 at m = 0.001, B_o = 0.5, T = 1 ms.
     loop = force_driven(spring(stiffness), sweep(stiffness))
     assert loop.scheme.structure == structure
     assert loop.rmse < 0.01
@@ -129,7 +129,7 @@ def test_sticking_counts_as_slope_of_the_explicit_environment() -> None:
 
 def test_a_recording_without_time_is_followed_at_an_assumed_speed() -> None:
     loop = motion_driven(spring(), sweep(timed=False))
-    # Four strokes of 0.5 rad at 0.5 rad/s.
+    # The recording has four strokes of 0.5 rad; the assumed speed is 0.5 rad/s.
     assert loop.assumed_speed == pytest.approx(0.5)
     assert loop.time[-1] == pytest.approx(4.0, abs=2e-3)
     speed = np.abs(np.diff(loop.recorded_position)) / 1e-3

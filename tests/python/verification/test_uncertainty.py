@@ -34,7 +34,7 @@ def strokes(seed: int, loss: float = 0.3) -> Recording:
 
 
 def test_errors_agree_with_their_standard_errors() -> None:
-    """Over 15 draws the error over its standard error has the spread of a standard normal."""
+    """Errors of model force and slope over their standard errors have a standard deviation of about 1."""
     ratios, slopes = [], []
     for seed in range(15):
         recording = noisy(seed)

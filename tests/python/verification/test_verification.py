@@ -124,7 +124,7 @@ def test_a_single_valued_model_keeps_rows_without_a_direction() -> None:
 def test_without_a_direction_the_play_operator_follows_the_motion() -> None:
     model = model_of(curve().source, hysteresis=True, play_radius=0.005)
     result = verify(model, stroke(direction=False))
-    # All rows except the 2r after each turning point slide, as with a known direction.
+    # As with a stated direction, the direction state is 1 or -1, except for 2 play radii after reversals.
     assert np.mean(np.abs(result.residual) < 4 * NOISE) > 0.98
     assert "the play operator follows the positions" in result.notes[0]
 
@@ -154,7 +154,7 @@ def test_a_play_radius_that_is_given_is_used_even_with_a_direction() -> None:
 
 
 def test_the_play_of_held_out_rows_follows_the_rows_between_them() -> None:
-    """Every 60th row of a fast motion: without the rows between, the play differs."""
+    """Every 60th row of a fast motion is held out; its play depends on the rows between the held-out rows."""
     time = np.arange(6000) * 1e-3
     x = 0.5 - 0.45 * np.cos(2 * np.pi * 3.0 * time) * np.cos(2 * np.pi * 0.11 * time)
     model = model_of(curve().source, hysteresis=True, play_radius=0.05)
@@ -188,7 +188,7 @@ def test_the_play_of_held_out_rows_follows_the_rows_between_them() -> None:
 def test_large_error_reports_the_change_that_makes_the_model_fit(
     changed: dict[str, Any], sentence: str
 ) -> None:
-    """The force is curved, so an offset of the position differs from one of the force."""
+    """The force is curved, so an offset of the position changes the error otherwise than one of the force."""
     model = model_of(
         stroke().source,
         alpha=[[4.0]],
@@ -290,7 +290,7 @@ def test_further_inputs_are_taken_by_name() -> None:
         lower=[0.0, 0.25],
         upper=[1.0, 1.0],
     )
-    # Outside its box a clamped gradient continues the network; it may differ from the plane.
+    # Outside the domain of its inputs the model continues with a limited gradient, not with the true plane.
     inside = load >= 0.25
     result = verify(model, both)
     assert np.abs(result.residual[inside]).max() < 5 * NOISE

@@ -30,7 +30,7 @@ def sweep(n: int, seed: int, encoder_step: float = 0.0) -> np.ndarray:
     ("n", "encoder_step"), [(50, 0.0), (300, 0.0), (3000, 7.7e-4)], ids=["n50", "n300", "n3000-encoder"]
 )
 def test_a_linear_spring_with_noise_needs_no_wavelet(n: int, encoder_step: float) -> None:
-    """0 wavelets in at least 38 of 40 draws (95 of 100), at any noise."""
+    """A linear spring is fitted with 0 wavelets in at least 38 of 40 draws (95 of 100), at any noise."""
     misjudged = 0
     for draw in range(DRAWS):
         random = np.random.default_rng(1000 + draw)
@@ -162,7 +162,7 @@ def test_gain_on_held_out_rows_below_its_standard_error_is_not_accepted(
 
 
 def test_play_radius_is_found_from_the_motion_when_no_direction_is_given() -> None:
-    """f = 2 x + 0.3 s with the play of 1 % of the travel, inner loops included."""
+    """f = 2 x + 0.3 s (direction state s, play radius 1 % of the travel), with inner loops."""
     random = np.random.default_rng(7)
     t = np.linspace(0.0, 30.0, 6000)
     x = 0.5 - 0.5 * np.cos(t) * np.abs(np.cos(0.21 * t))
@@ -300,7 +300,7 @@ def test_search_setting_given_as_an_option_is_refused_with_the_cure() -> None:
 
 
 def test_hysteresis_is_not_tested_if_motions_are_too_short_for_any_play() -> None:
-    """Like a recording whose time has a gap every few rows."""
+    """Every third row starts a new motion, as in a recording whose time has a gap every few rows."""
     x = np.linspace(0.0, 1.0, 600)
     force = 2.0 * x + np.random.default_rng(5).normal(0.0, 1e-3, len(x))
     starts = [0, *range(70, len(x), 3)]

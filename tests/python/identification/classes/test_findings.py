@@ -180,7 +180,7 @@ def test_unexplained_variance_is_that_of_the_noise() -> None:
     both = wall(x) + side
     assert unexplained_variance(x, both) > 0.5
     assert unexplained_variance(x, both, side) < 1e-3
-    # equal positions at different times are compared with each other
+    # forces at equal positions are compared with each other, also if they are of different times
     assert unexplained_variance(np.repeat([0.0, 1.0], 1000), np.tile(np.arange(1000.0), 2)) > 5e4
 
 
@@ -204,7 +204,7 @@ def test_likely_cause_is_time_direction_or_another_input() -> None:
 def test_model_with_a_small_error_has_no_finding() -> None:
     x = strokes(N)
     assert explained_findings(x, wall(x) + noise(N), noise(N), None, 0.005) == []
-    # a force that the model misses, not the position
+    # the model misses a part of the force; the position has no defect
     assert explained_findings(x, wall(x), wall(x) - wall(x).mean(), None, 1.0) == []
 
 

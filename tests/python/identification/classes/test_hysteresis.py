@@ -50,7 +50,7 @@ def test_a_motion_that_begins_in_the_middle_of_its_play_is_fitted_to_its_noise()
 @pytest.mark.parametrize("radius", [0.0033, 0.0071])
 @pytest.mark.parametrize("noise", [0.0, 2e-3], ids=["rendered", "measured"])
 def test_play_radius_between_the_options_is_found_without_more_wavelets(radius: float, noise: float) -> None:
-    """Wavelets grown at a wrong radius model the error of the radius without limit."""
+    """With a wrong play radius wavelets model the error of the radius, and their number is not limited."""
     x = 0.45 * wandering(10_000, 1)
     side = HysteresisInput.of_play([x], radius).side
     force = 1.5 * np.tanh(12 * (x - 0.2)) + side * (0.1 + 0.1 * x)

@@ -54,12 +54,12 @@ def test_variance_within_cells_excludes_the_slope_across_them() -> None:
     x = random.uniform(0.0, 1.0, 50_000)
     noise = random.normal(0.0, 0.02, len(x))
     rows = Compressor(x[:, None], 40.0 * x + noise, max_positions=200).rows()
-    freedom = rows.samples - len(rows.force) * 1.25  # a cell's mean, a slope for four cells
+    freedom = rows.samples - len(rows.force) * 1.25  # fitted: 1 mean a cell, 1 slope for 4 cells
     assert np.sqrt(rows.within / freedom) == pytest.approx(0.02, rel=0.01)
 
 
 def test_the_error_of_cells_is_second_order_and_bounded_by_the_estimate() -> None:
-    """Half the cell size quarters the error, and the estimate is the actual difference."""
+    """Half the cell size quarters the force error of compressed rows; the estimated error is the true one."""
     x = np.random.default_rng(2).uniform(0.0, 1.0, 200_000)
     errors = []
     for cells in (50, 100):

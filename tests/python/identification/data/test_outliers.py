@@ -106,7 +106,7 @@ def test_sums_over_files_refuse_a_spike(tmp_path: pytest.TempPathFactory) -> Non
     pd.DataFrame({"position_rad": changed(x, {5000: 6e5}), "torque_Nm": y}).to_csv(path, index=False)
     with pytest.raises(palpate.InputError, match=r"1 of 10000 rows have a position \(6e\+05\)"):
         identify_files(path)
-    # the cure, applied literally
+    # the cure that the message names: the row with the wrong position is deleted
     pd.DataFrame({"position_rad": np.delete(x, 5000), "torque_Nm": np.delete(y, 5000)}).to_csv(
         path, index=False
     )
@@ -119,7 +119,7 @@ FEW = 4000
 
 
 def with_outliers(y: Array, share: float) -> Array:
-    """Returns the force with that share of rows moved by ten ranges."""
+    """Returns the forces y; a share of the rows is moved by ten times the force range."""
     random, wrong = np.random.default_rng(8), y.copy()
     rows = random.choice(len(y), round(share * len(y)), replace=False)
     wrong[rows] += random.choice([-10.0, 10.0], len(rows)) * np.ptp(y)

@@ -144,7 +144,7 @@ def test_hysteresis_is_not_tested_if_one_recording_lacks_direction() -> None:
 
 
 def test_measured_probing_of_organs_is_a_force_of_depth_and_place(data: Path) -> None:
-    """Three inputs; every fifth row held out."""
+    """The models have three inputs (depth and two coordinates of the place); every fifth row is held out."""
     errors = []
     for path in sorted((data / "organ_probing").glob("*.csv"))[::3]:
         recording = palpate.read_recording(
@@ -204,14 +204,15 @@ def test_data_longer_than_a_period_are_taken_modulo_the_period() -> None:
 
 
 def test_hysteresis_of_a_knob_follows_the_motion_and_not_the_wrapped_position() -> None:
-    """Two turns forth and back: the play operator must not jump at the seam."""
+    """Two revolutions forth and back: the play operator must not jump where the position wraps to zero."""
     time = 1e-3 * np.arange(8000)
     x = TURN * (1.0 - np.cos(2.0 * np.pi * time / 4.0))
     friction = 0.2 * np.sign(np.gradient(x))
     force = np.sin(3.0 * x) + friction + np.random.default_rng(2).normal(0.0, 0.01, len(x))
     model = identify(Recording.from_arrays(x, force, time), period=TURN)
     assert model.kind == "hysteresis"
-    assert model.fit.nrmse < 0.06  # a jump at the seam leaves 0.2; friction of a smaller play leaves 0.05
+    # NRMSE 0.2: the play operator jumps at the end of the period; 0.05: friction with a smaller play radius
+    assert model.fit.nrmse < 0.06
 
 
 @pytest.mark.parametrize(("missing", "level"), [(0.02, "good"), (0.2, "usable"), (0.7, "no")])
@@ -239,7 +240,7 @@ def test_measured_turns_are_identified_with_their_period(data: Path) -> None:
 
 
 def spring(rate: float, *, mass: float = 0.0, damping: float = 0.0) -> Recording:
-    """Returns 3 N*m/rad swept sinusoidally, with a mass and a damping."""
+    """Returns a recording of a spring of 3 N*m/rad with mass and damping, moved sinusoidally."""
     t = np.arange(0.0, 10.0, 1e-3)
     x = 0.3 * np.sin(rate * t)
     force = 3.0 * x - mass * rate**2 * x + damping * 0.3 * rate * np.cos(rate * t)

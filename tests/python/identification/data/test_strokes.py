@@ -146,7 +146,7 @@ def test_repeated_rows_of_one_stroke_with_noise_give_no_finding(times: int) -> N
 
 
 def test_equal_strokes_do_not_change_the_model() -> None:
-    """Equal to the last bit to the model of the same rows without order."""
+    """The model equals, to the last bit, the model of the same rows in random order."""
     force = loop(h=0.0)
     ordered = identify(Recording.from_arrays(IN_AND_OUT, force))
     decision = "hysteresis: not accepted (press and release force do not differ by 4 standard errors)"
@@ -229,7 +229,7 @@ def test_measured_strokes_are_found_in_the_order_of_rows(data: Path) -> None:
 
 
 def test_measured_recordings_without_direction_are_identified_as_well(data: Path) -> None:
-    """NRMSE within 1.05 of the file with its direction. Equal strokes give equal models."""
+    """The NRMSE is at most 1.05 times that with stated directions; equal strokes give equal models."""
     for path in measured_files(data):
         stated = replace(read_recording(path), time=None)
         unstated = replace(stated, direction=None)

@@ -109,7 +109,7 @@ def test_cells_are_bounded_by_the_derivatives_of_the_core(order: int) -> None:
 
 
 def test_the_bounded_least_squares_is_the_best_one() -> None:
-    """Compares with brute force: on three wavelets, minimises over the active sets of a fine grid."""
+    """Compares the bounded fit of two straight strokes with the best of all four sets of active bounds."""
     random = np.random.default_rng(3)
     x = np.linspace(0.0, 1.0, 60)
     side = np.repeat([1.0, -1.0], 60)
@@ -144,7 +144,7 @@ def test_vanishing_noisy_hysteresis_stays_nonnegative_without_error() -> None:
 
 
 def test_crossing_strokes_are_replaced_by_their_mean() -> None:
-    """If the release is above the press, h = 0 and g is their mean; elsewhere nothing changes."""
+    """If release force exceeds press force, h = 0 and g is their mean; elsewhere g and h do not change."""
     x = np.linspace(0.0, 0.004, 400)
     h = 0.05 * np.sin(np.pi * x / 0.002)
     positions, force, side = strokes(h, x, 0.002)
@@ -255,7 +255,7 @@ def test_notes_give_position_where_a_late_force_crosses_its_strokes(seed: int) -
     found = re.search(r"release is up to (\S+) above press at (\S+) to (\S+); ", note)
     assert found is not None
     depth, near, far = map(float, found.groups())
-    # the wall moves by 2 v late = 0.06 mm between the strokes
+    # the wall moves by 2 v late = 0.06 mm between the strokes (speed v, force delay late)
     assert depth == pytest.approx(1e4 * 0.06e-3, rel=0.1)
     assert 3.3e-3 < near < 3.7e-3
     assert far == pytest.approx(TURN, abs=1e-4)

@@ -50,7 +50,7 @@ def any_basis(seed: int, n: int = 5) -> Basis:
 
 @pytest.mark.parametrize("kind", ["one force", "two strokes", "play"])
 def test_descent_direction_is_the_gradient_of_the_eliminated_objective(kind: str) -> None:
-    """d objective / d(log alpha, alpha beta) = -2 * direction, by central differences."""
+    """Checks d objective / d(log alpha, alpha beta) = -2 * direction with central differences."""
     problem, basis = noisy_switch(1, kind), any_basis(2)
     problem = problem.with_prior(1.0)
     _, direction = problem.normal_equations(problem.solve(basis))
@@ -82,7 +82,7 @@ def test_refinement_is_never_worse_than_its_start_and_keeps_its_bounds(seed: int
 
 @pytest.mark.parametrize("kind", ["one force", "two strokes", "play"])
 def test_quasi_newton_descends_along_the_gradient_of_all_parameters(kind: str) -> None:
-    """By central differences, in one random direction of coefficients, log(alpha) and beta."""
+    """Checks the gradient with central differences in one random direction of all parameters."""
     problem, basis = noisy_switch(1, kind), any_basis(2)
     problem = problem.with_prior(1.0)
     random, table = np.random.default_rng(3), problem.solve(basis).coefficients

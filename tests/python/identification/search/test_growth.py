@@ -26,7 +26,7 @@ OPTIONS = IdentifyOptions()
 
 
 def kinked(noise: float, seed: int = 0) -> SeparableProblem:
-    """Returns two kinks 100 samples apart."""
+    """Returns the fit of 200 rows of a force with two kinks, which are 100 rows apart."""
     x = np.linspace(0.0, 1.0, 200)
     y = 2.0 * np.abs(x - 0.25) - 3.0 * np.maximum(x - 0.75, 0.0)
     y = y + np.random.default_rng(seed).normal(0.0, noise, len(x))
@@ -59,7 +59,7 @@ def test_noise_is_not_taken_for_structure(noise: float) -> None:
 def over_two_inputs(
     law: Callable[[Float1D, Float1D], Float1D], n: int, noise: float = 0.0
 ) -> SeparableProblem:
-    """Returns rows drawn from the unit box, far apart."""
+    """Returns the fit of a force of two inputs, at n random points of the unit box."""
     random = np.random.default_rng(1)
     x = random.uniform(size=(n, 2))
     y = law(x[:, 0], x[:, 1]) + random.normal(0.0, noise, n)
