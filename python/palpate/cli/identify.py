@@ -234,9 +234,11 @@ def identify(
     rows = sum(len(recording) for recording in judged_on)
     compared = sum(verification.n for _, verification in verified)
     of_rows = str(rows) if compared == rows else f"{compared} of {rows}"
-    judged = "the rows it was identified on" if hold_out_every is None else f"{of_rows} rows held out"
+    judged = "the rows of the identification" if hold_out_every is None else f"{of_rows} rows held out"
     if hold_out_every is None and settings["loss"] == "huber":
         judged += ", where rows far from the model have less weight"
+    # The NRMSE of the fit leaves out wrong readings, which `verify` compares.
+    rms = "" if hold_out_every is None else _rms_text(verified)
     with finishing():
         if plot is not None:
             picture_verification(plot, model, verified, recordings)
@@ -249,7 +251,7 @@ def identify(
                 {
                     "model": f"{output}: {model.fit.model_class}, {model.n_wavelets} wavelets, "
                     f"{model.n_parameters} parameters",
-                    "error": f"{_rms_text(verified)}NRMSE {number(nrmse)} on {judged}",
+                    "error": f"{rms}NRMSE {number(nrmse)} on {judged}",
                     **dict(note.split(": ", 1) for note in model.notes["model_selection"][-_MOST_DECISIONS:]),
                     "time": f"{seconds:.2f} s",
                 }
@@ -274,8 +276,6 @@ def _require_unused(**others: Any) -> None:
 
 def _rms_text(verified: Sequence[tuple[Recording, Verification]]) -> str:
     """Returns the RMS force error of all rows in the unit of the file, as "RMS 0.02 N*m, "."""
-    if not verified:
-        return ""
     rms = float(np.sqrt(np.mean(np.concatenate([found.residual for _, found in verified]) ** 2)))
     return f"RMS {verified[0][0].file_unit('force').text(rms)}, "
 
