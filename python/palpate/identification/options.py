@@ -26,7 +26,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "loss": ("squares", "huber"),
     "filters": ("matched", "paper-implicit", "paper-explicit"),
 }
-"""Settings with a fixed set of words, and the allowed words."""
+"""Options whose value is one of several words, and the allowed words of each."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,7 @@ _LEAST_WHOLE = {
     "resolved_by": 3,
     "max_positions": 16,
 }
-"""Settings that are whole numbers, and the least allowed value of each."""
+"""Options that are whole numbers, and the least allowed value of each."""
 
 _LOWER_BOUND = {
     "evidence": -math.inf,
@@ -210,7 +210,7 @@ _LOWER_BOUND = {
     "coupling_stiffness": 0.0,
     "period": 0.0,
 }
-"""Settings that are real numbers; each must be above its number here."""
+"""Options that are real numbers, and the number that each must exceed."""
 
 
 def _require(options: IdentifyOptions | SearchOptions) -> None:

@@ -25,10 +25,11 @@ REPEATED_ROWS_SHARE = 1.0 / 3.0
 """Share of rows that equal the previous row, above which repeated rows are used once [-]."""
 
 PROBED_ROWS = 7
-"""Number of rows whose copies are counted first. They show if a table may contain every row several times."""
+"""Number of evenly spread rows that are tested first: if each of their forces also occurs in another row, the
+whole table is searched for repeated rows."""
 
 LEAST_LEVELS = 3
-"""Least number of distinct force values for which a force step is computed."""
+"""A force step is computed only for at least this number of distinct force values."""
 
 ROWS_PER_LEVEL = 2.0
 """Least number of rows for each distinct force value [-]: equal differences of force values are then not a

@@ -127,7 +127,7 @@ class _Cells:
     difference: Float1D
     """(m,) mean press force minus mean release force of a cell, at equal position [force]"""
     error: Float1D
-    """(m,) standard error of the difference [force]"""
+    """(m,) standard error of the difference of the mean press and release force of a cell [force]"""
 
     @classmethod
     def of(cls, position: Float1D, force: Float1D, side: Float1D) -> _Cells:

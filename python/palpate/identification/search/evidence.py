@@ -141,7 +141,8 @@ def held_out_deviance(criterion: str, rows: HeldOutRows, errors: Float1D) -> flo
 
 
 Reporter = Callable[[str, int], None]
-"""Function that receives the name of the tested model class and its number of wavelets, to show progress."""
+"""Function that is called with the name of the tested model class and its number of wavelets, to show
+progress."""
 
 _reporter: ContextVar[Reporter | None] = ContextVar("reporter", default=None)
 
