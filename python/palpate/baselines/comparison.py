@@ -36,7 +36,7 @@ class Compared:
     refused"""
     n_parameters: int
     seconds: float
-    """Duration of fit and choice of the setting [s]"""
+    """Duration of the fit of this baseline, including the choice of its settings [s]"""
     refused: str | None = None
     """Reason why the baseline could not be fitted"""
 
@@ -46,11 +46,13 @@ PASSIVE_SPLINE = "smoothing spline, two strokes, h >= 0"
 comparison with a passive model."""
 
 LEAST_STROKE_SHARE = 0.1
-"""Least share of the travel that press and release must each cover for separate fits [-]."""
+"""Least share of the travel that press and release must each cover; otherwise a baseline is fitted to both
+strokes together [-]."""
 
 
 def baselines(strokes: bool) -> dict[str, Estimator]:
-    """Returns every baseline by name; with strokes, each baseline has separate fits for press and release."""
+    """Returns every baseline by name; if `strokes` is True, each baseline has separate fits for press and
+    release."""
     single: dict[str, Estimator] = {
         "linear zones (Haptic Camera)": LinearZones(),
         "tissue parameters": TissueParameters(),
@@ -106,7 +108,8 @@ def _compared(
 
 
 def _has_strokes(recording: Recording) -> bool:
-    """Returns True if both strokes cover some of the travel."""
+    """Returns True if press and release of the recording each cover at least LEAST_STROKE_SHARE of the
+    travel."""
     if recording.direction is None:
         return False
     strokes = [recording.position[recording.direction == side] for side in (1, -1)]

@@ -17,13 +17,14 @@ from scipy.optimize import least_squares
 from .._typing import Float1D, Float2D
 
 HELD_OUT_EVERY = 5
-"""Every fifth of the fitted rows is used to choose missing settings."""
+"""Every fifth of the fitted rows is used to compare values of the settings that the caller did not give."""
 
 SIZES = (2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
-"""Numbers of entries of a force table that are tried."""
+"""Numbers of entries of the force table that the baseline lookup table tries."""
 
 SMOOTHINGS = (30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.0, 0.9, 0.8)
-"""Limits of the residual of a smoothing spline that are tried [multiples of the noise of the force]."""
+"""Tried values of the largest mean squared residual of a smoothing spline [multiples of the noise variance of
+the force]."""
 
 MOST_FITTED_ROWS = 20_000
 """Largest number of fitted rows; of longer data an evenly spread part is used."""
@@ -32,18 +33,19 @@ EXPONENTS = (0.5, 6.0)
 """Smallest and largest exponent of the tissue law of Hunt and Crossley [-]."""
 
 THRESHOLDS = (0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001)
-"""Limits of the residuals of zones with a linear force law that are tried [share of the range of the
-force]."""
+"""Tried values of the largest RMS residual of a zone with a linear force law; a zone with a larger residual
+is divided [share of the range of the force]."""
 
 MOST_ZONE_BOUNDARIES = 256
-"""Number of places at which a zone may be divided: quantiles of its positions."""
+"""Largest number of positions at which the division of a zone is tried: quantiles of the positions of its
+rows."""
 
 LEAST_ZONE_ROWS = 8
-"""Least number of rows in a zone for each of its parameters."""
+"""Least number of rows in a zone with a linear force law, for each fitted parameter of the zone."""
 
 RIDGE = 1e-10
-"""Factor of the ridge in least squares: two equal columns stay solvable, and the ridge is far below any noise
-[-]."""
+"""Factor of the ridge, a term that is added to the diagonal of the normal matrix of least squares [-]: two
+equal columns stay solvable, and the ridge is far below any noise."""
 
 C = TypeVar("C")
 """Type of the values that are tried for one setting of a baseline."""
@@ -53,7 +55,7 @@ class Estimator(Protocol):
     """Interface of a baseline: the methods fit and predict, as in scikit-learn."""
 
     n_parameters_: int
-    """Number of fitted real numbers, known after fit"""
+    """Number of fitted real numbers; available after the method fit was called"""
 
     def fit(self, X: Float2D, y: Float1D) -> Estimator:
         """Fits the baseline to the inputs X (n, d) and the force y (n,)."""
@@ -114,7 +116,7 @@ class PerStroke:
     passive: bool = False
 
     def fit(self, X: Float2D, y: Float1D) -> PerStroke:
-        """Fits one copy to the press rows of X (n, d) and one to the release rows."""
+        """Fits one copy of the baseline to the press rows of X (n, d), and one copy to the release rows."""
         press = X[:, -1] > 0
         self.press_ = deepcopy(self.estimator).fit(X[press, :-1], y[press])
         self.release_ = deepcopy(self.estimator).fit(X[~press, :-1], y[~press])
@@ -153,7 +155,7 @@ class LookupTable:
         """Fits to the first column of X (n, d), the position, and the force y (n,)."""
         size = self.size or best_of(SIZES, lambda entries, A, b: LookupTable(entries).fit(A, b), X, y)
         x, mean, count = merged(X[:, 0], y)
-        # Entries without rows near them are not determined by the data: leave these entries out.
+        # Table entries without rows near them are not determined by the data: leave these entries out.
         entries = np.linspace(x[0], x[-1], size)
         cell = np.clip(np.searchsorted(entries, x, side="right") - 1, 0, size - 2)
         held = np.isin(np.arange(size - 1), cell)
@@ -361,8 +363,8 @@ def _solved(design: Float2D, y: Float1D) -> Float1D:
 
 
 def _best_cut(x: Float1D, design: Float2D, y: Float1D, allowed: float) -> int | None:
-    """Returns the row before which to divide a zone; None if its error is small enough or it cannot be
-    divided."""
+    """Returns the index of the row before which a zone is divided; None if the RMS error of the zone is at
+    most `allowed`, or if its rows are too few or at too few positions."""
     least = LEAST_ZONE_ROWS * design.shape[1]
     rest = y - design @ _solved(design, y)
     if len(y) < 2 * least or float(np.sqrt(np.mean(rest**2))) <= allowed:
@@ -383,7 +385,8 @@ def _best_cut(x: Float1D, design: Float2D, y: Float1D, allowed: float) -> int | 
 
 
 def _explained(gram: Float2D, product: Float2D) -> Float1D:
-    """Returns, for each of several least-squares problems, the sum of squares that its fit explains."""
+    """Returns, for each of several least-squares problems, by how much its fit decreases the sum of squares
+    of the force."""
     ridge = RIDGE * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(gram.shape[1])
     return np.asarray(
         np.einsum("nk,nk->n", product, np.linalg.solve(gram + ridge, product[:, :, None])[:, :, 0])

@@ -50,20 +50,21 @@ from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from
 
 LEAST_KNOWN_SHARE = 0.5
-"""Least share of rows with a known direction for a test of hysteresis [-]."""
+"""Hysteresis is tested only if the direction of at least this share of the rows is known [-]."""
 
 MOST_CELLS = 8192
-"""Largest number of position cells of a summary: enough for the resolution of an identification."""
+"""Largest number of position cells in a summary of the rows: enough for the resolution of an
+identification."""
 
 UNKNOWN_STROKES = "the files have no direction column, and the order of rows does not show the direction"
-"""Reason why hysteresis is not tested."""
+"""Text of the decision that hysteresis is not tested, if the directions of the rows are not known."""
 
 SCATTER_CELLS = 16
 """Number of neighbouring position cells in which the force of single rows is compared with one straight
 line."""
 
 Progress = Callable[[int, int], None]
-"""Function that receives the number of parts read so far and the number of all parts."""
+"""Function that receives the number of file parts that were read so far, and the number of all file parts."""
 
 
 def identify_files(
@@ -409,7 +410,7 @@ def merged(first: Summary, second: Summary, most_cells: int = MOST_CELLS) -> Sum
     both = _joined(first, second, max(levels) if levels else None, lower, upper)
     if both.level is None and len(np.unique(both.cell)) > most_cells:
         both = _joined(first, second, _level_for(lower, upper, most_cells), lower, upper)
-    # a level for the whole range of positions, not for the cells in use: later rows may fill gaps
+    # the cell width fits the whole range of positions, not only cells with rows: later rows may fill gaps
     if both.level is not None and (needed := _level_for(lower, upper, most_cells)) > both.level:
         both = _joined(first, second, needed, lower, upper)
     return both

@@ -26,7 +26,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "loss": ("squares", "huber"),
     "filters": ("matched", "paper-implicit", "paper-explicit"),
 }
-"""Settings with a fixed set of words, and the allowed words."""
+"""Options whose value is one of several words, and the allowed words of each."""
 
 
 @dataclass(frozen=True)
@@ -40,19 +40,23 @@ class SearchOptions:
     """
 
     selection: str = "orthogonal"
-    """How wavelets are selected from the frame: orthogonal, residual or backward"""
+    """How wavelets are selected from the frame: orthogonal (add the one that reduces the error most),
+    residual (add the one that fits the residual best) or backward (remove wavelets from a larger
+    selection)"""
     evidence: float = 10.0
     """Least decrease of the criterion for a more complex model class; 10 is very strong evidence [-]"""
     patience: int = 3
-    """Number of added wavelets without improvement, for each input, after which growth stops [-]"""
+    """Growth of a network stops if this number of successive wavelets, times the number of inputs, was added
+    without a lower criterion [-]"""
     refine: bool = True
-    """False: dilations and translations stay on the frame"""
+    """True: dilations and translations are refined; False: they keep their values of the frame"""
     refinement: str = "projection"
-    """How wavelets are refined: by variable projection, or all parameters by quasi-newton as in the paper"""
+    """How wavelets are refined: projection (variable projection, which solves the weights by least squares at
+    each step) or quasi-newton (steps of all parameters, as in the paper)"""
     refine_steps: int = 8
-    """Refinement steps after each wavelet that was added or removed [-]"""
+    """Largest number of refinement steps after each wavelet that was added or removed [-]"""
     final_steps: int = 30
-    """Refinement steps of the accepted network [-]"""
+    """Largest number of refinement steps of the accepted network [-]"""
     frame_scale: float = 2.0
     """a0, the ratio of neighbouring dilations of the frame [-]"""
     frame_step: float = 0.5
@@ -68,9 +72,11 @@ class SearchOptions:
     """Filters for the forces of mass and damping: matched, or as published with an assumed mass:
     paper-implicit (figure 11), paper-explicit (figure 13)"""
     assumed_mass: float = 1e-3
-    """Mass m of the paper's figures [force s^2/position]"""
+    """Object mass m that the filters paper-implicit and paper-explicit assume, as in the paper's figures
+    [force s^2/position]"""
     assumed_damping: float = 0.5
-    """Object damping B_o of the paper's figure 13 [force s/position]"""
+    """Object damping B_o that the filter paper-explicit assumes, as in the paper's figure 13 [force
+    s/position]"""
     play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
     """Play radii tried for hysteresis if a recording has time but no direction; the best radius between the
     smallest and the largest is searched [share of the travel]"""
@@ -112,11 +118,14 @@ class IdentifyOptions:
     """"auto": the model selection decides, with position and the further inputs of the recording. Or names,
     as a tuple or separated by commas: position, then hysteresis, velocity (from time) or columns."""
     max_wavelets: int = 64
-    """Largest network that is tried [-]"""
+    """Largest network that is tried, as its number of wavelets [-]"""
     criterion: str = "bic"
-    """Stopping rule: bic, aicc, gcv, fpe, or on held-out rows: fresh, perceptual"""
+    """Criterion that compares models and ends growth. From the fitted rows: bic, aicc, gcv, fpe (Bayesian,
+    corrected Akaike, generalised cross-validation, final prediction error). From the error on held-out rows:
+    fresh (error as force) or perceptual (error in just noticeable differences)"""
     loss: str = "squares"
-    """squares: least squares; huber: rows far from the model get less weight"""
+    """Loss of the fit: squares (least squares), or huber (a row with a force far from the model's force gets
+    less weight)"""
     hysteresis_nonnegative: bool = True
     """Impose hysteresis h >= 0 over the domain, so that every loop of press and release loses energy"""
     slope_bounds: tuple[float, float] | None = None
@@ -189,7 +198,7 @@ _LEAST_WHOLE = {
     "resolved_by": 3,
     "max_positions": 16,
 }
-"""Settings that are whole numbers, and the least allowed value of each."""
+"""Options that are whole numbers, and the least allowed value of each."""
 
 _LOWER_BOUND = {
     "evidence": -math.inf,
@@ -201,7 +210,7 @@ _LOWER_BOUND = {
     "coupling_stiffness": 0.0,
     "period": 0.0,
 }
-"""Settings that are real numbers; each must be above its number here."""
+"""Options that are real numbers, and the number that each must exceed."""
 
 
 def _require(options: IdentifyOptions | SearchOptions) -> None:
@@ -267,7 +276,7 @@ def described_fields(kind: type[IdentifyOptions | SearchOptions] = IdentifyOptio
     fields."""
     try:
         tree = ast.parse(inspect.getsource(kind)).body[0]
-    except (OSError, SyntaxError):  # the source file is not installed
+    except (OSError, SyntaxError):  # the source file with the docstrings is missing
         tree = ast.Pass()
     texts: dict[str, str] = {}
     for each, text in pairwise(tree.body if isinstance(tree, ast.ClassDef) else []):

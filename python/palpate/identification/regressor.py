@@ -44,7 +44,8 @@ SETTINGS = {
 means the default search settings."""
 
 LEAST_RELATIVE_RANGE = 1e-12
-"""Least range of a column over its largest absolute value [-]. Below it the column is constant."""
+"""Least ratio of the range of a column to its largest absolute value [-]. Below this ratio the column is
+taken as constant."""
 
 MOST_ERROR_ROWS = 200_000
 """Largest number of rows, evenly spread, from which the reported RMS error is computed. More rows change at

@@ -48,7 +48,7 @@ accepted [longest time between samples of the device]
 """
 
 _LEAST_HYSTERESIS = 1.0 / 64.0
-"""Smallest share of the hysteresis h that is rendered [-]"""
+"""Least factor by which a plan may multiply the hysteresis h to make it renderable [-]"""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Task:
     coupling_damping: float | None = None
     mass: float | None = None
     object_damping: float | None = None
-    """B_o [force*s/position]"""
+    """Object damping B_o that the caller requires [force*s/position]"""
     play_radius: float | None = None
     predict: int | None = None
     """Number of previous position samples that the prediction uses. 0: no prediction; None: chosen by the
@@ -188,7 +188,8 @@ def _direct_limited(task: Task) -> Candidate | Refusal:
 
 
 def _massless(task: Task) -> Candidate | Refusal:
-    """Renders the model minus the spring of the coupling behind the coupling, with limited slopes."""
+    """Renders the model as a massless virtual object behind a coupling, with limited slopes; without
+    hysteresis the model is compensated for the spring of the coupling."""
     if refusal := task.not_static():
         return refusal
     if not task.coupling:

@@ -33,7 +33,8 @@ LONGEST_PLAY = 0.1
 """Largest play radius [share of the travel]; a larger play radius feels like play, not like hysteresis."""
 
 _USED_SLOPE = 1.02
-"""Slope for which a device is used [share of that of the model]; a network is fitted just below its limits"""
+"""Ratio of the slopes that a device must render to the slopes of the model [-]; above 1, because a network is
+fitted just below its slope limits"""
 
 _ATTEMPTS = ((0.005, False), (0.005, True), (0.02, True))
 """Tried pairs. First: standard deviation of the smoothing kernel [share of the travel]. Second: True if the
@@ -49,16 +50,19 @@ _IMPOSED_SHARE = 0.997
 than the true slopes [-]"""
 
 _SUFFICIENT_ERROR = 2e-5
-"""RMS error at which no further wavelets are added [share of the force's range]"""
+"""RMS error of the network with limited slopes, at which no further wavelets are added [share of the force's
+range]"""
 
 _SUFFICIENT_SLOPE_ERROR = 0.01
-"""Error of the slope at which no further wavelets are added [share of the smaller slope limit]"""
+"""Error of the slope of the network with limited slopes, at which no further wavelets are added [share of the
+smaller slope limit]"""
 
 _MOST_WAVELETS = 64
-"""Largest number of further wavelets [-]"""
+"""Largest number of wavelets that are added to the wavelets of the model [-]"""
 
 _LEAST_NEW_SHARE = 1e-5
-"""Least share of the squared norm of a candidate wavelet that is orthogonal to the chosen wavelets [-]"""
+"""A candidate wavelet can be added only if at least this share of its squared norm is orthogonal to the
+chosen wavelets [-]"""
 
 _SCALE_RATIO = 1.6
 """Ratio of adjacent dilations in the frame of the candidates [-]."""
@@ -66,7 +70,8 @@ _SCALE_STEP = 0.75
 """Translation step divided by the width of a wavelet in the frame of the candidates [-]."""
 
 _STICKLESS_PLAY = 1e9
-"""Play radius that is so large that the direction state adds no slope to the force [travels]"""
+"""Play radius that is so large that the direction state adds no slope to the force [multiples of the
+travel]"""
 
 
 @lru_cache(maxsize=8)
@@ -140,7 +145,7 @@ def _limited_once(
     model: ForceModel, low: float, high: float, sigma: float, restoring: bool
 ) -> ForceModel | None:
     """Returns the model plus the fitted change of its force, or None if a continuation is steeper than the
-    limit."""
+    slope limit."""
     x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
     forces = strokes(model, x)
     changes = _changes_needed(
@@ -165,8 +170,8 @@ def _limited_once(
 def _changes_needed(
     x: Float1D, strokes: Float2D, low: float, high: float, sigma: float, model: ForceModel, restoring: bool
 ) -> Float2D:
-    """Returns the changes (k, n) of the force of each stroke that limit its slope, with rounded kinks; 0
-    elsewhere."""
+    """Returns the changes (k, n) of the force of each stroke that limit its slope, with rounded kinks; a
+    change is 0 at positions where no limit is needed."""
     n, step = len(x), x[1] - x[0]
     margin = int(np.ceil(6.0 * sigma / step))
     before = after = 0

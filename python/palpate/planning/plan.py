@@ -376,7 +376,8 @@ def strokes(model: ForceModel, x: Float1D) -> Float2D:
 
 
 def _share(error: float, size: float, force: Float2D) -> float:
-    """Returns an error divided by `size`, or by the largest |force| if the force is constant."""
+    """Returns a force error divided by `size`; if the force is constant, divided by the largest absolute
+    value of the force."""
     size = size or float(np.abs(force).max())
     return 0.0 if error == 0.0 else error / size if size else math.inf
 

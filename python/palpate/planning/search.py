@@ -187,7 +187,7 @@ class _Property:
     improved: Callable[[DeviceProfile, float], DeviceProfile]
     """Function that returns the device with this property improved by a factor, rounded to three digits"""
     text: Callable[[DeviceProfile], str]
-    """Requirement that an improved device just meets, in words"""
+    """Function that returns, in words, the requirement that an improved device just meets"""
 
 
 def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:

@@ -27,9 +27,11 @@ from .plan import Plan, describe
 START = "handle_start"
 MIDDLE = "handle_middle"
 END = "handle_end"
-"""Stems of the columns with the true handle position at the start, in the middle and at the end of a tick."""
+"""Column names, without unit, of the true handle position at the start, in the middle and at the end of a
+tick."""
 MEAN_APPLIED = "mean_applied"
-"""Stem of the column with the mean force over a tick, which a fractional delay divides."""
+"""Column name, without unit, of the mean force over a tick; with a delay of a fraction of a tick two forces
+act in one tick."""
 
 _GRID = 1001
 """Number of positions at which the force range is computed [-]"""
@@ -41,7 +43,7 @@ _COMPENSATED_DAMPING_RATIO = 0.25
 (f'/K_c)^2 of this damping is felt."""
 
 _COMPARED_PREDICTION = 4
-"""Number of previous samples of the prediction in a comparison of structures [-]"""
+"""Number of previous position samples that a prediction uses in a comparison of structures [-]"""
 
 _NAMES = {int(value): name for name, value in Status.__members__.items()}
 """Maps the value of a status to its name."""
@@ -133,14 +135,15 @@ class ForceError:
     """Rendered minus identified force at the handle's true position, RMS over all ticks [N*m or N]."""
 
     end: float
-    """Error at the end of the tick in which the force is held; a force ahead of the motion makes it
-    smaller"""
+    """RMS force error at the end of the tick in which the force is held; a force that is predicted for a
+    later position makes this error smaller"""
     instant: float
     """Force error at the instant of reading the position: only the effects of structure and encoder"""
     mean: float
-    """Error of the force that is averaged over each tick"""
+    """RMS over all ticks of the mean force error in each tick"""
     band: float
-    """Error of the mean force over each tick below 50 Hz: the part that a hand can follow"""
+    """RMS of the error of the mean force over each tick, only its frequencies below 50 Hz: the part that a
+    hand can follow"""
     work: float
     """Work of the force error over the whole time [J]; negative if the rendering gives energy to the hand"""
 

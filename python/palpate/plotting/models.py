@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a model: with a recording, with another model, and the path of its identification."""
+"""Figures of a model: with a recording, with another model, and with the networks that its identification
+tested."""
 
 from __future__ import annotations
 

@@ -48,14 +48,17 @@ class ClosedLoop:
     recorded_position: Float1D
     recorded_force: Float1D
     rendered_position: Float1D
-    """Motion-driven: recorded position. Force-driven: resulting position of the environment."""
+    """Handle position of the simulated loop: the recorded position if `view` is motion-driven, the resulting
+    position of the environment if force-driven"""
     rendered_force: Float1D
-    """Motion-driven: rendered force. Force-driven: recorded force."""
+    """Force of the simulated loop: the rendered force if `view` is motion-driven, the recorded force if
+    force-driven"""
     environment_position: Float1D
     rmse: float
-    """RMS error; motion-driven: of the force, force-driven: of the position."""
+    """RMS error of the force if `view` is motion-driven, of the position if force-driven"""
     nrmse: float
-    """RMS error divided by the population standard deviation of the recorded signal [-]"""
+    """RMS error divided by the population standard deviation of the recorded force (motion-driven) or
+    position (force-driven) [-]"""
     status: Mapping[str, int]
     """Number of ticks with each status"""
     units: Mapping[str, str]

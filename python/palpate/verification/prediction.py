@@ -25,13 +25,13 @@ NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are 
 """Note on rows without velocity, with their number."""
 
 _UNSTATED = ""
-"""Unit of a recording or a model that does not state its unit."""
+"""Empty text, used as the unit if a recording or a model does not state its unit."""
 
 _STRUCTURE = "structure"
-"""Metadata key of a flight record for the rendered structure."""
+"""Key in the metadata of a flight record; its value is the name of the rendered structure."""
 
 _OBJECT_POSITION = "environment_position"
-"""Stem of the column with the position of the virtual object."""
+"""Column name, without unit, of the position of the virtual object."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Prediction:
     """Force of a model at the rows of a recording for which the model can compute a force."""
 
     rows: NDArray[np.bool_]
-    """(n,) rows of the recording that are used"""
+    """(n,) True for the rows of the recording that are used"""
     force: Float1D
     """(k,) force of the model at the used rows"""
     extrapolated: int

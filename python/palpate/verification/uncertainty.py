@@ -33,8 +33,8 @@ SLOPE_STEP = 1e-5
 [share of the domain]."""
 
 LEAST_EIGENVALUE_SHARE = 1e-12
-"""Share of the largest eigenvalue of J'J (columns of unit norm) below which an eigenvalue is a rounding error
-[-]."""
+"""Share of the largest eigenvalue of J'J, with the Jacobian J of the force (columns of unit norm), below
+which an eigenvalue is a rounding error [-]."""
 
 LARGEST_RHO = 0.999
 """Largest autocorrelation of neighbouring residuals that is used [-]: one of 2000 residuals is
@@ -116,8 +116,8 @@ def _blocks(position: Float1D, direction: Float1D | None) -> Iterator[tuple[Floa
 
 
 def _jacobian(model: Model, position: Float1D, direction: Float1D | None) -> Float2D:
-    """Returns df/dtheta (n, p); the columns for the hysteresis are those of the mean force times the
-    direction +1 or -1."""
+    """Returns the Jacobian (n, p) of the force by the parameters; the columns for the hysteresis are those of
+    the mean force times the direction +1 or -1."""
     x = np.ascontiguousarray(position, dtype=np.float64)[:, None]
     value, (by_alpha,), (by_beta,) = wavelet_jacobian(x, model.alpha, model.beta)
     linear = np.concatenate([np.ones_like(x), x - model.lower, value], axis=1)
@@ -130,7 +130,7 @@ def _jacobian(model: Model, position: Float1D, direction: Float1D | None) -> Flo
 
 
 def _inverse(gram: Float2D) -> Float2D:
-    """Returns the pseudo-inverse of J'J, on columns of unit norm."""
+    """Returns the pseudo-inverse of J'J for a Jacobian J, computed with columns of unit norm."""
     norm = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     value, vector = np.linalg.eigh(gram / np.outer(norm, norm))
     kept = value > LEAST_EIGENVALUE_SHARE * value.max()

@@ -30,15 +30,16 @@ from ..search.growth import Grown, Growth
 from .dynamics import Dynamics
 
 REGROWTH_ERROR_RATIO = 1.01
-"""Ratio of the RMS errors with and without constraints above which a network is grown again for the
-constraints [-]."""
+"""Ratio of the RMS error with constraints to the RMS error without constraints, above which a network is
+grown again on forces that keep the constraints [-]."""
 
 SMALLER_NETWORK_STANDARD_ERRORS = 3.0
 """Decrease of the error on held-out rows that a network of reduced size must show [standard errors]. The
 value is above 1 because each further trial may succeed by chance."""
 
 HELD_OUT_STOP_REASON = "held-out rows"
-"""Stop reason of growth if held-out rows refused a larger network."""
+"""Text of the reason why the growth of a network stopped, if the error on held-out rows refused a larger
+network."""
 
 VELOCITY_INPUTS = ("position", "velocity")
 """Inputs of a network of the model class velocity."""
@@ -77,7 +78,7 @@ class ClassSelection:
         self.data, self.options, self.classes, self.cells = data, options, classes, cells
         self.report: Report = Report(list(previous.report.path) if previous else [])
         self.start_basis: dict[str, Basis] = dict(previous.start_basis) if previous else {}
-        """Wavelets at the start of growth, for each model class"""
+        """Wavelets with which the growth of a network starts, by the name of the model class"""
         self.samples = Samples(data, options, cells)
         self.judge = Judge(self.samples, options, self.report, on_held_out=on_held_out)
         single = data.side is None and (data.starts is None or len(data.names) > 1)
@@ -98,8 +99,8 @@ class ClassSelection:
                 self.best = model_class(self).better(self.best)
 
     def repeated(self, data: Rows, *, cells: int | None = None, keep: bool = False) -> ClassSelection:
-        """Repeats the model selection on changed rows. With `keep`, each network first has the final wavelets
-        of this model selection."""
+        """Repeats this model selection on changed rows. If `keep` is True, the growth of each network starts
+        with the final wavelets of this model selection."""
         return ClassSelection(
             data,
             self.options,
@@ -124,8 +125,8 @@ class ClassSelection:
         rows: Compressed | None = None,
         strokes: HysteresisInput | None = None,
     ) -> Candidate:
-        """Returns the candidate with a solution fitted to compressed rows; by default these have no direction
-        state."""
+        """Returns the candidate model for a solution fitted to compressed rows; by default to rows without
+        direction state."""
         n_parameters = problem.n_parameters(len(solution.basis))
         if strokes is not None and strokes.play_radius is not None:
             n_parameters += 1
@@ -134,8 +135,8 @@ class ClassSelection:
 
     @cached_property
     def motion(self) -> Dynamics | None:
-        """Motion of the rows for mass and damping; None if the options name inputs or there are further
-        inputs."""
+        """Recorded motion, to which mass and damping are fitted; None if the option inputs is not "auto", or
+        if the force has inputs besides position."""
         data = self.data
         decides = data.parts and len(data.names) == 1 and self.options.inputs == "auto"
         return Dynamics(data, self.options) if decides else None
@@ -167,7 +168,7 @@ class ClassSelection:
         if kept is candidate.solution:
             return candidate
         if problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse and any(bound.seam for bound in bounds):
-            # Equal slopes at both ends of a period may raise the error more than a corner of the force there.
+            # If equal slopes at both ends of a period raise the error, only equal forces are imposed.
             bounds = [bound for bound in bounds if not (bound.seam and bound.of_slope)]
             kept = impose(problem, candidate.solution, bounds)
         worse = problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse
@@ -183,8 +184,8 @@ class ClassSelection:
         return replace(candidate, solution=kept, n_parameters=candidate.n_parameters + more)
 
     def _cost_of(self, bounds: Sequence[Bound], free: Candidate, rmse: float) -> str:
-        """Returns a note on imposed constraints: the change of the error, and the largest excess of release
-        over press force."""
+        """Returns a note on imposed constraints: the change of the RMS error by them, and the largest release
+        force minus press force without them."""
         names, unit = " and ".join(dict.fromkeys(bound.name for bound in bounds)), self.data.force_unit
         note = (
             f"{in_words(free.model_class)}: {names} imposed over the whole domain, which changes the RMS "

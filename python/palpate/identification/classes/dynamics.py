@@ -29,7 +29,7 @@ FOLDS = 10
 """Number of sections of the recording for a test of damping and mass; each section is held out once."""
 
 TERMS = ("damping", "mass")
-"""Names of the coefficients of velocity and acceleration."""
+"""Names of the coefficients of velocity (damping) and of acceleration (mass)."""
 
 
 class FoldedRegression:
@@ -84,8 +84,9 @@ class FoldedRegression:
         return _rss(self._grams[fold], columns, self._solution(kept, columns))
 
     def _columns(self, two_sided: bool, names: Sequence[str]) -> list[int]:
-        """Returns indices of table columns. The table holds force, velocity, acceleration, columns of f, and
-        those times s."""
+        """Returns the indices of columns of the least-squares table. Its columns are force, velocity,
+        acceleration, basis functions of the force over position, and these functions times the direction
+        state s."""
         static = self._n_static if two_sided else self._single
         return [1 + TERMS.index(name) for name in names] + list(range(3, 3 + static))
 
@@ -101,8 +102,8 @@ def _rss(gram: Float2D, columns: list[int], solution: Float1D) -> float:
 
 
 SAMPLES_PER_TIME_CONSTANT = 2.0
-"""Number of kept samples of a filtered column for each time constant of the low-pass [-]: more samples would
-be nearly equal."""
+"""Number of samples that are kept of a filtered column in each time constant of the low-pass filter [-]: more
+samples would be nearly equal."""
 
 LEAST_INDEPENDENT_SAMPLES = 40.0
 """Least number of independent rows of a recording for a decision on damping and mass."""
@@ -112,13 +113,15 @@ LEAST_SPEED_SPREAD = 0.19
 evenly from 1 to 2. With a smaller spread damping cannot be distinguished from friction."""
 
 SHORT_MOTION = "the motion of the recording between gaps of time is too short or too noisy"
-"""Reason for which damping and mass are not tested."""
+"""Text of the decision that damping and mass are not tested, if the recorded motion is too short or too
+noisy."""
 
 SMOOTHING_SPEED_SHARE = 0.1
-"""Speed at which the smoothed sign of the velocity is tanh(1) [share of the RMS speed]."""
+"""Speed v0 of the smoothed sign tanh(v/v0) of a velocity v [share of the RMS speed]."""
 
 MOST_ROWS = 20_000
-"""Largest number of rows, evenly spread, for the share of a residual that velocity explains."""
+"""Largest number of rows from which the share of a residual that velocity explains is computed; of more rows
+an evenly spread part is used."""
 
 
 class Dynamics:
@@ -208,8 +211,8 @@ class Dynamics:
         return {} if regression is None else regression.solved(side is not None, names)
 
     def moving(self, values: dict[str, float]) -> Moving:
-        """Returns given mass and damping with their force m L a + B L v at every row, filtered by the
-        low-pass L."""
+        """Returns given mass m and damping B with their force m L a + B L v at every row, with acceleration
+        a, velocity v and low-pass filter L."""
         total, known = np.zeros(len(self._data.force)), np.ones(len(self._data.force), dtype=bool)
         for name, derive in (
             ("damping", lambda part: part.velocity),

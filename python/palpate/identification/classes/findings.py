@@ -40,7 +40,8 @@ FEW_ROWS = 500
 """Number of rows below which each fitted number of the model needs ROWS_PER_PARAMETER_IF_FEW rows."""
 
 AMPLE_ROWS_PER_PARAMETER = 1000
-"""Number of rows for each fitted number of the model from which no search for repeated rows is needed."""
+"""Number of rows for each fitted number of the model, at and above which the check for too few rows does not
+search for repeated rows."""
 
 
 def error_findings(nrmse: float, rows: str) -> list[Finding]:
@@ -95,24 +96,28 @@ def verdict_of(
 
 
 LARGE_UNEXPLAINED_SHARE = 0.5
-"""Share of the mean squared error that position cannot explain, from which narrow wavelets are not used
-[-]."""
+"""If at least this share of the mean squared error cannot be explained by position, narrow wavelets are not
+used [-]."""
 
 REPORTED_UNEXPLAINED_SHARE = 0.25
-"""Share of the mean squared error that position cannot explain, from which a finding reports the share
-[-]."""
+"""If at least this share of the mean squared error cannot be explained by position, a finding reports the
+share [-]."""
 
 LEAST_CAUSE_SHARE = 0.4
-"""Least share of the variance of the residual that a named cause explains [-]."""
+"""A finding names a likely cause of the residual only if the cause explains at least this share of the
+variance of the residual [-]."""
 
 TIME_BLOCKS = 40
-"""Number of sections of the recording; their mean residuals show a dependence on time."""
+"""Number of successive sections of the recording; differences of their mean residuals show that the residual
+depends on time."""
 
 TRAVEL_PARTS = 8
-"""Number of parts of the travel; the dependence of the residual on direction may differ between the parts."""
+"""Number of parts of the travel; in each part it is computed separately how the residual depends on the
+direction."""
 
 MOST_ROWS = 50_000
-"""Largest number of rows, evenly spread, for the estimate of the share of variance that a cause explains."""
+"""Largest number of rows from which the share of variance that a cause explains is estimated; of more rows an
+evenly spread part is used."""
 
 
 def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None = None) -> float:
@@ -151,8 +156,8 @@ def unexplained_share(position: Float1D, force: Float1D, side: Float1D | None) -
 
 
 def large_unexplained_share(nrmse: float) -> float:
-    """Returns the unexplained share of the force variance from which it is most of the error of a model with
-    this NRMSE."""
+    """Returns the share of the force variance that, if position cannot explain it, is half of the mean
+    squared error of a model with this NRMSE."""
     return LARGE_UNEXPLAINED_SHARE * nrmse**2
 
 
@@ -186,8 +191,8 @@ def likely_cause(position: Float1D, residual: Float1D) -> tuple[str, str]:
 
 
 def _explained(values: Float1D, group: NDArray[np.intp]) -> float:
-    """Returns the share of the variance of values (n,) between groups (n,), minus the share of random
-    groups."""
+    """Returns the share of the variance of values (n,) that lies between the means of the groups `group`
+    (n,), minus the share expected for random groups."""
     _, index, count = np.unique(group, return_inverse=True, return_counts=True)
     mean = np.bincount(index, values) / count
     total = float(np.sum((values - values.mean()) ** 2))
@@ -247,10 +252,12 @@ REPORTED_NRMSE = 0.02
 """NRMSE on all rows below which no finding reports position cells that are too wide [-]."""
 
 MOST_SAMPLED_ROWS = 10_000
-"""Largest number of rows, evenly spread, for the standard deviation of the force."""
+"""Largest number of rows from which the standard deviation of the force is computed; of more rows an evenly
+spread part is used."""
 
 EXTREME_SHARE = 0.01
-"""Share of the rows with the most extreme forces; they must not determine the NRMSE alone [-]."""
+"""Share of the rows, those with the most extreme forces, that a second NRMSE leaves out, to show an error
+that these rows hide [-]."""
 
 LEAST_ROWS = 100
 """Least number of rows for the check of extreme forces: 1 % of them is one row."""
@@ -260,14 +267,15 @@ HIDDEN_ERROR_RATIO = 1.2
 reports both [-]."""
 
 POSITIONS_BETWEEN_ROWS = 4001
-"""Number of positions over the domain, besides the extrema of each wavelet, where the force is computed."""
+"""Number of positions over the domain, besides the extrema of each wavelet, where the model's force is
+compared with the range of the recorded forces."""
 
 USABLE_EXCESS = 0.25
 """Share of the range of the recorded forces by which the model may exceed them without a finding [-].
 Models of measured switches, domes and springs exceed it by less than 0.1."""
 
 UNFIT_EXCESS = 1.0
-"""Share of the range of the recorded forces by which the model exceeds them, from which the model is unfit
+"""If the model's force exceeds the recorded forces by at least this share of their range, the model is unfit
 [-]."""
 
 
@@ -295,8 +303,8 @@ def extreme_force_findings(error: RowError, force_unit: Unit = UNSTATED_UNIT) ->
 
 
 def _plainly_small(error: RowError, rows: NDArray[np.intp]) -> bool:
-    """True if the error is small compared with the spread of the forces (k,) without the most extreme
-    ones."""
+    """True if the RMS error of the model is small compared with the standard deviation of the recorded forces
+    (k,) without the most extreme ones."""
     some = error.force[rows[:: max(1, len(rows) // MOST_SAMPLED_ROWS)]]
     low, high = np.quantile(some, (EXTREME_SHARE, 1.0 - EXTREME_SHARE))
     inner = some[(some >= low) & (some <= high)]

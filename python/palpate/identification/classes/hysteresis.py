@@ -25,22 +25,25 @@ from .class_selection import ClassSelection, ModelClass, straight_line
 from .findings import USABLE_NRMSE
 
 REPORTED_ERROR_RATIO = 2.0
-"""Ratio of the RMS errors with and without the constraint h >= 0 above which a cure is reported [-]."""
+"""Ratio of the RMS error with the constraint hysteresis h >= 0 to the RMS error without this constraint,
+above which a finding names a cure [-]."""
 
 FIRST_MAX_WAVELETS = 4
-"""Largest number of wavelets of a network with hysteresis before the second search of the play radius."""
+"""Largest number of wavelets that a network with hysteresis has before the play radius is searched for the
+second time."""
 
 MOST_RADIUS_SEARCHES = 6
 """Largest number of searches of the play radius."""
 
 LEAST_KNOWN_SHARE = 0.5
-"""Least share of the rows with a known direction state at which a play radius is tried [-]."""
+"""A play radius is tried only if at least this share of the rows has a known direction state with it [-]."""
 
 RADIUS_TOLERANCE = 1e-3
-"""Relative tolerance of the play radius [-]."""
+"""Relative error of the play radius at which the search of the play radius ends [-]."""
 
 RADIUS_SEARCH_RATIO = 2.0
-"""Largest ratio of a tried play radius to the best radius so far, or of the best to the tried radius [-]."""
+"""A search tries play radii between the best radius so far divided by this ratio and that radius times this
+ratio [-]."""
 
 MOST_ROWS = 100_000
 """Largest number of rows for the comparison of two play radii; of more rows an evenly spread part is used."""
@@ -266,8 +269,8 @@ class PlaySearch:
         return self._of(math.exp(found.x)) if falls > self._evidence else strokes
 
     def with_first_states(self, found: Candidate) -> Candidate:
-        """Returns the candidate with the start value of the direction state of each motion computed from its
-        first force."""
+        """Returns the candidate for which the direction state at the start of each motion is computed from
+        the first recorded force of that motion."""
         if found.play_radius is None:
             return found
         g, h = found.parts_at(self._samples.data.box[self._starts])
@@ -281,8 +284,8 @@ class PlaySearch:
 
     @cached_property
     def _usable(self) -> list[HysteresisInput]:
-        """Direction states for each tried play radius, the smallest first, if enough rows of both strokes are
-        known."""
+        """Direction states of the rows for each tried play radius, the smallest radius first; without radii
+        at which too few rows, or rows of one stroke only, have a known direction state."""
         tried = [self._of(radius) for radius in self._radii]
         return [one for one in tried if one.known.mean() >= LEAST_KNOWN_SHARE and one.both_ways]
 

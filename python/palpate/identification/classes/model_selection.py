@@ -45,22 +45,22 @@ LEAST_GAIN_OVER_HYSTERESIS = 0.75
 hysteresis is easier to render and certify."""
 
 MOST_CORRELATION_ESTIMATES = 5
-"""Largest number of times that the correlation of noise is estimated."""
+"""Largest number of times that the correlation of the noise of successive rows is estimated."""
 
 LEAST_INDEPENDENT_SHARE = 0.02
-"""Least share of independent samples of noise [-]. With a smaller share the residual is not noise but memory
-or drift."""
+"""Least share of the rows that count as independent if the noise of successive rows is correlated [-]. With a
+smaller share the residual is not noise but memory or drift."""
 
 SETTLED_INDEPENDENT_RATIO = 0.8
-"""Ratio of the new to the previous share of independent samples above which the selection is not repeated
+"""Ratio of the new to the previous share of independent rows, above which the model selection is not repeated
 [-]."""
 
 LARGE_NRMSE = 0.2
 """NRMSE above which narrow wavelets are not used if position cannot explain most of the error [-]."""
 
 LEAST_HALF_CORE = 1.0 / 64.0
-"""Least half width of the core of wavelets if position cannot explain most of the error [share of the
-travel]."""
+"""Least distance from the centre of a wavelet to its side lobe if position cannot explain most of the error
+[share of the travel]."""
 
 
 def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) -> ClassSelection:
@@ -260,8 +260,8 @@ STATIC_CLASSES = (Linear, Network, Hysteresis)
 """Model classes other than constant that do not depend on velocity, the simplest first."""
 
 REVISIONS = (correlated_noise, no_finer_than_explained)
-"""Functions that repeat a selection without velocity, mass and damping if the residual is correlated or
-large."""
+"""Functions that repeat a model selection without velocity, mass and damping, if its residual is correlated
+or large."""
 
 DYNAMIC_CLASSES = (MassAndDamping, Velocity)
 """Model classes with velocity, mass or damping, tried last."""

@@ -60,9 +60,11 @@ class Compressed:
     samples: float
     """Number of represented rows of the recording, or the sum of their weights"""
     limits: RowLimits = NO_LIMITS
-    """Share of independent rows, error that the force step hides, and noise of the position"""
+    """Limits of the information in the rows: share of independent rows, RMS error hidden by the resolution of
+    the force, and noise of the position"""
     cells: int = 0
-    """Largest number of distinct positions; with more, positions are gathered in this number of cells"""
+    """Largest number of distinct positions; if a recording has more, its rows are gathered in this number of
+    position cells"""
 
     def reweighted_to(self, samples: float) -> Compressed:
         """Returns the rows with weights scaled so that together they represent `samples` rows of the
@@ -232,7 +234,8 @@ def _mean(group: NDArray[np.int64], count: Float1D, weighted: Float1D) -> Float1
 
 
 SEAM_SHARE = 0.02
-"""Share of the period at each end whose rows are copied to the opposite end for the fit [-]."""
+"""Share of the repeat length of a periodic force law, at each of its two ends, whose rows are copied to the
+opposite end for the fit [-]."""
 
 
 def around_seam(rows: Compressed) -> Compressed:
@@ -264,11 +267,11 @@ HELD_OUT_BLOCKS = 50
 correlated."""
 
 TRIMMED_SHARE = 0.1
-"""Share of the groups of rows with the largest and with the smallest change of error that the trimmed mean
-drops [-]."""
+"""A trimmed mean of the change of error over groups of rows drops this share of the groups twice: those with
+the largest and those with the smallest change [-]."""
 
 MOST_HELD_OUT_ROWS = 20_000
-"""Largest number of held-out rows; of more, an evenly spread part is used."""
+"""Largest number of held-out rows; of more held-out rows an evenly spread part is used."""
 
 
 @dataclass(frozen=True)

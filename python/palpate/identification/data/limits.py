@@ -25,30 +25,33 @@ REPEATED_ROWS_SHARE = 1.0 / 3.0
 """Share of rows that equal the previous row, above which repeated rows are used once [-]."""
 
 PROBED_ROWS = 7
-"""Number of rows whose copies are counted first. They show if a table may contain every row several times."""
+"""Number of evenly spread rows that are tested first: if each of their forces also occurs in another row, the
+whole table is searched for repeated rows."""
 
 LEAST_LEVELS = 3
-"""Least number of distinct force values for which a force step is computed."""
+"""A force step is computed only for at least this number of distinct force values."""
 
 ROWS_PER_LEVEL = 2.0
 """Least number of rows for each distinct force value [-]: equal differences of force values are then not a
 coincidence."""
 
 MOST_SAMPLED_ROWS = 8192
-"""Largest number of rows that are examined for few distinct force values."""
+"""Largest number of rows that are searched for a force step: few distinct force values that are multiples of
+one step."""
 
 GRID_TOLERANCE = 0.02
 """Largest deviation of a force difference from a multiple of the force step [steps]."""
 
 STEP_ERROR = 1.0 / 3.0
-"""RMS error in force steps below which the force step hides the error [-]; uniform rounding errors have
-1/sqrt(12)"""
+"""RMS error divided by the step of the recorded force, below which the step hides the error [-]; uniform
+rounding errors have 1/sqrt(12)"""
 
 LEAST_CORRELATION = 0.15
 """Correlation of neighbouring residuals below which the residuals are taken as independent [-]."""
 
 SIGNIFICANT_STANDARD_ERRORS = 5.0
-"""Least correlation of neighbouring residuals that is not random [standard errors]."""
+"""A correlation of neighbouring residuals is not random if it exceeds this number of standard errors of a
+correlation of zero."""
 
 LEAST_NOISE_EVENNESS = 0.8
 """Least ratio of the median to the RMS of correlated residuals, 1 for normal noise, at which they are taken
@@ -58,7 +61,8 @@ MOST_ORDERED_ROWS = 50_000
 """Largest number of successive rows for the estimate of position noise."""
 
 LEAST_REVERSALS = 0.1
-"""Least share of position steps opposite to the previous step, for an estimate of position noise [-]."""
+"""If a smaller share of the position steps is opposite to the previous step, no position noise is estimated
+[-]."""
 
 LARGEST_NOISE_STEP = 0.02
 """Largest position step that can be noise [share of the travel]. Larger steps back and forth belong to a
@@ -74,7 +78,7 @@ class RowLimits:
     force_error: float = 0.0
     """RMS error that the force step hides [force]; a criterion does not count smaller errors"""
     position_noise: float = 0.0
-    """Standard deviation of the position noise [box]"""
+    """Standard deviation of the noise of the position, as a share of the range of recorded positions [-]"""
 
 
 NO_LIMITS = RowLimits()
@@ -154,8 +158,8 @@ def force_step(force: Float1D) -> float:
 
 
 def correlation(residual: Float1D) -> float:
-    """Returns the correlation of neighbouring residuals (n,) in recorded order; 0 if it can be random, or an
-    unfitted force."""
+    """Returns the correlation of neighbouring residuals (n,) in recorded order; 0 if the correlation can be
+    random, or can come from a force that the model does not fit."""
     power = float(residual @ residual)
     if power == 0.0 or len(residual) < 2:
         return 0.0
@@ -172,8 +176,8 @@ def independent_share(rho: float) -> float:
 
 
 def innovation_deviance(residual: Float1D, n_parameters: int, least: float) -> float:
-    """Returns the BIC of residuals (n,) after each is predicted from the previous one; `least` is the least
-    mean square."""
+    """Returns the BIC of a model with residuals (n,), from the errors of predicting each residual by the
+    previous one; a mean squared prediction error below `least` is replaced by `least`."""
     n, power = len(residual), max(float(residual @ residual), np.finfo(float).tiny)
     rho = float(residual[1:] @ residual[:-1]) / power
     new = residual[1:] - rho * residual[:-1]
@@ -203,7 +207,7 @@ LARGE_OFFSET_RATIO = 1e3
 """Ratio of the mean force to the range of the force above which the mean is subtracted before the fit [-]."""
 
 UNSCALED_EXPONENT = 50
-"""Largest exponent of two of a force that is not scaled for the fit [-]: forces from 2^-50 to 2^50."""
+"""A force whose size is from 2^-n to 2^n, with this number n, is not scaled for the fit [-]."""
 
 
 @dataclass(frozen=True)

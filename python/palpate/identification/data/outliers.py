@@ -33,7 +33,8 @@ from ...verdict import Finding, no, usable
 from .limits import FORCE_RESOLUTION
 
 MOST_ISOLATED_SHARE = 0.01
-"""Largest share of the rows that may be isolated [-]."""
+"""Largest share of the rows that can be isolated: rows with a value far from the values of all other rows
+[-]."""
 
 LEAST_ROWS = 100
 """Number of rows below which only one row may be isolated, by a larger gap: in a table of few rows the
@@ -48,19 +49,21 @@ SPARSE_GAP_RATIO = 1000.0
 [-]."""
 
 REPORTED_GAP_SHARE = 0.2
-"""Least gap between isolated and other rows that a finding reports [share of the gap that drops rows]."""
+"""A gap between the values of isolated and other rows is reported from this share of the gap at which the
+isolated rows are dropped [-]."""
 
 LONGEST_RUN = 3
 """Largest number of successive isolated rows that are dropped; more successive rows can be a real motion."""
 
 LEAST_OTHERS = 3
-"""Least number of distinct values that must remain without the isolated rows."""
+"""Least number of distinct values that the other rows must have for isolated rows to be dropped."""
 
 MOST_SAMPLED_ROWS = 10_000
-"""Largest number of evenly spread rows from which the range of most values is computed."""
+"""Largest number of evenly spread rows from which the range of the values without the largest and smallest 1
+% is computed."""
 
 MOST_NAMED_ROWS = 3
-"""Largest number of rows that a finding names."""
+"""Largest number of isolated rows or outliers that a finding lists with row number or position."""
 
 
 @np.errstate(over="ignore", invalid="ignore")  # huge values, refused later, may overflow
@@ -204,7 +207,8 @@ def _gap(values: Float1D, others: Float1D) -> float:
 
 
 def _bracketed(position: Float1D, apart: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Returns True (n,) for rows with rows that are not isolated at smaller and at larger positions."""
+    """Returns True (n,) for each row whose position is between the positions of two rows that are not
+    isolated."""
     others = position[~apart]
     return np.asarray((position > others.min()) & (position < others.max()))
 
@@ -220,8 +224,8 @@ HUBER_THRESHOLD = 2.0
 squares on data without outliers."""
 
 OUTLIER_STANDARD_DEVIATIONS = 8.0
-"""Difference of a force from its neighbours, and from the model, above which the row is dropped [standard
-deviations]."""
+"""Difference of a recorded force from the median of the neighbouring rows, and from the force of the model,
+above which its row is dropped [standard deviations]."""
 
 NEIGHBOUR_ROWS = 3
 """Number of previous rows, and of next rows, whose median force is compared with the force of a row."""
@@ -233,7 +237,8 @@ SETTLED_WEIGHT_CHANGE = 1e-3
 """Mean change of the weights of the rows below which no further fit is needed [-]."""
 
 MOST_OUTLIER_SHARE = 0.2
-"""Largest share of dropped rows [-]. A larger share cannot be outliers, and the model is unfit."""
+"""Largest share of the rows that are dropped as outliers [-]. A larger share cannot be outliers: then the
+model is unfit."""
 
 
 def standard_deviation(residual: Float1D) -> float:

@@ -80,7 +80,8 @@ class Rows:
     robust: Robust | None = None
     """Weights and outliers of Huber's loss; None for least squares"""
     limits: RowLimits = NO_LIMITS
-    """Share of independent rows, error that the force step hides, and noise of the position"""
+    """Limits of the information in the rows: share of independent rows, RMS error hidden by the resolution of
+    the force, and noise of the position"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) smallest and largest position of the unit box; None: those of the rows"""
     position_unit: Unit = UNSTATED_UNIT
@@ -104,7 +105,8 @@ class Rows:
 
     @cached_property
     def path(self) -> Float2D:
-        """(n, d) positions in units of the box; those of a periodic force law may be outside [0, 1)."""
+        """(n, d) positions minus the smallest position, divided by the side lengths of the unit box; those of
+        a periodic force law may be outside [0, 1)."""
         return (self.positions - self.lower) / self.reach
 
     @cached_property

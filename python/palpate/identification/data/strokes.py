@@ -22,11 +22,12 @@ TRAVEL_CELLS = 32
 """Number of cells of the travel in which press force and release force are compared."""
 
 SIGNIFICANT_STANDARD_ERRORS = 4.0
-"""Least difference of press and release force for a test of hysteresis [standard errors]."""
+"""Hysteresis is tested only if press and release force differ by at least this number of standard errors of
+the difference."""
 
 LEAST_CONSISTENT_SHARE = 0.9
-"""Least share of the cells in which the force of one recording is above that of another for press and release
-[-]."""
+"""If the force of one recording is above that of another in at least this share of the position cells, the
+recording with the higher force is taken as press, the other one as release [-]."""
 
 LEAST_MEAN_DIFFERENCE = 0.05
 """Least mean force difference of two recordings for press and release [standard deviations of the force].
@@ -37,20 +38,21 @@ WINDOW_ROWS = 16
 force."""
 
 LEAST_WINDOWS = 5
-"""Least number of windows of neighbouring positions for a finding that press and release force differ."""
+"""A finding that press and release force differ needs at least this number of windows of rows that are
+neighbours in position."""
 
 LEAST_GROUP_VARIANCE = 0.85
 """Least share of the force variance of a window between its two groups, for two forces at one position [-]:
 0.68 for noise, 1 for two separate forces."""
 
 REPORTED_SPREAD = 0.02
-"""Standard deviation of the force at one position from which a finding reports it, for shuffled rows [share
-of the force range]."""
+"""If the rows are shuffled, a finding reports the standard deviation of the force at one position from this
+value on [share of the force range]."""
 
 DIRECTION_CURE = (
     "keep the rows in the order of the recording, or add a column direction with the words press and release"
 )
-"""Cure in messages on unknown directions."""
+"""Text of the cure in messages on rows with unknown direction."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ class _Cells:
     difference: Float1D
     """(m,) mean press force minus mean release force of a cell, at equal position [force]"""
     error: Float1D
-    """(m,) standard error of the difference [force]"""
+    """(m,) standard error of the difference of the mean press and release force of a cell [force]"""
 
     @classmethod
     def of(cls, position: Float1D, force: Float1D, side: Float1D) -> _Cells:
@@ -172,8 +174,8 @@ class _Cells:
 
 
 def _press(recordings: Sequence[Recording]) -> Float1D | None:
-    """Returns +1 for recordings with the higher force, -1 for the others; None if they do not form two
-    groups."""
+    """Returns +1 (press) for each recording of the group with the higher force, -1 (release) for each of the
+    other group; None if the recordings do not form two groups."""
     if len(recordings) < 2 or any(recording.direction is not None for recording in recordings):
         return None
 

@@ -67,15 +67,15 @@ class Resolution:
 
 
 COARSEST_CANDIDATE = 1.0
-"""Dilation of the widest wavelets of the frame [1/box]."""
+"""Dilation of the widest wavelets of the frame [1/range of recorded positions]."""
 
 MOST_LIBRARY_ENTRIES = 2**23
 """Largest number of stored values of all candidate wavelets at all rows, 32 MiB. Many rows allow fewer
 candidates."""
 
 NEGLIGIBLE_SHARE = 1e-14
-"""Ratio to the first product of spectra below which a product cannot change a printed digit of the frame
-bounds [-]."""
+"""A product of Fourier transforms in the sum for the frame bounds is left out below this share of the first
+product [-]: it cannot change a printed digit."""
 
 
 def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:

@@ -70,7 +70,8 @@ class Bound:
     """Change of the reading that weighs as much as a change of the force by 1; it is 1 if the reading is a
     force"""
     at: float | None = None
-    """Position of a constraint that applies at one position [box]; None: it applies at every position"""
+    """Position of a constraint that applies at one position [share of the unit box]; None: it applies at
+    every position"""
     seam: bool = False
     """True if the reading is the difference between the ends of the domain, which is 0 for a periodic
     force"""
@@ -318,10 +319,11 @@ def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequ
 
 
 COMPARED_POSITIONS = 2048
-"""Number of positions at which press and release are compared."""
+"""Number of positions at which press force and release force are compared."""
 
 REPORTED_HEIGHT = 3.0
-"""Least difference of release force minus press force that is reported [RMS errors]: larger than noise."""
+"""Release force above press force is reported only from this difference on [multiples of the RMS error]:
+larger than noise."""
 
 LATE_SLOPE_RATIO = 2.0
 """Ratio of the slope of the force, at positions where the release force is above the press force, to the mean

@@ -78,7 +78,7 @@ class FittedNetwork:
     path: tuple[PathPoint, ...] = ()
     """Networks that the model selection tested, in order"""
     decisions: tuple[Decision, ...] = ()
-    """Last decision on each model class"""
+    """Last decision of the model selection on each model class: accepted or not, with the reason"""
     notes: tuple[str, ...] = ()
     """Sentences on unused rows, on the rise of the error by constraints, and on replaced decisions"""
     independent_rows: float = np.inf

@@ -74,7 +74,8 @@ def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
 
 
 CORE_RADIUS = float(np.sqrt(3.0))
-"""|u| at the side lobe of a wavelet, which limits its core; the data must resolve the core [-]."""
+"""Half width of a wavelet's core, the part between its two side lobes, in the scaled distance u from the
+wavelet's centre [-]; the data must resolve the core."""
 
 HALF_CORE_NOISE_RATIO = 5.0
 """Least half width of a wavelet's core [standard deviations of the position noise]."""
@@ -174,7 +175,8 @@ class SeparableProblem:
     held_out: HeldOutRows | None = None
     """Held-out rows, for the criteria that use held-out rows"""
     limits: RowLimits = NO_LIMITS
-    """Share of independent rows, error that the force step hides, and noise of the position"""
+    """Limits of the information in the rows: share of independent rows, RMS error hidden by the resolution of
+    the force, and noise of the position"""
     prior: float = 0.0
     """Penalty factor of a squared weight [-]; see :meth:`with_prior`"""
     resolutions: tuple[Resolution, ...] = ()
@@ -203,8 +205,8 @@ class SeparableProblem:
         return 2 * self.dimension * n_wavelets + self.n_channels * (n_wavelets + 1 + self.dimension)
 
     def total(self, rss: float) -> float:
-        """Returns the sum of squared errors of all samples [force^2] for a criterion: at least that of the
-        force resolution."""
+        """Returns the sum of squared errors of all samples [force^2] for a criterion; at least the sum for
+        errors of the size of the force resolution."""
         least = max(FORCE_RESOLUTION * self.force_range, self.limits.force_error)
         return max(rss + self.within, least**2 * self.samples, TINY)
 
@@ -223,8 +225,8 @@ class SeparableProblem:
         return float(np.sqrt(self.total(solution.rss) / self.samples))
 
     def evenness(self, solution: Solution) -> float:
-        """Returns the scaled ratio of median to RMS of |residual|: 1 for normal noise, small if few positions
-        cause the error."""
+        """Returns 1.4826 times the ratio of median to RMS of the absolute residuals: 1 for normal noise,
+        small if few positions cause the error."""
         residual = np.abs(np.concatenate(solution.residuals))
         return 1.4826 * float(np.median(residual)) / max(float(np.sqrt(np.mean(residual**2))), TINY)
 
@@ -262,7 +264,7 @@ class SeparableProblem:
 
     def finest(self, beta: Float2D) -> Float2D:
         """Returns the largest dilation (N, 1) that the positions around each translation resolve, on every
-        stroke [1/box]."""
+        stroke [1/range of recorded positions]."""
         reach = np.max([each.reach(beta, self.resolved_by) for each in self.resolutions], axis=0)
         least = max(HALF_CORE_NOISE_RATIO * self.limits.position_noise, 1e-9)
         return np.asarray(CORE_RADIUS / np.maximum(reach, least))[:, None]
@@ -333,8 +335,8 @@ class SeparableProblem:
         return matrix, gradient
 
     def removal_costs(self, solution: Solution) -> Float1D:
-        """Returns the increase of the penalised squared error (N,) if that wavelet were removed and the
-        linear unknowns fitted again."""
+        """Returns, for each of N wavelets, the increase of the penalised squared error if this wavelet were
+        removed and all weights, slopes and biases fitted again."""
         n, first = len(solution.basis), 1 + self.dimension
         cost = np.zeros(n)
         for block, gram, table in zip(
@@ -388,18 +390,20 @@ def problem_of(
 
 
 LEAST_DILATION = 0.5
-"""Smallest dilation [1/box]: a wider wavelet would be nearly a parabola over the unit box."""
+"""Smallest dilation [1/range of recorded positions]: a wider wavelet would be nearly a parabola over all
+recorded positions."""
 
 LARGEST_OVERHANG = 0.3
-"""Largest distance of a translation from the unit box [box]. A wavelet further away is nearly a straight line
-in the box."""
+"""Largest distance of a translation outside the range of recorded positions, as a share of this range [-]. A
+wavelet further away is nearly a straight line in this range."""
 
 LONGEST_STEP = 0.7
 """Longest refinement step of log(dilation) and of dilation * translation [-]. For a longer step the
 linearisation is not valid."""
 
 MOST_IDLE_STEPS = 2
-"""Number of successive steps with a gain below the tolerance after which refinement ends."""
+"""Number of successive refinement steps, each with a decrease of the error below the tolerance, after which
+refinement ends."""
 
 
 def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:

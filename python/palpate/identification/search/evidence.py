@@ -104,7 +104,8 @@ def enough(criterion: str, value: float) -> bool:
 
 
 def choice(criterion: str, values: Sequence[float], n: float) -> int:
-    """Returns the index of the network to take, from the criterion values of networks in order of size."""
+    """Returns the index of the network that the criterion prefers, from the criterion values of networks in
+    order of size."""
     least = min(values)
     limit = {"fresh": least + standard_error(n), "perceptual": max(0.0, least)}.get(criterion, least)
     return next(index for index, value in enumerate(values) if value <= limit)
@@ -140,7 +141,8 @@ def held_out_deviance(criterion: str, rows: HeldOutRows, errors: Float1D) -> flo
 
 
 Reporter = Callable[[str, int], None]
-"""Function that receives the name of the tested model class and its number of wavelets, to show progress."""
+"""Function that is called with the name of the tested model class and its number of wavelets, to show
+progress."""
 
 _reporter: ContextVar[Reporter | None] = ContextVar("reporter", default=None)
 
@@ -169,7 +171,8 @@ class Moving:
     damping: float | None
     mass: float | None
     force: Float1D
-    """(n,) filtered force of mass and damping at every row, m L a + B L v, with low-pass filter L [force]"""
+    """(n,) force m L a + B L v of mass m and damping B at every row, with acceleration a, velocity v and
+    low-pass filter L [force]"""
     known: Float1D
     """(n,) 1 in the rows that have a velocity and an acceleration, else 0"""
 
@@ -286,7 +289,8 @@ class Candidate:
         )
 
     def force_at(self, rows: slice = ALL_ROWS) -> Float1D:
-        """Returns the force over position (n,) of all rows, or of the rows of a slice."""
+        """Returns the force (n,) of the candidate without the forces of mass and damping, at all rows or at
+        the rows of a slice."""
         return self._force(self.data.box[rows], None if self.side is None else self.side[rows])
 
     def parts_at(self, positions: Float2D) -> tuple[Float1D, Float1D]:
@@ -356,8 +360,8 @@ class Report:
     """Findings on a wrong sign of position or force"""
 
     def replaces(self, other: Report, note: str) -> None:
-        """Adds the tested networks of a replaced model selection, and the reason of the replacement, before
-        those of this one."""
+        """Puts the tested networks of the replaced model selection `other`, and the reason for its
+        replacement, in front of the tested networks and notes of this model selection."""
         self.path[:0] = other.path
         self.notes.insert(0, note)
 
@@ -392,7 +396,7 @@ class Samples:
             limits=data.limits,
         )
         self.used = self._compressor.rows_used
-        """Number of rows that represent all rows of the recording"""
+        """Number of recorded rows that are used to represent the recording"""
         self._resolved_by = options.search.resolved_by
         self._for_criterion = options.criterion in ON_HELD_OUT_ROWS
 
@@ -467,15 +471,15 @@ class Samples:
 
 @dataclass(frozen=True)
 class Judgement:
-    """Result of the comparison of a simpler (lower) and a more complex (upper) candidate."""
+    """Result of the comparison of a simpler candidate (lower) with a more complex candidate (upper)."""
 
     accepted: bool
-    """True if the upper candidate is accepted"""
+    """True if the more complex of two compared candidates is accepted"""
     reason: str
-    """Change of criterion and error from the lower to the upper candidate, in words"""
+    """Change of criterion and RMS error from the simpler to the more complex candidate, in words"""
     criterion_falls: bool
-    """True if the criterion decreases enough; an upper candidate that is not accepted was then refused on
-    held-out rows"""
+    """True if the criterion decreases enough; a more complex candidate that is not accepted was then refused
+    because of its error on held-out rows"""
 
 
 class Judge:
@@ -498,8 +502,8 @@ class Judge:
         self._samples, self._report, self.on_held_out = samples, report, on_held_out
 
     def better(self, below: Candidate, above: Candidate) -> Candidate:
-        """Returns the upper candidate if it is accepted, else the lower candidate; adds the decision to the
-        report."""
+        """Returns the more complex candidate if it is accepted, else the simpler candidate; adds the decision
+        to the report."""
         return above if self.noted(below, above).accepted else below
 
     def noted(self, below: Candidate, above: Candidate, *, errors: float = 1.0) -> Judgement:
@@ -509,12 +513,12 @@ class Judge:
         return judged
 
     def accepts(self, below: Candidate, above: Candidate) -> bool:
-        """True if the upper candidate is accepted."""
+        """True if the more complex of two compared candidates is accepted"""
         return self.compared(below, above).accepted
 
     def fall(self, below: Candidate, above: Candidate) -> float:
-        """Returns the decrease of the criterion from candidate `below` to `above`, on the rows usable for
-        both."""
+        """Returns the decrease of the criterion from the simpler candidate `below` to the more complex
+        candidate `above`, on the rows that both candidates can use."""
         below = self._samples.on_known_rows(below, above)
         return below.criterion(self.criterion) - above.criterion(self.criterion)
 

@@ -38,16 +38,16 @@ LEAST_NOISE_EVENNESS = 0.5
 as noise [-]. Narrower wavelets are then not tried."""
 
 FINER_ERROR_RATIO = 4.0
-"""Least factor by which narrower wavelets must reduce the RMS error [-]. Wavelets that fit noise reduce the
-error by less."""
+"""Narrower wavelets that the criterion does not accept are still accepted if they divide the RMS error by
+more than this factor [-]. Wavelets that fit noise divide the error by less."""
 
 SIGNIFICANT_CORRELATION = 3.0
 """Correlation of residuals at neighbouring positions above which the residuals are not noise [standard
 errors]."""
 
 SMOOTH_CORE_SHARE = 0.25
-"""Least share of all positions that must lie in a wavelet's core while only wide wavelets are tried [-]; for
-several inputs."""
+"""While only wide wavelets are tried for several inputs, at least this share of all positions must lie in the
+core of each wavelet, the part between its side lobes [-]."""
 
 MOST_STRETCHED = 64
 """Largest number of wavelets of the frame that are also tried with a changed dilation along each of several
@@ -256,7 +256,7 @@ class Growth:
         return replace(found, problem=replace(found.problem, resolved_by=problem.resolved_by))
 
     def _price(self, problem: SeparableProblem, solution: Solution) -> float:
-        """Returns by how much the last wavelet of the solution raises the penalty in the criterion."""
+        """Returns the increase of the penalty in the criterion by the last wavelet of the solution."""
         penalty, n = CRITERIA[self._criterion], len(solution.basis)
         return penalty(problem.independent, problem.n_parameters(n)) - penalty(
             problem.independent, problem.n_parameters(n - 1)

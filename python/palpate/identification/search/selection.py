@@ -31,11 +31,12 @@ CANDIDATES_AT_ONCE = 64
 processor."""
 
 LEAST_DISTANCE = 1.0
-"""Least distance of two candidate wavelets, in widths or as difference of log(dilation), at which refinement
-may end in different minima [-]."""
+"""Two candidate wavelets count as different from this distance on, in widths or as difference of
+log(dilation): their refinement may then end in different minima [-]."""
 
 STRETCH_FACTORS = (0.25, 0.5, 2.0, 4.0)
-"""Factors of the dilation of a candidate along one input [-]."""
+"""Factors by which the dilation of a candidate wavelet along one input is multiplied to get further
+candidates [-]."""
 
 
 class Library:
@@ -131,7 +132,7 @@ class OrthogonalSelection:
             factor = self._factors[b]
             fresh = columns[:, index].T.astype(np.float64)
             norm = np.linalg.norm(fresh, axis=0)
-            for _ in range(2):  # two passes: orthogonal to the taken columns up to rounding (Kahan)
+            for _ in range(2):  # two passes: columns orthogonal to the taken ones up to rounding (Kahan)
                 fresh = fresh - factor @ (factor.T @ fresh)
             basis, triangle = np.linalg.qr(fresh)
             basis = basis[
