@@ -44,7 +44,7 @@ _MODULE_OF = {
     }.items()
     for name in names
 }
-"""Module of each public name."""
+"""Submodule that defines each public name of the package, by name."""
 
 __all__ = [
     "DeviceProfile",
@@ -94,7 +94,7 @@ def _has_scikit_learn() -> bool:
 
 
 if not _has_scikit_learn():
-    # Left out of `from palpate import *` and help(): the name needs a package that may be missing.
+    # The class needs scikit-learn, which is not installed: `from palpate import *` and help() leave it out.
     __all__.remove("WaveletNetworkRegressor")
 
 

@@ -134,7 +134,7 @@ def named_arguments(kind: Any) -> None:
             except TypeError:
                 return f"{name} is {shown(value)}; it must be {words[type(getattr(example, name))]}"
             except ValueError:
-                continue  # the ValueError refuses the value, but its type is right
+                continue  # ValueError: the type of the argument is right, only the value is refused
         return f"{kind.__name__} does not take {shown(fields)}"
 
     named.__doc__ = construct.__doc__

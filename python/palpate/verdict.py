@@ -60,16 +60,16 @@ class Verdict:
         return f"{self.level}: {'; '.join(self.reasons)}" if self.findings else self.level
 
     def __add__(self, other: Verdict) -> Verdict:
-        """Returns one verdict on both results, with the findings of both."""
+        """Returns one verdict that has the findings of both verdicts, without repetitions."""
         return Verdict(tuple(dict.fromkeys(self.findings + other.findings)))
 
     def record(self) -> list[dict[str, str]]:
-        """Returns the findings for a model file."""
+        """Returns the findings of the verdict as they are written to a model file."""
         return [{"level": finding.level, "sentence": finding.sentence} for finding in self.findings]
 
     @classmethod
     def from_record(cls, record: Iterable[Mapping[str, Any]]) -> Verdict:
-        """Returns the verdict of a model file; invalid entries are ignored."""
+        """Returns the verdict from the findings in a model file; invalid findings are ignored."""
         return cls(
             tuple(
                 Finding(item["level"], str(item.get("sentence", "")))

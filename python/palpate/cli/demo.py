@@ -35,7 +35,7 @@ from .printing import (
 from .verb import PATH, json_option, require_writable, verb
 
 IDENTIFY_SEED, FRESH_SEED = 1, 2
-"""Seeds of two recordings of the sample: one to identify, one to verify."""
+"""Random seeds of two simulated recordings: one to identify the model, one to verify it."""
 
 RENDERED_S = 4.0
 """Simulated time of each rendering [s]."""

@@ -19,7 +19,7 @@ from ..verdict import Verdict
 from .printing import OutputError, echo, end_line_on_terminal, print_line
 
 FAILED = 1
-"""Exit code if the work failed, or if the verdict is no."""
+"""Exit code of a verb that failed although its input is valid, or whose verdict is no."""
 BAD_INPUT = 2
 """Exit code for bad usage or bad input."""
 INTERRUPTED = 130
@@ -27,7 +27,7 @@ INTERRUPTED = 130
 
 
 _GRACE_S = 0.05
-"""Time after Ctrl-C in which Python can raise KeyboardInterrupt, before the process is ended [s]."""
+"""Time between Ctrl-C and the forced end of the process, so that Python can raise KeyboardInterrupt [s]."""
 
 
 class WorkError(Exception):
@@ -36,7 +36,7 @@ class WorkError(Exception):
 
 @dataclass(frozen=True)
 class ExitStatus:
-    """Exit code and its message, which may be empty."""
+    """Exit code of a verb, and its error message, which may be empty."""
 
     code: int
     sentence: str = ""

@@ -30,7 +30,7 @@ _COLUMN_INCHES = 3.5
 _DOTS_PER_INCH = 200
 
 _TITLE_COLUMNS = 60
-"""Number of characters of a title that fit the width of a figure."""
+"""Largest number of characters in a line of a figure's title."""
 
 _STYLE: Any = {
     "font.size": 8.0,
@@ -42,7 +42,10 @@ _STYLE: Any = {
 }
 
 _LIGHTER = 0.01
-"""Mass and damping of the object in the implicit structure, over those that the explicit one needs."""
+"""Factor from mass and damping of the explicit structure's virtual object to those of the implicit one.
+
+The explicit structure has the least mass and damping that it needs.
+"""
 
 _MOST_NAMES = 2
 """Largest number of source files that the title of a figure names."""
@@ -124,7 +127,7 @@ def source_name(files: Iterable[str]) -> str:
 
 
 def _error_text(reference: NDArray[np.float64], other: NDArray[np.float64]) -> str:
-    """Returns the NRMSE of the forces that a figure compares."""
+    """Returns the text "NRMSE ... on ... rows" for the two forces that a figure compares."""
     spread = float(np.std(reference))
     error = float(np.sqrt(np.mean((other - reference) ** 2)))
     return f"NRMSE {number(error / spread) if spread else 'not defined'} on {len(reference)} rows"
@@ -238,7 +241,7 @@ def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, 
 
 
 def picture_path(path: Path, model: Model) -> None:
-    """Draws error and criterion of each network that identification compared, over the number of wavelets."""
+    """Draws error and criterion of each compared network; the horizontal axis is the number of wavelets."""
     from ..plotting import draw_path
 
     if not model.path:

@@ -51,7 +51,7 @@ from .verb import (
 )
 
 _READ_BY_PARTS = ("position", "force", "time", "direction", "units", "negate", "invalid")
-"""Options of reading that can be used if a file is read part by part."""
+"""Arguments of `read_recording` that can be used if a file is too large for memory and is read in parts."""
 
 
 def _text(value: Any) -> str:
@@ -78,13 +78,13 @@ HELP = {
 }
 
 _METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE", "inputs": "NAMES"}
-"""Name that the help shows for the value of an option."""
+"""Placeholder that the help shows for the value of an option, by option."""
 
 _MOST_DECISIONS = 7
 """Largest number of decisions of the model selection that the summary prints"""
 
 _GROUP = {"inputs": "Model", "monotone": "Constraints"}
-"""Heading of an option in the help; options that are not listed here are under "Expert"."""
+"""Heading in the help, by option; options that are not listed here are under "Expert"."""
 
 
 def _search(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> SearchOptions:
@@ -265,7 +265,7 @@ def identify(
 
 
 def _require_unused(**others: Any) -> None:
-    """Refuses options that need all rows in memory, if a file is read part by part."""
+    """Refuses options that need all rows in memory; called if a file is read part by part."""
     for name, value in others.items():
         if value:
             raise click.UsageError(
@@ -288,7 +288,7 @@ def _pooled_nrmse(verified: Sequence[tuple[Recording, Verification]]) -> float:
 
 
 def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) -> list[Compared]:
-    """Fits the usual methods, to compare with the model, to the rows that are not held out."""
+    """Fits the usual methods (baselines), to compare with the model, to the rows that are not held out."""
     if hold_out_every is None:
         raise click.UsageError("--baselines compares on held-out rows and needs --hold-out-every K")
     talk("fitting the baselines ...")
@@ -296,7 +296,7 @@ def _fit_baselines(recordings: Sequence[Recording], hold_out_every: int | None) 
 
 
 def _print_baselines(nrmse: float, n_parameters: int, seconds: float, others: Sequence[Compared]) -> None:
-    """Prints the errors on the held-out rows: of the model, then of the usual methods."""
+    """Prints the NRMSE on the held-out rows, first of the model, then of the usual methods (baselines)."""
     rows = [("wavelet network", number(nrmse), str(n_parameters), f"{seconds:.2f}")]
     rows += [
         (each.name, "refused", "", "")

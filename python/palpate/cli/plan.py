@@ -158,7 +158,7 @@ def plan(
     """Choose the structure that renders a model on a device, and certify it."""
     profile_path = profile_file(device)
     require_writable(plot, inputs=(model_file, profile_path))
-    require_writable(output, plot, inputs=(profile_path,))  # the output may replace the model file
+    require_writable(output, plot, inputs=(profile_path,))  # the output may be the model file
     profile = DeviceProfile.load(profile_path)
     model = load_model(model_file, with_plan=False)
     talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")

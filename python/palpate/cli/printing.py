@@ -82,7 +82,7 @@ def terminal_width(*, err: bool = False) -> int | None:
     stream = sys.stderr if err else sys.stdout
     try:
         on_terminal = stream.isatty()
-    except (AttributeError, ValueError):  # a closed stream is not a terminal
+    except (AttributeError, ValueError):  # a closed output stream is not a terminal
         return None
     return min(shutil.get_terminal_size().columns, WIDEST) if on_terminal else None
 
@@ -138,7 +138,7 @@ def echo(text: str, *, err: bool = False, nl: bool = True) -> None:
 
 
 def end_line_on_terminal() -> None:
-    """Ends the current line on standard error."""
+    """Prints a line break on standard error."""
     if terminal_width(err=True) is not None:
         echo("", err=True)
 
@@ -173,7 +173,7 @@ def _finite(value: Any) -> Any:
 
 
 def number(value: float) -> str:
-    """Returns a value with four significant digits."""
+    """Returns a number as text with four significant digits."""
     return f"{value:.4g}"
 
 

@@ -65,7 +65,7 @@ def show(model_file: Path, other_file: Path | None, plot: Path | None, as_json: 
 
 
 def _record(model: Model, file: Path) -> dict[str, Any]:
-    """Returns the values that are printed, under the names that they have in the model file."""
+    """Returns the values of a model that `palpate show --json` prints, by their names in the model file."""
     content = model.to_dict()
     fit = {name: value for name, value in content["fit"].items() if name != "path"}
     return {

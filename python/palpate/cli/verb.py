@@ -23,7 +23,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 PATH = click.Path(path_type=Path)
 
 _FIGURES = (".png", ".pdf", ".svg")
-"""Suffixes of the file names of figures."""
+"""Suffixes (formats) that the file name of a figure may have."""
 
 _READ = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows", "zero",
          "force_late_s", "invalid")  # fmt: skip
@@ -104,7 +104,7 @@ class ReadingOptions:
     options: dict[str, Any] = field(default_factory=dict)
 
     def read(self, path: Path, inputs: Sequence[str] = ()) -> Recording:
-        """Reads a recording with further inputs, and prints its file, number of rows and chosen columns."""
+        """Reads a recording whose force also depends on `inputs`; prints file, number of rows and columns."""
         recording = read_recording(path, inputs=inputs, **self.options)
         chosen, *others = recording.notes
         talk(f"read {path}: {len(recording)} rows; {chosen}")

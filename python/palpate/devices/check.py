@@ -23,7 +23,7 @@ NO_FORCE_SHARE = 0.7
 """Share of a check's duration without force; during the remaining time the device pushes the handle [-]"""
 
 PUSH_FORCE_SHARE = 0.005
-"""Force of a push [share of the largest force of the device]; too small to be felt"""
+"""Force by which the check pushes the handle [share of the device's force limit]; too small to be felt"""
 
 _FRICTION_ADVICE = (
     "take the hand off the handle and check for 10 s; if the friction exceeds the force of the pushes, state "
@@ -35,11 +35,11 @@ _NO_FRICTION_ADVICE = (
 _SHORTEST_DURATION_S = 2.0
 """Least duration of a check [s]; in this time the handle must be moved and must be at rest"""
 _DELAY_MARGIN_PERIODS = 0.05
-"""Time added to the measured delay, because the clocks of host and device drift [periods]"""
+"""Time added to the measured delay of the device, because the clocks of host and device drift [periods]"""
 _LEAST_SIGN_STEPS = 5.0
-"""Least displacement of the handle by a push that shows the sign of the force reliably [encoder steps]"""
+"""Displacement of the handle by a push that is needed to judge the sign of the force [encoder steps]"""
 _LEAST_SIGN_ERRORS = 3.0
-"""Least displacement of the handle by a push that shows the sign of the force reliably [standard errors]"""
+"""Mean displacement by pushes that is needed to judge the sign of the force [standard errors of the mean]"""
 _FORCE_SIGN = "sign of the force"
 """Name of the observation on the sign of the device's force"""
 _SIMULATED_FRICTION_SHARE = 0.002
@@ -56,7 +56,7 @@ class Check:
     base: CoreProfile
     """Properties that the device itself states; inertia, damping and friction are not among them."""
     coulomb_friction: float | None = None
-    """Friction that the user states [N or N*m]"""
+    """Coulomb friction of the device that the user states [N or N*m]"""
 
     @property
     def suitable(self) -> bool:
@@ -190,7 +190,7 @@ def check_device(
         "wait_s": wait_s,
         "progress": progress,
         "keep": True,
-        "lowest_rate_share": 0.0,  # a low loop rate does not end the check; an observation reports it
+        "lowest_rate_share": 0.0,  # a low rate of the control loop is reported, it does not end the check
         "friction_share": _SIMULATED_FRICTION_SHARE,
     }
     summary = measure(device, duration_s=duration_s * (NO_FORCE_SHARE if push else 1.0), **common)

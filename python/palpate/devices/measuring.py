@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..model import Model
 
 Progress = Callable[[int, float, float, int], None]
-"""Function that is called ten times a second with ticks, position, object force and lost samples so far"""
+"""Function that is called ten times a second with number of ticks, position, force, number of lost samples"""
 
 
 def measure(device: str = "simulated", *, object: Model | None = None, **settings: Any) -> dict[str, Any]:

@@ -25,20 +25,20 @@ _LARGEST_LOST_SHARE = 1e-3
 _LARGEST_NOISE_STEPS = 2.0
 """Largest accepted RMS noise of the encoder while the handle is at rest [encoder steps]."""
 _REST_DURATION_S = 0.1
-"""Duration of the pieces into which a check is divided to find one with the handle at rest [s]."""
+"""A device check is divided into pieces of this duration, to find a piece with the handle at rest [s]."""
 _LEAST_MOTION_STEPS = 50.0
-"""Least motion of the handle that shows the signs of velocity and transducer reliably [encoder steps]."""
+"""Motion of the handle that is needed to judge the signs of velocity and force sensor [encoder steps]."""
 _VELOCITY_SAMPLES = 50
 """Number of samples between two positions whose difference is compared with the reported velocity."""
 _VELOCITY_TOLERANCE = 0.25
 """Largest accepted error of the reported velocity [share of the velocity from the positions]"""
 _LEAST_CORRELATION = 0.3
-"""Least |correlation| of force and position that shows the sign of the transducer."""
+"""|Correlation| of force and position that is needed to judge the sign of the force sensor [-]."""
 
 _STEP_TOLERANCE = 0.01
-"""Largest difference of encoder step and force limit from the expected ones [share]"""
+"""Accepted difference of encoder step and force limit from the expected values [share of these values]"""
 _DAMPING_TOLERANCE = 0.1
-"""Share by which measured damping and friction may be less than the expected ones, because of noise."""
+"""Measured damping and friction may be less than expected by this share of the expected values [-]."""
 
 _TOO_LITTLE_MOTION = f"the handle moved by less than {_LEAST_MOTION_STEPS:g} encoder steps"
 _CABLE_ADVICE = "try another cable, another port, or no hub"
@@ -51,10 +51,10 @@ class Observation:
     name: str
     text: str
     right: bool | None = None
-    """True: the property is right; False: it is wrong; None: it was not judged"""
+    """True: the device's property is right; False: it is wrong; None: it was not judged"""
     advice: str = ""
     forbids_force: bool = False
-    """True if the device must not receive any force while this property is wrong"""
+    """True if no force may be sent to the device while this property is wrong"""
     detail: bool = False
     """True if a summary shows the property only when it is wrong"""
 
@@ -69,7 +69,7 @@ class Observation:
 
 
 def observe_at_rest(summary: Mapping[str, Any]) -> list[Observation]:
-    """Judges rate, clock, losses, encoder and signs from a summary of `measure` with ticks, without force."""
+    """Judges rate, clock, losses, encoder and signs from the `summary` of a measurement without force."""
     ticks, wanted = summary["kept"], summary["wanted_rate_hz"]
     step = summary["profile"].encoder_step
     observations = [

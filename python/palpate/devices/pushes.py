@@ -14,12 +14,12 @@ from scipy.optimize import least_squares
 from .._typing import Float1D, Float2D
 
 _LARGE_PUSH_SHARE = 0.9
-"""Least force of a push whose displacement shows the sign of the force [share of the largest push]"""
+"""Least force of a push that is used to judge the sign of the force [share of the largest push's force]"""
 _FEWEST_PUSHES = 3
 """Least number of pushes from which a standard error is computed"""
 
 _LEAST_FITTED_STEPS = 10.0
-"""Least displacement of the handle by a push from which the mechanics are fitted [encoder steps]"""
+"""Least displacement by a push from which inertia, damping and friction are fitted [encoder steps]"""
 
 _LEAST_SIZE_RATIO = 1.25
 """Least ratio of the forces of the strongest and the weakest push that separates friction from damping [-]"""
@@ -31,16 +31,16 @@ _ROUNDING_STEPS = 1.0
 """RMS error of the fitted displacement that is always accepted [encoder steps]"""
 
 _FRICTION_RESERVE_SHARE = 0.05
-"""Share subtracted from the fitted friction, because a real handle differs from the fitted law [-]"""
+"""Share of the fitted friction that is subtracted from it, because a real handle differs from the law [-]"""
 
 _FRICTION_RESERVE_ERRORS = 3.0
-"""Number of standard errors subtracted from the fitted friction [-]"""
+"""Number of standard errors of the fitted friction that are subtracted from it for a certificate [-]"""
 
 _LARGEST_LOGARITHM = 40.0
 """Largest |logarithm| of the inertia J and of the damping b that the fit may reach, both in SI units [-]"""
 
 _START_FRICTION_SHARES = (0.05, 0.4)
-"""Friction values from which the fit begins, over the force of the largest push [-]"""
+"""Friction values from which the fit begins, divided by the force of the largest push [-]"""
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,13 @@ class Mechanics:
     """Inertia, damping and friction of a handle."""
 
     inertia: float
-    """J [kg or kg*m^2]"""
+    """Inertia J of the handle [kg or kg*m^2]"""
     damping: float
-    """b, viscous [N*s/m or N*m*s/rad]"""
+    """Viscous damping b of the handle [N*s/m or N*m*s/rad]"""
     friction: float
-    """f_c, Coulomb [N or N*m]"""
+    """Coulomb friction f_c of the handle [N or N*m]"""
     friction_standard_error: float
-    """Standard error of `friction`; 0 if it was given [N or N*m]"""
+    """Standard error of `friction` [N or N*m]; 0 if the caller gave the friction"""
 
     @property
     def friction_lower_bound(self) -> float:
@@ -79,7 +79,7 @@ class Push:
     reported_sign_agrees: bool
     """True if the force that the device reports has the sign of the commanded force"""
     delay_samples: int | None
-    """Number of whole samples from the command of a force to the force; None if it was not found"""
+    """Number of whole samples from the command of a force until the force acts; None if it was not found"""
     mechanics: Mechanics | None
     """Inertia, damping and friction of the handle; None if they cannot be fitted"""
     mechanics_problem: str = ""
@@ -111,10 +111,10 @@ def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction:
     displacements: list[float] = []
     sizes: list[float] = []
     agreement = 0.0
-    # A sample of the device reports the force that acted before it: a push begins one sample earlier.
+    # A sample reports the force that acted before the sample: a push begins one sample earlier.
     pushing = applied != 0.0
     begins = np.flatnonzero(pushing[1:] & ~pushing[:-1])
-    for begin in begins[begins > 2]:  # three samples before a push show the motion without a push
+    for begin in begins[begins > 2]:  # three samples before a push show the handle's motion without the push
         samples = int(np.argmin(pushing[begin + 1 :])) or len(pushing) - begin - 1
         commanded = float(np.sign(sent[max(0, begin + 1 - samples) : begin + 1 + samples].sum()))
         agreement += commanded * float(np.sign(applied[begin + 1]))
@@ -149,7 +149,7 @@ def _push_displacement(time: Float1D, position: Float1D, begin: int, samples: in
 
 
 def _delay(ticks: Mapping[str, Any]) -> int | None:
-    """Returns the samples from a command to the first sample that reports its force, minus one; or None."""
+    """Returns the number of samples between a command and the first one that reports its force, or None."""
     sent, applied = np.asarray(ticks["force"]), np.asarray(ticks["applied"])
     begins = np.flatnonzero((sent[1:] != 0.0) & (sent[:-1] == 0.0)) + 1
     delays = [int(np.argmax(applied[begin + 1 :] != 0.0)) for begin in begins if np.any(applied[begin + 1 :])]

@@ -221,7 +221,7 @@ class Model(ForceModel):
 
     @property
     def domain(self) -> tuple[Float1D, Float1D]:
-        """Domain: least and largest value of each input, (lower, upper), each (d,)."""
+        """Domain: least and largest value of each of the d inputs in the recording, as (lower, upper)."""
         return self.lower, self.upper
 
     @property

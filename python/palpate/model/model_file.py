@@ -17,7 +17,7 @@ from ..errors import escaped
 from ..recording.files import replacing
 
 _MULTILINE_FIELDS = ("network", "fit", "plan", "certificate")
-"""Objects of a model file that are written with one line for each field."""
+"""JSON objects of a model file that are written with each of their fields on its own line."""
 
 
 class PathStep(TypedDict):
@@ -26,19 +26,19 @@ class PathStep(TypedDict):
     n_wavelets: int
     rmse: float
     criterion: float | None
-    """Value of the criterion that stops adding wavelets; smaller is better; None if it has no value"""
+    """Criterion that decides when to stop adding wavelets (smaller is better); None if it is not defined"""
     model_class: str
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Result of an identification."""
+    """Result of an identification: model class, error and size of the model."""
 
     model_class: str
     """Simplest accepted model class: constant, linear, position, hysteresis, ..."""
     stop_reason: str
     nrmse: float
-    """RMS error over the population standard deviation of the force, on the rows that were fitted"""
+    """RMS error divided by the population standard deviation of the force, on the rows that were fitted"""
     n_wavelets: int
     n_parameters: int
     """Number of fitted real numbers of the model, including dilations and translations"""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Choice of the columns of a recording by five rules. A refusal names all problems and one cure."""
+"""Choice of position, force and time columns by five rules. A refusal names all problems and one cure."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from .units import (
 
 @dataclass(frozen=True)
 class Role:
-    """A role that a column can have."""
+    """Role of a column in a recording (position, force or time), with its units and usual names."""
 
     name: str
     si_units: tuple[str, ...]
     preferred_stems: tuple[str, ...]
-    """Stems that are preferred, in this order, if several columns could take the role."""
+    """Column names (without unit) to prefer, in this order, if several columns could have the role."""
     example: str
     """Unit in the option that an error message suggests for a column of unknown unit."""
     words: tuple[str, ...]
@@ -166,7 +166,7 @@ def choose_columns(
 def _attempt(
     names: Sequence[str], request: _Request, unstated: Collection[str]
 ) -> tuple[Choice | None, dict[str, str]]:
-    """Returns the chosen columns, or the problems of the choice by role or option."""
+    """Returns the chosen columns, or the reasons of the refusal, by role (position) or option."""
     problems: dict[str, str] = {}
     options = [
         (f"--{role}", name) for role, name in (*request.roles.items(), ("direction", request.direction))
@@ -260,7 +260,7 @@ def _choose(
 
 
 def _best(candidates: Sequence[Column], notes: list[str]) -> list[list[Column]]:
-    """Returns the candidates of each stem; if a stem occurs in several units, only those in SI."""
+    """Returns the candidate columns; if names differ only in the unit, only the columns in SI units."""
     by_stem: dict[str, list[Column]] = {}
     for column in candidates:
         by_stem.setdefault(stem_key(column.stem), []).append(column)
@@ -268,7 +268,7 @@ def _best(candidates: Sequence[Column], notes: list[str]) -> list[list[Column]]:
 
 
 def _prefer_si(same_stem: list[Column], notes: list[str]) -> list[Column]:
-    """Keeps, of the columns of one stem, those in SI; else those in another unit; else those in counts."""
+    """Returns, of columns whose names differ only in the unit, those in SI, else those not in counts."""
 
     def distance_from_si(column: Column) -> int:
         assert column.unit is not None, "candidates have units"
@@ -303,7 +303,7 @@ def _cure(
     steady: Collection[str],
     problems: Mapping[str, str],
 ) -> str:
-    """Returns the options that make a refused file readable; tests the choice with these options first."""
+    """Returns the options that make a refused file readable, after checking that they choose all columns."""
     no_cure = ". A recording needs two columns of numbers, a position and a force"
     roles, units, direction = dict(request.roles), dict(request.units), request.direction
     inputs = tuple(name for name in request.inputs if name in names)

@@ -19,16 +19,16 @@ from .recording import Recording
 from .units import GRAVITY
 
 MOST_COMPARED_ROWS = 100_000
-"""Most rows of a recording that are compared. Of a longer recording every k-th moving row is used."""
+"""Largest number of rows used to compare forces; of a longer recording every k-th moving row is used."""
 
 MOST_CELLS = 64
 """Largest number of equal intervals (cells) into which the positions of a recording are divided."""
 
 LEAST_ROWS_PER_CELL = 8
-"""Least mean number of rows in a position cell, for each of press and release."""
+"""Mean number of rows for each stroke and position cell; it sets the number of cells of a short recording."""
 
 LEAST_COMPARED_ROWS = 3
-"""Least number of rows of one stroke in a position cell whose mean force is used."""
+"""The mean force of a stroke in a position cell is used if the cell has at least this number of its rows."""
 
 PLAY_RADIUS_SHARE = 0.02
 """Play radius that separates the strokes, as a share of the distance between least and largest position.
@@ -37,12 +37,12 @@ A motion back by less than two play radii does not end a stroke.
 """
 
 SPIKE_PERCENT = 0.5
-"""Percentage of the rows with the least, and with the largest, position that may be spikes of the sensor."""
+"""Percentage of the rows, at the least and again at the largest positions, that may be sensor spikes."""
 
 
 @dataclass(frozen=True)
 class Travel:
-    """Least and largest position of a recording without spikes, and the rows between these positions."""
+    """Least and largest position of a recording, spikes excluded, and the rows between these positions."""
 
     lower: float
     upper: float
@@ -71,7 +71,7 @@ class CellRows:
     """Rows of a recording by position cell. A cell holds rows of one stroke at nearly the same position."""
 
     row: NDArray[np.intp]
-    """(k,) indices of the compared rows, in their order"""
+    """(k,) indices, in the recording, of the rows that are compared, ascending"""
     cell: NDArray[np.intp]
     """(k,) index of the position cell of each row; rows of a release have the index plus `cells`"""
     place: Float1D
@@ -81,9 +81,9 @@ class CellRows:
     cells: int
     """Number of position cells"""
     loop: Float1D
-    """(m,) press minus release force at the positions where both strokes have rows"""
+    """(m,) press minus release force, at m positions where both strokes have rows"""
     loop_error: Float1D
-    """(m,) standard error of the differences in `loop`"""
+    """(m,) standard error of each force difference in `loop`"""
 
 
 def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
@@ -120,7 +120,7 @@ def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
 
 
 def sides(recording: Recording, travel: Travel) -> NDArray[np.int8]:
-    """Returns the direction of each row (n,): +1 for a press, -1 for a release, 0 if unknown."""
+    """Returns the direction of each of the n rows: +1 for a press, -1 for a release, 0 if unknown."""
     if recording.direction is not None and recording.direction.any():
         return recording.direction
     if not travel.length > 0.0:
@@ -135,22 +135,31 @@ SPLIT_BLOCKS = 32
 """Number of equal blocks of rows. A change of the object is searched only at the edges of these blocks."""
 
 LEAST_EXPLAINED_SHARE = 0.4
-"""Least share of the force's scatter about its mean over position that two parts of a file must explain."""
+"""Least share of the force's scatter that a division into two parts must remove to report two objects.
+
+The scatter is the sum of the squared differences between force and mean force at the same position.
+"""
 
 LEAST_PART_DISTANCE = 0.02
-"""Least RMS difference of the forces of two parts of a file, as a share of the force's standard deviation."""
+"""Least RMS force difference of two parts of a file at which the file is reported to hold two objects.
+
+It is a share of the force's standard deviation.
+"""
 
 PATTERN_ROWS = 16
 """Number of first rows of a file that are searched again later in the file, to find an appended copy."""
 
 LEAST_COPY_SHARE = 0.1
-"""Least share of a file's rows that belong to a copy of the file's beginning."""
+"""Least length of a copy of a file's first rows at the end of the file, as a share of all rows."""
 
 MOST_COPY_STARTS = 4
-"""Most rows that may be the start of a copy of the file and are compared row by row to the end."""
+"""Largest number of rows that are tested as the first row of a copy of the file appended to itself."""
 
 LARGEST_MEAN_OFFSET = 0.1
-"""Largest difference of the mean positions of two parts in a cell whose forces are compared [cell widths]."""
+"""Largest difference of the mean positions of two file parts in one position cell [cell widths].
+
+If the difference is larger, the forces of the parts in this cell are not compared.
+"""
 
 MOST_CURVE_POINTS = 64
 """Largest number of points of a curve of force over position."""
@@ -168,22 +177,31 @@ UNIT_RATIOS = {
     4.4482216: "N and lbf",
     180.0 / np.pi: "deg and rad",
 }
-"""Ratio of two units that are often confused in files, and the names of these units."""
+"""Names of two units that are often confused in files, by the ratio of the units."""
 
 LEAST_SHARED_TRAVEL = 0.3
-"""Least share of the longer position range of two recordings that both cover, so that they are compared."""
+"""Least common position range of two recordings whose forces are compared.
+
+It is a share of the longer of the two position ranges.
+"""
 
 LEAST_CURVE_DIFFERENCE = 0.25
-"""Least RMS difference of the forces of two recordings that is reported, over the standard deviation."""
+"""RMS force difference of two recordings above which it is reported, divided by the standard deviation."""
 
 LARGEST_EXPLAINED_DIFFERENCE = 0.1
-"""Largest RMS force difference that may remain after a change of unit, over the standard deviation."""
+"""Largest RMS force difference of two recordings that is explained by a wrong unit of one of them.
+
+It is computed after the change of unit, and divided by the force's standard deviation.
+"""
 
 ONE_STROKE_SHARE = 0.99
-"""Least share of the moving rows with the same direction in a recording that holds one stroke only."""
+"""A recording with at least this share of its moving rows in one direction holds only that stroke."""
 
 PRESS_ABOVE_SHARE = 0.9
-"""Least share of the common positions at which the press force exceeds the release force of one object."""
+"""Share of positions at which the press force must exceed the release force, for one object with hysteresis.
+
+Otherwise a recorded press and a recorded release that differ are reported as two objects.
+"""
 
 LARGEST_RANGE_RATIO = 2.0
 """Largest ratio of the force ranges (largest minus least force) of press and release of one object.
@@ -199,7 +217,7 @@ Curve = tuple[Float1D, Float1D]
 
 
 def merged_findings(recording: Recording, cells: CellRows | None) -> list[Finding]:
-    """Returns findings on repeated rows and on a force with two branches, one before and one after a row."""
+    """Returns findings on a file that was appended to itself, and on a file that holds two objects."""
     if recording.input_names:
         return []
     if (copy_start := _copy_start(recording)) is not None:
@@ -213,7 +231,7 @@ def merged_findings(recording: Recording, cells: CellRows | None) -> list[Findin
 
 
 def _change_findings(recording: Recording, cells: CellRows) -> list[Finding]:
-    """Returns a finding if the force at equal positions differs before and after one edge of a row block."""
+    """Returns a finding if the force at equal positions differs between two parts of a recording."""
     total = float(np.sum(cells.residual**2))
     spread = float(np.std(recording.force))
     if not total > 0.0 or not spread > 0.0:
@@ -258,7 +276,7 @@ def _change_findings(recording: Recording, cells: CellRows) -> list[Finding]:
 
 
 def _copy_start(recording: Recording) -> int | None:
-    """Returns the first row from which the file repeats its beginning exactly to its end, or None."""
+    """Returns the row from which to the last row the file repeats its first rows exactly, or None."""
     x, f = recording.position, recording.force
     n = len(x)
     least = int(LEAST_COPY_SHARE * n)
@@ -411,7 +429,7 @@ def _curve_difference(one: Curve, other: Curve) -> float:
 
 
 def _ratio(one: Curve, other: Curve) -> tuple[str, float, str] | None:
-    """Returns the column (position, force) and the unit ratio that best explain a difference, or None."""
+    """Returns the column, unit ratio and unit names that explain a force difference, or None."""
     x, f = other
     candidates = []
     for ratio, units in UNIT_RATIOS.items():

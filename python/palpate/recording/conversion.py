@@ -37,7 +37,7 @@ A mirrored axis gives about -0.3 to -0.9 on indentation curves; humps, detents a
 """
 
 Range = tuple[int | None, int | None]
-"""Half-open range of rows, counted from 0. None leaves an end open."""
+"""First row, and row after the last one, counted from 0. None: first row, or last row, of the file."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Source:
     held_out_every: int = 0
     """k if the rows i with i mod k = k - 1 were held out; 0: no rows were held out."""
     held_out: bool = False
-    """True if the recording contains the held-out rows, False if it contains the other rows."""
+    """True if the recording contains only held-out rows, False if it contains none of them."""
 
     @staticmethod
     def merged(sources: Iterable[Source]) -> Source:
@@ -80,7 +80,7 @@ class Motion:
     time: Float1D | None
     """(m,) [s]"""
     rows: NDArray[np.intp]
-    """(n,) indices of the rows that the recording contains"""
+    """(n,) indices, in `position`, of the rows that the recording contains"""
 
 
 @dataclass(frozen=True)
@@ -88,11 +88,11 @@ class Conversion:
     """Chosen columns of a table, and the conversion of their cells to SI values."""
 
     name: str
-    """Name of the table for messages"""
+    """Name of the table (a file or arrays) in messages"""
     choice: Choice
     direction: str | None
     status: str | None
-    """Column that states for each row if the force was the model's, not changed by a guard or a fault"""
+    """Column that states for each row if the force is the model's or was changed by a guard or a fault"""
     negated: frozenset[str]
     drop: bool
     """True: rows that cannot be used are dropped and counted. False: the first such row refuses the table."""
@@ -348,7 +348,7 @@ def mirror_notes(correlation: float, position_falls: bool = False) -> list[str]:
 
 
 def _sign_notes(x: Float1D, f: Float1D, directions: Int8Vector | None) -> list[str]:
-    """Adds one note on a force or position whose sign looks reversed. Only an option changes a sign."""
+    """Returns a note if the sign of force or position is probably reversed. The sign is not changed."""
     x, f = _scaled(x), _scaled(f)
     correlation = float(np.corrcoef(x, f)[0, 1]) if np.ptp(f) > 0 else 0.0
     position_falls = directions is not None and len(x) > 1 and float((np.diff(x) * directions[1:]).sum()) < 0
@@ -356,13 +356,13 @@ def _sign_notes(x: Float1D, f: Float1D, directions: Int8Vector | None) -> list[s
 
 
 def _scaled(values: Float1D) -> Float1D:
-    """Returns the values divided by a power of two: squares cannot overflow, and no digit changes."""
+    """Returns the values divided exactly by a power of two, so that their squares cannot overflow."""
     _, exponent = np.frexp(np.abs(values).max(initial=0.0))
     return np.asarray(np.ldexp(values, -exponent))
 
 
 def _motion(conversion: Conversion, cells: Mapping[str, Cells], rows: NDArray[np.intp]) -> Motion | None:
-    """Returns positions and times of all rows of a file, or None if the time does not always increase."""
+    """Returns positions and times of all rows of a file; None without a time that increases in every row."""
     if conversion.choice.time is None:
         return None
     position, time = (
@@ -388,7 +388,7 @@ def _row_range(name: str, rows: Range | None, total: int) -> tuple[int, int]:
 
 
 def _si_name(column: Column) -> str:
-    """Returns the name of an input with its SI unit."""
+    """Returns the column name of an input with the unit replaced by its SI unit."""
     return column.name if column.unit is None else f"{column.stem}_{COLUMN_SUFFIX[column.unit.si]}"
 
 

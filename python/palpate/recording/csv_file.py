@@ -24,7 +24,7 @@ from .dialect import HEAD_BYTES, not_csv, recognise, refuse_marks
 from .table import MISSING, Cells, LongTable, parse_with, to_numbers
 
 _CHUNK_ROWS = 1_000_000
-"""Number of rows that are read at a time, to limit the memory that is used besides the finished columns."""
+"""Number of rows of a CSV file that are read at a time, to limit the use of memory."""
 
 _EXACT_OPTIONS: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
@@ -51,7 +51,7 @@ _OPENING_QUOTE = {separator: re.compile(rb'(?:^|%b)"' % separator) for separator
 
 
 class FileBytes(io.RawIOBase):
-    """The bytes [start, stop) of a file: a recording without its torn last line, or a part of one."""
+    """The bytes [start, stop) of a CSV file: all without an incomplete last line, or one part of the file."""
 
     def __init__(self, path: Path, start: int, stop: int) -> None:
         self._stream = path.open("rb", buffering=0)
@@ -184,7 +184,7 @@ class CsvFile(LongTable):
         except ValueError as error:
             if isinstance(error, InputError):
                 raise
-        # A column with numbers in its first rows contains text below them. Find it and read it as text.
+        # A column has numbers in its first rows and text in later rows. Find this column and read it as text.
         return self._read(as_text | self._columns_with_text(as_text), numbers, text)
 
     def _read(self, as_text: set[str], numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
@@ -197,7 +197,7 @@ class CsvFile(LongTable):
                 elif name in numbers and name not in text:
                     cells = self._to_numbers(name, chunk[name].to_numpy(dtype=object))
                 else:
-                    # A categorical keeps one string for each word and saves memory.
+                    # The pandas type "category" stores each distinct word only once, which saves memory.
                     cells = chunk[name].astype("category").to_numpy(dtype=object)
                 parts[name].append(cells)
         columns: dict[str, Cells] = {}
@@ -360,7 +360,7 @@ class CsvFile(LongTable):
 
 @dataclass
 class RowCount:
-    """Number of rows in a stream of bytes, and positions of ends of rows."""
+    """Number of rows in a stream of bytes, and byte positions at which rows end."""
 
     rows: int = 0
     ends: list[int] = field(default_factory=lambda: [0])
@@ -423,7 +423,7 @@ def _cell_count(row: bytes, mark: bytes) -> int:
 
 
 def _ends_quoted(line: bytes, quoted: bool, mark: bytes) -> bool:
-    """Returns True if a line ends within a quoted cell; `quoted` is True if it begins within one."""
+    """Returns True if a line ends inside a quoted cell; `quoted`: the line begins inside a quoted cell."""
     offset = 0
     while True:
         found = (_CLOSING_QUOTE.match if quoted else _OPENING_QUOTE[mark].search)(line, offset)

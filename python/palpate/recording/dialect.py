@@ -18,7 +18,7 @@ from .table import MISSING, parse_number, parse_with
 from .units import split_name, unit_of
 
 HEAD_BYTES = 1 << 20
-"""Number of bytes that must contain the header."""
+"""Number of first bytes of a file in which the header is searched; a later header is not found."""
 
 HEAD_LINES = 1000
 """Number of lines, without comments, from which separator and decimal mark are recognised."""
@@ -37,7 +37,7 @@ RECORDING_FORMATS = "CSV, Parquet, Excel (.xlsx), NumPy (.npz), MATLAB (.mat) or
 Row = Sequence[str]
 
 LEAST_NUMBERS = 2
-"""Least number of cells with numbers in a row of data: position and force."""
+"""A row of data needs numbers in at least this number of cells: position and force."""
 
 LEAST_CONSECUTIVE_ROWS = 3
 """Least number of consecutive rows of numbers that mark the data of a table; all rows of a shorter table."""
@@ -62,9 +62,9 @@ class Dialect:
     names: tuple[str, ...]
     metadata: dict[str, str]
     start: int
-    """Bytes before the first line after the header and its units"""
+    """Number of bytes of the file up to the end of the header and its line of units"""
     lines_before: int
-    """Number of lines before the first line after the header and its units"""
+    """Number of lines of the file up to the end of the header and its line of units"""
     trailing: bool
     """True if each row ends with a separator"""
     notes: tuple[str, ...]
@@ -169,7 +169,7 @@ def _decoded(file: str, head: bytes, encoding: str, whole: bool) -> str | None:
 
 
 def _is_binary(text: str) -> bool:
-    """Returns True if one character in ten is a control character, or one is NUL."""
+    """Returns True if at least a tenth of the characters are control characters, or any character is NUL."""
     start = text[:4096]
     control = sum(unicodedata.category(each) == "Cc" and each not in "\t\n\r\f" for each in start)
     return "\x00" in start or 10 * control > len(start)
@@ -182,7 +182,7 @@ def _json_refusal(file: str, text: str) -> InputError:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """Header that is found if the lines are split at one separator."""
+    """Header of a file whose lines are split at a separator that may be the right one."""
 
     header: Header
     separator: str
@@ -225,7 +225,7 @@ def _is_comment(line: str) -> bool:
 def _rows(
     file: str, plain: list[tuple[int, str]], separator: str
 ) -> tuple[list[tuple[int, int]], list[list[str]]]:
-    """Returns the first and last line of each row, and its cells."""
+    """Returns, for each row, the indices of its first and last line in the file, and its cells."""
     spans, rows = [], []
     reader = csv.reader((line for _, line in plain), delimiter=separator)
     first_line = 0
@@ -301,7 +301,7 @@ def find_header(rows: Sequence[Row]) -> Header | None:
 
 
 def first_row_as_header(rows: Sequence[Row]) -> Header:
-    """Takes the first row as the header if no row of numbers shows it."""
+    """Returns the first row as the header, for a table without rows of numbers."""
     return Header(0, tuple(escaped(name.strip()) for name in rows[0]), 1)
 
 

@@ -44,7 +44,7 @@ def require_file(path: Path) -> None:
     if path.is_dir():
         raise InputError(f"{path} is a folder, not a file")
     if not path.is_file():
-        # Opening a pipe that no program writes would block forever.
+        # Opening a pipe would wait forever if no program writes to the pipe.
         raise InputError(f"{path} is a pipe, a device or a socket; save its contents to a file first")
     try:
         with path.open("rb") as stream:

@@ -26,7 +26,7 @@ MOST_HEADER_ROWS = 200
 """Number of first rows of an Excel sheet among which the header is searched."""
 
 STEADY_ROWS = 1000
-"""Number of first rows in which a column with only one or two distinct values counts as steady."""
+"""A column that has only one or two distinct values in this number of first rows is steady."""
 
 
 _MATLAB_HEADER_BYTES = 128

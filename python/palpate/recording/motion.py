@@ -21,7 +21,7 @@ from ..errors import InputError
 from .recording import Recording
 
 TURN_SHARE = 0.02
-"""Least motion back that counts as a reversal of the stroke, as a share of the position range [-]."""
+"""Least motion against the stroke that reverses the stroke, as a share of the position range [-]."""
 
 TURN_NOISE = 8.0
 """Least motion back that counts as a reversal, in standard deviations of the position noise [-].
@@ -42,7 +42,10 @@ If noise or steps require more, reversals cannot be distinguished from noise.
 """
 
 GRID_STEPS = 8.0
-"""Number of grid steps in the least motion back of a reversal. Positions are rounded to this grid."""
+"""Grid steps in the least motion against a stroke that reverses the stroke [-].
+
+To find reversals, positions are rounded to this grid.
+"""
 
 MOST_DIFFERENCES = 100_000
 """Approximate largest number of differences of adjacent positions from which the noise is estimated."""
@@ -51,13 +54,13 @@ LEAST_STROKE_ROWS = 4
 """Least number of rows between two reversals; fewer rows are a jump, for example between two strokes."""
 
 JUMPING_SHARE = 0.1
-"""Share of the rows in jumps above which the rows are taken as not ordered in time [-]."""
+"""If a larger share of the rows is in jumps of position, the rows are not ordered in time [-]."""
 
 HOLD_SHARE = 0.1
-"""Least share of a stroke's rows that stay at the stroke's last position and are a hold [-]."""
+"""Rows at the last position of a stroke are a hold if they are more than this share of its rows [-]."""
 
 HOLD_ROWS = 10
-"""Least number of rows that stay at the last position of a stroke, so that these rows are a hold."""
+"""Rows at the last position of a stroke are a hold (direction 0) only if they are at least this many."""
 
 
 def strokes_from_order(position: Float1D) -> Int8Vector | None:
@@ -100,7 +103,7 @@ def strokes_from_order(position: Float1D) -> Int8Vector | None:
         direction[begin : last + 1] = sign
         near = min(TURN_NOISE * noise, 1.0)
         held, moving = _rest(around, reached, near)
-        # Share of a half-period in which a sinusoidal motion is nearer to its end than the distance `near`.
+        # Share of a half-period in which a sinusoidal motion is within `near` of an extreme position.
         slow_share = 2.0 * np.arccos(1.0 - 2.0 * near) / np.pi
         if moving - held >= max(HOLD_ROWS, (HOLD_SHARE + slow_share) * reached):
             holds.append(slice(begin + held, begin + moving + 1))
@@ -141,8 +144,8 @@ def _resolution(x: Float1D) -> float:
 
 
 def _stroke_ends(x: Float1D, turn: float) -> list[tuple[int, int]]:
-    """Returns last row and direction of each stroke. A stroke ends if x moves back by more than `turn`."""
-    # Positions rounded to a grid have few local extremes, even with much noise.
+    """Returns last row and direction of each stroke. A motion back by more than `turn` ends a stroke."""
+    # Rounded to a grid, even noisy positions have few local extremes, so few rows must be examined.
     grid = np.rint(x * (GRID_STEPS / turn))
     steps = np.diff(grid)
     moves = np.flatnonzero(steps)
@@ -183,25 +186,31 @@ def _rest(x: Float1D, row: int, within: float) -> tuple[int, int]:
 
 
 GAP_RATIO = 2.5
-"""Time step above which a recording has a gap, over the median step. Derivatives and filters stop there."""
+"""Ratio of a time step to the median time step above which the time step is a gap of the recording.
+
+Derivatives and filters are not computed across a gap.
+"""
 
 LARGEST_STEP_DEVIATION = 0.01
-"""Largest difference of the time steps of a piece that is not resampled, as a share of the period."""
+"""Rows between two gaps are resampled if a time step differs from the period by more than this share."""
 
 MARGIN_TIME_CONSTANTS = 3.0
-"""Time removed at both ends of a filtered piece, in time constants 2/w_c of the low-pass filter."""
+"""Duration of the inaccurate results that are removed at both ends of a low-passed signal.
+
+It is in time constants 2/w_c of the low-pass filter, with the cutoff frequency w_c.
+"""
 
 HIGHEST_CUTOFF = 0.25
 """Highest cutoff frequency of the low-pass that is tried [rad/time step]; a higher one would not filter."""
 
 NOISE_SHARE = 0.01
-"""Largest share of position noise in the variance of a velocity or acceleration after the low-pass."""
+"""Accepted share of position noise in the variance of a low-passed velocity or acceleration."""
 
 CUTOFF_RATIO = 0.85
-"""Ratio of each cutoff frequency of the low-pass to the one tried before."""
+"""Each tried cutoff frequency of the low-pass is the previously tried one times this factor [-]."""
 
 LEAST_TIME_CONSTANTS = 200.0
-"""Least duration of a recording in units of 1/w_c, with the cutoff w_c [rad/s] of the low-pass."""
+"""Least duration of a recording that may be low-passed with the cutoff w_c [rad/s], in units of 1/w_c."""
 
 
 @dataclass(frozen=True)
@@ -209,7 +218,7 @@ class Piece:
     """Rows of a recording between two gaps in time, with an even time grid."""
 
     rows: slice
-    """Rows of the recording that belong to the piece"""
+    """Rows of the recording between the two gaps"""
     time: Float1D
     """(k,) [s]"""
     position: Float1D
@@ -217,26 +226,26 @@ class Piece:
     row_time: Float1D
     """(rows,) [s]"""
     period: float
-    """Time step of the grid [s]"""
+    """Time step of the even time grid [s]"""
     even: bool
     """True if the grid times are the times of the rows; False if values are interpolated between the rows"""
 
     def on_grid(self, values: Float1D) -> Float1D:
-        """Returns values at the piece's rows, interpolated to the grid."""
+        """Returns values, given at the rows of the recording, interpolated to the even time grid."""
         return values if self.even else np.interp(self.time, self.row_time, values)
 
     def at_rows(self, values: Float1D) -> Float1D:
-        """Returns values on the grid, interpolated to the piece's rows."""
+        """Returns values, given on the even time grid, interpolated to the rows of the recording."""
         return values if self.even else np.interp(self.row_time, self.time, values)
 
     @property
     def velocity(self) -> Float1D:
-        """Velocity: central difference of the position on the grid (k,) [position/s]"""
+        """Velocity (k,) on the even time grid: central difference of the position [position/s]"""
         return velocity_of(self.position, self.period)
 
     @property
     def acceleration(self) -> Float1D:
-        """Acceleration: second central difference of the position on the grid (k,) [position/s^2]"""
+        """Acceleration (k,) on the even time grid: second central difference of position [position/s^2]"""
         return acceleration_of(self.position, self.period)
 
 
@@ -345,7 +354,7 @@ def quiet_low_pass(parts: Sequence[Piece], *, order: int) -> LowPass | None:
 
 
 def long_enough(parts: Sequence[Piece], low_pass: LowPass) -> list[Piece]:
-    """Returns the pieces that have samples left after the inaccurate ones at both ends are removed."""
+    """Returns the pieces that are longer than their inaccurate samples at both ends after the low-pass."""
     return [part for part in parts if len(part.time) > 2 * low_pass.margin(part.period) + 2]
 
 
@@ -374,7 +383,10 @@ def velocity(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
 
 
 def acceleration(recording: Recording) -> tuple[Float1D, NDArray[np.bool_]]:
-    """Returns the acceleration [position unit per second squared] of each row; else as :func:`velocity`."""
+    """Returns the acceleration [position unit per second squared] of each row, and True for rows with one.
+
+    It raises the same errors as :func:`velocity`.
+    """
     return _derivative(recording, 2)
 
 

@@ -23,76 +23,100 @@ PLAUSIBLE_TRAVEL = {"m": (1e-7, 0.5), "rad": (1e-3, 100.0 * np.pi)}
 """Least and largest plausible position range by unit: from microscope tip to arm; up to 50 revolutions."""
 
 PLAUSIBLE_FORCE_RANGE = {"N*m": (1e-6, 1e3), "A": (1e-5, 1e3)}
-"""Least and largest plausible difference of two forces by unit; for N it depends on the position range."""
+"""Least and largest plausible range of the force by unit; for N it depends on the position range."""
 
 MICROSCOPE_TRAVEL = 1e-4
 """Position range below which a recording is taken to be from a force microscope [m]."""
 
 MICROSCOPE_FORCE_RANGE, USUAL_FORCE_RANGE = (1e-10, 0.1), (1e-3, 1e4)
-"""Plausible least and largest force range, for a force microscope and for other recordings [N]."""
+"""Least and largest plausible force range of a force microscope, and of other recordings [N]."""
 
 LEAST_SAME_SIGN_SHARE = 0.8
-"""Least share of positions at which press minus release force has the same sign as its mean."""
+"""Hysteresis needs the sign of the mean of press minus release force at this share of the positions."""
 
 LEAST_LOOP_SHARE = 0.02
-"""Least mean of press minus release force that counts as hysteresis, over the force's standard deviation."""
+"""Least mean of press minus release force that is hysteresis, divided by the force's standard deviation."""
 
 LEAST_LOOP_ERRORS = 5.0
-"""Least mean of press minus release force that counts as hysteresis, over the standard error of this mean."""
+"""Least mean of press minus release force that is hysteresis, divided by the standard error of this mean."""
 
 LEAST_CLIPPED_ROWS = 5
-"""Least number of rows with the same extreme force or position that are reported as clipped."""
+"""Least number of rows at the largest or least force (or position) that are reported as a clipped sensor."""
 
 LEAST_CLIPPED_POSITIONS = 3
-"""Least number of positions in rows with a clipped force. A tool at rest has one position."""
+"""A clipped force is reported if it occurs at this number of positions or more; a tool at rest has one."""
 
 LEAST_CLIPPED_RATIO = 5.0
-"""Least number of rows at a clipped value over the rows at any near value; rounding alone gives at most 3."""
+"""Least ratio of rows at a clipped value to rows at any near value; rounding alone gives at most 3."""
 
 NEAR_EXTREME_SHARE = 0.1
-"""Largest distance of a value from the extreme value to count as near to it, as a share of the range."""
+"""Values within this share of the range from the largest or least value are near to it."""
 
 CONTACT_FORCE_SHARE = 0.2
-"""Share of the largest |force| below which an extreme force belongs to a tool without contact."""
+"""A largest or least force below this share of the largest |force| is not clipped: there is no contact."""
 
 LEAST_FORCE_CHANGE_SHARE = 0.1
-"""Least change of force at a constant position, as a share of the force's range."""
+"""Least change of force at the largest or least position that reports a clipped position sensor.
+
+The change is a share of the force's range.
+"""
 
 LEAST_FORCE_CHANGE_NOISE = 6.0
-"""Least change of force at a constant position, over the force noise."""
+"""Least change of force at a constant position that reports a clipped or stuck position sensor.
+
+The change is divided by the force noise.
+"""
 
 LEAST_STUCK_FORCE_SHARE = 0.005
-"""Least change of force before a jump of the position, as a share of the force's range."""
+"""Least change of force that reports a stuck position sensor, as a share of the force's range.
+
+The force changes while the position is constant; then the position jumps.
+"""
 
 LEAST_JUMP_RATIO = 5.0
-"""Least jump of the position after a stuck sensor, over the median change of position between rows."""
+"""Least jump of the position that reports a stuck position sensor in the rows before the jump.
+
+The jump is divided by the median change of position between rows.
+"""
 
 LEAST_REGULAR_SHARE = 0.8
-"""Least share of rows in runs of equal values whose lengths are multiples of one number of rows."""
+"""Share of the rows that must be in runs of regular length, so that a column is reported as repeated.
+
+A run is a series of rows with one value. Its length is regular if it is a multiple of the commonest length.
+"""
 
 LEAST_CHANGE_RATIO = 1.5
-"""Least number of changes of one column (position or force) over those of the column that repeats values."""
+"""Least ratio of two numbers of changes at which a column is reported as repeated.
+
+The number of changes of the other column (position or force) is divided by that of the repeated column.
+"""
 
 LEAST_REPORTED_LAG = 0.005
-"""Least change of force between two new samples that is reported as late, over the force's spread."""
+"""Least change of force between two new values of a repeated sensor that is reported as late.
+
+Both are standard deviations: that of the change is divided by that of the force.
+"""
 
 LONGEST_HELD_ROWS = 1000
-"""Number of rows with an equal value above which the motion paused and no sample was repeated."""
+"""A value that is constant in this number of rows or more is a pause of the motion, not a repeated sample."""
 
 LEAST_GAP_SHARE = 0.02
-"""Least width of a gap in position, as a share of the position range."""
+"""Least width of a position interval without rows that is reported, as a share of the position range."""
 
 LEAST_GAP_RATIO = 8.0
-"""Least width of a gap in position, over the 90th percentile of the distances of adjacent positions."""
+"""Least width of a position interval without rows that is reported as a gap.
+
+The width is divided by the 90th percentile of the distances of adjacent positions.
+"""
 
 MOST_NAMED_GAPS = 2
-"""Largest number of gaps in position whose ends a finding states."""
+"""A finding on position intervals without rows states the limits of at most this number of intervals."""
 
 LARGEST_END_GAP = 0.05
-"""Largest share of the position range that one stroke may leave out at one end without a finding."""
+"""Share of the position range that a stroke may miss at the least or largest position without a finding."""
 
 LEAST_LOST_SHARE = 0.05
-"""Least share of a recording's duration without samples that is reported."""
+"""Gaps in time are reported if they are together at least this share of the recording's duration."""
 
 
 def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
@@ -154,10 +178,10 @@ def magnitude_findings(recording: Recording, travel: Travel) -> list[Finding]:
 
 
 def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) -> list[Finding]:
-    """Returns findings on a reversed direction, an active loop, and a force that falls with position."""
+    """Returns findings on a reversed direction, release force above press force, and falling force."""
     signs = recording.direction
     if signs is not None and len(signs) > 1:
-        # a spike of the position moves it both up and down and does not count
+        # a spike of the position sensor goes up and down again, so it is not counted as motion
         step = np.where(travel.inside[1:] & travel.inside[:-1], np.diff(recording.position) * signs[1:], 0.0)
         if step.sum() < 0:
             against = float(np.mean(step[step != 0.0] < 0))
@@ -187,7 +211,7 @@ def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) 
 
 
 def _loop(recording: Recording, cells: CellRows | None) -> tuple[float, bool]:
-    """Returns the mean of press minus release force, and True if this mean is clearly not zero."""
+    """Returns the mean of press minus release force, and True if it differs from zero by more than noise."""
     if cells is None or len(cells.loop) < 4:
         return 0.0, False
     mean = float(np.mean(cells.loop))
@@ -273,7 +297,7 @@ def _constant_position_findings(recording: Recording, travel: Travel, force_rang
 
 
 def _usual_count(x: Float1D, value: float, travel: Travel) -> float:
-    """Returns the median number of rows with one position, for positions near an extreme position."""
+    """Returns the median number of rows with equal position, for positions near `value`, without `value`."""
     near = x[(np.abs(x - value) <= NEAR_EXTREME_SHARE * travel.length) & (x != value)]
     return float(np.median(np.unique(near, return_counts=True)[1])) if len(near) else 1.0
 
@@ -338,7 +362,7 @@ def _held_findings(recording: Recording, subject: str, rows: int, other: str) ->
 
 
 def _held_for(values: Float1D) -> int:
-    """Returns the number of rows in which a column repeats a value; 1 if this number is not regular."""
+    """Returns the number of rows for which a column usually keeps one value; 1 if it is irregular."""
     edges = np.flatnonzero(np.diff(values)) + 1
     lengths = np.diff(edges)
     lengths = lengths[lengths < LONGEST_HELD_ROWS]
@@ -381,7 +405,7 @@ def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
 
 
 def _gaps(recording: Recording, travel: Travel, name: str, gaps: list[tuple[float, float]]) -> Finding:
-    """Returns one finding on all position intervals without rows; it states the ends of the longest ones."""
+    """Returns a finding on all position intervals without rows, with the limits of the longest ones."""
     unit = recording.file_unit("position")
     share = sum(stop - start for start, stop in gaps) / travel.length
     longest = sorted(gaps, key=lambda gap: gap[0] - gap[1])[:MOST_NAMED_GAPS]

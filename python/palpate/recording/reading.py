@@ -205,7 +205,7 @@ BLOCK_ROWS = 500_000
 
 @dataclass(frozen=True)
 class Block:
-    """Rows of a long file that are in memory at a time."""
+    """Consecutive rows of a long file, which are processed together in memory."""
 
     position: Float1D
     """[SI]"""
@@ -225,11 +225,11 @@ class LongRecording:
     conversion: Conversion
     """Conversion of the columns position, force and direction to SI values"""
     parts: tuple[tuple[int, int], ...]
-    """Start and end of each part of the file"""
+    """Start and end of each part of the file: bytes of a CSV file, row groups of a Parquet file"""
     rows: int
     """Number of rows of the file, counted without reading their cells"""
     source: Source
-    """Source of the recording; its number of used rows is not yet known"""
+    """Source of the recording; `source.rows` is not yet known, because the rows were not read"""
     notes: tuple[str, ...]
 
     @property
@@ -317,7 +317,7 @@ def open_long_recording(
         drop=invalid == "drop",
     )
     if conversion.direction == "segment" and direction is None and "segment" not in table.text_names:
-        conversion = replace(conversion, direction=None)  # segment numbers state no press or release
+        conversion = replace(conversion, direction=None)  # segment numbers are not directions
     notes = conversion.note(dialect=table.notes), *conversion.choice.notes
     conversion = replace(conversion, choice=replace(conversion.choice, time=None, inputs=()))
     rows, parts = _require_long_table(table, file).parts(part_rows)

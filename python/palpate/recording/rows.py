@@ -20,7 +20,7 @@ DIRECTION_WORDS: dict[str, int] = {
     **dict.fromkeys(("release", "retract", "unload", "unloading", "back", "-1"), -1),
     **dict.fromkeys(("pause", "hold", "extra", "0"), 0),
 }
-"""Words for the stroke: into the object (+1), out of it (-1), neither (0)."""
+"""Direction of the stroke by the word in a file: into the object (+1), out of it (-1), neither (0)."""
 
 
 @dataclass
@@ -34,7 +34,7 @@ class LeftOut:
 
     @property
     def rows(self) -> int:
-        """Number of all ignored rows."""
+        """Number of rows of the file that are not used, for all reasons together."""
         return self.status.total() + sum(count for count, _ in self.dropped.values())
 
     def drop(self, reason: str, count: int, first: int) -> None:

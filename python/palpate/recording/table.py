@@ -34,7 +34,7 @@ class Table(ABC):
     names: tuple[str, ...]
     metadata: Mapping[str, str]
     torn = 0
-    """Number of incomplete lines at the end of the file that are ignored"""
+    """Number of lines (0 or 1) at the end of the file that are ignored because they are incomplete"""
     notes: Sequence[str] = ()
     """Differences of the file from a plain table, as parts of one sentence"""
     text_names: Collection[str] = ()
@@ -161,7 +161,7 @@ class FrameTable(Table):
         }
 
     def place(self, row: int) -> str:
-        """Returns position and index label of a row."""
+        """Returns the place of a row for messages: its number in the frame and its index label."""
         return f"row {row} (index {self._frame.index[row]!r})"
 
     def cell(self, row: int, name: str) -> str:
