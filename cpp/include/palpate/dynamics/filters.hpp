@@ -49,8 +49,8 @@ struct EnvironmentFilters {
     const double central_gain = paper ? 14.8379 : at_dc / (2.0 * period);
     const double forward_gain = paper ? 31.0 : at_dc / period;
 
-    const TransferFunction integrator{{period, 0.0, 0.0}, {1.0, -1.0, 0.0}};          // I = T z / (z - 1)
-    const TransferFunction delayed_integrator{{0.0, period, 0.0}, {1.0, -1.0, 0.0}};  // I = T / (z - 1)
+    const TransferFunction integrator{{period, 0.0, 0.0}, {1.0, -1.0, 0.0}};          // I(z) = T z / (z - 1)
+    const TransferFunction delayed_integrator{{0.0, period, 0.0}, {1.0, -1.0, 0.0}};  // I(z) = T / (z - 1)
     const TransferFunction central{{central_gain, 0.0, -central_gain}, {1.0, -1.6556, 0.68518}};
     const TransferFunction forward{{0.0, forward_gain, -forward_gain}, {1.0, -1.6556, 0.68518}};
     if (pair == FilterPair::Implicit) {

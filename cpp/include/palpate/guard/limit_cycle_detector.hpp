@@ -103,8 +103,8 @@ class LimitCycleDetector {
     double last_reversal_ = 0.0;
     double least_force_ = std::numeric_limits<double>::infinity();  ///< smallest force in the current swing
     double largest_force_ = -std::numeric_limits<double>::infinity();  ///< largest force in the current swing
-    double first_ = 0.0;  ///< length of the longest of the first five swings [m or rad]
-    double last_ = 0.0;   ///< length of the longest of swings six to ten [m or rad]
+    double first_ = 0.0;  ///< longest of the first five swings of a possible limit cycle [m or rad]
+    double last_ = 0.0;   ///< longest of the swings six to ten of a possible limit cycle [m or rad]
     std::uint64_t swings_ = 0;
     std::uint64_t ticks_ = 0;  ///< ticks since the last reversal of the handle
 };

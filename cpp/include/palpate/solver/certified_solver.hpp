@@ -555,7 +555,7 @@ class CertifiedSolver {
     double by_radius_;  ///< 1 / r; 0 without hysteresis [1/m]
     double travel_;
     double period_;     ///< repeat length of a periodic force; 0 if the force is not periodic [m]
-    double tolerance_;  ///< largest error of the solution's position [m]
+    double tolerance_;  ///< largest allowed error of the position y that solves a load line [m]
     double least_slope_ =
         infinity;  ///< smallest load-line slope p for which F is proved to rise in every cell [N/m]
     std::vector<Border> borders_;

@@ -192,7 +192,8 @@ class InverseCells {
         if (!std::all_of(c.begin(), c.end(), [](double one) { return std::isfinite(one); })) {
             return std::numeric_limits<double>::infinity();
         }
-        // Element j is a bound of |P^(j)| / j! over the cell for its polynomial P, rounding included.
+        // Element j is an upper bound of |P^(j)| / j! over one cell, rounding included. P^(j) is derivative j of the
+        // polynomial P of the cell.
         std::array<double, order + 1> inner{};
         for (std::size_t j = 1; j < c.size(); ++j) {
             double binomial = 1.0;

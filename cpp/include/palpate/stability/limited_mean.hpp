@@ -22,7 +22,7 @@ namespace detail {
 struct PeriodicStrokes {
     const NetworkCurve& g;
     const NetworkCurve* h = nullptr;
-    double steepest = 0.0;  ///< proved bound of |g'| + |h'| (mean force g, hysteresis h) [N/m]
+    double steepest = 0.0;  ///< proved upper bound of |g'| + |h'| (mean force g, hysteresis h) [N/m]
 
     /// Returns value and antiderivative of g + `side` * h + `shift` at position x (mean force g, hysteresis h); `side`
     /// is 1 for press, -1 for release.
