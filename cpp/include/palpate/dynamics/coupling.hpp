@@ -16,13 +16,13 @@ struct VirtualCoupling {
     double stiffness = 100.0;  ///< stiffness K_c of the virtual coupling [N/m]
     double damping = 0.02;     ///< damping B_c of the virtual coupling [N*s/m]
 
-    /// Returns the force of the coupling [N] for a difference of the positions and of the velocities of device and
-    /// virtual object.
+    /// Returns the force of the virtual coupling [N]. The two arguments are the position and the velocity of the device
+    /// minus those of the virtual object.
     [[nodiscard]] constexpr double force(double position_error, double velocity_error) const noexcept {
         return stiffness * position_error + damping * velocity_error;
     }
 
-    /// Returns K_c + B_c / T [N/m], the part of the coupling in the slope of a load line.
+    /// Returns K_c + B_c / T [N/m], the term of the virtual coupling in the slope p of a load line.
     [[nodiscard]] constexpr double load_line_slope(double period_s) const noexcept {
         return stiffness + damping / period_s;
     }

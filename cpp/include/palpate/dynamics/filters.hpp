@@ -10,13 +10,13 @@
 
 namespace palpate {
 
-/// Time between two samples for which the differentiators of the paper are designed [s].
+/// Sample period [s] for which the paper designed its differentiators.
 inline constexpr double paper_sample_time = 1e-3;
 
-/// The two sets of integrators and differentiators of the paper (section 4.3).
+/// Selects one of the two sets of integrators and differentiators in section 4.3 of the paper.
 enum class FilterPair : std::uint8_t { Implicit, Explicit };
 
-/// Gain of the differentiators G. I is the integrator that G must invert, so G I should be 1.
+/// Choice of the gain of each differentiator G. G must invert the integrator I, so the product G I should be 1.
 enum class FilterDesign : std::uint8_t {
     Paper,  ///< gains of the paper, 14.8379 and 31: the product G I at low frequency is 1.0032 and 1.048
     /// Gains for which the product of differentiator G and integrator I is exactly 1 at low frequency
@@ -49,8 +49,8 @@ struct EnvironmentFilters {
     const double central_gain = paper ? 14.8379 : at_dc / (2.0 * period);
     const double forward_gain = paper ? 31.0 : at_dc / period;
 
-    const TransferFunction integrator{{period, 0.0, 0.0}, {1.0, -1.0, 0.0}};          // I = T z / (z - 1)
-    const TransferFunction delayed_integrator{{0.0, period, 0.0}, {1.0, -1.0, 0.0}};  // I = T / (z - 1)
+    const TransferFunction integrator{{period, 0.0, 0.0}, {1.0, -1.0, 0.0}};          // I(z) = T z / (z - 1)
+    const TransferFunction delayed_integrator{{0.0, period, 0.0}, {1.0, -1.0, 0.0}};  // I(z) = T / (z - 1)
     const TransferFunction central{{central_gain, 0.0, -central_gain}, {1.0, -1.6556, 0.68518}};
     const TransferFunction forward{{0.0, forward_gain, -forward_gain}, {1.0, -1.6556, 0.68518}};
     if (pair == FilterPair::Implicit) {

@@ -19,7 +19,7 @@
 // struct. Checks, files, fingerprints, comparisons and Python classes use these tables.
 namespace palpate {
 
-/// Rule for the number in a field: any number, finite, >= 0, or > 0.
+/// Rule that the number in a field must satisfy: no rule (any number), finite, >= 0, or > 0.
 enum class Rule : std::uint8_t { Any, Finite, NotNegative, Positive };
 
 /// Returns the rule as text for an error message, for example "> 0".
@@ -40,8 +40,8 @@ struct Field {
     const char* name = "";
     const char* doc = "";  ///< meaning and unit of the field
     Rule rule = Rule::Any;
-    bool stored = true;  ///< false: files do not contain the field, because it can be computed
-    std::span<const std::string_view> words = {};  ///< allowed texts of the field; empty = any text
+    bool stored = true;  ///< false: the field is not written to files, because the program can compute it
+    std::span<const std::string_view> words = {};  ///< texts that the field may contain; empty list: any text
 
     template <class S>
     [[nodiscard]] static constexpr auto& of(S& object) noexcept {
@@ -63,7 +63,7 @@ template <auto outer, class... Fields>
                       fields);
 }
 
-/// True for the type of an optional field, which a file may omit.
+/// True if the type V is std::optional. A file may omit a field of such a type.
 template <class V>
 inline constexpr bool is_optional = false;
 template <class V>
@@ -98,7 +98,7 @@ template <HasWords Enum>
     return words_of<Enum>[static_cast<std::size_t>(value)];
 }
 
-/// Returns the words joined to a text such as "direct, massless or implicit".
+/// Joins the words to one text for an error message, for example "direct, massless or implicit".
 [[nodiscard]] inline std::string either(std::span<const std::string_view> words) {
     std::string text;
     for (std::size_t k = 0; k < words.size(); ++k) {
@@ -120,8 +120,8 @@ template <HasWords Enum>
                                 either(words_of<Enum>));
 }
 
-/// Throws std::invalid_argument unless `holds` is true. The message contains the name of the field, its value and the
-/// rule `right`.
+/// Throws std::invalid_argument unless `holds` is true. The message contains the name of the field, its value, and the
+/// text `right`, for example "> 0".
 inline void require_field(bool holds, const std::string& field, double value, const std::string& right) {
     if (!holds) {
         throw std::invalid_argument(field + " is " + readable(value) + ", must be " + right);

@@ -12,8 +12,8 @@ namespace palpate {
 
 /// Settings of an energy tank: bounds of the stored energy, and losses of the device that the tank counts.
 struct TankSettings {
-    StoredEnergySettings stored;   ///< numbers that bound the energy that the rendering stores
-    double device_damping = 0.0;   ///< device damping b that the tank counts [N*s/m or N*m*s/rad]
+    StoredEnergySettings stored;   ///< numbers from which the upper bound of the stored energy is computed
+    double device_damping = 0.0;   ///< device damping b whose losses the tank counts [N*s/m or N*m*s/rad]
     double device_friction = 0.0;  ///< Coulomb friction f_c that the tank counts [N or N*m]
     /// Length by which each motion is shortened before friction losses are counted [m or rad]
     double uncredited_motion = 0.0;
@@ -71,7 +71,7 @@ class EnergyTank {
         return Status::EnergyLimited;
     }
 
-    /// Return the given energy G of the last tick, and its largest value since the start [J].
+    /// Return the energy G that the rendering had given at the last tick, and the largest G of the run [J].
     [[nodiscard]] double given() const noexcept { return given_; }
     [[nodiscard]] double most_given() const noexcept { return most_given_; }
     [[nodiscard]] const StoredEnergy& stored() const noexcept { return stored_; }

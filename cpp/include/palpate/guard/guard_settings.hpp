@@ -16,17 +16,19 @@ namespace palpate {
 
 /// Settings of the guards for a rendering on a device, with times in seconds.
 struct GuardSettings {
-    double force_limit = 5.0;  ///< largest force [N or N*m]
-    double slew_s = 0.005;     ///< shortest time from zero force to the force limit; 0 = no slew limit [s]
-    double ramp_s = 0.2;       ///< duration of the start ramp from zero force to the full force [s]
+    double force_limit = 5.0;  ///< largest absolute force that is sent to the device [N or N*m]
+    /// Slew limit: shortest time in which the force may rise from 0 to the force limit; 0: no slew limit [s]
+    double slew_s = 0.005;
+    double ramp_s = 0.2;           ///< duration of the start ramp from zero force to the full force [s]
     double largest_speed = 100.0;  ///< handle speed above which a reading is a fault (jump) [m/s or rad/s]
     /// Speed from which a handle cannot stop within one period T [m/s or rad/s]
     double frozen_speed = 0.3;
-    double frozen_s =
-        0.05;  ///< time of constant position after fast motion that proves a frozen encoder; 0 = no check [s]
+    /// If the position is constant for this time directly after fast motion, the encoder is frozen; 0: no check [s]
+    double frozen_s = 0.05;
     bool energy_tank = true;  ///< true: an energy tank limits the energy that the rendering may give
-    double limit_cycle_force =
-        0.05;  ///< smallest change of force in each swing of a limit cycle; 0 = no check [N or N*m]
+    /// An oscillation is a limit cycle only if the force changes by at least this much in each swing between two
+    /// reversals; 0: limit cycles are not detected [N or N*m]
+    double limit_cycle_force = 0.05;
     double device_damping = 0.0;   ///< device damping b [N*s/m or N*m*s/rad]
     double device_friction = 0.0;  ///< Coulomb friction f_c of the device [N or N*m]
     double encoder_step = 0.0;     ///< encoder step of the device [m or rad]
@@ -53,13 +55,13 @@ struct GuardSettings {
     return guards;
 }
 
-inline constexpr double longest_guard_s =
-    3600.0;  ///< largest ramp_s and frozen_s, so that their number of samples fits an integer [s]
+/// Largest allowed `ramp_s` and `frozen_s`, so that each number of samples fits an integer [s].
+inline constexpr double longest_guard_s = 3600.0;
 
-/// Share of the damping and friction of the device that the energy tank counts in a run without a certificate.
+/// Without a certificate, the energy tank counts this part (90 %) of the losses by device damping and Coulomb friction.
 inline constexpr double uncertified_credit = 0.9;
 
-/// Frequency above which an oscillation cannot come from a hand [Hz].
+/// Lowest frequency of a limit cycle [Hz]: slower oscillations of the handle can come from a hand.
 inline constexpr double lowest_limit_cycle_hz = 20.0;
 
 /// Throws std::invalid_argument if a guard setting is not allowed, with the name of the setting, its value and the

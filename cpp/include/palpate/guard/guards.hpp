@@ -25,14 +25,14 @@ struct Guards {
     ReadingGuard reading{};  ///< checks the position measured in each tick
     /// Limits the computed force to the device's force limit, before all other limits of the force
     ForceLimit limit{};
-    /// Detects limit cycles, and multiplies all later forces by a factor below 1
+    /// Detects limit cycles; after each limit cycle, all forces are multiplied by a smaller factor
     LimitCycleDetector limit_cycle{};
-    ForceRamp ramp{};                   ///< increases the force from zero at the start
-    SlewLimit slew{};                   ///< limits the change of the force in a tick
-    EnergyTank tank{};                  ///< limits the energy that the rendering may give
-    ReadMotion motion{};                ///< computes the motion of the handle that the encoder readings prove
-    PassivityObserver ramp_observer{};  ///< energy that the rendering absorbed during the start ramp
-    PassivityObserver observer{};       ///< energy that the rendering absorbed after the start ramp
+    ForceRamp ramp{};     ///< start ramp: increases the force from zero
+    SlewLimit slew{};     ///< limits the change of the force from tick to tick
+    EnergyTank tank{};    ///< limits the energy that the rendering may give
+    ReadMotion motion{};  ///< computes the handle motion that is certain in spite of encoder steps
+    PassivityObserver ramp_observer{};  ///< sums the energy that the rendering absorbs during the start ramp
+    PassivityObserver observer{};       ///< sums the energy that the rendering absorbs after the start ramp
 };
 
 /// Returns an upper bound of the energy that a rendering stores while handle and virtual object do not move and are

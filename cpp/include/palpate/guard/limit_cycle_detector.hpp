@@ -13,11 +13,13 @@ namespace palpate {
 /// Criteria by which an oscillation of the handle is a limit cycle. A swing is the motion between two reversals of the
 /// handle.
 struct LimitCycleSettings {
-    /// Smallest change of force in each swing of a limit cycle [N or N*m]
+    /// A swing counts for a limit cycle only if the force changes by at least this much during the swing [N or N*m]
     double force_swing = std::numeric_limits<double>::infinity();
-    /// Longest duration of each swing of a limit cycle [ticks]; hands oscillate below 20 Hz
+    /// A swing counts for a limit cycle only if it takes at most this time [ticks]; slower swings (below 20 Hz) can
+    /// come from a hand
     std::uint64_t longest_swing = 25;
-    double encoder_step = 0.0;  ///< a backward motion of at most this length is not a reversal [m or rad]
+    /// Motion against the current direction of at most one encoder step is not a reversal [m or rad]
+    double encoder_step = 0.0;
 };
 
 /// Detects a limit cycle of the handle and scales all forces down. A limit cycle is ten consecutive swings between
@@ -63,7 +65,7 @@ class LimitCycleDetector {
     static constexpr std::uint64_t swings_in_half = 5;  ///< swings in each half of a limit cycle
     /// Smallest ratio in a limit cycle: longest of its last five swings / longest of its first five
     static constexpr double least_last_to_first = 0.8;
-    /// Factor by which each limit cycle multiplies all later forces
+    /// After each detected limit cycle, all later forces are multiplied by this factor once more
     static constexpr double force_factor = 0.7;
 
     void end_swing() noexcept {
@@ -101,10 +103,10 @@ class LimitCycleDetector {
     double last_reversal_ = 0.0;
     double least_force_ = std::numeric_limits<double>::infinity();  ///< smallest force in the current swing
     double largest_force_ = -std::numeric_limits<double>::infinity();  ///< largest force in the current swing
-    double first_ = 0.0;  ///< length of the longest of the first five swings [m or rad]
-    double last_ = 0.0;   ///< length of the longest of swings six to ten [m or rad]
+    double first_ = 0.0;  ///< longest of the first five swings of a possible limit cycle [m or rad]
+    double last_ = 0.0;   ///< longest of the swings six to ten of a possible limit cycle [m or rad]
     std::uint64_t swings_ = 0;
-    std::uint64_t ticks_ = 0;  ///< ticks since the handle last changed its direction
+    std::uint64_t ticks_ = 0;  ///< ticks since the last reversal of the handle
 };
 
 }  // namespace palpate

@@ -16,7 +16,7 @@ namespace palpate {
 struct ForceLimit {
     double largest = 5.0;  ///< force limit [N or N*m], > 0
 
-    /// Limits the force and returns `Limited` if the force has changed.
+    /// Limits the force to the range from -`largest` to `largest`; returns `Limited` if the force was changed.
     [[nodiscard]] Status apply(double& force) const noexcept {
         if (!std::isfinite(force)) {
             force = 0.0;
@@ -35,7 +35,8 @@ struct SlewLimit {
         std::numeric_limits<double>::infinity();  ///< largest change of force in a tick [N or N*m], > 0
     double last = 0.0;                            ///< force that was sent in the last tick [N or N*m]
 
-    /// Limits the force and returns `Limited` if the force has changed.
+    /// Limits the change of the force since the last tick to `largest_step`; returns `Limited` if the force was
+    /// changed.
     [[nodiscard]] Status apply(double& force) noexcept {
         const double unlimited = force;
         force = std::clamp(force, last - largest_step, last + largest_step);
@@ -49,7 +50,7 @@ struct SlewLimit {
 /// Increases the force from zero after the start: multiplies the first `ticks` forces by 0, 1/ticks, 2/ticks, ...
 struct ForceRamp {
     std::uint64_t ticks = 0;  ///< length of the start ramp [ticks]
-    std::uint64_t done = 0;   ///< ticks since the start, at most `ticks`
+    std::uint64_t done = 0;   ///< number of forces multiplied so far, at most `ticks`
 
     /// Returns true if the start ramp has ended, so that forces are not scaled.
     [[nodiscard]] bool is_over() const noexcept { return done >= ticks; }

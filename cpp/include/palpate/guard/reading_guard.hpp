@@ -20,20 +20,21 @@ namespace palpate {
 /// exactly for `frozen_samples`, the encoder has failed. A failure while the handle rests cannot be detected.
 class ReadingGuard {
   public:
-    /// Largest change of position in a tick, and the criteria by which an encoder is frozen.
+    /// Limits by which a change of position is a jump, and by which a constant position means a frozen encoder.
     struct Limits {
-        double largest_step =
-            std::numeric_limits<double>::infinity();  ///< largest change of position in a tick [m or rad]
+        /// A larger change of position in one tick is a fault (jump) [m or rad]
+        double largest_step = std::numeric_limits<double>::infinity();
         /// Change of position in a tick so fast that a stop in the next tick means a frozen encoder [m or rad]
         double frozen_step = 0.0;
-        /// Consecutive ticks with equal position that prove a frozen encoder; 0 = no check
+        /// Number of consecutive ticks with equal position after fast motion that means a frozen encoder; 0: no check
         std::uint64_t frozen_samples = 0;
     };
 
     ReadingGuard() = default;
     explicit ReadingGuard(const Limits& limits) noexcept : limits_{limits} {}
 
-    /// Returns the status of a sample: `reported` by the device, or a fault of its sequence number or position.
+    /// Returns the status of a sample: the status `reported` that the device sent, or a fault that the sequence number
+    /// or the position of the sample shows.
     [[nodiscard]] Status check(double position, std::uint64_t sequence, Status reported) noexcept {
         ++exchanges_;
         if (!sends_force(reported)) {
@@ -61,13 +62,14 @@ class ReadingGuard {
         return lost ? Status::Lost : reported;
     }
 
-    /// Return the number of samples that the host did not receive, and of repeated samples.
+    /// Return the number of samples that never arrived from the device, and the number of samples that arrived
+    /// repeatedly.
     [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
     [[nodiscard]] std::uint64_t repeated() const noexcept { return repeated_; }
 
   private:
-    static constexpr std::uint64_t most_late_samples =
-        2;  ///< largest counted number of samples that arrive after their own tick
+    /// The guard expects at most this number of samples that arrive after their own tick.
+    static constexpr std::uint64_t most_late_samples = 2;
 
     [[nodiscard]] Status motion_status(double position, double samples) noexcept {
         const double step = std::isnan(last_position_) ? 0.0 : std::abs(position - last_position_);

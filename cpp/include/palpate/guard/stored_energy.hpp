@@ -62,7 +62,7 @@ class StoredEnergy {
 
   private:
     StoredEnergySettings settings_;
-    /// Stretch F_max / K_c of the coupling at the force limit [m or rad]
+    /// Stretch F_max / K_c of the virtual coupling when its force is the force limit F_max [m or rad]
     double stretch_ = std::numeric_limits<double>::infinity();
     double below_ = 0.0;
     double above_ = 0.0;

@@ -38,7 +38,8 @@ struct BoundedCell {
     Jet at_from, at_to;
     Interval range;
 
-    /// Makes a cell. `remainder` is an upper bound of the polynomial's distance from g plus the rounding error.
+    /// Makes a cell from the function g at both ends of the cell. `remainder` is an upper bound of |g - polynomial of
+    /// the cell| plus the rounding error.
     BoundedCell(double left, double right, const Jet& at_left, const Jet& at_right, double remainder) noexcept
         : from{left}, to{right}, at_from{at_left}, at_to{at_right} {
         const Interval both = coefficients(at_from, to - from).with(coefficients(at_to, from - to));
@@ -66,7 +67,7 @@ struct BoundedCell {
 /// One term of a sum whose bounds `enclose` computes: the derivative of order `order` of a network.
 struct Term {
     const NetworkParameters& network;
-    std::size_t order;  ///< 0: value of the network, 1: first derivative
+    std::size_t order;  ///< 0: the term is the value of the network; 1: the first derivative
 };
 
 /// Returns proved lower and upper bounds of g, the sum of the terms, over [from, to] by bisection into cells. A cell is
@@ -104,8 +105,8 @@ template <std::size_t terms>
             eighth += derivative_bounds(network, left, right)[order + 8];
         }
         double remainder = eighth * std::pow(h, 8) / (256.0 * 40320.0);
-        // Factors of value and derivatives in the Bernstein coefficients. The 8 epsilon below cover the rounding of
-        // their sums.
+        // Factors that multiply the value and the derivatives of g in the Bernstein coefficients of a polynomial. An
+        // error of 8 epsilon for each product covers the rounding of the sums.
         const Jet factors{1.0, 3.0 / 7.0 * h, 3.0 / 42.0 * h * h, h * h * h / 210.0};
         for (std::size_t d = 0; d < factors.size(); ++d) {
             const double size = std::max(std::abs(at_left[d]), std::abs(at_right[d]));

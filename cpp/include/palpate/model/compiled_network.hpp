@@ -20,9 +20,10 @@ namespace palpate {
 
 /// Required accuracy and largest size of the table of polynomials that replaces a wavelet network.
 struct CompileOptions {
-    double relative_error = 1e-12;     ///< largest force error / max|f| over the domain; includes rounding
-    std::size_t largest_table = 8192;  ///< largest number of table cells of 80 bytes
-    /// Smallest number of wavelets for a table; the sum of fewer wavelets is as fast
+    /// Largest force error divided by max|f| over the domain; includes rounding
+    double relative_error = 1e-12;
+    std::size_t largest_table = 8192;  ///< largest number of cells (80 bytes each) in the table.
+    /// A network with fewer wavelets gets no table, because the sum of its wavelets is as fast as a table.
     std::size_t fewest_wavelets = 2;
 };
 
@@ -54,7 +55,7 @@ class CompiledCurve {
         build(options);
     }
 
-    /// Returns the network with its continuations from which the table was computed.
+    /// Returns the wavelet network and its continuations, from which the table was computed.
     [[nodiscard]] const NetworkCurve& curve() const noexcept { return curve_; }
     /// Returns true if the polynomials of the table are used, false if the network itself is evaluated.
     [[nodiscard]] bool compiled() const noexcept { return !table_.empty(); }
@@ -198,16 +199,15 @@ class CompiledNetwork {
     explicit CompiledNetwork(const WaveletNetwork& network, const CompileOptions& options = {})
         : curve_{network.curve(), options} {}
 
-    /// Returns the table of polynomials that replaces the network.
+    /// Returns the table of polynomials that is evaluated in place of the wavelet network.
     [[nodiscard]] const CompiledCurve& curve() const noexcept { return curve_; }
 
-    /// Returns force, slope and energy at x.
-    [[nodiscard, gnu::always_inline]] inline EnvironmentSample at(double x,
-                                                                  const State& /*stateless*/) const noexcept {
+    /// Returns force, slope and energy at position x.
+    [[nodiscard, gnu::always_inline]] inline EnvironmentSample at(double x, const State&) const noexcept {
         const Curve curve = curve_.at(x);
         return {curve.value, curve.slope, curve.integral, curve_.extrapolated(x)};
     }
-    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    void advance(double /*x*/, State&) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 
   private:

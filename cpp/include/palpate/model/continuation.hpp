@@ -16,8 +16,8 @@ namespace palpate {
 struct Curve {
     double value = 0.0;            ///< f(x)
     double slope = 0.0;            ///< f'(x)
-    double integral = 0.0;         ///< integral of f up to x, plus a constant
-    double double_integral = 0.0;  ///< integral of `integral` up to x, plus a constant
+    double integral = 0.0;         ///< integral of f over the position up to x, plus a constant
+    double double_integral = 0.0;  ///< integral of `integral` over the position up to x, plus a constant
 };
 
 /// Kind of force outside the positions of the recording. The network is never evaluated there, because the force of a
@@ -40,7 +40,8 @@ struct EdgeLine {
     /// Distance from the end of the domain to zero force [m]
     double reach = std::numeric_limits<double>::infinity();
 
-    /// Returns force, slope and antiderivatives at a position x outside the domain, on the side of this edge.
+    /// Returns force, slope and antiderivatives at a position x outside the domain. `edge` must be the end of the
+    /// domain that is nearest to x.
     [[nodiscard]] Curve at(double x) const noexcept {
         const double distance = x - edge;
         const double inside = std::clamp(distance, -reach, reach);
@@ -56,11 +57,11 @@ struct EdgeLine {
     }
 };
 
-/// Properties of a force inside its domain that define the straight lines outside the domain.
+/// Properties of a force inside its domain, from which the straight lines outside the domain are computed.
 struct CurveExtent {
     double travel = 0.0;         ///< length of the domain, upper - lower [m]
     double largest_force = 0.0;  ///< max |f| over the domain [N]
-    double slope_cap = 0.0;      ///< max f' over the domain without its outer 2 %, at least 0 [N/m]
+    double slope_cap = 0.0;      ///< max f' over the domain without the 2 % at its ends, at least 0 [N/m]
 };
 
 /// Returns the straight line that continues a force outside the edge `edge` of the domain. `outward` is -1 for the

@@ -42,7 +42,7 @@ using Derivatives = std::array<double, 5>;
     return {f[0], f[1], f[2], f[3]};
 }
 
-/// Order of the highest derivative that `derivative_bounds` bounds.
+/// `derivative_bounds` computes bounds of the derivatives up to this order.
 inline constexpr std::size_t highest_derivative = 9;
 
 /// Upper bounds of |f|, |f'|, ..., |f^(9)| of a network f of one input over an interval of positions.
@@ -69,8 +69,8 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
 
 }  // namespace detail
 
-/// Returns bounds of the rounding errors of value and four derivatives from `derivatives` for positions in [-reach,
-/// reach].
+/// Returns bounds of the rounding errors of the value and the four derivatives that `derivatives` computes, for
+/// positions from -reach to reach.
 [[nodiscard]] inline Derivatives derivatives_rounding(const NetworkParameters& network,
                                                       double reach) noexcept {
     const double c = std::abs(network.linear[0]);
@@ -89,7 +89,8 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
     return sum;
 }
 
-/// Returns bounds of the rounding errors of value and three derivatives from `jet` for positions in [-reach, reach].
+/// Returns bounds of the rounding errors of the value and the three derivatives that `jet` computes, for positions from
+/// -reach to reach.
 [[nodiscard]] inline Jet jet_rounding(const NetworkParameters& network, double reach) noexcept {
     const Derivatives f = derivatives_rounding(network, reach);
     return {f[0], f[1], f[2], f[3]};
@@ -114,7 +115,7 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
         }
     }
     for (double& bound : bounds) {
-        // Increases each bound by more than the rounding error of the sum over the wavelets
+        // Makes each bound larger by more than the rounding error of the sum over the wavelets
         bound *= 1.0 + 1e-9;
     }
     return bounds;

@@ -13,9 +13,9 @@ namespace palpate {
 
 /// Smallest and largest energy that a virtual object can store.
 struct EnergyRange {
-    /// Smallest energy over all positions, continuation included; -infinity without a lower bound [J]
+    /// Smallest stored energy over all positions, continuation included; -infinity if the energy has no lower bound [J]
     double least = 0.0;
-    double largest = 0.0;  ///< largest energy over the domain, hysteresis included [J]
+    double largest = 0.0;  ///< largest stored energy over the domain, hysteresis included [J]
     /// Upper bound of the error of `least` and `largest`: both are computed at finitely many positions [J]
     double missed = 0.0;
 
@@ -66,7 +66,8 @@ template <class At>
     return (force - 0.5 * within) * within / std::abs(line.at_edge.slope);
 }
 
-/// Smallest and largest energy of a limited force over a domain, and the energy at both ends of the domain [J].
+/// Smallest and largest stored energy of a force with a force limit over a domain, and the stored energy at both ends
+/// of the domain [J].
 struct LimitedEnergy {
     EnergyRange range;
     double at_lower = 0.0;
@@ -113,7 +114,8 @@ template <class At>
     return energy;
 }
 
-/// Returns the number of cells for the energy of a model: 16 for each width of the finest wavelet, at least 1024.
+/// Returns the number of cells into which the domain is divided to compute the energy of a model: 1024, plus 16 for
+/// each width of the finest wavelet that fits in the domain; at most 10^6.
 [[nodiscard]] inline std::size_t energy_cells(double travel, double finest_width) noexcept {
     constexpr double fewest = 1024.0;
     constexpr double most = 1e6;

@@ -12,10 +12,11 @@ struct EnvironmentSample {
     double force = 0.0;         ///< force f(x) of the virtual object [N or N*m]
     double slope = 0.0;         ///< df/dx, the local stiffness [N/m]
     double energy = 0.0;        ///< energy stored in the virtual object, plus a constant [J]
-    bool extrapolated = false;  ///< true if x lies outside the data from which the model was identified
+    bool extrapolated = false;  ///< true if x lies outside the domain of the model
 };
 
-/// Empty state of a virtual object without memory, that is without hysteresis.
+/// Type of the state of a virtual object without hysteresis: empty, because its force depends only on the present
+/// position.
 struct Stateless {};
 
 /// A virtual object of one degree of freedom. `at` computes the force at a trial position x and does not change the

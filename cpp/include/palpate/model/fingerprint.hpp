@@ -76,7 +76,8 @@ class NumberHash {
     hash.add(domain.period.value_or(0.0));
     hash.add(model.play_radius().value_or(0.0));
     if (model.velocity() != nullptr) {
-        hash.add(std::uint64_t{1});  // distinguishes a model whose second input is the velocity
+        // A model of position and velocity gets another hash than a model of two positions with the same parameters
+        hash.add(std::uint64_t{1});
     }
     return hash.text();
 }

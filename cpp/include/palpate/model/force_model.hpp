@@ -36,7 +36,8 @@ class ForceModel {
         return ForceModel{VelocityNetwork{std::move(network), std::move(domain)}};
     }
 
-    /// Returns the force law: a network of position, with hysteresis, of position and velocity, or of more inputs.
+    /// Returns the force law: a network of position, a network with hysteresis, a network of position and velocity, or
+    /// a network of several inputs.
     [[nodiscard]] const Kind& kind() const noexcept { return kind_; }
     /// Returns the wavelet network of one input, or null if the model is of another kind.
     [[nodiscard]] const WaveletNetwork* network() const noexcept {

@@ -71,7 +71,8 @@ inline constexpr std::array<double, 12> exponential{
     return kernels;
 }
 
-/// Returns the functions for sums of wavelets with the widest registers of this processor. The choice is made once.
+/// Returns the functions that compute sums of wavelets with the widest vector registers of this processor. The
+/// processor is examined only at the first call.
 [[nodiscard]] inline const HatKernel& hat_kernel() {
     static const HatKernel kernel = usable_hat_kernels().back();
     return kernel;
@@ -99,7 +100,7 @@ class HatSum {
         }
     }
 
-    /// Adds the wavelets' value, derivative and antiderivatives at position x to `sum`.
+    /// Adds value, derivative and antiderivatives of the sum of all wavelets at position x to `sum`.
     void add(double x, Curve& sum) const noexcept { kernel_.at(columns(), x, sum); }
 
     /// Adds the wavelets' value, derivative or antiderivative at every position in `x` to the element of `sum` with the

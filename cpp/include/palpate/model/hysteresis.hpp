@@ -18,7 +18,7 @@ namespace palpate {
 struct HysteresisParameters {
     std::vector<double> weight;  ///< weights of the wavelets in the hysteresis h [N]
     double linear = 0.0;         ///< slope of the straight line in the hysteresis h [N/m]
-    double bias = 0.0;           ///< constant in the hysteresis h [N]
+    double bias = 0.0;           ///< constant term of the hysteresis h [N]
 };
 
 /// Returns the new position of the play operator of radius r, a slot of width 2r that the position x moves with its
@@ -81,7 +81,8 @@ class HysteresisPair {
         const Curve g = force_.at(x);
         const Curve h = hysteresis_force_.at(x);
         const bool sticks = play == state.play;
-        // int_play^x (xi - play) h = (x - play) H(x) - int_play^x H
+        // Integration by parts: integral of (xi - play) h(xi) from play to x = (x - play) H(x) - integral of H from
+        // play to x; H is the antiderivative of h
         const double stored =
             (x - play) * h.integral - (h.double_integral - hysteresis_force_.at(play).double_integral);
         return {g.value + s * h.value, g.slope + s * h.slope + (sticks ? h.value / play_radius_ : 0.0),

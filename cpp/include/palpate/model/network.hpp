@@ -34,15 +34,15 @@ class WaveletNetwork {
 
     [[nodiscard]] const NetworkParameters& parameters() const noexcept { return curve_.parameters(); }
     [[nodiscard]] const Domain& domain() const noexcept { return domain_; }
-    /// Returns the force over all positions, continuations included.
+    /// Returns the wavelet network and its continuations, which give the force at all positions.
     [[nodiscard]] const NetworkCurve& curve() const noexcept { return curve_; }
 
     /// Returns force, slope and energy at position x.
-    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+    [[nodiscard]] EnvironmentSample at(double x, const State&) const noexcept {
         const Curve curve = curve_.at(x);
         return {curve.value, curve.slope, curve.integral, curve_.extrapolated(x)};
     }
-    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    void advance(double /*x*/, State&) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 
   private:

@@ -67,8 +67,8 @@ class NetworkCurve {
         return periodic_ ? !std::isfinite(x) : !(x >= lower_ && x <= upper_);
     }
 
-    /// Returns force, slope and antiderivatives by eq. 4 without continuation. Computes one exponential for each
-    /// wavelet.
+    /// Returns force, slope and antiderivatives at position x by eq. 4 of the paper, without continuation. Computes one
+    /// exponential for each wavelet.
     [[nodiscard]] Curve inside(double x) const noexcept {
         const double c = network_.linear[0];
         const double b = network_.bias;
@@ -103,7 +103,8 @@ class NetworkCurve {
     [[nodiscard]] Interval value_bounds() const { return palpate::value_bounds(network_, lower_, upper_); }
     [[nodiscard]] Interval slope_bounds() const { return palpate::slope_bounds(network_, lower_, upper_); }
 
-    /// Returns the properties of the force inside the domain that define its straight lines outside the domain.
+    /// Returns the properties of the force inside the domain from which its straight lines outside the domain are
+    /// computed.
     [[nodiscard]] CurveExtent extent() const {
         const double travel = upper_ - lower_;
         // The largest slope is computed without the outer 2 % of the domain, because the slope of a fitted network is

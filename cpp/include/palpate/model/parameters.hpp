@@ -25,11 +25,11 @@ struct NetworkParameters {
 /// Smallest and largest value of each input in the recording from which a network was identified, and the kind of force
 /// outside these values.
 struct Domain {
-    std::vector<double> lower{0.0};             ///< smallest values of the d inputs
-    std::vector<double> upper{1.0};             ///< largest values of the d inputs
-    Continuation below = Continuation::Linear;  ///< one input (d = 1): continuation below the domain
-    Continuation above = Continuation::Linear;  ///< one input (d = 1): continuation above the domain
-    /// One input (d = 1): length after which a periodic force repeats; equals upper - lower
+    std::vector<double> lower{0.0};             ///< smallest recorded value of each of the d inputs
+    std::vector<double> upper{1.0};             ///< largest recorded value of each of the d inputs
+    Continuation below = Continuation::Linear;  ///< continuation below the domain, if d = 1
+    Continuation above = Continuation::Linear;  ///< continuation above the domain, if d = 1.
+    /// Length after which a periodic force repeats, if d = 1; equals upper - lower
     std::optional<double> period;
 };
 

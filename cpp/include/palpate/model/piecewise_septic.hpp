@@ -96,7 +96,7 @@ class PiecewiseSeptic {
         const double u2 = u * u;
         const double u4 = u2 * u2;
         const auto [first, second] = integrals_[at.piece];
-        // The antiderivatives of u^j are u^(j+1)/(j+1) and u^(j+2)/((j+1)(j+2)).
+        // The first antiderivative of u^j is u^(j+1)/(j+1), the second is u^(j+2)/((j+1)(j+2)).
         const double once =
             ((c[0] + 1.0 / 2.0 * c[1] * u) + (1.0 / 3.0 * c[2] + 1.0 / 4.0 * c[3] * u) * u2) +
             ((1.0 / 5.0 * c[4] + 1.0 / 6.0 * c[5] * u) + (1.0 / 7.0 * c[6] + 1.0 / 8.0 * c[7] * u) * u2) * u4;
@@ -107,7 +107,8 @@ class PiecewiseSeptic {
         return {both[0], both[1], first + u * once, second + u * (first + u * twice)};
     }
 
-    /// Stores the two antiderivatives of the function at the centre of every cell, computed by `antiderivatives(x)`.
+    /// Stores the first and the second antiderivative of the function at the centre of every cell. `antiderivatives(x)`
+    /// computes both.
     template <class Function>
     void integrate(Function antiderivatives) {
         integrals_.reserve(size());
@@ -121,7 +122,7 @@ class PiecewiseSeptic {
     /// bounds of the derivatives.
     [[nodiscard]] std::array<double, 2> rounding(std::size_t k) const noexcept {
         const auto c = coefficients(k);
-        // Bounds of the polynomial and its derivatives by t = x / h, with the cell width h
+        // Bounds of the polynomial and of its derivatives with respect to t = x / h (cell width h)
         Jet bounds{std::abs(c[0]), 0.0, 0.0, 0.0};
         for (std::size_t j = 1; j < c.size(); ++j) {
             double term = std::ldexp(std::abs(c[j]), -static_cast<int>(j));
@@ -191,7 +192,7 @@ class PiecewiseSeptic {
         return scaled;
     }
 
-    /// Converts derivatives of a function by x to derivatives by t = x / h, with the cell width h.
+    /// Converts derivatives of a function with respect to x to derivatives with respect to t = x / h (cell width h).
     [[nodiscard]] Jet by_t(const Jet& jet) const noexcept {
         return {jet[0], jet[1] * width_, jet[2] * (width_ * width_), jet[3] * (width_ * width_ * width_)};
     }

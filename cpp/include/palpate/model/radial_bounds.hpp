@@ -118,7 +118,8 @@ class RadialEnclosure {
     std::vector<double> radius_;
 };
 
-/// Smallest and largest computed value of a function, and the test that a cell needs no further division.
+/// Smallest and largest value of a function at the positions computed so far. They decide whether a cell is divided
+/// again.
 struct SampledRange {
     Interval range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
 
@@ -206,7 +207,8 @@ void visit_steep_positions(const NetworkParameters& network, std::span<const dou
             gradient[j].add(slopes[j]);
         }
     };
-    // Inputs with probably large values are sampled first, because large sampled values finish other boxes sooner.
+    // Positions at which the network is probably large are computed first: a box is finished if its bounds do not
+    // exceed the largest computed value by much.
     std::vector<double> slopes(d);
     detail::visit_steep_positions(network, lower, upper, [&](const std::vector<double>& x) {
         slopes = network.linear;

@@ -98,8 +98,8 @@ class RadialSum {
         kernel_.radial(columns(), x, value, gradient);
     }
 
-    /// Computes value, derivatives and remainder of the sum of the wavelets for Taylor's formula about the middle of a
-    /// box.
+    /// Computes the terms of Taylor's formula about the middle of a box for the sum of the wavelets: value, derivatives
+    /// and a bound of the remainder.
     void expand(const double* middle, const double* radius, detail::RadialExpansion& sums) const noexcept {
         kernel_.expansion(columns(), middle, radius, sums);
     }
@@ -124,7 +124,7 @@ class RadialSum {
     std::size_t dimension_;
     std::size_t size_;
     std::vector<double> columns_;
-    std::vector<double> box_;  ///< lower ends of the box for all inputs, then the upper ends
+    std::vector<double> box_;  ///< lower end of the box for each input, then upper end for each input
 };
 
 }  // namespace palpate

@@ -37,8 +37,8 @@ class VelocityNetwork {
     [[nodiscard]] double lower() const noexcept { return network_.domain().lower[0]; }
     [[nodiscard]] double upper() const noexcept { return network_.domain().upper[0]; }
     [[nodiscard]] double travel() const noexcept { return upper() - lower(); }
-    /// Return the straight lines that continue the force at velocity zero outside the domain. Their antiderivatives are
-    /// not computed.
+    /// Return the straight lines that continue the force at velocity zero below and above the domain. The
+    /// antiderivatives in these lines are not set.
     [[nodiscard]] const EdgeLine& below() const noexcept { return below_; }
     [[nodiscard]] const EdgeLine& above() const noexcept { return above_; }
 

@@ -19,7 +19,7 @@ struct MexicanHat {
     double double_integral;  ///< E
 };
 
-/// Returns the Mexican hat, its derivative and its antiderivatives at u.
+/// Returns the Mexican hat psi(u) of one input, its derivative and its two antiderivatives at u.
 [[nodiscard]] inline MexicanHat mexican_hat(double u) noexcept {
     u = std::clamp(u, -wavelet_reach, wavelet_reach);
     const double square = u * u;
@@ -45,7 +45,7 @@ struct MexicanHat {
 /// gradient.
 struct RadialMexicanHat {
     double value;            ///< (r^2 - d) E
-    double gradient_over_u;  ///< (d + 2 - r^2) E; its product with u is the gradient
+    double gradient_over_u;  ///< (d + 2 - r^2) E; this factor times the vector u is the gradient
 
     /// Returns the second derivative d^2 psi / du_j^2 for a component u_j = `u` (2 E is `value` + `gradient_over_u`).
     [[nodiscard]] double curvature(double u) const noexcept {

@@ -59,7 +59,7 @@ class Compensated {
                 -found.environment.energy - 0.5 * force * force / stiffness_, found.environment.extrapolated};
     }
 
-    void advance(double /*shifted*/, State& /*stateless*/) const noexcept {}
+    void advance(double /*shifted*/, State&) const noexcept {}
     [[nodiscard]] State start(double /*shifted*/) const noexcept { return {}; }
 
   private:

@@ -57,15 +57,17 @@ class CertifiedSolver {
     /// State between two calls of `solve`: the last solution, its tangent as a function of q, and the interval of
     /// positions around it in which F is smooth.
     struct Memory {
-        double position = 0.0;    ///< solution of the last call [m]
-        double at_zero = 0.0;     ///< position at which the tangent to F at the last solution is zero [m]
+        double position = 0.0;  ///< solution of the last call [m]
+        /// Position at which the tangent to F, drawn at the last solution, has the value 0 [m]
+        double at_zero = 0.0;
         double compliance = 0.0;  ///< 1 / F' at the last solution [m/N]
         /// Lower end of the interval around the last solution in which F is smooth; low > high: no prediction [m]
         double low = std::numeric_limits<double>::infinity();
-        /// Upper end of the interval around the last solution in which F is smooth [m]
+        /// Upper end of the interval around the last solution over which F is smooth [m]
         double high = -std::numeric_limits<double>::infinity();
-        double curvature = 0.0;  ///< c = max|F''| / (2 min F') over the cell that contains the last solution
-        double play = 0.0;       ///< position of the play operator at the last solution [m]
+        /// c = max|F''| / (2 min F') over the cell that contains the last solution [1/m]
+        double curvature = 0.0;
+        double play = 0.0;  ///< position of the play operator at the last solution [m]
 
         Memory() = default;
         explicit Memory(double at) noexcept : position{at} {}
@@ -114,7 +116,8 @@ class CertifiedSolver {
         return found(sample, y + correction, 1.0 / (line.slope + sample.slope), line, 1, memory);
     }
 
-    /// Searches the load line from the last position, without a proof that the solution is the only one.
+    /// Searches a solution of the load line, starting at the last solution in `memory`. It is not proved that the load
+    /// line has only one solution.
     template <Environment E>
     [[nodiscard]] Solution search(const E& environment, const typename E::State& state, LoadLine line,
                                   Memory& memory) const noexcept {
@@ -129,15 +132,17 @@ class CertifiedSolver {
     static constexpr double infinity = std::numeric_limits<double>::infinity();
     static constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-    /// A border between two cells; `curvature` is c = max|F''| / (2 min F') of the cell above the border.
+    /// A border between two cells of positions; `curvature` is c = max|F''| / (2 min F') over the cell above the
+    /// border.
     struct Border {
         double position;
-        double force;       ///< force f, or mean force g with hysteresis [N]
+        double force;       ///< force f at the border; for a model with hysteresis, mean force g [N]
         double hysteresis;  ///< hysteresis h [N]
         double curvature;
     };
 
-    /// Cell k of the positions lies above border k - 1 and below border k; the first and the last cell are infinite.
+    /// An interval of positions. Cell k lies between border k - 1 and border k. The first cell begins at -infinity, the
+    /// last cell ends at +infinity.
     struct Cell {
         double low;
         double high;
@@ -163,8 +168,9 @@ class CertifiedSolver {
     struct Trial {
         double position;
         double correction;
-        double compliance;  ///< 1 / F' at the position of the evaluation [m/N]
-        double steepest;    ///< largest slope of press force, release force and sticking force, plus p [N/m]
+        double compliance;  ///< 1 / F' at the position at which this step evaluated F [m/N]
+        /// p plus the largest of the slopes of press force, release force and sticking force [N/m]
+        double steepest;
         EnvironmentSample sample;
     };
 
@@ -208,8 +214,8 @@ class CertifiedSolver {
         return radius_ > 0.0 && cell.low < play + radius_ && cell.high > play - radius_;
     }
 
-    /// Returns the direction state of positions in the cell: 1 (press) if the cell lies above play + r, otherwise -1
-    /// (release).
+    /// Returns the direction state of positions in a cell without sticking: 1 (press) if the cell lies above play + r,
+    /// otherwise -1 (release).
     [[nodiscard]] double direction(const Cell& cell, double play) const noexcept {
         return cell.low >= play + radius_ ? 1.0 : -1.0;
     }
@@ -223,7 +229,8 @@ class CertifiedSolver {
         return border.force + s * border.hysteresis + p * y;
     }
 
-    /// Returns cell k moved by the distance `turn_offset`, whole repeat lengths of a periodic force.
+    /// Returns cell k, moved by the distance `turn_offset`. This distance is a whole number of repeat lengths of a
+    /// periodic force.
     [[nodiscard]] Cell cell_at(std::size_t k, double turn_offset) const noexcept {
         return {k == 0 ? -infinity : borders_[k - 1].position + turn_offset,
                 k == borders_.size() ? infinity : borders_[k].position + turn_offset,
@@ -353,7 +360,8 @@ class CertifiedSolver {
             double turns = std::floor((line.intercept - first.force - line.slope * first.position) /
                                       (line.slope * period_));
             turn_offset = turns * period_;
-            // Hysteresis or rounding can move the solution by some repeat lengths of a periodic force.
+            // Hysteresis or rounding can make the computed number `turns` of repeat lengths wrong by a few; the loops
+            // correct it by at most 4.
             constexpr int farthest = 4;
             for (int k = 0; k < farthest && !lies_below(first); ++k) {
                 turn_offset = --turns * period_;
@@ -509,7 +517,8 @@ class CertifiedSolver {
         for (const Piece& piece : pieces) {
             const auto [lower, upper] = piece.positions;
             if (!std::isfinite(lower) || !std::isfinite(upper)) {
-                // In an infinite interval F is a straight line, because the hysteresis h is constant there.
+                // In an infinite interval, F must be a straight line: the hysteresis h must be constant over the
+                // interval.
                 const double edge = std::isfinite(lower) ? lower : upper;
                 const double slope = piece.force.linear[0];
                 const double gain = by_radius_ * jet(piece.hysteresis, edge)[0];
@@ -546,7 +555,7 @@ class CertifiedSolver {
     double by_radius_;  ///< 1 / r; 0 without hysteresis [1/m]
     double travel_;
     double period_;     ///< repeat length of a periodic force; 0 if the force is not periodic [m]
-    double tolerance_;  ///< largest error of the solution's position [m]
+    double tolerance_;  ///< largest allowed error of the position y that solves a load line [m]
     double least_slope_ =
         infinity;  ///< smallest load-line slope p for which F is proved to rise in every cell [N/m]
     std::vector<Border> borders_;

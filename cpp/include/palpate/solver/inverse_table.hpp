@@ -20,8 +20,9 @@ namespace palpate {
 
 /// Required accuracy and largest size of the tables that give the solution of a load line.
 struct ResolventOptions {
-    double relative_error = 1e-12;     ///< largest position error / length of the domain; includes rounding
-    std::size_t largest_table = 8192;  ///< largest number of cells of 64 bytes in each table
+    /// Largest position error divided by the length of the domain; includes rounding
+    double relative_error = 1e-12;
+    std::size_t largest_table = 8192;  ///< largest number of cells (64 bytes each) in one table
 };
 
 /// Function whose inverse is tabulated: F(y) = f(y) + p y on an interval of positions y over which F rises. f is a
@@ -40,7 +41,7 @@ struct RisingForce {
 struct InverseTable {
     /// Smallest and largest q for which the table contains the solution of F(y) = q
     Interval values{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-    /// Solutions y for the smallest and the largest q
+    /// Solutions y of F(y) = q for the smallest and the largest q in `values`
     Interval positions;
     double error = 0.0;  ///< proved bound of the error of the position y with F(y) = q
     PiecewiseSeptic table;
@@ -116,11 +117,12 @@ class InverseCells {
     }
 
   private:
-    /// The position y = F^-1(q) for one value q with derivatives by q, and the function F at this position.
+    /// For one value q: the position y that solves F(y) = q, and the function F at this position, both with their
+    /// derivatives.
     struct InverseJet {
-        Jet inverse;      ///< y = F^-1(q) and its derivatives by q
-        Jet forward;      ///< F(y) and its derivatives by y
-        double residual;  ///< F(y) - q [N]
+        Jet inverse;      ///< position y = F^-1(q) and its derivatives with respect to q
+        Jet forward;      ///< F(y) and its derivatives with respect to y
+        double residual;  ///< difference F(y) - q that remains at the computed position y [N]
     };
 
     [[nodiscard]] bool certified(std::size_t k) const noexcept { return errors_[k] <= largest_error_; }
@@ -178,8 +180,8 @@ class InverseCells {
         return std::isfinite(low) ? (std::isfinite(high) ? 0.5 * (low + high) : low) : high;
     }
 
-    /// Value of a cell's error if rounding alone exceeds the required error, so that narrower cells would not reduce
-    /// the error.
+    /// Number stored as the error of a cell in which rounding alone exceeds the required error. Such a cell is not
+    /// divided, because narrower cells would not reduce the error.
     static constexpr double rounding_limited = std::numeric_limits<double>::max();
 
     /// Returns a proved bound of the position error of the polynomial in cell k; infinity if no bound is proved. `of_f`
@@ -190,7 +192,8 @@ class InverseCells {
         if (!std::all_of(c.begin(), c.end(), [](double one) { return std::isfinite(one); })) {
             return std::numeric_limits<double>::infinity();
         }
-        // Element j is a bound of |P^(j)| / j! over the cell for its polynomial P, rounding included.
+        // Element j is an upper bound of |P^(j)| / j! over one cell, rounding included. P^(j) is derivative j of the
+        // polynomial P of the cell.
         std::array<double, order + 1> inner{};
         for (std::size_t j = 1; j < c.size(); ++j) {
             double binomial = 1.0;

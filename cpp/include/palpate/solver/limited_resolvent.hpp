@@ -26,8 +26,8 @@ namespace palpate {
 template <class Solver>
 class LimitedResolvent {
   public:
-    /// State between two calls of `solve`: that of the solver for the unlimited force, and the last position of the
-    /// search.
+    /// State between two calls of `solve`: the state of the solver for the unlimited force, and the last solution for
+    /// the limited force, at which the next search starts.
     struct Memory {
         typename Solver::Memory unlimited;
         WarmStart newton;

@@ -24,15 +24,16 @@ struct LoadLine {
 /// Position y that solves a load line f(y) + p y = q, with the force at y and the result of the search.
 struct Solution {
     double position = 0.0;          ///< solution y [m]
-    EnvironmentSample environment;  ///< force, slope and energy at the solution
-    double residual = 0.0;          ///< f(y) + p y - q [N or N*m]; 0 if a proof replaces the evaluation
-    int evaluations = 0;            ///< number of evaluations of the force
+    EnvironmentSample environment;  ///< force, slope and energy of the virtual object at the solution
+    /// f(y) + p y - q at the computed y [N or N*m]; 0 if a proved error bound makes this evaluation unnecessary
+    double residual = 0.0;
+    int evaluations = 0;  ///< number of evaluations of the force that the search needed
     Status status = Status::Ok;
 };
 
-/// State between two calls of the solver: the position at which the next search starts.
+/// State between two calls of the solver: the last finite solution, at which the next search starts.
 struct WarmStart {
-    double position = 0.0;  ///< solution of the last call [m]
+    double position = 0.0;  ///< last finite solution y, at first the position given to the constructor [m]
 
     WarmStart() = default;
     explicit WarmStart(double at) noexcept : position{at} {}
@@ -61,8 +62,8 @@ struct LoadLineSolver {
     using Memory = WarmStart;
 
     [[nodiscard]] static constexpr bool tabulated() noexcept { return false; }
-    /// Returns false: without a proof a load line may have several solutions.
-    [[nodiscard]] static constexpr bool unique(double /*p*/) noexcept { return false; }
+    /// Returns false for every slope of the load line: this solver has no proof that a load line has only one solution.
+    [[nodiscard]] static constexpr bool unique(double) noexcept { return false; }
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return *this; }
 
     /// Solves the load line from the last solution in `memory`, and stores the new solution in `memory` unless it is
@@ -91,7 +92,7 @@ struct LoadLineSolver {
                                  double start, Bracket bracket) const noexcept {
         Solution at = search(environment, state, line, start, bracket);
         if (at.status == Status::NotUnique) {
-            at.status = Status::Ok;  // the solution found is an end of the interval `bracket`
+            at.status = Status::Ok;  // the search ended at an end of `bracket`, which is then the solution
         }
         return at;
     }
@@ -137,7 +138,8 @@ struct LoadLineSolver {
             if (bracketed && high - low <= tolerated) {
                 return at;
             }
-            // Newton's step is used while slope + f' > 0 and the step at least halves the residual.
+            // Newton's step is used while the slope p + f' of the residual is > 0 and each step at least halves the
+            // residual.
             const double newton = slope > 0.0 ? -at.residual / slope : 0.0;
             const double direction = at.residual < 0.0 ? 1.0 : -1.0;
             double step = newton;

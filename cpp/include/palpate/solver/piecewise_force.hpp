@@ -24,8 +24,10 @@ struct PiecewiseForce {
     double lower = 0.0;
     double upper = 0.0;
     bool periodic = false;
-    std::vector<OuterLine> below;  ///< straight lines of the force below the domain, beginning at the domain
-    std::vector<OuterLine> above;  ///< straight lines of the force above the domain, beginning at the domain
+    /// Straight lines of the force below the domain, the line nearest to the domain first
+    std::vector<OuterLine> below;
+    /// Straight lines of the force above the domain, the line nearest to the domain first
+    std::vector<OuterLine> above;
 };
 
 namespace detail {

@@ -28,11 +28,11 @@ struct Branch {
     Interval values{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     Interval positions{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     InverseTable table;
-    /// Slope p + f' if F is a straight line over the interval; otherwise 0 [N/m]
+    /// Slope p + f' of F if F is a straight line over this branch; otherwise 0 [N/m]
     double line_slope = 0.0;
-    /// |f''| at the lower end of the interval if F falls below this end; else 0
+    /// |f''| at the lower end of this branch if F falls at the positions below this end; otherwise 0
     double curvature_low = 0.0;
-    /// |f''| at the upper end of the interval if F falls above this end; else 0
+    /// |f''| at the upper end of this branch if F falls at the positions above this end; otherwise 0
     double curvature_high = 0.0;
 
     /// Returns the position y with F(y) = q if F is a straight line over this interval, computed from a finite end of
@@ -72,7 +72,8 @@ struct Branch {
 /// located, `CertifiedSolver` solves all load lines.
 class Resolvent {
   public:
-    /// State between two calls of `solve`: the branch of the last solution, and the state of `CertifiedSolver`.
+    /// State between two calls of `solve`: the branch (interval of rising F) that contains the last solution, and the
+    /// state of `CertifiedSolver`.
     struct Memory {
         CertifiedSolver::Memory newton;
         std::size_t branch = 0;  ///< index of the branch with the last solution; 0: no branch found yet
@@ -271,11 +272,12 @@ class Resolvent {
         }
     }
 
-    /// Changes `memory.branch` to the next or the previous branch until the values of F on the branch contain q.
+    /// Moves `memory.branch` from branch to branch (intervals of rising F) until the branch contains the solution for
+    /// q.
     void find_branch(double q, Memory& memory) const noexcept {
         const double turn = slope_ * period_;
         if (repeats_) {
-            // Skips repeat lengths of the periodic force that do not contain a solution.
+            // Goes directly to a repeat length of the periodic force that can contain the solution.
             if (q > highest_ + memory.turns * turn) {
                 memory.branch = 1;
                 memory.turns = std::ceil((q - highest_) / turn);
@@ -379,9 +381,9 @@ class Resolvent {
     double slope_;
     double period_;
     bool repeats_ = false;
-    /// Largest F over the first repeat length of a periodic force [N]
+    /// Largest value of F(y) = f(y) + p y over the first repeat length of a periodic force [N]
     double highest_ = -std::numeric_limits<double>::infinity();
-    /// Smallest F over the first repeat length of a periodic force [N]
+    /// Smallest value of F(y) = f(y) + p y over the first repeat length of a periodic force [N]
     double lowest_ = std::numeric_limits<double>::infinity();
     std::vector<Branch> branches_ = std::vector<Branch>(1);
 };

@@ -29,7 +29,8 @@ namespace palpate {
     const double margin = rounding[1] + std::numeric_limits<double>::epsilon() * std::abs(p);
     const auto slope = [&](double y) { return p + jet(network, y)[1]; };
 
-    std::vector<Interval> cells;  // intervals still to be examined; the leftmost is the last element
+    // Cells (intervals of positions) that are not examined yet; the cell with the lowest positions is the last element
+    std::vector<Interval> cells;
     for (int k = first_cells; k > 0; --k) {
         const auto border = [&](int j) { return lower + (upper - lower) * j / first_cells; };
         cells.push_back({k == 1 ? lower : border(k - 1), k == first_cells ? upper : border(k)});
@@ -40,7 +41,8 @@ namespace palpate {
         return std::nullopt;
     }
     bool rises = first_slope > 0.0;
-    double start = lower;  // start of the interval over which F rises up to the examined cell
+    // If F rises at the lower end of the examined cell: lower end of the interval over which F rises up to this cell
+    double start = lower;
     for (int examined = 0; !cells.empty(); ++examined) {
         const Interval cell = cells.back();
         cells.pop_back();

@@ -23,7 +23,8 @@ namespace palpate {
 /// lies at or below play - r.
 class SlidingResolvent {
   public:
-    /// State between two calls of `solve`: those of the solver and of the tables for press and release.
+    /// State between two calls of `solve`: the states of three solvers, `CertifiedSolver` and one `Resolvent` each for
+    /// press and release.
     struct Memory {
         CertifiedSolver::Memory newton;
         Resolvent::Memory press;

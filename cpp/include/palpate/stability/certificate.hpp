@@ -26,11 +26,11 @@
 
 namespace palpate {
 
-/// Result of a certificate.
+/// Verdict of a certificate about a rendering.
 enum class Verdict : std::uint8_t {
-    /// Proved: no motion of the handle can get more energy from the device than the motion gave
+    /// Passive, proved: in no motion of the handle does the device give more energy than it received from the hand
     Certified,
-    StableLocally,  ///< the linearised system is stable; nothing is proved about energy
+    StableLocally,  ///< the linearised rendering is stable; it is not proved that the rendering is passive
     Refused,
 };
 
@@ -51,7 +51,7 @@ struct Certificate {
     std::string fingerprint;
     std::string reason;
 
-    /// Returns true if the rendering is passive.
+    /// Returns true if it is proved that the rendering is passive.
     [[nodiscard]] bool certified() const noexcept { return verdict == Verdict::Certified; }
 };
 
@@ -79,7 +79,8 @@ void hash_value(NumberHash& hash, const T& value) {
         for_each_field<T>([&](const auto& field) {
             const auto& part = field.of(value);
             if constexpr (is_optional<std::remove_cvref_t<decltype(part)>>) {
-                // An optional field without a value is not hashed, so older fingerprints of a scheme remain valid
+                // An empty optional field does not change the hash, so fingerprints computed before this field existed
+                // remain valid
                 if (part) {
                     hash.add(std::string_view{field.name});
                     hash_value(hash, *part);

@@ -131,8 +131,8 @@ namespace detail {
     for (std::size_t k = 0; k < now.inequalities.size(); ++k) {
         const std::string path = "inequalities[" + std::to_string(k) + "]";
         require(detail::line_disagrees(path, stored.inequalities[k], now.inequalities[k]));
-        // Another computer may round differently, so the returned certificate keeps the stored numbers; the stored
-        // fingerprint was computed from them.
+        // The stored fingerprint was computed from the stored numbers. The returned certificate keeps these numbers,
+        // because this computer may round differently from the computer that stored them.
         now.inequalities[k].left = stored.inequalities[k].left;
         now.inequalities[k].right = stored.inequalities[k].right;
     }

@@ -23,8 +23,8 @@ namespace detail {
     return device.late_samples() > 0;
 }
 
-/// Returns an inequality for a case in which no bound is proved beyond `known`; `cure` is the action that avoids this
-/// case.
+/// Returns the inequality `known` >= `value`. If `value` is larger than `known`, nothing is proved about the rendering;
+/// `cure` is a text that says how to avoid this case.
 [[nodiscard]] inline Inequality unknown(const char* id, const char* name, const char* formula, double known,
                                         double value, const char* cure) {
     return {id, name, formula, known, value, Basis::None, cure};
@@ -90,7 +90,8 @@ inline void add_no_quantisation_of_a_mass(std::vector<Inequality>& lines, const 
 
 }  // namespace detail
 
-/// Share of the device damping that a virtual coupling may need, if no setting defines the stiffness of the coupling.
+/// If no setting gives the stiffness of a virtual coupling, the stiffness is chosen so that the coupling needs at most
+/// this part (95 %) of the device damping.
 inline constexpr double usual_coupling_share = 0.95;
 
 /// Returns the largest stiffness of a virtual coupling for which the part `share` of the device damping is sufficient

@@ -136,8 +136,8 @@ template <class Need>
     const double second = a[2] / leading;
     const std::complex<double> half_difference =
         std::sqrt(std::complex<double>{0.25 * first * first - second});
-    std::complex<double> far =
-        -0.5 * first - half_difference;  // first <= 0, so the sum in `near` has no cancellation
+    // `first` <= 0: both terms of the sum `near` have real parts >= 0, so the sum loses no digits
+    std::complex<double> far = -0.5 * first - half_difference;
     std::complex<double> near = -0.5 * first + half_difference;
     if (std::abs(near) > std::abs(far)) {
         std::swap(near, far);

@@ -19,7 +19,7 @@ namespace detail {
 /// an encoder step, half a force step, and the mean force of a periodic model.
 [[nodiscard]] inline Inequality friction_inequality(const DeviceProfile& device, double gain,
                                                     double mean_force, const std::string& formula) {
-    // An encoder without steps needs no friction, even if `gain` is infinite.
+    // A device without encoder steps needs no friction against encoder steps, even if `gain` is infinite.
     const double encoder = device.encoder_step > 0.0 ? 0.5 * gain * device.encoder_step : 0.0;
     return {"friction-steps",
             "Coulomb friction against encoder and force steps",
@@ -50,8 +50,8 @@ namespace detail {
     const bool late = device.late_samples() > 0;
     return {
         "damping-hold", "viscous damping against hold and delay", formula, device.viscous_damping,
-        // The velocity is computed with the nominal period; with jitter the true time between two samples can be
-        // longer.
+        // The rendering computes the velocity with the nominal period; with jitter, the true time between two samples
+        // can be longer than this period.
         T * device_need(device, slopes) + T / device.period_s * drag, Basis::Proved,
         late ? "docs/certificate.md" : "Colgate and Schenkel 1997; docs/certificate.md"};
 }

@@ -46,9 +46,10 @@ namespace palpate {
                                           double period_s, int delay_samples) noexcept {
     constexpr int frequencies = 512;
     constexpr int slope_steps = 32;
-    // Number of times the search halves the distance between the tried frequencies and slopes
+    // The search for the largest needed damping halves the distance between the tried frequencies, and between the
+    // tried slopes, this number of times
     constexpr int halvings = 20;
-    constexpr double lowest = 1e-4;  // lowest tried frequency, angular frequency times T [rad]
+    constexpr double lowest = 1e-4;  // lowest tried frequency, as angular frequency times the period T [rad]
     const double octaves = std::log(std::numbers::pi / lowest);
     const auto need = [&](double along, double slope) noexcept {
         return explicit_need_at(lowest * std::exp(octaves * along), slope, inertia, coupling, period_s,

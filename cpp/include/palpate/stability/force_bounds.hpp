@@ -34,7 +34,8 @@ struct ForceBounds {
     /// Returns s_ = max(0, -min f'), the steepest falling slope [N/m]; NaN stays NaN.
     [[nodiscard]] double falling() const noexcept { return slope.lower >= 0.0 ? 0.0 : -slope.lower; }
 
-    /// Returns the play radius r [m], computed from the largest h and the largest h/r; infinity without hysteresis.
+    /// Returns the play radius r [m]: the largest hysteresis h divided by the largest h/r. Returns infinity for a model
+    /// without hysteresis.
     [[nodiscard]] double play_radius() const noexcept {
         return hysteresis_per_play > 0.0 ? hysteresis_force.upper / hysteresis_per_play
                                          : std::numeric_limits<double>::infinity();

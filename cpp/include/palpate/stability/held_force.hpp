@@ -21,7 +21,7 @@ struct SlopeRange {
     double rising = 0.0;   ///< M, steepest rising slope, >= 0 [N/m]
     double falling = 0.0;  ///< s, steepest falling slope, >= 0 [N/m]
 
-    /// Returns the larger of the two slopes [N/m].
+    /// Returns the larger of `rising` and `falling` [N/m].
     [[nodiscard]] double steepest() const noexcept { return std::max(rising, falling); }
 };
 
@@ -87,10 +87,10 @@ namespace detail {
 }
 
 /// Method that computes the maximum over all frequencies of a trigonometric polynomial of degree N from its values at
-/// `resolution` N + 1 frequencies.
+/// (`resolution` times N) + 1 frequencies.
 enum class Maximum : std::uint8_t {
-    Likely,  ///< maximum of the parabola through the largest computed value and its two neighbours
-    Proved,  ///< proved upper bound of the true maximum over all frequencies, rounding included
+    Likely,  ///< estimate: maximum of the parabola through the largest value and its two neighbours
+    Proved,  ///< proved upper bound of the maximum over all frequencies, rounding included
 };
 
 /// Returns the maximum over all frequencies of a trigonometric polynomial with the sampled values value(0) to
@@ -136,7 +136,8 @@ class FilterGain {
     /// Returns the sum of the absolute filter coefficients, an upper bound of the frequency response |Q|.
     [[nodiscard]] double size() const noexcept { return size_; }
 
-    /// Returns the maximum over all frequencies of l Re Q + gamma |Q|^2 for the frequency response Q.
+    /// Returns the maximum over all frequencies of l Re Q + gamma |Q|^2, with the frequency response Q of the filter
+    /// and the given factors l and gamma.
     [[nodiscard]] double most(double l, double gamma) const noexcept {
         return maximum_of(kind_, resolution_, real_.size() - 1, (std::abs(l) + gamma * size_) * size_,
                           [&](std::size_t k) { return l * real_[k] + gamma * square_[k]; });
@@ -158,7 +159,8 @@ struct Minimum {
 /// Finds the minimum of a convex function between `low` and `high` by golden-section search.
 template <class Function>
 [[nodiscard]] Minimum minimum_between(double low, double high, Function function) {
-    constexpr int steps = 40;  // number of steps, which together reduce the interval to 4e-9 of its length
+    // Number of steps; together they reduce the interval from `low` to `high` to 4e-9 of its length
+    constexpr int steps = 40;
     constexpr double golden = 0.6180339887498949;
     double left = high - golden * (high - low);
     double right = low + golden * (high - low);
@@ -368,8 +370,8 @@ namespace detail {
     if (delay <= period - jitter) {  // the force always acts before the next position is read
         return delayed_need(0, delay / T, slopes);
     }
-    // Lambda^2 T: the time during which the delay after one sample overlaps the delays after all samples, this sample
-    // included.
+    // `common` is Lambda^2 T: the sum, over all samples, of the largest time during which the delay after a sample
+    // overlaps the delay after one given sample. The given sample itself adds `delay`.
     double common = delay;
     for (int j = 1; j * period < delay + jitter; ++j) {
         const double rest = delay - j * period;

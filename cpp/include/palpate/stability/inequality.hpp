@@ -64,7 +64,7 @@ inline constexpr auto fields_of<Inequality> =
                Field<&Inequality::strict>{
                    "strict", "True if the left side must be larger than the right side.", Rule::Any, false}};
 
-/// Returns true if all inequalities hold.
+/// Returns true if all inequalities in `lines` hold.
 [[nodiscard]] inline bool all_hold(const std::vector<Inequality>& lines) noexcept {
     return std::all_of(lines.begin(), lines.end(), [](const Inequality& line) { return line.holds(); });
 }

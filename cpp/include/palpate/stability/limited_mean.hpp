@@ -22,10 +22,10 @@ namespace detail {
 struct PeriodicStrokes {
     const NetworkCurve& g;
     const NetworkCurve* h = nullptr;
-    double steepest = 0.0;  ///< proved bound of |g'| + |h'| (mean force g, hysteresis h) [N/m]
+    double steepest = 0.0;  ///< proved upper bound of |g'| + |h'| (mean force g, hysteresis h) [N/m]
 
-    /// Returns value and antiderivative of the force g + side h + shift at position x; `side` is 1 for press, -1 for
-    /// release.
+    /// Returns value and antiderivative of g + `side` * h + `shift` at position x (mean force g, hysteresis h); `side`
+    /// is 1 for press, -1 for release.
     [[nodiscard]] std::pair<double, double> at(double x, double side, double shift) const noexcept {
         const Curve force = g.inside(x);
         const Curve hysteresis = h != nullptr ? h->inside(x) : Curve{};
@@ -132,7 +132,7 @@ struct PeriodicStrokes {
         low = high;
         high *= 2.0;
     }
-    constexpr int halvings = 1100;  // so many halvings that `low` and `high` become adjacent doubles
+    constexpr int halvings = 1100;  // halvings after which no double lies between `low` and `high`
     for (int k = 0; k < halvings; ++k) {
         const double middle = 0.5 * (low + high);
         if (!(middle > low && middle < high)) {

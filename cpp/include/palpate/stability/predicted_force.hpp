@@ -69,9 +69,10 @@ namespace palpate {
         const std::vector<double> taps = prediction_taps(whole, predict);
         const double split = filtered_need(taps, (fraction * P + uncertain_s) / T, slopes,
                                            ((1.0 - fraction) * P + jitter) / T);
-        return std::min(simple,
-                        // Also the need without remaining delay, because the true delay may be shorter
-                        std::max(filtered_need(taps, slopes), split));
+        return std::min(
+            simple,
+            // The true delay may be shorter, so the damping needed without the remaining delay counts too
+            std::max(filtered_need(taps, slopes), split));
     }
     if (jitter >= P) {
         return simple;

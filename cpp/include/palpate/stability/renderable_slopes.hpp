@@ -23,8 +23,8 @@ namespace palpate {
 
 namespace detail {
 
-/// Returns the largest value between 0 and `most` for which holds(value) is true; holds must also be true for every
-/// smaller value.
+/// Returns the largest value v between 0 and `most` for which holds(v) is true. If holds(v) is true, it must also be
+/// true for all values from 0 to v.
 template <class Holds>
 [[nodiscard]] double largest_that_holds(double most, Holds holds) {
     if (holds(most)) {
@@ -32,7 +32,8 @@ template <class Holds>
     }
     double low = 0.0;
     double high = most;
-    // The first loop finds the largest value to a factor of eight, the second loop to its 50 leading bits.
+    // The first loop finds the result within a factor of eight, the second loop finds the 50 leading bits of the
+    // result.
     constexpr int eighths = 20;
     for (int k = 1; k < eighths && low == 0.0; ++k) {
         const double guess = std::ldexp(most, -3 * k);
@@ -57,8 +58,8 @@ template <class Holds>
                                 : direct_inequalities(bounds, device));
 }
 
-/// Returns the largest slope that searches for slopes try [N/m]: larger than any realistic slope, and far below the
-/// largest double.
+/// Returns the upper end of the slopes in which the largest renderable slope is searched [N/m]. It is larger than any
+/// realistic slope, and far below the largest double.
 [[nodiscard]] inline double slope_search_limit(const DeviceProfile& device) noexcept {
     return 1e9 * (1.0 + device.viscous_damping / device.period_s);
 }
@@ -140,10 +141,12 @@ template <class Holds>
 /// play radius.
 [[nodiscard]] inline Scheme explicit_scheme(const ForceBounds& bounds, const DeviceProfile& device,
                                             const SchemeChoices& chosen) {
-    constexpr std::array shares{0.9,  0.75, 0.6,
-                                0.45, 0.3,  0.15};      // coupling stiffness / stiffest certified one
-    constexpr std::array ratios{0.1, 0.25, 0.5, 1.0};   // B_o T / m; the paper's choice is 0.5
-    constexpr std::array reserves{1.1, 1.5, 2.5, 5.0};  // slope limit / steepest slope
+    // Tried values of the coupling stiffness divided by the largest certified stiffness
+    constexpr std::array shares{0.9, 0.75, 0.6, 0.45, 0.3, 0.15};
+    // Tried values of B_o T / m (object damping B_o, object mass m); the paper uses 0.5
+    constexpr std::array ratios{0.1, 0.25, 0.5, 1.0};
+    // Tried values of (largest stable model slope + K_c) / (steepest slope of the model + K_c), coupling stiffness K_c
+    constexpr std::array reserves{1.1, 1.5, 2.5, 5.0};
     const double T = device.period_s;
     const double stiffest = stiffest_coupling(0.0, 0.0, device);
     Scheme scheme;

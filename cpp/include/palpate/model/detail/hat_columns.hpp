@@ -25,7 +25,7 @@ inline constexpr double hat_reach = 37.4;
 struct HatColumns {
     std::size_t count, size;
     const double *alpha, *beta, *weight;
-    /// w alpha, w / alpha, w / alpha^2 (weight w, dilation alpha)
+    /// Products w alpha, w / alpha and w / alpha^2 for each wavelet (weight w, dilation alpha)
     const double *weight_by_width, *weight_width, *weight_width_squared;
 };
 
@@ -34,7 +34,7 @@ struct HatColumns {
 struct RadialColumns {
     std::size_t dimension, size;
     const double *alpha, *beta, *weight;
-    /// `uncancelled_weights`: numbers in place of the weights in bounds of fourth derivatives
+    /// Result of `uncancelled_weights`: numbers that replace the weights in the bounds of fourth derivatives
     const double* uncancelled;
     const double *lower, *upper;
 
@@ -69,19 +69,21 @@ struct RadialExpansion {
           workspace((2 * d + 4) * size + d * d) {}
 
     double value = 0.0;
-    std::vector<double> gradient;           ///< gradient of the sum in the middle of the box, d numbers
-    std::vector<double> second_derivative;  ///< second derivatives in the middle of the box, d x d numbers
-    std::vector<double> third_derivative;   ///< third derivatives in the middle of the box, d x d x d numbers
+    std::vector<double> gradient;  ///< gradient of the sum in the middle of the box, d numbers
+    /// Second derivatives of the sum in the middle of the box, d x d numbers
+    std::vector<double> second_derivative;
+    /// Third derivatives of the sum in the middle of the box, d x d x d numbers
+    std::vector<double> third_derivative;
     /// Bound of the fourth-order term of Taylor's formula for each input, d numbers
     std::vector<double> rest;
-    std::vector<double> workspace;  ///< memory for intermediate results
+    std::vector<double> workspace;  ///< memory for the intermediate results of `expansion`
 };
 
 /// Functions that compute sums of Mexican hat wavelets, compiled for one instruction set of the processor.
 struct HatKernel {
     void (*at)(const HatColumns& of, double x, Curve& sum) noexcept;
-    std::array<void (*)(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept, 3>
-        batch;  ///< sums at many positions, one function for each `HatQuantity`
+    /// Functions that compute the sum of the wavelets at many positions, one function for each `HatQuantity`
+    std::array<void (*)(const HatColumns& of, const double* x, std::size_t n, double* sum) noexcept, 3> batch;
     void (*radial)(const RadialColumns& of, const double* x, double& value, double* gradient) noexcept;
     void (*expansion)(const RadialColumns& of, const double* middle, const double* radius,
                       RadialExpansion& sums) noexcept;

@@ -19,7 +19,7 @@ PALPATE_TARGET inline void gaussian_within(const Lanes& square, Lanes& e) noexce
     const Lanes exponent = -0.5 * square;
     const Lanes rounded = exponent * 0x1.71547652b82fep+0 + 0x1.8p52;  // log2(e)
     const Lanes n = rounded - 0x1.8p52;
-    // ln 2 is the sum of two numbers; the first has so few digits that its product with n is exact.
+    // ln 2 is written as a sum of two numbers. The first number has so few digits that its product with n is exact.
     const Lanes r = (exponent - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
     const Lanes r2 = r * r;
     const Lanes r4 = r2 * r2;
@@ -27,7 +27,7 @@ PALPATE_TARGET inline void gaussian_within(const Lanes& square, Lanes& e) noexce
     const Lanes low = (c[0] + c[1] * r) + (c[2] + c[3] * r) * r2;
     const Lanes middle = (c[4] + c[5] * r) + (c[6] + c[7] * r) * r2;
     const Lanes high = (c[8] + c[9] * r) + (c[10] + c[11] * r) * r2;
-    // The low bits of `rounded` hold the integer n. n >= -1010, so 2^n is a normal number.
+    // The low bits of `rounded` contain the integer n. n is at least -1010, so 2^n is a normal floating-point number.
     Integers bits;
     __builtin_memcpy(&bits, &rounded, sizeof(bits));
     bits = (bits << 52) + 0x3ff0000000000000;
@@ -36,7 +36,7 @@ PALPATE_TARGET inline void gaussian_within(const Lanes& square, Lanes& e) noexce
     e = (low + (middle + high * r4) * r4) * power;
 }
 
-/// Computes the Gaussian e^{-s/2} of any squared distance s >= 0; limits s to hat_reach^2.
+/// Computes the Gaussian e^{-s/2} of any squared distance s >= 0; an s above hat_reach^2 is replaced by hat_reach^2.
 PALPATE_TARGET inline void gaussian(Lanes& square, Lanes& e) noexcept {
     const Lanes farthest = Lanes{} + hat_reach * hat_reach;
     square = square > farthest ? farthest : square;
@@ -141,11 +141,12 @@ PALPATE_TARGET void batch(const HatColumns& of, const double* x, std::size_t n, 
 /// is null. The sum is computed at the point of the box that is nearest to x.
 PALPATE_TARGET inline void radial(const RadialColumns& of, const double* x, double& value,
                                   double* gradient) noexcept {
-    // Wavelets computed together; a multiple of the numbers in a vector register
+    // Number of wavelets that are computed together: a multiple of the count of numbers in a vector register
     constexpr std::size_t block = 64;
     const auto inputs = static_cast<double>(of.dimension);
     const Lanes reach = Lanes{} + hat_reach;
-    double factors[block];  // for each wavelet w (d + 2 - r^2) E; its product with u is the gradient by u
+    // Factor w (d + 2 - r^2) E of each wavelet; factor times scaled distance u from the centre is the gradient by u
+    double factors[block];
     Lanes values{};
     for (std::size_t first = 0; first < of.size; first += block) {
         const std::size_t count = of.size - first < block ? of.size - first : block;
@@ -191,7 +192,7 @@ PALPATE_TARGET inline void multiply(Lanes& product, const double* column) noexce
     product *= factor;
 }
 
-/// Returns the sum over all wavelets of the product of the wavelet's numbers in all given columns.
+/// Multiplies the given columns element by element (one element for each wavelet), and returns the sum of the products.
 template <class... Columns>
 PALPATE_TARGET inline double sum_of(std::size_t size, const Columns*... columns) noexcept {
     Lanes sum{};
@@ -213,7 +214,7 @@ PALPATE_TARGET inline void expansion(const RadialColumns& of, const double* midd
     const std::size_t n = of.size;
     const std::size_t d = of.dimension;
     const auto inputs = static_cast<double>(d);
-    // Factor A_2 of each wavelet; the factors A_4 and A_6 follow
+    // `first`, `second` and `third` contain the factors A_2, A_4 and A_6 of each wavelet
     double* const first = sums.workspace.data();
     double* const second = first + n;
     double* const third = second + n;
@@ -310,7 +311,7 @@ PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double
     }
 }
 
-/// Returns the functions for sums of Mexican hats of this instruction set.
+/// Returns the functions that compute sums of Mexican hats with this instruction set of the processor.
 [[nodiscard]] inline HatKernel kernel() noexcept {
     return {at,
             {batch<HatQuantity::Value>, batch<HatQuantity::Slope>, batch<HatQuantity::Integral>},

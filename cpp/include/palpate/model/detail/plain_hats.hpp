@@ -8,7 +8,7 @@
 #include "palpate/model/detail/hat_columns.hpp"
 #include "palpate/model/wavelet.hpp"
 
-/// Sums of Mexican hats for any processor and compiler, as plain loops.
+/// Functions that compute sums of Mexican hat wavelets by plain loops, for any processor and compiler.
 namespace palpate::detail::plain {
 
 inline void at(const HatColumns& of, double x, Curve& sum) noexcept {
