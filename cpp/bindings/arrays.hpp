@@ -23,7 +23,7 @@ namespace palpate::bindings {
 /// A numpy array of float64 in contiguous memory, converted from any Python sequence or array of numbers.
 using Array = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
 
-/// Type check of `ArrayLike` that accepts any Python object.
+/// Type check for the argument type `ArrayLike`: returns 1, because every Python object is accepted.
 inline int any_object(PyObject* /*object*/) {
     return 1;
 }
@@ -33,7 +33,7 @@ class ArrayLike : public pybind11::object {
     PYBIND11_OBJECT_DEFAULT(ArrayLike, pybind11::object, any_object)
 };
 
-/// Returns the shape of an array as text, for messages.
+/// Returns the shape of a numpy array as text for error messages, for example "(3, 2)".
 [[nodiscard]] inline std::string shape_of(const pybind11::array& array) {
     std::string text = "(";
     for (pybind11::ssize_t k = 0; k < array.ndim(); ++k) {
@@ -118,7 +118,7 @@ void in_parts(std::size_t size, const Work& work) {
         try {
             others.emplace_back([&part, k] { part(k); });
         } catch (const std::system_error&) {
-            part(k);  // computes the part in this thread, because the system cannot start another one
+            part(k);  // no new thread could start: this thread does part k of the work
         }
     }
     part(0);

@@ -14,7 +14,7 @@
 
 namespace palpate::bindings {
 
-/// Type of a struct field in Python: str for an enumeration, otherwise the C++ type.
+/// Type in which a struct field is passed to Python: std::string for an enumeration, otherwise the field's own type.
 template <class V>
 using PythonType = std::conditional_t<HasWords<V>, std::string, V>;
 

@@ -27,7 +27,7 @@ namespace {
 struct Hats {
     static constexpr std::size_t block = 64;
 
-    double inputs = 1.0;  ///< number of inputs d of the wavelet
+    double inputs = 1.0;  ///< d, the number of input variables of the wavelet
     std::size_t first = 0, size = 0;
     std::array<double, block> square{}, gaussian{};
 
@@ -40,7 +40,7 @@ struct Hats {
 /// arrays mean d = 1.
 struct Frame {
     std::size_t samples, wavelets, dimension;
-    /// X, the values of all inputs: first input 1 for all rows, then input 2, ...
+    /// X, the values of all input variables: those of variable 1 for all samples, then those of variable 2, ...
     std::vector<double> inputs;
     const double *alpha, *beta;
 
@@ -86,7 +86,7 @@ struct Frame {
     /// the compiler vectorises. A block so far from the wavelet that all its values are 0 needs no exponentials.
     template <class Visitor>
     void radial(std::size_t i, Visitor visit) const {
-        // exp(-80) is 2e-35. Products of smaller numbers are denormal, which makes linear algebra ten times as slow.
+        // Values below exp(-80) = 2e-35 become 0: their products would be denormal, which slows linear algebra tenfold.
         constexpr double negligible_square = 160.0;
         constexpr double most = detail::hat_reach * detail::hat_reach;
         Hats hats;

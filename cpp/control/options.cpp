@@ -31,7 +31,8 @@ constexpr const char* epilogue =
 constexpr double least_positive = std::numeric_limits<double>::min();
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-/// Returns a check that the value of an option is a number from `low` to `high`, with an error message in words.
+/// Returns a check that the value of an option is a number from `low` to `high`. The error message of the check states
+/// the allowed values.
 CLI::Validator number_between(double low, double high) {
     CLI::Validator validator;
     validator.operation([low, high](std::string& text) -> std::string {
@@ -221,13 +222,13 @@ void add_running(CLI::App& app, RenderOptions& options) {
         ->type_name("FAULT");
 }
 
-/// Returns the message for an error in the command line, worded like the other messages of the program.
+/// Returns the error message of palpate-control for an error that CLI11 found in the command line.
 std::string sentence_of(const CLI::ParseError& error) {
     const std::string message = error.what();
     if (error.get_name() == "ArgumentMismatch") {
         return message.substr(0, message.find(':')) + " needs a value";
     }
-    if (error.get_name() == "ConversionError") {  // example of this error: "Could not convert: --cpu = 0.5"
+    if (error.get_name() == "ConversionError") {  // CLI11's message: "Could not convert: --cpu = 0.5"
         const std::size_t name = message.find("--");
         const std::size_t value = message.find(" = ", name);
         if (value != std::string::npos) {

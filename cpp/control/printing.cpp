@@ -23,7 +23,7 @@ namespace palpate::control {
 namespace {
 
 constexpr std::size_t shown_ticks = 8;
-constexpr int calls_a_line = 5;  ///< calls of show() for each update of the status line, ten updates a second
+constexpr int calls_a_line = 5;  ///< show() writes the status line in every fifth call, ten times a second
 
 nlohmann::json json_of(const NamedValues& fields);
 
@@ -40,7 +40,7 @@ nlohmann::json json_of(const std::vector<NamedValues>& list) {
 }
 
 template <class T>
-nlohmann::json json_of(const T& value) {  // dump() writes null for a number that is not finite
+nlohmann::json json_of(const T& value) {  // the JSON text has null for a number that is not finite
     return value;
 }
 

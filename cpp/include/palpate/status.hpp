@@ -25,7 +25,7 @@ enum class Status : std::uint8_t {
     LimitCycleScaled,
 };
 
-/// Word and meaning of a status.
+/// The word of a status, such as "Ok", and its meaning as a sentence.
 struct StatusText {
     const char* word;
     const char* meaning;

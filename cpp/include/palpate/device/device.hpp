@@ -16,12 +16,12 @@ struct Command {
     double force = 0.0;  ///< force on the handle [N or N*m]
 };
 
-/// Position, velocity, forces, time and number that a device reports in one sample.
+/// One sample of a device: position and velocity of the handle, forces, time, and the number of the sample.
 struct Reading {
     double position = 0.0;  ///< measured position of the handle [m or rad]
     /// Velocity of the handle: measured, or a difference quotient of positions [m/s or rad/s]
     double velocity = 0.0;
-    double applied = 0.0;  ///< force that the device applies, sign as in `Command` [N or N*m]
+    double applied = 0.0;  ///< force that the motor applies; > 0 pushes to smaller positions [N or N*m]
     /// Force that a transducer measures; NaN without a transducer
     double measured = std::numeric_limits<double>::quiet_NaN();
     /// Time of the sample by the device's clock [s]

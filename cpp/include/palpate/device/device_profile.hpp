@@ -53,8 +53,8 @@ struct DeviceProfile {
         return whole_delay_samples() + (delay_fraction() > 0.0 ? 1 : 0);
     }
 
-    /// Returns true if `force` is at most the device's force limit. An excess of up to one force step counts as
-    /// rounding.
+    /// Returns true if `force` is at most the device's force limit. A force that is larger by at most one force
+    /// step also counts, because the device rounds forces to force steps.
     [[nodiscard]] bool makes(double force) const noexcept {
         return force <= force_limit * (1.0 + 1e-9) + force_step;
     }

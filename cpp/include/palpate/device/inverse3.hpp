@@ -25,23 +25,24 @@
 
 namespace palpate {
 
-/// Address of the service of an Inverse3, and the axis along which its handle is used.
+/// Network address of the Inverse Service that controls a Haply Inverse3, and the axis along which its handle moves.
 struct Inverse3Settings {
     std::string host = "127.0.0.1";
     std::uint16_t port = 10001;
     int axis = 2;                                  ///< 0 = x, 1 = y, 2 = z
-    double direction = 1.0;                        ///< +1 or -1: sign of the direction into the object
+    double direction = 1.0;                        ///< +1 or -1: direction of a press along the axis
     std::chrono::milliseconds step_timeout{2000};  ///< longest wait in each step of opening the device
-    /// Longest wait for a message of the service with position and force
+    /// Longest wait of a tick for the service's message with position and force
     std::chrono::milliseconds answer_timeout{20};
 };
 
 /// Properties of the Inverse3 that its service sent when the device was opened.
 struct Inverse3Info {
-    std::string id;           ///< short identifier, such as 049D
-    std::string type;         ///< inverse3, inverse3x, minverse
-    double force_gate = 0.0;  ///< gain of the service's reduction of forces during oscillation [-]
-    double damping = 0.0;     ///< damping that the service adds to forces, without unit
+    std::string id;    ///< identifier of the device, such as 049D
+    std::string type;  ///< device type: inverse3, inverse3x or minverse
+    /// Setting of the service: gain of its reduction of forces when the handle oscillates [-]
+    double force_gate = 0.0;
+    double damping = 0.0;  ///< setting of the service: damping that it adds to commanded forces, no unit
 };
 
 /// One direction of a Haply Inverse3, Inverse3x or Minverse, through the Inverse Service of its maker: JSON over a
@@ -117,7 +118,7 @@ class Inverse3Device {
                 link_->run(std::chrono::milliseconds{200}, [&closed] { return closed; });
             }
         } catch (const std::exception&) {
-            // No zero force must be sent: the service ends the force of a device that gets no commands
+            // Zero force need not be sent: the service ends the force of a device that gets no commands
             link_->disconnected = true;
         }
         link_.reset();
@@ -137,17 +138,17 @@ class Inverse3Device {
         boost::beast::websocket::stream<boost::beast::tcp_stream> stream{context};
         boost::beast::flat_buffer buffer;
         std::string message;       ///< message to the service that is being sent
-        std::string command_head;  ///< text of each command before the force value
+        std::string command_head;  ///< start of each command's text, up to the force
         bool sending = false;
         bool reading = false;
         bool disconnected = false;
         int unanswered = 0;     ///< sent messages that the service has not answered
-        double position = 0.0;  ///< position along the axis, from the service [m]
-        double origin = 0.0;    ///< position along the axis on opening [m]
+        double position = 0.0;  ///< handle position that the service sent last [m]
+        double origin = 0.0;    ///< handle position when the device was opened [m]
         double velocity = 0.0;
-        double echoed = 0.0;  ///< current force along the axis, from the service [N]
+        double echoed = 0.0;  ///< force that the service reported last [N]
         std::uint64_t sequence = 0;
-        /// Consecutive messages of the service with zero force although a force was commanded
+        /// Number of consecutive messages in which the service reports zero force although a force was commanded
         int states_without_effect = 0;
         std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 
@@ -163,7 +164,7 @@ class Inverse3Device {
         }
     };
 
-    /// Smallest commanded force that the service must report as not zero [N]
+    /// A commanded force above this limit counts as without effect if the service reports zero force [N]
     static constexpr double least_visible_force = 0.05;
     static constexpr int most_states_without_effect = 200;
 
@@ -256,7 +257,7 @@ class Inverse3Device {
         last_.sequence = link_->sequence;
     }
 
-    /// Writes a force command into the text of the next message.
+    /// Writes a command with this force as the next message to the service.
     void write_message(double force, const char* head) {
         std::string& text = link_->message;
         text.assign(head).append(link_->command_head);
@@ -271,10 +272,10 @@ class Inverse3Device {
         text += "}}}}]}";
     }
 
-    /// Sends a force command and waits for the device's state that answers it. Returns the status of the exchange.
+    /// Sends a force command and waits for the service's next message with the position. Returns the tick's status.
     [[nodiscard]] Status exchanged(double force) {
         Link& link = *link_;
-        if (!link.sending) {  // at most one command in transmission
+        if (!link.sending) {  // no new command while another one is being sent
             write_message(force, "{");
             link.sending = true;
             ++link.unanswered;

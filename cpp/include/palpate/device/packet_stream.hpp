@@ -17,18 +17,18 @@ namespace palpate {
 /// Counters of the packets from and to a device since the device was opened.
 struct StreamHealth {
     std::uint64_t packets = 0;    ///< valid packets
-    std::uint64_t lost = 0;       ///< samples of the device that did not arrive
+    std::uint64_t lost = 0;       ///< samples that the device sent and that did not arrive
     std::uint64_t repeated = 0;   ///< samples that arrived twice or out of order
     std::uint64_t malformed = 0;  ///< packets of a wrong size, first byte or version
     /// Packets that confirm a command sent before this program opened the device, or never sent
     std::uint64_t late_echoes = 0;
-    std::uint64_t watchdog_trips = 0;  ///< torques that the device's watchdog ended
+    std::uint64_t watchdog_trips = 0;  ///< number of times the watchdog ended a torque
 
-    std::uint64_t refused_commands = 0;  ///< packets that report a command that the device did not understand
-    std::uint64_t late_commands = 0;     ///< commands whose delay was longer than allowed
-    /// Time from sending a command to its confirmation, by the host's clock [ns]
+    std::uint64_t refused_commands = 0;  ///< packets in which the device reports an invalid command
+    std::uint64_t late_commands = 0;     ///< commands with a delay longer than allowed
+    /// Times from sending a command to the packet that confirms it, by the host's clock [ns]
     DurationHistogram round_trip;
-    /// Time from a sample to the force computed from it, by the device's clock [ns]
+    /// Times from a sample until the device applies the force computed from it, by the device's clock [ns]
     DurationHistogram delay;
 };
 
@@ -101,7 +101,7 @@ class PacketStream {
     struct SentCommand {
         std::uint16_t sequence = 0;
         Nanoseconds sent = 0;
-        /// Time of the sample by the device's clock [us]; the least value if the command has no sample.
+        /// Time of the sample by the device's clock [us]; the smallest integer for a command without a sample.
         std::int64_t sample_us = std::numeric_limits<std::int64_t>::min();
     };
 
@@ -133,7 +133,7 @@ class PacketStream {
         }
     }
 
-    /// Converts a packet to a reading in SI units.
+    /// Stores the position, velocity, force and time of a packet as the last reading, in SI units.
     void read(const wire::InPacket& packet, bool first, std::int64_t step) noexcept {
         Reading now;
         now.position = wire::position_of(count_.value(), info_.counts_per_rev);

@@ -20,9 +20,9 @@ namespace palpate {
 
 /// Settings of the connection to a USB device.
 struct UsbOptions {
-    std::string serial;                     ///< serial number; empty: the only connected device
-    std::chrono::microseconds wait{5'000};  ///< longest wait of an exchange for a packet
-    std::uint16_t time_to_live_ms = 10;     ///< time after which a torque ends without a new packet
+    std::string serial;                     ///< serial number of the device; empty: the only one connected
+    std::chrono::microseconds wait{5'000};  ///< longest time that a tick waits for a packet
+    std::uint16_t time_to_live_ms = 10;  ///< the device ends its torque if no command arrives for this time
     double longest_delay_s = std::numeric_limits<double>::infinity();  ///< allowed delay [s]
     bool makes_force = true;  ///< false: the motor is never enabled; the device only sends samples
 };
@@ -33,10 +33,10 @@ struct UsbHealth {
     /// Commands not sent, because the previous command was in flight or a newer sample had arrived.
     std::uint64_t skipped_commands = 0;
     std::uint64_t lost_commands = 0;  ///< commands that did not arrive at the device
-    std::uint64_t timeouts = 0;       ///< ticks in which no packet arrived in time
-    std::uint64_t discarded = 0;      ///< received packets that the host did not process in time
-    std::uint64_t stalls = 0;         ///< halts of a USB endpoint, which were cleared
-    std::uint64_t bus_errors = 0;     ///< transfers that failed on the bus
+    std::uint64_t timeouts = 0;       ///< ticks in which no packet arrived before the deadline
+    std::uint64_t discarded = 0;      ///< received packets discarded unread, because the host was late
+    std::uint64_t stalls = 0;         ///< number of times a USB endpoint halted
+    std::uint64_t bus_errors = 0;     ///< USB transfers that failed on the bus
 };
 
 /// A haptic device of one degree of freedom over USB; device/wire.hpp defines packets and signs.
@@ -163,15 +163,15 @@ class UsbDevice {
         profile.period_s = 1.0 / info().rate_hz;
         profile.encoder_step = wire::position_of(1, info().counts_per_rev);
         profile.force_step = 1e-6;
-        // Division by 1e6, because a multiplication by 1e-6 would round twice
+        // Divided by 1e6, not multiplied by 1e-6: 1e-6 is itself a rounded number
         profile.force_limit = info().max_torque_uNm / 1e6;
         return profile;
     }
 
   private:
-    /// If more received packets wait, the host discards all of them
+    /// If more than this number of received packets wait to be read, the host discards all of them
     static constexpr std::size_t most_waiting_packets = 4;
-    static constexpr int most_kept_packets = 2;  ///< old packets that a device may still send after opening
+    static constexpr int most_kept_packets = 2;  ///< number of old packets discarded on opening
     static constexpr Nanoseconds first_packet_timeout = nanoseconds_a_second;
     static constexpr Nanoseconds write_timeout = nanoseconds_a_second / 50;
 
@@ -239,7 +239,7 @@ class UsbDevice {
                    : std::numeric_limits<Nanoseconds>::max();
     }
 
-    /// Returns the fault of the device in words.
+    /// Returns the fault that the status bits report as text, for example "an emergency stop".
     [[nodiscard]] static std::string fault_text(std::uint16_t bits) {
         return (bits & wire::emergency_stop) != 0     ? "an emergency stop"
                : (bits & wire::over_temperature) != 0 ? "over-temperature"
@@ -350,7 +350,7 @@ class UsbDevice {
         return reading;
     }
 
-    /// Returns the last reading with `status` as its status. Only the position of this reading is valid.
+    /// Returns a copy of the last reading with the given status, for a failed tick. Only its position is valid.
     [[nodiscard]] Reading failed(Status status) const noexcept {
         Reading reading = open_ == nullptr ? Reading{} : open_->stream.reading();
         reading.status = status;

@@ -23,9 +23,9 @@
 /// packet's torque [N*m].
 namespace palpate::wire {
 
-inline constexpr std::uint16_t vendor_id = 0x1209;  ///< USB vendor number of the device
+inline constexpr std::uint16_t vendor_id = 0x1209;  ///< USB vendor number (idVendor)
 inline constexpr std::uint16_t product_id =
-    0x0001;  ///< test product number of pid.codes, only for development
+    0x0001;  ///< USB product number (idProduct): test number of pid.codes, only for development
 inline constexpr std::uint8_t interface_number = 0;
 inline constexpr std::array<std::uint8_t, 3> interface_kind{0xFF, 0x01, 0x01};  ///< class, subclass, protocol
 inline constexpr std::uint8_t in_endpoint = 0x81;   ///< interrupt IN endpoint: packets from the device
@@ -38,24 +38,24 @@ inline constexpr std::uint8_t request_to_device = 0x41;
 /// Numbers of the control requests to the device (the field bRequest of a control transfer).
 enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
 
-/// Returns cause and cure for an error code of libusb; empty for a code without a text.
+/// Returns a text with the cause and the cure of an error number of libusb; empty for an unknown number.
 [[nodiscard]] constexpr std::string_view usb_cause(int code) noexcept {
     switch (code) {
-        case -1:  // LIBUSB_ERROR_IO
+        case -1:  // libusb returns this number as LIBUSB_ERROR_IO
             return "the transfer failed on the bus; try another cable or port";
-        case -3:  // LIBUSB_ERROR_ACCESS
+        case -3:  // libusb returns this number as LIBUSB_ERROR_ACCESS
             return "permission denied; run 'sudo palpate devices --install-udev-rule' once, then plug the "
                    "device in again";
-        case -4:  // LIBUSB_ERROR_NO_DEVICE
-        case -5:  // LIBUSB_ERROR_NOT_FOUND
+        case -4:  // libusb returns this number as LIBUSB_ERROR_NO_DEVICE
+        case -5:  // libusb returns this number as LIBUSB_ERROR_NOT_FOUND
             return "the device was unplugged; plug it in and try again";
-        case -6:  // LIBUSB_ERROR_BUSY
+        case -6:  // libusb returns this number as LIBUSB_ERROR_BUSY
             return "another program uses the device; end that program, then try again";
-        case -7:  // LIBUSB_ERROR_TIMEOUT
+        case -7:  // libusb returns this number as LIBUSB_ERROR_TIMEOUT
             return "the device does not answer; unplug it and plug it in again";
-        case -9:  // LIBUSB_ERROR_PIPE
+        case -9:  // libusb returns this number as LIBUSB_ERROR_PIPE
             return "the device refused a request; the version of its firmware may differ";
-        case -11:  // LIBUSB_ERROR_NO_MEM
+        case -11:  // libusb returns this number as LIBUSB_ERROR_NO_MEM
             return "the system has no memory left for USB; see "
                    "/sys/module/usbcore/parameters/usbfs_memory_mb";
         default:
@@ -82,7 +82,7 @@ inline constexpr std::uint32_t measures_velocity = 2;
 inline constexpr int shortest_watchdog_ms = 2;
 inline constexpr int longest_watchdog_ms = 1000;
 
-/// Largest packet of an interrupt endpoint of USB full speed [bytes]
+/// Largest packet that USB full speed allows for an interrupt endpoint [bytes]
 inline constexpr std::size_t largest_packet = 64;
 inline constexpr std::size_t in_size = 32;
 inline constexpr std::size_t out_size = 16;
@@ -91,22 +91,22 @@ inline constexpr std::size_t info_size = 32;
 /// Packet that the device sends once in each USB frame of 1 ms.
 struct InPacket {
     std::uint16_t sequence = 0;
-    std::uint32_t clock_us = 0;  ///< device clock when the position was read; restarts at 0 after 71 minutes
-    std::int32_t count = 0;      ///< encoder position [counts]
-    std::int32_t velocity_cps = 0;   ///< velocity [counts/s]; 0 if not measured
+    std::uint32_t clock_us = 0;      ///< time of the sample by the device's clock; 0 again after 71 minutes
+    std::int32_t count = 0;          ///< encoder position [counts]
+    std::int32_t velocity_cps = 0;   ///< velocity; 0 if not measured [counts/s]
     std::int32_t torque_uNm = 0;     ///< applied torque
     std::uint16_t status = 0;        ///< status bits
-    std::uint16_t out_sequence = 0;  ///< number of the last accepted command
+    std::uint16_t out_sequence = 0;  ///< number of the last command that the device accepted
     std::uint16_t out_age_us = 0;    ///< time since the last command was accepted, at most 65535 [us]
     std::uint16_t temperature_dC = 0;
-    std::int32_t sensor_uNm = 0;  ///< torque at the transducer; 0 without a transducer
+    std::int32_t sensor_uNm = 0;  ///< measured torque; 0 without a transducer
 };
 
 /// Command packet to the device.
 struct OutPacket {
     std::uint16_t sequence = 0;
     std::int32_t torque_uNm = 0;
-    std::uint16_t time_to_live_ms = 10;  ///< time after which the torque ends without a new command [ms]
+    std::uint16_t time_to_live_ms = 10;  ///< the torque ends if no new command arrives for this time
     std::uint32_t host_us = 0;
 };
 
@@ -266,7 +266,7 @@ class ByteWriter {
 template <std::integral Counter>
 class Unwrapped {
   public:
-    /// Takes the next reading of the counter. Returns the step since the previous reading, 0 for the first reading.
+    /// Adds a reading of the counter. Returns its increase since the previous reading; 0 for the first reading.
     std::int64_t follow(Counter reading) noexcept {
         using Unsigned = std::make_unsigned_t<Counter>;
         const auto ahead =

@@ -79,7 +79,7 @@ class GrowingFile {
         if (std::string reason = name_conflict(); !reason.empty()) {
             return reason;
         }
-        // If another run finishes its recording between the two tries, the second try to create NAME.part succeeds.
+        // If another run finishes its recording after the first failed try, a later try to create NAME.part succeeds.
         for (int retries = 2; descriptor_ < 0; --retries) {
             descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
             if (descriptor_ < 0 && (errno != EEXIST || retries == 0)) {
@@ -135,7 +135,7 @@ class GrowingFile {
         return done;
     }
 
-    /// Replaces the text at the offset `place` of the file by a text of the same length.
+    /// Overwrites a part of the file, from byte `place` on, with a text of the same length as that part.
     void overwrite(off_t place, std::string_view text) noexcept {
         if (descriptor_ >= 0 && place + static_cast<off_t>(text.size()) <= size_) {
             // If this write fails, the file keeps its old text, which is also valid.
@@ -230,7 +230,7 @@ class GrowingFile {
                           " may belong to another run, because this file system has no locks; choose "
                           "another name, or rename it";
         } else if (detail::is_path_of(part(),
-                                      there)) {  // otherwise another run has just renamed NAME.part
+                                      there)) {  // false: another run has just renamed NAME.part
             if (::fstat(there, &about) == 0 && about.st_size == 0) {
                 reason =
                     part() +

@@ -34,13 +34,13 @@ class JsonField {
         throw std::invalid_argument((path_.empty() ? "the file contains " : path_ + " is ") + shown +
                                     ": must be " + right);
     }
-    /// Refuses the value unless the condition `holds` is true; `right` describes valid values.
+    /// Throws std::invalid_argument if `holds` is false; `right` describes valid values in the error message.
     void require(bool holds, const std::string& right) const {
         if (!holds) {
             refuse(right);
         }
     }
-    /// Throws unless the value is a list of this length.
+    /// Throws std::invalid_argument if the number of elements of this JSON list is not `length`.
     void require_length(std::size_t length, const char* meaning) const {
         if (value_.size() != length) {
             throw std::invalid_argument(path_ + " has " + std::to_string(value_.size()) +
@@ -72,7 +72,7 @@ class JsonField {
             }
         }
     }
-    /// Returns the elements of this JSON list, each with its place in the file for messages.
+    /// Returns the elements of this JSON list, each with its path in the file, which error messages name.
     [[nodiscard]] std::vector<JsonField> items() const {
         require(value_.is_array(), "a list");
         std::vector<JsonField> fields;
@@ -135,11 +135,11 @@ class JsonField {
         }
         return values;
     }
-    /// Throws unless the value is an object.
+    /// Throws std::invalid_argument if this value is not a JSON object.
     void require_object() const { require(value_.is_object(), "an object"); }
     [[nodiscard]] const Json& value() const { return value_; }
 
-    /// Throws if this value contains a number that is not finite at any depth, because JSON cannot store such a number.
+    /// Throws if a number in this value, or in its nested lists and objects, is not finite: JSON cannot store it.
     void require_finite() const {
         if (value_.is_object()) {
             for (const auto& item : value_.items()) {

@@ -67,7 +67,7 @@ inline constexpr int deepest_json = 100;  ///< largest allowed depth of nested l
     std::error_code none;
     std::ifstream stream;
     if (std::filesystem::is_regular_file(path,
-                                         none)) {  // opening a pipe that no program writes to would block
+                                         none)) {  // opening a pipe would wait for a writing program
         stream.open(path, std::ios::binary);
     }
     if (!stream.is_open()) {

@@ -19,10 +19,10 @@ namespace palpate {
 /// Content of a model file that a rendering uses: model, units, plan and certificate.
 struct ModelFile {
     ForceModel model;                        ///< the identified model
-    std::string position_unit;               ///< rad, m, count or "" (not stated)
-    std::string force_unit;                  ///< N*m, N, A or ""
+    std::string position_unit;               ///< unit of position: rad, m, count; "": not stated
+    std::string force_unit;                  ///< unit of force: N*m, N, A; "": not stated
     std::vector<std::string> inputs;         ///< names of the model's inputs
-    std::optional<Scheme> plan;              ///< structure and coupling for the model
+    std::optional<Scheme> plan;              ///< the plan: structure and its numbers; unset: no plan
     std::optional<ForceModel> limited;       ///< model that the plan renders instead of the identified model
     std::optional<Certificate> certificate;  ///< certificate of the plan, recomputed on reading
 

@@ -25,7 +25,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
                                                (used ? "" : "no ") + structure_has);
 }
 
-/// Reads the structure and its numbers from the plan of a model file; nothing if the plan is null.
+/// Returns the structure and its numbers from the plan of a model file; std::nullopt if the plan is null.
 [[nodiscard]] inline std::optional<Scheme> read_plan(const JsonField& plan) {
     if (plan.is_null()) {
         return std::nullopt;

@@ -16,7 +16,7 @@
 
 namespace palpate {
 
-/// Metadata at the start of a recording: pairs of key and text.
+/// Metadata at the start of a recording, as pairs of a key and its text.
 using Metadata = std::vector<std::pair<std::string, std::string>>;
 
 /// A flight record: a CSV recording with `#` lines of metadata, a header of names that end in a unit, and one row for

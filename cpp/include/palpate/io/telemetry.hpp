@@ -47,7 +47,7 @@ class Telemetry {
         return "";
     }
 
-    /// Sends the first tick after each sending time, and ignores all other ticks.
+    /// Sends one tick for each interval of the send rate: the first tick of the interval; ignores the other ticks.
     void take(std::span<const TickRecord> ticks) noexcept {
         if (socket_ < 0) {
             return;

@@ -15,7 +15,7 @@ namespace palpate {
 
 /// Record of one tick for recordings and telemetry, in SI units.
 struct TickRecord {
-    double time = 0.0;      ///< time of the wake-up since the first wake-up [s]
+    double time = 0.0;      ///< time of the tick's wake-up, counted from the first wake-up [s]
     double position = 0.0;  ///< measured position of the handle [m or rad]
     double force = 0.0;     ///< sent force after all guards, positive out of the object [N or N*m]
     double applied = 0.0;   ///< force that the device applied at the sample, same sign [N or N*m]
@@ -23,7 +23,7 @@ struct TickRecord {
     double measured = std::numeric_limits<double>::quiet_NaN();
     double environment_position = 0.0;  ///< position y of the virtual object [m or rad]
     double velocity = 0.0;              ///< velocity of the handle [m/s or rad/s]
-    double device_time = 0.0;           ///< time by the device's clock [s]
+    double device_time = 0.0;           ///< time of the sample by the device's clock [s]
     double lateness = 0.0;              ///< actual minus planned time of the control loop's wake-up [s]
     std::uint64_t sequence = 0;         ///< number of the sample, counted by the device
     std::int32_t evaluations = 0;       ///< number of evaluations of the model's force in this tick
@@ -37,7 +37,7 @@ struct TickRecord {
     return std::isnan(tick.measured) ? -tick.applied : tick.measured;
 }
 
-/// Units of position and force that end the column names of a recording; empty for a model without a unit.
+/// Units of position and force at the end of a recording's column names, such as force_Nm; empty without a unit.
 struct RecordUnits {
     std::string position = "rad";
     std::string force = "Nm";
@@ -48,7 +48,7 @@ struct RecordUnits {
     return {position, force == "N*m" ? "Nm" : force};
 }
 
-/// Returns the end of a column name, such as "_Nm"; empty without a unit.
+/// Returns a unit as the end of a column name, such as "_Nm"; "" for an empty unit.
 [[nodiscard]] inline std::string suffix_of(const std::string& unit) {
     return unit.empty() ? "" : "_" + unit;
 }
@@ -62,7 +62,7 @@ inline void append_number(std::string& text, double value) {
     text.append(digits.data(), end);
 }
 
-/// Appends a time [s] with nine decimals, because the clock counts nanoseconds.
+/// Appends a time [s] with nine decimals, because the clock's unit is the nanosecond.
 inline void append_nanoseconds(std::string& text, double seconds) {
     std::array<char, 32> digits{};
     const auto end =

@@ -26,7 +26,7 @@ concept RecordConsumer = requires(C& consumer, std::span<const Record> records) 
 template <class Record, RecordConsumer<Record> Consumer>
 class FlightRecorder {
   public:
-    /// Starts the thread, which passes records to the consumer at the interval `every`.
+    /// Starts a thread that passes the records in the ring buffer to the consumer once in each interval `every`.
     FlightRecorder(Consumer& consumer, std::size_t capacity, std::chrono::milliseconds every)
         : ring_{capacity}, consumer_{consumer}, every_{every}, batch_(4096) {
         writer_ = std::thread{[this] { write_until_stopped(); }};
@@ -77,7 +77,7 @@ class FlightRecorder {
     std::thread writer_;
 };
 
-/// Stores the last records of a loop in memory, for the report of a fault.
+/// Keeps the records of the last ticks of a loop in memory, so that they can be saved after a fault.
 template <class Record>
 class LastRecords {
   public:

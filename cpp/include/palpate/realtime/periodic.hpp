@@ -25,7 +25,7 @@ inline constexpr Nanoseconds nanoseconds_a_second = 1'000'000'000;
 struct Wake {
     Nanoseconds deadline = 0;  ///< planned time of the wake-up
     Nanoseconds now = 0;       ///< actual time of the wake-up
-    /// Number of later deadlines that had also passed at this wake-up; they get no tick
+    /// Number of ticks that are skipped, because their planned times had also passed at this wake-up
     std::uint64_t skipped = 0;
 };
 

@@ -21,8 +21,8 @@ namespace palpate {
 /// Settings that the control loop's thread requests from the operating system to run without delays. If the system
 /// refuses a request, ticks can be late; the refusal is reported, and the loop runs.
 struct RealTimeOptions {
-    int priority = 80;  ///< priority of SCHED_FIFO, 1 to 99; 0 = ordinary scheduling
-    int cpu = -1;       ///< processor core of the thread; -1 = the last allowed core, -2 = any core
+    int priority = 80;  ///< real-time priority (SCHED_FIFO), 1 to 99; 0 = ordinary thread
+    int cpu = -1;       ///< core of the control loop; -1 = highest core number allowed, -2 = any
 };
 
 /// Keeps the memory of the process from being swapped out during the lifetime of this object.
@@ -63,7 +63,7 @@ class SleepInhibitor {
     SleepInhibitor(const SleepInhibitor&) = delete;
     SleepInhibitor& operator=(const SleepInhibitor&) = delete;
 
-    /// Returns 0, or the system error number if the cores may still enter a sleep state.
+    /// Returns 0, or the system error number if processor cores could not be kept out of sleep states.
     [[nodiscard]] int error() const noexcept { return error_; }
 
   private:

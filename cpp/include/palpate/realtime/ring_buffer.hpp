@@ -51,7 +51,7 @@ class RingBuffer {
     [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
 
   private:
-    /// Distance in memory between data that different cores change [bytes]
+    /// Size of a cache line; data changed by different processor cores are at least this far apart [bytes]
     static constexpr std::size_t cache_line = 64;
 
     std::vector<T> slots_;

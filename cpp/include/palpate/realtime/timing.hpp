@@ -104,7 +104,7 @@ class RateCheck {
   public:
     explicit RateCheck(Nanoseconds window = nanoseconds_a_second / 2) noexcept : window_{window} {}
 
-    /// Counts a tick. Returns true if a window of time has just ended; `rate_hz` then returns the rate in that window.
+    /// Counts a tick. Returns true at the end of each time window; `rate_hz` then returns the rate in that window.
     [[nodiscard]] bool add(Nanoseconds now) noexcept {
         if (start_ == 0) {
             start_ = now;

@@ -25,7 +25,7 @@ class WakeUp {
         }
     }
 
-    /// Returns the number of events so far. A waiting thread reads this number before it checks its condition.
+    /// Returns the number of events so far. A thread reads this number, then checks its condition, then calls wait().
     [[nodiscard]] std::uint32_t events() const noexcept { return events_.load(std::memory_order_seq_cst); }
 
     /// Waits until the number of events differs from `known`. Returns false if the deadline passed without a new event.
@@ -33,8 +33,8 @@ class WakeUp {
         const timespec until{deadline / nanoseconds_a_second, deadline % nanoseconds_a_second};
         waits_.store(true, std::memory_order_seq_cst);
         while (events_.load(std::memory_order_seq_cst) == known && monotonic_now() < deadline) {
-            // The system call returns at once if an event has happened since the check, because the kernel compares
-            // again.
+            // The system call returns at once if the number of events is no longer `known`, so an event just before
+            // the call is not missed.
             ::syscall(SYS_futex, word(), FUTEX_WAIT_BITSET_PRIVATE, known, &until, nullptr,
                       FUTEX_BITSET_MATCH_ANY);
         }

@@ -42,7 +42,7 @@ class Compensated {
     Compensated(E environment, double coupling_stiffness)
         : environment_{std::move(environment)}, stiffness_{coupling_stiffness} {}
 
-    /// Returns the virtual object without compensation, which the hand feels through the compensated coupling.
+    /// Returns the force law before compensation: the force that the hand feels through the coupling.
     [[nodiscard]] const E& uncompensated() const noexcept { return environment_; }
     /// Returns the stiffness K_c of the coupling [N/m or N*m/rad].
     [[nodiscard]] double stiffness() const noexcept { return stiffness_; }
@@ -80,14 +80,14 @@ class CompensatedResolvent {
           factor_{1.0 - p / coupling_stiffness},
           resolvent_{scaled(std::move(force), factor_), p, options} {}
 
-    /// Returns true if a table of solutions of the load line exists.
+    /// Returns true if this solver has a table of load-line solutions, so that no search is needed.
     [[nodiscard]] bool tabulated() const noexcept { return resolvent_.tabulated(); }
     /// Returns true if every load line of slope p is proved to have exactly one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return p == slope_ && resolvent_.unique(p); }
-    /// Returns the solver that is used for forces without proved slope bounds.
+    /// Returns the load-line solver for force laws whose slope has no proved bounds.
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return resolvent_.uncertified(); }
 
-    /// Solves the load line and stores the solution in `memory` as the start of the next solution.
+    /// Solves the load line and stores the solution in `memory`, where the search of the next tick starts.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const Compensated<E>& environment,
                                                             const Stateless& state, LoadLine line,

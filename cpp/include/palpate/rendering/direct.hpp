@@ -89,7 +89,7 @@ class HalfSamplePrediction {
     /// Sets all past positions to one position, as for a handle at rest.
     void reset(double position) noexcept { past_.fill(position); }
 
-    /// Returns x_hat, the position predicted from the last position and the m positions before the last one.
+    /// Returns x_hat, the position predicted from the newest measured position and the m positions measured before it.
     [[nodiscard]] double ahead(double position) const noexcept {
         double moved = 0.0;
         for (std::size_t j = 0; j < taps_; ++j) {

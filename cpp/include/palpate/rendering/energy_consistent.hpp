@@ -52,7 +52,7 @@ class EnergyConsistent {
         reset(0.0);
     }
 
-    /// Returns the slope p of the load line that each step solves for an object behind the coupling.
+    /// Returns the slope p of the load line of every step, for a virtual object behind a virtual coupling.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
         return inertia.midpoint_slope(period) + coupling.load_line_slope(period);
@@ -93,7 +93,7 @@ class EnergyConsistent {
         return moved_to(solution, force);
     }
 
-    /// Moves the object by one step with a given force in place of the coupling.
+    /// Moves the virtual object by one step; the given force acts on it in place of the coupling's force.
     [[nodiscard]] Rendered drive(double force) noexcept {
         const Solution solution = solve({0.0, 0.0}, force);
         return solution.status == Status::NonFinite ? detail::refused(position_) : moved_to(solution, force);
@@ -117,7 +117,7 @@ class EnergyConsistent {
             const double moved = y - from;
             const double quotient = mean(y, sample, state);
             if (!switched || (sample.force - quotient) * moved < 0.0) {
-                // Slope of the quotient D: D' = (f - D) / (y - from), or f' / 2 for y = from.
+                // Slope of the mean force D over y: D' = (f - D) / (y - from), or f' / 2 for y = from.
                 sample.slope =
                     std::abs(moved) > shortest ? (sample.force - quotient) / moved : 0.5 * sample.slope;
                 sample.force = quotient;
@@ -156,7 +156,8 @@ class EnergyConsistent {
                 memory * position_ + 2.0 * inertia_.mass / period_ * velocity_ + driving_force};
     }
 
-    /// Returns the force of the next step as an environment: D, or f where f does not generate energy if `switched`.
+    /// Returns the force of the next step as an environment: the mean force D. If `switched`: the force f where f does
+    /// not generate energy, otherwise D.
     [[nodiscard]] Stepped stepped(bool switched) const noexcept {
         return {environment_, position_, environment_.at(position_, state_).energy, shortest_, switched};
     }
@@ -193,7 +194,7 @@ class EnergyConsistent {
             if (by_force.status != Status::Ok || !generates(by_force)) {
                 return end(by_force, 0);
             }
-            // The solution with f would generate energy, so the only solution of the step is y_D, the solution with D.
+            // With the force f the step would generate energy, so y_D, the solution with the mean force D, is used.
             const Solution by_energy =
                 newton.solve(quotient, state_, line, by_force.position, bracket_to(by_force.position));
             return end(by_energy, by_energy.evaluations);
@@ -232,7 +233,7 @@ class EnergyConsistent {
     double period_;
     double shortest_;
     bool switched_;
-    double force_limit_;  ///< F_max [N or N*m]
+    double force_limit_;  ///< F_max, largest force sent to the device [N or N*m]
     Solver solver_;
     typename E::State state_;
     double device_ = 0.0;    ///< x_{k-1}, last position of the device

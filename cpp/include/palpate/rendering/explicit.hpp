@@ -67,7 +67,7 @@ class Explicit {
         return rendered;
     }
 
-    /// Moves the object by one step with a given force in place of the coupling.
+    /// Moves the virtual object by one step; the given force acts on it in place of the coupling's force.
     [[nodiscard]] Rendered drive(double force) noexcept {
         const EnvironmentSample sample = environment_.at(position_, state_);
         const double velocity =
@@ -98,7 +98,7 @@ class Explicit {
 struct ExplicitStructure {
     static constexpr StructureTraits traits{.name = "explicit", .coupling = true, .mass = true};
 
-    /// Returns the slope limit: with a model at least as steep as this slope, the explicit structure diverges.
+    /// Returns the slope limit: the explicit structure diverges with a model whose slope reaches this limit.
     [[nodiscard]] static double slope_limit(const StructureNumbers& numbers) noexcept {
         return explicit_slope_limit(numbers.inertia, numbers.coupling, numbers.period_s);
     }

@@ -51,7 +51,7 @@ class Implicit {
         reset(0.0);
     }
 
-    /// Returns the slope p of the load line of every step; for K_c = B_c = 0 the slope without the coupling.
+    /// Returns the slope p of the load line of every step. Zero K_c and B_c give the slope without the coupling.
     [[nodiscard]] static double load_line_slope(Inertia inertia, VirtualCoupling coupling,
                                                 double period) noexcept {
         return coupling.load_line_slope(period) + inertia.load_line_slope(period);
@@ -94,11 +94,12 @@ class Implicit {
         return moved_to(solution, force, 0);
     }
 
-    /// Moves the object by one step with a given force in place of the coupling (paper figure 12).
+    /// Moves the virtual object by one step; `force` acts on it in place of the coupling's force (paper figure 12).
     [[nodiscard]] Rendered drive(double force) noexcept { return drive_from(position_, force, 0); }
 
   private:
-    /// Moves the object by one step with a force in place of the coupling, to the first solution found from `start`.
+    /// Moves the virtual object by one step; `force` acts on it in place of the coupling's force. The search for the
+    /// object's new position starts at `start`.
     [[nodiscard]] Rendered drive_from(double start, double force, int evaluations) noexcept {
         const LoadLine line{uncoupled_slope_, force - inertial_ * before_ + uncoupled_factor_ * position_};
         typename Solver::Memory from{start};
@@ -122,13 +123,13 @@ class Implicit {
     E environment_;
     VirtualCoupling coupling_;
     double period_;
-    double force_limit_;      ///< F_max [N or N*m]
+    double force_limit_;      ///< F_max, largest force sent to the device [N or N*m]
     double inertial_;         ///< m/T^2
     double coupled_slope_;    ///< slope p of the load line with the coupling
     double uncoupled_slope_;  ///< slope p of the load line without the coupling
     /// Factor of the last position y_{k-1} in the load line's q: 2m/T^2 + B_o/T + B_c/T
     double coupled_factor_;
-    /// Factor of y_{k-1} in the load line's q without the coupling: 2m/T^2 + B_o/T
+    /// Factor of the last position y_{k-1} in the q of the load line without the coupling: 2m/T^2 + B_o/T
     double uncoupled_factor_;
     Solver coupled_;
     Solver uncoupled_;

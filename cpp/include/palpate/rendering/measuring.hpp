@@ -20,7 +20,7 @@ class FreeMotion {
     /// Does nothing, because free motion has no state.
     void reset(double /*position*/) noexcept {}
 
-    /// Returns zero force for a valid position.
+    /// Returns zero force; with the status NonFinite if the position is not finite.
     [[nodiscard]] Rendered step(double position) noexcept {
         return std::isfinite(position) ? Rendered{0.0, position, 0, Status::Ok, false}
                                        : detail::refused(position);
@@ -99,7 +99,7 @@ class Probe {
         const double velocity = (position - last_) / period_ - direction_ * settings_.speed;
         last_ = position;
         const double spring = settings_.stiffness * (position - sweep_);
-        // A real object stops the handle, so the motion reverses
+        // The spring's force has reached its limit: the object stops the handle, so the motion reverses
         if (std::abs(spring) > settings_.force_limit) {
             const double held = std::copysign(settings_.force_limit, spring);
             sweep_ = position - held / settings_.stiffness;
@@ -123,7 +123,7 @@ class Probe {
 /// friction from damping: both reduce the motion, but only the damping force grows with speed.
 struct PulseSettings {
     double force = 0.02;    ///< force of a push [N or N*m]; the sign alternates
-    double smaller = 0.6;   ///< factor of the force in every second group of three pushes [-]
+    double smaller = 0.6;   ///< every second group of three pushes has `force` times this factor [-]
     double push_s = 0.03;   ///< duration of a push [s]
     double rest_s = 0.17;   ///< pause after a push [s]
     double farthest = 0.2;  ///< distance from the start position beyond which pushes have no force [m or rad]

@@ -15,18 +15,18 @@ namespace palpate {
 /// Size of a model's positions and forces, relative to a model that suits the default simulated knob. Default settings
 /// in m, rad, N or N*m are multiplied by these factors; times do not change.
 struct ModelScale {
-    double length = 1.0;  ///< factor of all default positions; 1 for the default simulated knob
-    double force = 1.0;   ///< factor of all default forces; 1 for the default simulated knob
+    double length = 1.0;  ///< default positions are multiplied by this factor, 1 for the simulated knob
+    double force = 1.0;   ///< default forces are multiplied by this factor, 1 for the simulated knob
 
-    /// Returns the factor of stiffnesses: the factor of forces divided by the factor of positions.
+    /// Returns the factor for default stiffnesses: the factor of forces divided by the factor of positions.
     [[nodiscard]] double stiffness() const noexcept { return force / length; }
 };
 
 namespace detail {
 
-/// Length of the domain of a model that suits the default simulated knob [rad]
+/// A model whose domain has this length gets the position factor 1 [rad]
 inline constexpr double knob_travel = 0.5;
-/// Force limit of a simulated device divided by the model's largest force
+/// The default force limit of a simulated device is this factor times the model's largest force [-]
 inline constexpr double force_reserve = 1.05;
 
 /// Returns the force of a model at a position during a long stroke in a direction, +1 for press and -1 for release. A
@@ -99,7 +99,7 @@ struct SchemeChoices {
     std::optional<double> play_radius;
     std::optional<int> predict;
 
-    /// Returns true if the user chose at least one field. `compensated` counts only if it is true.
+    /// Returns true if the user chose at least one field of the scheme; `compensated` = false is not a choice.
     [[nodiscard]] bool any() const noexcept {
         return structure || compensated.value_or(false) || coupling_stiffness || coupling_damping || mass ||
                object_damping || play_radius || predict;

@@ -62,7 +62,7 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
     return scheme;
 }
 
-/// Largest slope of a model that may be compensated, divided by the coupling's stiffness [-].
+/// A model can be compensated only if its largest slope is at most this factor times the coupling's stiffness K_c [-].
 inline constexpr double compensated_share = 0.9;
 
 /// Checks that a scheme can render a model. Throws std::invalid_argument with the wrong field, its value and the rule.

@@ -31,16 +31,16 @@ concept Structure = requires(S& structure, double position) {
 
 /// Properties of a structure that do not depend on the model.
 struct StructureTraits {
-    std::string_view name;               ///< name in options and files
-    bool coupling = false;               ///< true: has a virtual coupling
-    bool mass = false;                   ///< true: the object has mass and damping
-    bool solved = false;                 ///< true: each step solves a load line
-    bool velocity = false;               ///< true: can render a force of position and velocity
-    bool predicts = false;               ///< true: can compute the force at a predicted position
+    std::string_view name;               ///< name of the structure, as in --structure
+    bool coupling = false;               ///< true: the structure has a virtual coupling
+    bool mass = false;                   ///< true: the virtual object has mass and damping
+    bool solved = false;                 ///< true: every tick solves a load line
+    bool velocity = false;               ///< true: the structure can render a force that depends on velocity
+    bool predicts = false;               ///< true: the structure can use a predicted position
     bool may_reduce_hysteresis = false;  ///< true: may dissipate less energy than the model's hysteresis
 };
 
-/// Numbers from which a structure is built; the environment is given separately.
+/// Parameters of a structure, except the environment (the force law of the virtual object).
 struct StructureNumbers {
     VirtualCoupling coupling;
     Inertia inertia;

@@ -16,7 +16,7 @@
 
 namespace palpate {
 
-/// Numbers of all structures, in the order of the list `Structures`.
+/// One enumerator for each structure, in the order of the type list `Structures`.
 enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit, EnergyConsistent };
 
 using Structures = std::tuple<DirectStructure, MasslessStructure, ImplicitStructure, ExplicitStructure,
@@ -44,7 +44,7 @@ inline constexpr auto words_of<StructureKind> = structure_names;
     return traits_of(kind).mass;
 }
 
-/// Calls `visit` with the builder class of a structure, the element number `kind` of the list `Structures`.
+/// Calls `visit` with the class that builds the structure `kind`, an element of the type list `Structures`.
 template <std::size_t k = 0, class Visit>
 decltype(auto) with_kind(StructureKind kind, const Visit& visit) {
     if constexpr (k + 1 < std::tuple_size_v<Structures>) {

@@ -98,7 +98,7 @@ class Controller {
         const Status slewed = guards_.slew.apply(force);
         const Status energy_limited = guards_.tank.apply(force);
         guards_.limit_cycle.watch(reading_.position, force);
-        // The first status that is not Ok is reported, and guards of the energy come before the force limit.
+        // The first status in this list that is not Ok is reported; the energy tank comes before the force limit.
         for (const Status status : {rendered.status, ramped, energy_limited, cycle_scaled, limited, slewed}) {
             if (status != Status::Ok) {
                 return status;

@@ -15,7 +15,7 @@ namespace palpate {
 
 /// Values and text lines that a device adds to the summary of a run.
 struct DeviceReport {
-    std::string name;  ///< key of `fields` in the summary; empty without fields
+    std::string name;  ///< key in the summary under which `fields` appear; empty: none
     NamedValues fields;
     Lines lines;
 };
@@ -38,7 +38,7 @@ class LiveDevice {
 
     std::string title;  ///< name of the device in messages
     DeviceProfile profile;
-    ModelScale scale;        ///< size of the model relative to the default knob
+    ModelScale scale;        ///< the model's factors for default positions and forces
     double rate_hz = 0.0;    ///< ticks of the control loop a second
     Metadata metadata;       ///< metadata of the device for recordings
     bool simulated = false;  ///< true for a simulated device

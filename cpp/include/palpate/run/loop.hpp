@@ -31,7 +31,7 @@ struct LoopSettings {
 
 inline constexpr double lowest_rate_hz = 100.0;
 inline constexpr double highest_rate_hz = 10'000.0;
-/// Smallest measured rate / rate_hz that is not reported as too low [-]
+/// The rate is reported as too low if the measured rate divided by the chosen rate is below this limit [-]
 inline constexpr double held_rate_share = 0.99;
 
 /// Checks the settings of a control loop. Throws std::invalid_argument with the wrong field, its value and the rule.
@@ -52,7 +52,7 @@ enum class ExitReason : std::uint8_t {
     Guard,        ///< a guard found a wrong position or force
     DeviceFault,  ///< the device reported a fault or did not respond
     RateTooLow,
-    NotCertified,  ///< the time between two ticks was longer than certified
+    NotCertified,  ///< a tick came later than the certificate allows
 };
 
 /// Returns true if the loop ended because its duration ended or a stop was requested.
@@ -60,7 +60,7 @@ enum class ExitReason : std::uint8_t {
     return reason == ExitReason::TimeUp || reason == ExitReason::StopRequested;
 }
 
-/// Progress of a running control loop, for other threads. Two of the numbers may belong to different ticks.
+/// Progress of a running control loop, read by other threads. One read may mix numbers of two successive ticks.
 struct LoopProgress {
     std::atomic<std::uint64_t> ticks{0};
     std::atomic<std::uint64_t> missed{0};
@@ -79,9 +79,11 @@ struct LoopReport {
     std::array<std::uint64_t, status_texts.size()> ticks_by_status{};
     std::uint64_t lost_samples = 0;
     std::uint64_t repeated_samples = 0;
-    double given_in_ramp = 0.0;  ///< largest net energy that the motor gave during the start ramp [J]
-    double given = 0.0;          ///< largest net energy that the motor gave after the start ramp [J]
-    double most_stored = 0.0;    ///< upper bound of the energy stored in the object, above its minimum [J]
+    /// Largest value of the energy that the motor gave minus the energy that it received, during the start ramp [J]
+    double given_in_ramp = 0.0;
+    /// Largest value of the energy that the motor gave minus the energy that it received, after the start ramp [J]
+    double given = 0.0;
+    double most_stored = 0.0;  ///< upper bound of the energy stored in the object, above its minimum [J]
     /// Number of detected limit cycles; each multiplied all later forces by 0.7
     std::uint64_t limit_cycles = 0;
 };
@@ -129,11 +131,11 @@ template <class Control, class Clock, class Sink>
 void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
               const std::atomic<bool>& stop_requested, Sink& sink, LoopProgress& progress,
               LoopReport& report) noexcept {
-    constexpr double most_ticks = 1e15;  // number of ticks that replaces an infinite duration
+    constexpr double most_ticks = 1e15;  // largest number of ticks of a run, also if its duration is infinite
     const auto deadlines = static_cast<std::uint64_t>(
         std::clamp(std::round(settings.duration_s * settings.rate_hz), 1.0, most_ticks));
     std::uint64_t bad_in_a_row = 0;
-    (void)controller.start();  // status ignored here: the first tick checks the first reading
+    (void)controller.start();  // the status of the first reading is checked in the first tick
     clock.start();
     for (bool running = true; running;) {
         const Wake wake = clock.wait();
@@ -142,7 +144,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
         report.timing.add(wake);
         if (too_late) {
             report.exit_reason = ExitReason::NotCertified;
-            break;  // no further tick: the device held the last force for longer than the certificate allows
+            break;  // the device held the last force longer than the certificate allows
         }
         const Tick tick = controller.tick();
         const TickRecord record = record_of(tick, wake, report.timing.first);

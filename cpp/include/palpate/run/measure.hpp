@@ -26,10 +26,10 @@ struct MeasureOptions : RunOptions {
     bool probe = false;  ///< true: the device moves the handle slowly between lower and upper
     /// Settings of the slow motion; unset: default values scaled to the device
     std::optional<double> lower, upper, speed, stiffness, force_limit;
-    std::optional<double> push;   ///< force of short pushes to either side [N or N*m]
-    bool keep = false;            ///< true: return every tick with the summary
+    std::optional<double> push;   ///< force of the short pushes; unset: no pushes [N or N*m]
+    bool keep = false;            ///< true: the summary contains the records of all ticks
     bool transducer = true;       ///< true: the simulated device has a force transducer
-    double friction_share = 0.0;  ///< Coulomb friction / force limit of the simulated device
+    double friction_share = 0.0;  ///< simulated device: Coulomb friction divided by force limit
 
     /// Returns true if the device moves the handle.
     [[nodiscard]] bool moves() const noexcept { return probe || push; }
@@ -88,7 +88,7 @@ namespace detail {
                    readable(probe->force_limit);
     }
     if (!options.moves()) {
-        guards.ramp_s = 0.0;  // without probe and push the device makes no force
+        guards.ramp_s = 0.0;  // no start ramp: without probe and push the device makes no force
     }
     validate(guards);
     Metadata metadata{{"created_by", options.created_by}};

@@ -22,7 +22,7 @@ namespace palpate {
 /// Opens a Haply Inverse3 device for rendering. Throws std::invalid_argument with the reason if that is not possible.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_inverse3(const RenderOptions& options,
                                                                const PlannedModel& model) {
-    constexpr double usual_force_limit = 2.0;  // [N]; the service does not send a force limit
+    constexpr double usual_force_limit = 2.0;  // [N]; used because the service reports no force limit
     if (model.position_unit != "m" || model.force_unit != "N") {
         refuse(model.units_text() + "; an Inverse3 moves along a line and needs a model in m and N");
     }

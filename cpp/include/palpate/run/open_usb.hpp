@@ -92,7 +92,7 @@ namespace detail {
                                                           const PlannedModel& model) {
     UsbOptions usb = detail::usb_options(options);
     if (!options.uncertified && model.certificate) {
-        // The certificate does not hold if the delay is longer than the certified delay
+        // The allowed delay is the certified delay, because the certificate does not hold for a longer delay
         usb.longest_delay_s = model.certificate->device.delay_s;
     }
     auto live = std::make_unique<LiveDeviceOf<UsbDevice>>(UsbDevice{std::move(usb)}, detail::usb_report);

@@ -18,7 +18,7 @@ struct Range {
     double lower = std::numeric_limits<double>::quiet_NaN();
     double upper = std::numeric_limits<double>::quiet_NaN();
 
-    /// Adds a value to those whose smallest and largest value are stored.
+    /// Updates the smallest and the largest value with a new value; a NaN changes nothing.
     void add(double value) noexcept {
         lower = std::fmin(lower, value);
         upper = std::fmax(upper, value);
@@ -33,7 +33,7 @@ struct RecordSinks {
     bool keeps = false;        ///< true if every tick is kept in memory
     bool real_object = false;  ///< true if the recorded force is that of a real object
 
-    /// Writes and sends the records of some ticks, in the order of time.
+    /// Writes records to the recording, sends them as telemetry and keeps them if requested. The oldest comes first.
     void take(std::span<const TickRecord> ticks) noexcept {
         if (real_object) {
             recorded_.assign(ticks.begin(), ticks.end());

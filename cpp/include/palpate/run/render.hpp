@@ -35,7 +35,7 @@ namespace palpate {
 /// Options of every run on a device, for rendering and for measuring.
 struct RunOptions {
     std::string device = "simulated";
-    std::optional<double> wait_s;  ///< longest wait for a sample [s]; unset: default of the device
+    std::optional<double> wait_s;  ///< longest wait of a tick for a sample [s]; unset: the device's default
     LoopSettings loop;
     RealTimeOptions real_time;
     std::string record;  ///< name of the recording; empty without one
@@ -71,7 +71,7 @@ struct RenderOptions : RunOptions {
     double frozen_s = GuardSettings{}.frozen_s;
     bool energy_tank = true;
     bool uncertified = false;
-    std::vector<std::string> faults;  ///< faults that the simulated device makes on request, for tests
+    std::vector<std::string> faults;  ///< faults that the simulated device must produce, for tests
 };
 
 template <>
@@ -140,7 +140,7 @@ namespace detail {
 [[nodiscard]] inline std::string certificate_mismatch(const RenderOptions& options, const PlannedModel& model,
                                                       const DeviceProfile& device) {
     const auto differs = [](double certified, double measured) {
-        // Largest relative difference of two numbers that counts as rounding of a handwritten profile
+        // Two numbers of the profiles count as equal if their relative difference is at most this limit [-]
         constexpr double rounding = 1e-6;
         return std::abs(certified - measured) > rounding * std::abs(measured);
     };
@@ -192,7 +192,7 @@ namespace detail {
     return guards;
 }
 
-/// Least measured rate for which a certificate holds, divided by the certified rate [-].
+/// A certificate holds only if the measured rate is at least this factor times the certified rate [-].
 inline constexpr double certified_rate_share = 0.99;
 
 /// Sets guards and control loop to the values of the certificate: force limit, longest time between two ticks, and the

@@ -26,9 +26,9 @@ namespace palpate {
 struct SessionSettings {
     LoopSettings loop{};
     RealTimeOptions real_time{};
-    /// Interval at which tick records are written to the file
+    /// Time between two writes of tick records to the recording file
     std::chrono::milliseconds hand_over_every{20};
-    double ring_s = 10.0;          ///< time whose tick records fit into the ring buffer [s]
+    double ring_s = 10.0;          ///< the ring buffer holds the tick records of this time [s]
     std::size_t last_ticks = 500;  ///< number of ticks saved to NAME.fault.csv after a fault
 };
 
@@ -77,7 +77,7 @@ template <class Control>
     const auto period = static_cast<Nanoseconds>(std::llround(1e9 / settings.loop.rate_hz));
     const auto capacity = static_cast<std::size_t>(settings.ring_s * settings.loop.rate_hz) + 1;
     SessionReport report;
-    // The report is on the heap, because it is large
+    // On the heap, because a LoopReport is large
     const auto loop_report = std::make_unique<LoopReport>();
     LoopProgress progress;
     std::atomic<bool> privileges_known{false};

@@ -28,7 +28,7 @@ namespace palpate {
     return text;
 }
 
-/// Returns rate, periods and delays of a control loop as one line of text.
+/// Returns one line of text with the rate of a control loop, its periods, and how late its ticks were.
 [[nodiscard]] inline std::string timing_text(const LoopTiming& timing, double wanted_hz) {
     return readable(timing.rate_hz()) + " Hz of " + readable(wanted_hz) + " Hz over " +
            std::to_string(timing.ticks()) + " ticks; period " + percentiles(timing.period) + "; late by " +

@@ -31,21 +31,22 @@ struct SessionExpectation {
     double encoder_step = 0.0;  ///< encoder step of the device [m or rad]; 0: the encoder has no steps
     Range domain{};             ///< domain of the rendered model [m or rad]; NaN for a real object
     std::string position_unit{};
-    std::vector<std::string> warnings{};  ///< warnings of `finish_record`
+    std::vector<std::string> warnings{};  ///< warnings about the recording
 };
 
 namespace detail {
 
-/// Largest share of missed ticks, lost samples or lost rows in a run with the verdict good
+/// A run is not good if missed ticks divided by planned ticks exceed this limit, or if lost and repeated samples
+/// divided by ticks exceed this limit [-]
 inline constexpr double tolerated_loss = 0.001;
-/// Largest share of ticks in which guards changed the force, for the verdict good
+/// A run is not good if the ticks in which guards changed the force, divided by all ticks, exceed this limit [-]
 inline constexpr double tolerated_change = 0.01;
-/// Smallest travel of the handle in a good recording of a real object [encoder steps]
+/// A recording of a real object is not good if the handle's travel is less than this number of encoder steps
 inline constexpr double fewest_encoder_steps = 50;
-/// Smallest share of the domain that a good rendering covers [-]
+/// A rendering is not good if the handle's travel divided by the length of the domain is below this limit [-]
 inline constexpr double smallest_domain_share = 0.1;
 
-/// Returns a part of a whole as a text such as "12 of 1000 (1.2 %)".
+/// Returns two counts and their ratio as a text such as "12 of 1000 (1.2 %)".
 [[nodiscard]] inline std::string share_text(std::uint64_t part, std::uint64_t whole) {
     return std::to_string(part) + " of " + std::to_string(whole) + " (" +
            readable(100.0 * static_cast<double>(part) /

@@ -35,10 +35,10 @@ struct Summary {
     std::uint64_t telemetry_dropped = 0;
     Range positions;
     Range forces;
-    std::vector<TickRecord> kept;       ///< records of all ticks; empty unless the caller requires them
-    std::vector<std::string> notes;     ///< messages to the user from the time before the run
+    std::vector<TickRecord> kept;       ///< records of all ticks; empty if the caller did not require them
+    std::vector<std::string> notes;     ///< messages to the user from the preparation of the run
     std::vector<std::string> warnings;  ///< warnings about the recording
-    /// Message on the file NAME.fault.csv of the last ticks; empty without a fault
+    /// Message that names the file NAME.fault.csv, which holds the last ticks before a fault; empty without a fault
     std::string last_ticks;
     std::vector<SessionFinding> findings;
     std::string device;

@@ -21,14 +21,14 @@
 
 namespace palpate {
 
-/// One tick of a simulated run, with the state of the simulated device before and after the tick.
+/// One tick of a simulated run, with the handle's motion and the applied force at the start and at the end of the tick.
 struct SimulatedTick {
     std::size_t number = 0;
     Tick tick;
-    Motion start;               ///< motion of the handle at the start of the tick
-    Motion end;                 ///< motion of the handle at the end of the tick
-    double force_before = 0.0;  ///< applied force at the start of the tick [N or N*m]
-    double force = 0.0;         ///< applied force at the end of the tick [N or N*m]
+    Motion start;               ///< position and velocity of the handle at the start of the tick
+    Motion end;                 ///< position and velocity of the handle at the end of the tick
+    double force_before = 0.0;  ///< force of the motor at the start of the tick [N or N*m]
+    double force = 0.0;         ///< force of the motor at the end of the tick [N or N*m]
 };
 
 /// Runs a structure on a simulated device in simulated time. Calls `watch(SimulatedTick)` after every tick; the loop
@@ -50,20 +50,20 @@ std::size_t closed_loop(D& device, S structure, const Guards& guards, std::size_
     return now.number;
 }
 
-/// Start position, integration and guards of a simulated run with an energy account.
+/// Start position and velocity, integration steps and guards of a simulated run that counts energies.
 struct ClosedLoopSettings {
-    int substeps = usual_substeps;  ///< integration steps in a tick
+    int substeps = usual_substeps;  ///< number of integration steps in each tick
     double start_position = 0.0;    ///< start position of the handle [m or rad]
     double start_velocity = 0.0;    ///< start velocity of handle and hand [m/s or rad/s]
     Guards guards{};                ///< guards of the rendering; by default only the device's force limit
 };
 
-/// Energies and motion at the end of a simulated run.
+/// Result of a simulated run: energies, motion of the handle and number of ticks.
 struct ClosedLoopEnd {
     EnergyAccount energy;
-    Motion at_first_force;  ///< position and velocity of the handle when the first force acts on it
-    Motion handle;          ///< position and velocity of the handle at the end
-    std::size_t ticks = 0;  ///< number of ticks
+    Motion at_first_force;  ///< position and velocity of the handle when the first computed force acts
+    Motion handle;          ///< position and velocity of the handle at the end of the run
+    std::size_t ticks = 0;  ///< number of ticks of the run
 };
 
 /// Runs a structure on a simulated device with an energy account. Calls `watch(tick, handle, account)` after every
@@ -89,24 +89,24 @@ template <Structure S, SimulatedHand H, class Watch>
 
 /// A simulated rendering, one row for each tick.
 struct Trace {
-    std::vector<double> time;      ///< time [s]
+    std::vector<double> time;      ///< simulated time [s]
     std::vector<double> position;  ///< position measured by the encoder [m or rad]
-    std::vector<double> velocity;  ///< difference quotient of measured positions [m/s or rad/s]
+    std::vector<double> velocity;  ///< velocity from the differences of measured positions [m/s or rad/s]
 
     std::vector<double> handle_start;   ///< true handle position when the encoder is read [m or rad]
     std::vector<double> handle_middle;  ///< true handle position in the middle of the tick [m or rad]
     std::vector<double> handle_end;     ///< true handle position at the end of the tick [m or rad]
 
     std::vector<double> environment_position;  ///< y, position of the virtual object [m or rad]
-    std::vector<double> force;                 ///< commanded force [N or N*m]
+    std::vector<double> force;                 ///< force sent to the device [N or N*m]
     std::vector<double> applied;               ///< applied force at the end of the tick [N or N*m]
-    std::vector<double> mean_applied;          ///< mean applied force over the tick [N or N*m]
-    std::vector<int> evaluations;              ///< evaluations of the model in the tick
+    std::vector<double> mean_applied;          ///< mean of the applied force during the tick [N or N*m]
+    std::vector<int> evaluations;              ///< number of evaluations of the model in the tick
     std::vector<Status> status;
     std::vector<std::uint8_t> extrapolated;  ///< 1 if y lies outside the model's domain
 };
 
-/// Largest number of ticks of `simulate`: one hour at 1 kHz, about 270 MB.
+/// Largest number of ticks that `simulate` accepts: one hour at 1 kHz, which needs about 270 MB of memory.
 inline constexpr std::size_t most_simulated_ticks = 3'600'000;
 
 /// Returns the number of ticks in a simulated time. Throws std::invalid_argument if the number is not 1 to
@@ -160,7 +160,7 @@ template <class Each>
     return trace;
 }
 
-/// Renders a model on a simulated device as above, without a function that is called after every tick.
+/// Renders a model on a simulated device and returns its trace: `simulate` without the function `watch`.
 [[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
                                     const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
                                     int substeps = usual_substeps, double start_position = 0.0) {

@@ -19,20 +19,20 @@ namespace palpate {
 
 /// Kinds of simulated faults in the exchange between the host and a device.
 enum class FaultKind : std::uint8_t {
-    Late,        ///< no sample arrives in time
+    Late,        ///< no sample arrives before the deadline of the tick
     Lost,        ///< one sample of the device is missing
     Repeated,    ///< the device sends the last sample again
-    NotANumber,  ///< the position is NaN
-    Frozen,      ///< the encoder reports its last position again and again
-    Jump,        ///< the reported position has the error `jump`
+    NotANumber,  ///< the reported position is NaN
+    Frozen,      ///< the reported position stays constant although the handle moves
+    Jump,        ///< an error (`jump`) is added to the reported position
     Saturated,   ///< the device applies half of the force and reports Limited
-    Gone,        ///< the device reports Fault and makes no force until the end
+    Gone,        ///< the device reports Fault and makes no force for the rest of the run
 };
 
 inline constexpr std::array<std::string_view, 8> fault_names{"late",   "lost", "repeated",  "nan",
                                                              "frozen", "jump", "saturated", "gone"};
 
-/// One simulated fault: its kind, the number of its first exchange, and its duration in samples.
+/// One simulated fault: its kind, the number of the exchange in which it starts, and its duration [samples].
 struct Fault {
     FaultKind kind = FaultKind::Late;
     std::uint64_t exchange = 0;

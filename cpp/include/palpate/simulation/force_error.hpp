@@ -28,12 +28,12 @@ struct ForceError {
     double end = 0.0;  ///< RMS error of the rendered force at the end of the tick [N or N*m]
     /// RMS error of the rendered force for the position at the start of the tick [N or N*m]
     double instant = 0.0;
-    double mean = 0.0;  ///< RMS of the error of the rendered force, averaged over each tick [N or N*m]
-    double band = 0.0;  ///< RMS of the tick averages of the error, below 50 Hz [N or N*m]
+    double mean = 0.0;  ///< RMS of the mean force error of each tick [N or N*m]
+    double band = 0.0;  ///< RMS of the mean force error of each tick, parts above 50 Hz removed [N or N*m]
     double work = 0.0;  ///< work of the force error on the handle [J]
 };
 
-/// Largest frequency of the band-limited force error [Hz].
+/// Parts of the force error above this frequency are removed for `ForceError::band` [Hz].
 inline constexpr double force_error_band_hz = 50.0;
 
 /// Removes the part of a signal above the frequency f, without a phase shift. Convolves the signal with
@@ -74,11 +74,11 @@ inline constexpr double force_error_band_hz = 50.0;
 
 /// True positions of the handle and forces of the device, one value for each tick.
 struct HeldForces {
-    std::span<const double> start;         ///< handle position at the start of the tick
-    std::span<const double> middle;        ///< handle position in the middle of the tick
-    std::span<const double> end;           ///< handle position at the end of the tick
-    std::span<const double> applied;       ///< applied force at the end of the tick
-    std::span<const double> mean_applied;  ///< mean applied force over the tick
+    std::span<const double> start;         ///< handle position at the start of the tick [m or rad]
+    std::span<const double> middle;        ///< handle position in the middle of the tick [m or rad]
+    std::span<const double> end;           ///< handle position at the end of the tick [m or rad]
+    std::span<const double> applied;       ///< force of the motor at the end of the tick [N or N*m]
+    std::span<const double> mean_applied;  ///< mean force of the motor during the tick [N or N*m]
 };
 
 /// Returns the positions and forces of a simulated rendering that the force error needs.
@@ -102,8 +102,8 @@ template <class Law>
         return {};
     }
     constexpr std::size_t parts = 4;
-    std::vector<double> motion;  // position in the middle of each quarter of a tick
-    std::vector<double> moved;   // change of position in each quarter of a tick
+    std::vector<double> motion;  // handle position in the middle of each quarter of a tick
+    std::vector<double> moved;   // change of the handle position in each quarter of a tick
     std::vector<double> ends{held.start[0]};
     for (std::size_t k = 0; k < ticks; ++k) {
         const double slope = held.end[k] - held.start[k];

@@ -21,13 +21,13 @@ struct Motion {
 ///
 ///     F = push + stiffness (target - x) - damping v - mass v'.
 struct Grip {
-    double stiffness = 0.0;  ///< stiffness of the spring [N/m or N*m/rad]
+    double stiffness = 0.0;  ///< stiffness of the hand's spring [N/m or N*m/rad]
     double damping = 0.0;    ///< damping between handle and ground [N*s/m or N*m*s/rad]
-    double target = 0.0;     ///< position to which the spring pulls [m or rad]
-    double push = 0.0;       ///< constant force [N or N*m]
+    double target = 0.0;     ///< position to which the hand's spring pulls the handle [m or rad]
+    double push = 0.0;       ///< constant force of the hand on the handle [N or N*m]
     double mass = 0.0;       ///< mass of the hand [kg or kg*m^2]
 
-    /// Returns the hand's force without the force of its mass; the integrator adds the mass to the handle's inertia.
+    /// Returns the force of spring, damper and push on the handle. The integrator adds the hand's mass to the inertia.
     [[nodiscard]] double force(const Motion& handle) const noexcept {
         return push + stiffness * (target - handle.position) - damping * handle.velocity;
     }
@@ -50,7 +50,7 @@ struct Hand {
     double upper = 0.47;
     double frequency_hz = 0.5;
 
-    /// Returns the position of the spring's target at a time [m or rad].
+    /// Returns the position to which the hand's spring pulls the handle at a time [m or rad].
     [[nodiscard]] double target(double time) const noexcept {
         const double phase = 2.0 * std::numbers::pi * frequency_hz * time;
         return lower + 0.5 * (upper - lower) * (1.0 - std::cos(phase));

@@ -17,9 +17,9 @@ struct Mechanics {
     double friction = 0.0;  ///< Coulomb friction f_c [N or N*m]
 };
 
-/// Base class of integrators that have no memory and no force transducer.
+/// Base class of integrators of the handle's motion that store nothing between ticks and have no force transducer.
 struct PlainPlant {
-    /// Does nothing, because this integrator has no memory.
+    /// Does nothing, because this integrator stores nothing between ticks.
     void start() noexcept {}
     /// Returns NaN, because this integrator has no force transducer.
     [[nodiscard]] static double measured(const Motion& /*handle*/) noexcept {
@@ -76,7 +76,7 @@ struct EnergyAccount {
     double dissipated = 0.0;  ///< energy lost by damping and friction [J]
     /// Sum of the absolute work of hand and motor, for a bound of rounding errors [J]
     double throughput = 0.0;
-    /// Smallest value since the start of: work of the hand + 1e-12 `throughput` [J]
+    /// Smallest value of (work of the hand + 1e-12 `throughput`) since the device was opened [J]
     double least = 0.0;
 };
 
@@ -90,7 +90,7 @@ struct EnergyAccount {
 /// velocity would reverse, the handle stops and its kinetic energy is dissipated.
 class Midpoint : public PlainPlant {
   public:
-    /// Resets the energy account.
+    /// Sets all energies of the account to 0.
     // NOLINTNEXTLINE(bugprone-derived-method-shadowing-base-method): never called through the base
     void start() noexcept { account_ = {}; }
 
@@ -132,7 +132,7 @@ class Midpoint : public PlainPlant {
     [[nodiscard]] const EnergyAccount& account() const noexcept { return account_; }
 
   private:
-    /// Bound of the rounding errors of the energies, divided by `throughput`
+    /// The rounding errors of the energies are at most this factor times `throughput` [-]
     static constexpr double rounding = 1e-12;
 
     void stop(const Mechanics& handle, const Grip& grip, double applied, Motion& motion) noexcept {

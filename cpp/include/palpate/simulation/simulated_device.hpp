@@ -17,8 +17,8 @@
 
 namespace palpate {
 
-inline constexpr int usual_substeps = 20;   ///< integration steps of the simulated handle in 1 ms
-inline constexpr int most_substeps = 1000;  ///< most integration steps in one tick
+inline constexpr int usual_substeps = 20;   ///< number of integration steps of the handle in 1 ms
+inline constexpr int most_substeps = 1000;  ///< largest allowed number of integration steps in one tick
 
 /// A simulated haptic device with a hand. Each exchange simulates one tick. The simulation includes inertia, viscous
 /// and Coulomb friction, encoder step, force step, force limit, a force that is held for one tick, and delay. The
@@ -43,7 +43,7 @@ class SimulatedHandle {
     /// Replaces the integrator of the handle, for example to mount an object on the handle.
     void mount(Plant plant) { plant_ = std::move(plant); }
 
-    /// Sets the handle to its start position and velocity.
+    /// Opens the simulated device: sets the handle to its start position and start velocity.
     Opened open() {
         handle_ = start_;
         plant_.start();
@@ -112,7 +112,7 @@ class SimulatedHandle {
         return pending_[tick % pending_.size()];
     }
 
-    /// Integrates the motion of the handle with a constant motor force over the part `share` of the tick.
+    /// Integrates the motion of the handle over the time `share` times the period, with a constant motor force.
     void move(const Grip& grip, double force, double share, int substeps) noexcept {
         applied_ = force;
         plant_.tick({profile_.inertia, profile_.viscous_damping, profile_.coulomb_friction}, grip, applied_,
@@ -128,7 +128,7 @@ class SimulatedHandle {
     double applied_ = 0.0;
     double last_reading_ = 0.0;
     std::uint64_t tick_ = 0;
-    /// Commanded forces that the motor has not yet applied
+    /// Forces that were commanded in the last ticks and that the motor does not yet apply, because of the delay
     std::array<double, longest_delay_samples + 2> pending_{};
 };
 

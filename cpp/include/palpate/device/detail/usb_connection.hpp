@@ -19,7 +19,7 @@
 
 namespace palpate {
 
-/// Name of a USB device, for messages and to find the device again.
+/// Name, serial number and bus address of a USB device, for messages and to find the device again.
 struct UsbName {
     std::string manufacturer;
     std::string product;
@@ -38,18 +38,18 @@ struct UsbName {
 
 namespace detail {
 
-/// Deleter of a libusb context.
+/// Ends the use of libusb (its context) when the std::unique_ptr that owns it is destroyed.
 struct CloseContext {
     void operator()(libusb_context* context) const noexcept { libusb_exit(context); }
 };
-/// Deleter of a device handle.
+/// Closes an open USB device when the std::unique_ptr that owns its libusb handle is destroyed.
 struct CloseHandle {
     void operator()(libusb_device_handle* handle) const noexcept {
         libusb_release_interface(handle, wire::interface_number);
         libusb_close(handle);
     }
 };
-/// Deleter of a list of USB devices.
+/// Frees libusb's list of USB devices when the std::unique_ptr that owns the list is destroyed.
 struct FreeList {
     void operator()(libusb_device** list) const noexcept { libusb_free_device_list(list, 1); }
 };
@@ -111,8 +111,8 @@ class UsbConnection {
         }
         const std::unique_ptr<libusb_device*, FreeList> list{found};
         std::vector<Candidate> suitable;
-        std::vector<std::string> others;   // serial numbers of USB devices that were not requested
-        std::vector<std::string> reasons;  // reasons why the other USB devices are unsuitable
+        std::vector<std::string> others;   // serial numbers that differ from the requested serial number
+        std::vector<std::string> reasons;  // for each unsuitable device, why palpate cannot use it
         for (libusb_device* device : std::span{found, static_cast<std::size_t>(count)}) {
             if (is_ours(device)) {
                 examine(device, serial, suitable, others, reasons);
@@ -190,7 +190,8 @@ class UsbConnection {
         });
     }
 
-    /// Opens a USB device, reads its name, checks its properties, and adds it to one of the three lists.
+    /// Opens a USB device, reads its name, checks its properties, and adds it to one of three lists: `suitable`,
+    /// `others` (its serial number is not the requested one) or `reasons` (why palpate cannot use it).
     static void examine(libusb_device* device, const std::string& serial, std::vector<Candidate>& suitable,
                         std::vector<std::string>& others, std::vector<std::string>& reasons) {
         UsbName name;

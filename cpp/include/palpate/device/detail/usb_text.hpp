@@ -15,7 +15,7 @@
 
 namespace palpate::detail {
 
-/// Returns the meaning of a libusb error code, and the cure.
+/// Returns a text with the cause of a libusb error and the action by which the user can correct it.
 [[nodiscard]] inline std::string usb_reason(int code) {
     static_assert(LIBUSB_ERROR_IO == -1 && LIBUSB_ERROR_ACCESS == -3 && LIBUSB_ERROR_NO_MEM == -11);
     const std::string_view cause = wire::usb_cause(code);
@@ -53,7 +53,7 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
 /// ends. Returns an empty text if the bytes are not valid UTF-16.
 [[nodiscard]] inline std::string text_of_utf16(std::span<const std::uint8_t> bytes) {
     std::string text;
-    std::uint32_t high = 0;  // first half of a surrogate pair
+    std::uint32_t high = 0;  // first half of a character that UTF-16 stores in two units; 0: none
     for (std::size_t k = 0; k + 1 < bytes.size(); k += 2) {
         const std::uint32_t unit = two_bytes(bytes, k);
         const bool is_low = unit >= 0xDC00 && unit < 0xE000;

@@ -98,7 +98,7 @@ class UsbTransfers {
         }
         out_bytes_ = wire::encode(command);
         constexpr unsigned no_timeout =
-            0;  // no timeout in libusb, because the device's watchdog ends the torque of an old command
+            0;  // libusb waits without a time limit: the device's watchdog ends the torque of an old command
         libusb_fill_interrupt_transfer(write_.get(), handle_, wire::out_endpoint, out_bytes_.data(),
                                        static_cast<int>(out_bytes_.size()), &UsbTransfers::write_callback,
                                        this, no_timeout);
@@ -180,7 +180,8 @@ class UsbTransfers {
     static constexpr Nanoseconds longest_stop = 5 * nanoseconds_a_second;
     static constexpr Nanoseconds cancel_interval = nanoseconds_a_second / 10;
     static constexpr unsigned request_timeout_ms = 500;
-    static constexpr int most_errors_in_a_row = 100;  ///< consecutive bus errors that end the connection
+    /// The connection ends after this number of consecutive errors of the USB bus
+    static constexpr int most_errors_in_a_row = 100;
 
     struct FreeTransfer {
         void operator()(libusb_transfer* transfer) const noexcept { libusb_free_transfer(transfer); }
@@ -222,7 +223,7 @@ class UsbTransfers {
         if (reads_halted_) {
             if (reads_in_flight_.load(std::memory_order_acquire) > 0) {
                 for (Read& read : reads_) {
-                    // Error NOT_FOUND: this USB transfer has already ended
+                    // the result is ignored: canceling fails only if this transfer has already ended
                     (void)libusb_cancel_transfer(read.transfer.get());
                 }
                 return;
@@ -309,7 +310,7 @@ class UsbTransfers {
         static_cast<UsbTransfers*>(transfer->user_data)->write_ended(*transfer);
     }
 
-    /// Handles the end of a sent command: counts errors and marks the write as ended.
+    /// Called when libusb has sent a command or failed to send it: counts a failure, and allows the next command.
     void write_ended(const libusb_transfer& transfer) noexcept {
         if (transfer.status != LIBUSB_TRANSFER_COMPLETED) {
             lost_writes_.fetch_add(1, std::memory_order_relaxed);
@@ -318,7 +319,7 @@ class UsbTransfers {
             case LIBUSB_TRANSFER_STALL:
                 stalls_.fetch_add(1, std::memory_order_relaxed);
                 if (!stopping_.load(std::memory_order_acquire)) {
-                    // The command counts as in flight until the halt of the USB endpoint is cleared
+                    // No command can be sent until the halt of the USB endpoint is cleared
                     writes_halted_ = true;
                     return;
                 }
@@ -396,7 +397,7 @@ class UsbTransfers {
 
     void cancel_all() noexcept {
         for (Read& read : reads_) {
-            // Error NOT_FOUND: this USB transfer has already ended
+            // the result is ignored: canceling fails only if this transfer has already ended
             (void)libusb_cancel_transfer(read.transfer.get());
         }
         (void)libusb_cancel_transfer(write_.get());
@@ -423,11 +424,11 @@ class UsbTransfers {
     std::atomic<std::uint64_t> stalls_{0};
     std::atomic<std::uint64_t> bus_errors_{0};
     std::atomic<std::uint64_t> lost_writes_{0};
-    /// True while the endpoint for packets is halted; for the event thread only
+    /// True while the endpoint for packets is halted; only the event thread uses it
     bool reads_halted_ = false;
-    /// True while the endpoint for commands is halted; for the event thread only
+    /// True while the endpoint for commands is halted; only the event thread uses it
     bool writes_halted_ = false;
-    int errors_in_a_row_ = 0;  ///< consecutive errors of the USB bus; for the event thread only
+    int errors_in_a_row_ = 0;  ///< number of USB bus errors in a row; only the event thread uses it
 
     std::thread events_;
 };
