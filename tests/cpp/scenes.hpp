@@ -37,7 +37,8 @@ struct Scene {
     double start = 0.0;
     double steepest = 0.0;  ///< position at which the slope f' of the force is largest [m or rad]
 
-    /// Stored energy at the start minus the least stored energy, and the largest absolute stored energy |V| [J].
+    /// `held`: stored energy at the start minus the least stored energy; `largest`: largest absolute stored energy |V|
+    /// [J].
     double held = 0.0;
     double largest = 0.0;
 };
@@ -92,8 +93,8 @@ inline double energy_at(const ForceModel& model, const Scheme& scheme, double x)
                                          : model.network()->at(x, {}).energy;
 }
 
-/// Returns the device with the damping and friction that the certificate requires, times `factor`; nothing if the
-/// scene cannot be certified.
+/// Returns the device with `factor` times the damping and friction that the certificate requires; nothing if no damping
+/// and friction are sufficient.
 inline std::optional<DeviceProfile> device_at_its_bound(const ForceModel& model, const Scheme& scheme,
                                                         DeviceProfile device, double factor) {
     constexpr double placeholder_damping = 12345.0;

@@ -62,7 +62,8 @@ void check_with_random_hand(test::Random& random, const Scene& scene, Check chec
     }
 }
 
-// At every substep: energy put in by the hand + stored energy S(0) - S_min + m v(0)^2 / 2 at the start >= -rounding
+// At every substep: energy put in by the hand + stored energy S(0) - S_min at the start + kinetic energy m v(0)^2 / 2
+// at the start >= -(rounding error).
 TEST(CertifiedScenes, NeverGiveMoreEnergyThanTheObjectStored) {
     test::Random random{20};
     std::map<std::string, int> tried;
@@ -85,7 +86,7 @@ TEST(CertifiedScenes, NeverGiveMoreEnergyThanTheObjectStored) {
     EXPECT_GE(tried.size(), 21U) << "structures, kinds of model and delays that were met";
 }
 
-// "No growing oscillation follows for passive hands only": kinetic energy never exceeds the energy stored at the start.
+// With a passive hand no oscillation grows: the kinetic energy never exceeds the energy stored at the start.
 TEST(CertifiedScenes, DoNotOscillateWithPassiveHands) {
     test::Random random{21};
     for (int k = 0; k < test::cases(300); ++k) {
@@ -120,7 +121,7 @@ Scene random_scene_of_velocity(test::Random& random) {
         network.alpha[2 * i + 1] = std::exp(test::uniform(random, -1.0, 2.0)) / fastest;
         network.beta[2 * i + 1] = test::uniform(random, -1.0, 1.0) * fastest;
     }
-    network.linear[1] = test::uniform(random, -0.2, 0.2);  // damping of the object, also negative
+    network.linear[1] = test::uniform(random, -0.2, 0.2);  // damping of the object, positive or negative
     const double slowest = random() % 4 == 0 ? test::uniform(random, 0.0, 0.1) : -fastest;
     Scene scene{
         ForceModel::of_velocity(network, {{0.0, slowest}, {1.0, fastest}, {}, {}, std::nullopt}), {}, {}};
@@ -130,7 +131,7 @@ Scene random_scene_of_velocity(test::Random& random) {
 
 /// Returns the energy of the object at rest at position x minus its energy at the lower edge of the domain [J].
 double resting_energy(const VelocityNetwork& force, double x) {
-    constexpr int cells = 200;  // play radius of at most a quarter of the travel
+    constexpr int cells = 200;  // number of cells for the integral of the force over the position
     const double step = (x - force.lower()) / cells;
     double sum = 0.0;
     for (int k = 0; k < cells; ++k) {
@@ -141,9 +142,12 @@ double resting_energy(const VelocityNetwork& force, double x) {
     return sum * step / 6.0;
 }
 
-// Velocity models: b >= T M/2 + t_d L + B_v, f_c >= L_x Delta/2 + B_v Delta/T
+// Models with velocity require the damping b >= T M/2 + t_d L + B_v and the friction f_c >= L_x Delta/2 + B_v Delta/T.
+// Here t_d is the delay, Delta the encoder step, M, L and L_x are largest slopes over position, and B_v is the largest
+// slope over velocity.
 TEST(CertifiedScenes, NeverGiveEnergyWithForcesOfVelocity) {
-    constexpr double quadrature = 1e-6;  // tolerance [J]; the objects store tenths of a joule
+    // Tolerance of the energy [J]; the objects store some tenths of a joule
+    constexpr double quadrature = 1e-6;
     test::Random random{22};
     for (int k = 0; k < test::cases(200); ++k) {
         Scene scene = random_scene_of_velocity(random);

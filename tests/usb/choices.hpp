@@ -54,7 +54,8 @@ namespace emulator {
 
     device.first_sequence = static_cast<std::uint16_t>(below(0x10000));
     device.first_us = static_cast<std::uint32_t>(random());
-    // The first encoder count may be close to integer overflow, as after many revolutions of the handle.
+    // The first encoder count may be close to the largest or smallest 32-bit integer, as after many revolutions of the
+    // handle.
     device.first_count = one_of(0, -7, INT32_MAX - 100, INT32_MIN + 1, static_cast<std::int32_t>(random()));
     device.first_out_sequence = static_cast<std::uint16_t>(below(0x10000));
     device.first_out_age_us = one_of(std::uint16_t{0}, std::uint16_t{0xFFFF});

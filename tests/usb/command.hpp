@@ -85,7 +85,7 @@ class Orders {
 /// and ends when this process ends.
 class Command {
   public:
-    /// Starts the command; `prepare` runs in the child.
+    /// Starts the command in a child process, which first runs `prepare`.
     Command(std::vector<std::string> words, const std::function<void()>& prepare) {
         child() = ::fork();
         if (child() == 0) {

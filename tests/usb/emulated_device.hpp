@@ -20,7 +20,7 @@
 
 namespace emulator {
 
-/// Result of a transaction on the bus.
+/// Answer of the emulated device to one packet on the USB bus: accepted, not ready (Nak), or refused.
 enum class Handshake : std::uint8_t { Ack, Nak, Stall };
 
 /// Emulates the device of protocol version 1: memory and mechanics, one frame for each millisecond. It is independent
@@ -157,7 +157,7 @@ class EmulatedDevice {
     [[nodiscard]] bool withholds_packets() const { return naks_ || mute_; }
     [[nodiscard]] bool is_slow() const { return slow_; }
 
-    // ----------------------------------------------------------------------------- values for the tests
+    // ----------------------------------------------------------------------------- state that the tests read
 
     [[nodiscard]] std::uint64_t frames() const { return frames_; }
     [[nodiscard]] std::uint16_t sequence() const { return sequence_; }
@@ -271,7 +271,8 @@ class EmulatedDevice {
     std::uint64_t frames_ = 0;
     std::uint16_t sequence_ = 0;
     std::uint32_t clock_us_ = 0;
-    bool out_seen_ = false;  ///< an OUT packet has arrived, so the frames of the fault script are counted
+    /// The host has sent an OUT packet, so the frames of the fault script are counted
+    bool out_seen_ = false;
 
     std::deque<Bytes> packets_;  ///< IN packets that the host has not yet read
     Bytes last_sent_;

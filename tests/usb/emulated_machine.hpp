@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Functions for tests of UsbDevice with the emulator: send orders to it, and bring a stream into a known state.
+// Functions for tests of UsbDevice with the emulator: they send orders to the emulator, and exchange packets with a
+// device until its state is known.
 #pragma once
 
 #include <sys/socket.h>
@@ -18,13 +19,13 @@
 
 namespace palpate::test {
 
-/// Sends an order to the emulator and returns its answer.
+/// Sends an order ("fault KIND COUNT", "state", ...) to the emulator and returns the emulator's answer.
 inline std::string send_order(const std::string& order) {
     const int connection = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     sockaddr_un own{};
     own.sun_family = AF_UNIX;
     ::bind(connection, reinterpret_cast<const sockaddr*>(&own),
-           sizeof own.sun_family);  // the kernel chooses a name for the socket
+           sizeof own.sun_family);  // empty address: the kernel chooses a name for the socket
     sockaddr_un emulator{};
     emulator.sun_family = AF_UNIX;
     std::string{std::getenv("PALPATE_EMULATOR")}.copy(emulator.sun_path, sizeof emulator.sun_path - 1);
@@ -36,7 +37,7 @@ inline std::string send_order(const std::string& order) {
     return {answer.data(), static_cast<std::size_t>(length)};
 }
 
-/// Returns one number of the device's state from the emulator.
+/// Returns the number in one field of the state of the emulated device, as the emulator reports it.
 inline double state(const std::string& field) {
     const std::string all = send_order("state");
     const std::string key = "\"" + field + "\": ";
@@ -65,7 +66,7 @@ inline Reading settled(UsbDevice& device, double force = 0.0) {
         return reading.status != Status::Lost && device.in_flight() <= 2 && newest;
     };
     for (int k = 0; k < 1000 && reading.status != Status::Fault && !is_settled(); ++k) {
-        // After this pause, a packet on its way to the host has arrived and is read in the next exchange.
+        // During this pause a packet that the device has sent arrives at the host; the next exchange reads this packet.
         std::this_thread::sleep_for(std::chrono::milliseconds{2});
         if (!is_settled()) {
             reading = device.exchange({force});

@@ -14,17 +14,19 @@
 
 namespace emulator {
 
-/// Options of the command line of both emulators.
+/// Options of the command line of the two emulator programs, umockdev and USB/IP.
 struct Settings {
     std::vector<Identity> devices{Identity{}};
     Plant plant;
     std::vector<Fault> script;
     bool lock_step = false;
     double rate_hz = 1000.0;
-    std::chrono::milliseconds lock_step_timeout{3000};  ///< lock-step: longest wait of a frame for the host
-    std::string trace;          ///< path of the trace, a CSV file with one row for each frame
-    std::string preload_first;  ///< library of a sanitizer, loaded first
-    bool denied = false;        ///< true: opening the device file fails
+    /// Option --lock-step: longest time that a frame waits for a transfer of the host
+    std::chrono::milliseconds lock_step_timeout{3000};
+    /// Path of a CSV file with one row for each USB frame: the state of the emulated device
+    std::string trace;
+    std::string preload_first;  ///< library of a sanitizer, which must be loaded before umockdev
+    bool denied = false;        ///< true: the tested program may not open the device file
     std::vector<std::string> command;
 };
 
@@ -52,7 +54,7 @@ inline constexpr const char* options_text =
     "  --denied               The device cannot be opened.\n"
     "  --preload-first FILE   Library of a sanitizer, which must be loaded before umockdev.\n";
 
-/// Reads the command line. Throws std::invalid_argument if an option is wrong.
+/// Reads the options of the command line. Throws std::invalid_argument if an option is unknown or its value is wrong.
 [[nodiscard]] inline Settings read_settings(int count, char** words) {
     Settings settings;
     Identity common;

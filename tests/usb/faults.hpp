@@ -16,28 +16,30 @@ namespace emulator {
 /// Kind of a fault of the emulated device. The first six have numbers in the USB protocol (request 0x7F, wValue 1 to
 /// 6).
 enum class FaultKind : std::uint8_t {
-    StallIn,          ///< The IN endpoint halts, once for each count.
-    StallOut,         ///< The OUT endpoint halts, once for each count.
-    Short,            ///< IN packets have half the length.
-    Freeze,           ///< Every transfer is refused with NAK; the time of the device continues.
-    Unplug,           ///< The device is unplugged after this many frames.
-    Skip,             ///< Sequence numbers of IN packets are skipped.
-    Repeat,           ///< The last IN packet is sent again.
-    Magic,            ///< The first byte of IN packets is wrong.
-    Version,          ///< The version is 2.
-    Long,             ///< IN packets have 64 bytes.
-    Deaf,             ///< OUT packets are accepted and ignored.
-    Mute,             ///< IN packets are not sent; OUT packets are accepted.
-    OldEcho,          ///< The packet echoes an earlier OUT packet.
-    Encoder,          ///< Status encoder fault, torque off.
-    OverTemperature,  ///< Status over-temperature, torque off.
-    EmergencyStop,    ///< Status emergency stop, torque off until CLEAR.
-    Reset,            ///< The device restarts: disabled, torque off.
-    Saturate,         ///< Half the torque, with the status bit for it.
-    Jump,             ///< The encoder count has an error of a quarter revolution.
-    FrozenEncoder,    ///< The count repeats.
-    Slow,             ///< Frames last three times longer.
-    Busy,             ///< OUT packets are refused with NAK and arrive one frame late; IN packets continue.
+    StallIn,   ///< The IN endpoint halts `count` times.
+    StallOut,  ///< The OUT endpoint halts `count` times.
+    Short,     ///< The device sends IN packets of half the correct length.
+    /// The device refuses every transfer with NAK (not ready), but its clock and its watchdog continue.
+    Freeze,
+    Unplug,           ///< The device is unplugged after `count` frames.
+    Skip,             ///< The device skips sequence numbers of IN packets.
+    Repeat,           ///< The device sends the previous IN packet again.
+    Magic,            ///< The first byte of each IN packet, which identifies the protocol, is wrong.
+    Version,          ///< IN packets state the protocol version 2 instead of 1.
+    Long,             ///< The device sends IN packets of 64 bytes, which is too long.
+    Deaf,             ///< The device acknowledges OUT packets but ignores them.
+    Mute,             ///< The device sends no IN packets, but accepts OUT packets.
+    OldEcho,          ///< The number of the last OUT packet that IN packets report is too low by 3.
+    Encoder,          ///< The device reports an encoder fault in its status and sets the torque to zero.
+    OverTemperature,  ///< The device reports over-temperature in its status and sets the torque to zero.
+    EmergencyStop,    ///< The device reports an emergency stop; the torque is zero until the request CLEAR.
+    Reset,            ///< The device restarts and is then disabled, with zero torque.
+    Saturate,  ///< The motor gives half the torque, and the device sets the saturation bit of its status.
+    Jump,      ///< The encoder count of the device has an error of a quarter revolution.
+    FrozenEncoder,  ///< The device sends the same encoder count again and again.
+    Slow,           ///< Each frame of the device lasts three times longer than normal.
+    /// The device refuses OUT packets with NAK, so they arrive one frame late; IN packets are not late.
+    Busy,
 };
 
 inline constexpr std::array<std::string_view, 22> fault_names{
@@ -47,7 +49,7 @@ inline constexpr std::array<std::string_view, 22> fault_names{
     "emergency-stop", "reset",     "saturate", "jump",    "frozen-encoder",
     "slow",           "busy"};
 
-/// Fault with its duration (in packets or frames) and its first frame.
+/// A fault with its duration `count` (in packets or frames) and the number `frame` of the frame in which it begins.
 struct Fault {
     FaultKind kind = FaultKind::StallIn;
     std::uint32_t count = 1;
@@ -84,7 +86,8 @@ class Faults {
 
     void inject(FaultKind kind, std::uint32_t count) { remaining(kind) = std::max(count, 1U); }
 
-    /// Begins a USB frame; the frame number of the fault script increases if `counts`.
+    /// Begins a USB frame. If `counts` is true, the frame number increases and the faults of the script with this
+    /// number begin.
     void frame(bool counts) {
         started_ += counts ? 1 : 0;
         for (const Fault& fault : script_) {
@@ -93,7 +96,7 @@ class Faults {
             }
         }
     }
-    /// Returns the number of frames that the fault script has counted.
+    /// Returns the number of frames since the count for the fault script began.
     [[nodiscard]] std::uint64_t started() const { return started_; }
 
     /// Returns true if a fault is active, and reduces the remaining count of this fault by one.

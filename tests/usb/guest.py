@@ -30,7 +30,7 @@ NEEDED = {
     "ldd": "libc-bin",
 }
 LONGEST_RUN_S = 1800
-"""Longest allowed run of the guest Linux in QEMU [s]"""
+"""Longest time that the guest Linux may run in QEMU [s]"""
 UNPRIVILEGED = "nobody"
 """User without rights"""
 
@@ -83,7 +83,7 @@ def install_module(driver: Path, folder: Path) -> None:
 
 @dataclass
 class GuestOutput:
-    """Console text and files of one run of the guest Linux in QEMU."""
+    """Console text and returned files of one run of the guest Linux in QEMU."""
 
     console: str
     files: dict[str, str]
@@ -167,5 +167,5 @@ def run(script: str, programs: dict[str, Path], files: dict[str, Path]) -> Guest
                 if content is not None:
                     returned[member.name.removeprefix("./")] = content.read().decode(errors="replace")
     except tarfile.TarError:
-        pass  # the guest ended too early; its console shows the reason
+        pass  # the guest Linux ended too early; the text of its console shows the reason
     return GuestOutput(process.stdout, returned)

@@ -10,7 +10,8 @@
 
 namespace emulator {
 
-/// Properties of an emulated device, and its choices for everything that the protocol leaves open.
+/// Properties of an emulated device, and its behaviour in all cases for which the USB protocol allows several
+/// behaviours.
 struct Identity {
     // GET_INFO
     std::uint8_t magic = 'I';  ///< First byte of the answer to GET_INFO; 'I' for devices of this project.
@@ -22,7 +23,8 @@ struct Identity {
     std::uint32_t capabilities = 3;  ///< Bit 0: the device measures force, bit 1: it measures velocity.
     std::uint64_t uid = 0x5041'4C50'0001ULL;
     std::size_t info_size = 32;  ///< Bytes of the answer to GET_INFO; another value means another protocol.
-    bool reports_current_watchdog = true;  ///< False: GET_INFO reports the initial watchdog time.
+    /// False: GET_INFO reports the watchdog time at power-up, also after a change.
+    bool reports_current_watchdog = true;
 
     // Descriptors
     std::u16string manufacturer = u"palpate";
@@ -37,30 +39,35 @@ struct Identity {
     std::uint8_t power = 250;          ///< largest current from the USB bus [2 mA]
     bool out_endpoint_first = false;
     bool has_second_interface = false;
-    Bytes class_descriptor;  ///< descriptor between those of interface and endpoints
+    /// Descriptor that the device sends between the interface descriptor and the endpoint descriptors
+    Bytes class_descriptor;
 
-    // The counters begin close to their largest values, so that they overflow to zero in every run.
+    // Sequence number and clock begin close to their largest values, so that they overflow to zero in every run.
     std::uint16_t first_sequence = 65'500;
     std::uint32_t first_us = 4'294'867'296U;
     std::int32_t first_count = 0;
-    std::uint16_t first_out_sequence = 0;  ///< OUT sequence number in IN packets before the first OUT packet.
-    std::uint16_t first_out_age_us = 0xFFFF;  ///< OUT age in IN packets before the first OUT packet.
+    /// Number of the last OUT packet that IN packets report before the first OUT packet.
+    std::uint16_t first_out_sequence = 0;
+    /// Age of the last OUT packet that IN packets report before the first one [us].
+    std::uint16_t first_out_age_us = 0xFFFF;
 
-    // Choices of the firmware
+    // Behaviour that the protocol leaves to the firmware
     bool reversed = false;  ///< The torque has the wrong sign.
-    /// The torque of an OUT packet acts before the encoder count of its frame is stored.
+    /// True: the torque of an OUT packet acts before the device reads the encoder count of the same frame.
     bool applies_out_first = false;
-    /// The device completes the IN transfer of a frame before the OUT transfer.
+    /// True: in each frame the device completes the IN transfer before the OUT transfer.
     bool ends_in_transfer_first = false;
-    /// Number of IN packets that wait until the host reads them. With 0 the newest packet replaces an unread one.
+    /// Number of IN packets that the device stores until the host reads them. With 0 a new packet replaces the packet
+    /// that the host has not read.
     std::size_t held_packets = 0;
-    /// False: OUT packets are accepted only while the device is enabled.
+    /// False: the device accepts OUT packets only while it is enabled.
     bool accepts_while_disabled = true;
-    bool refuses_by_stall = true;    ///< False: ENABLE after an emergency stop is accepted without effect.
+    /// False: after an emergency stop the request ENABLE is accepted without effect.
+    bool refuses_by_stall = true;
     bool stop_disables = true;       ///< An emergency stop also clears the enabled bit of the status.
-    std::uint16_t spare_status = 0;  ///< Status bits without a meaning in the protocol.
+    std::uint16_t spare_status = 0;  ///< Bits of the status that the protocol does not define.
     std::uint16_t temperature_dC = 253;
-    std::int32_t torque_step_uNm = 1;  ///< Smallest change of the torque that the current control makes.
+    std::int32_t torque_step_uNm = 1;  ///< Smallest change of the motor torque that the device can make.
     std::uint32_t latch_jitter_us = 0;
 
     [[nodiscard]] Bytes device_descriptor() const {
@@ -80,7 +87,7 @@ struct Identity {
             rest.insert(rest.end(), part.begin(), part.end());
         }
         if (has_second_interface) {
-            // Interface for another purpose, firmware update.
+            // A second USB interface of the device, for updates of its firmware.
             const Bytes second{9, 4, 1, 0, 0, 0xFE, 0x01, 0x01, 0};
             rest.insert(rest.end(), second.begin(), second.end());
         }

@@ -11,7 +11,7 @@
 
 namespace emulator {
 
-/// Bits of an IN packet's status.
+/// Bits of the status in an IN packet (device to host).
 inline constexpr std::uint16_t enabled_bit = 1;
 inline constexpr std::uint16_t watchdog_bit = 2;
 inline constexpr std::uint16_t saturated_bit = 4;
@@ -20,7 +20,8 @@ inline constexpr std::uint16_t encoder_fault = 16;
 inline constexpr std::uint16_t over_temperature = 32;
 inline constexpr std::uint16_t emergency_stop = 64;
 
-/// Motor of a device, with every event that sets the torque to zero. Times are those of the device's clock.
+/// Motor of an emulated device, with every event that sets the torque to zero. All times are read from the device's
+/// clock.
 class Motor {
   public:
     explicit Motor(Identity identity)
@@ -71,7 +72,7 @@ class Motor {
         torque_uNm_ = 0;
         enabled_ = enabled_ && !(bit == emergency_stop && identity_.stop_disables);
     }
-    /// Halves the torque and sets the status bit for saturation.
+    /// If `now` is true, the motor gives half the commanded torque and the status contains the saturation bit.
     void saturate(bool now) { saturates_ = now; }
 
     void take(const Bytes& packet, std::uint32_t clock_us) {
@@ -141,7 +142,7 @@ class Motor {
     std::int32_t torque_uNm_ = 0;
     std::uint16_t out_sequence_ = 0;
     std::uint32_t command_us_ = 0;
-    bool has_command_ = false;  ///< a command has arrived since the start of the device
+    bool has_command_ = false;  ///< the device has received a command since its start
     std::uint64_t outs_ = 0;
     std::uint64_t bad_outs_ = 0;
 };

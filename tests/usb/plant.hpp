@@ -28,7 +28,7 @@ struct Plant {
     double velocity = 0.0;  ///< [rad/s]
     double time = 0.0;      ///< [s]
 
-    /// Advances by `seconds` with a constant motor torque [N*m].
+    /// Moves the handle for the time `seconds` under a constant motor torque [N*m].
     void advance(double torque, double seconds) {
         constexpr int substeps = 20;
         const double step = seconds / substeps;
@@ -38,7 +38,7 @@ struct Plant {
             const double hand =
                 hand_stiffness > 0.0 ? hand_stiffness * (target - position) - hand_damping * velocity : 0.0;
             velocity += step / inertia * (torque + object_torque() + hand - damping * velocity);
-            // Coulomb friction stops the handle but does not reverse it.
+            // Coulomb friction reduces the speed of the handle to zero but does not reverse the motion.
             velocity = std::copysign(std::max(0.0, std::abs(velocity) - step / inertia * friction), velocity);
             position += step * velocity;
             time += step;

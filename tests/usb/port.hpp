@@ -12,17 +12,18 @@
 
 namespace emulator {
 
-/// Transfer that the host has submitted, with the terms of the Linux kernel.
+/// USB transfer that the host has submitted; the names are those of the Linux kernel.
 struct Transfer {
-    std::uint64_t id = 0;  ///< identifier that the transport uses
+    /// Number with which the transport (umockdev or USB/IP) identifies the transfer
+    std::uint64_t id = 0;
     const void* owner = nullptr;
     bool is_control = false;
     std::uint8_t endpoint = 0;
     Bytes setup;
-    Bytes data;              ///< outgoing or received data
-    std::size_t length = 0;  ///< largest size of received data
+    Bytes data;              ///< data that the host sends or has received
+    std::size_t length = 0;  ///< largest number of bytes that the host accepts
     std::size_t actual = 0;  ///< transferred bytes
-    int status = 0;          ///< result of the transfer: 0 or a negative errno
+    int status = 0;          ///< result of the transfer: 0 or a negative error number of Linux (errno)
 };
 
 /// USB port of the emulated device: transfers wait here until a frame executes them. The port is independent of the
@@ -34,7 +35,8 @@ class Port {
     [[nodiscard]] EmulatedDevice& device() { return device_; }
     [[nodiscard]] const EmulatedDevice& device() const { return device_; }
 
-    /// Submits a transfer; returns 0 or a negative errno. Control transfers complete immediately.
+    /// Submits a transfer; returns 0 or a negative error number of Linux (errno). Control transfers complete
+    /// immediately.
     int submit(Transfer transfer) {
         if (device_.is_unplugged()) {
             return -ENODEV;
@@ -75,7 +77,7 @@ class Port {
         return false;
     }
 
-    /// Prepares for the next host after the device was closed.
+    /// Forgets how the last host made its transfers, because this host has closed the device.
     void reset_host() {
         reads_ahead_ = false;
         host_must_answer_ = true;
@@ -91,11 +93,11 @@ class Port {
     void clear_halt(std::uint8_t endpoint) {
         device_.clear_halt(endpoint);
         (endpoint == 0x81 ? in_held_ : out_held_) = false;
-        // The OUT packet with which the host answered was lost, even if the host does not know this.
+        // The OUT packet that the host sent after the last IN packet was lost, even if the host does not know this.
         host_must_answer_ = host_must_answer_ && endpoint == 0x81;
     }
 
-    /// Runs one frame of the bus.
+    /// Executes the transfers of one USB frame.
     void frame() {
         if (device_.is_unplugged()) {
             return;
@@ -184,11 +186,13 @@ class Port {
     std::deque<Transfer> in_;
     std::deque<Transfer> out_;
     std::deque<Transfer> done_;
-    bool in_held_ = false;  ///< a halted endpoint serves no transfer until it is cleared
+    /// True: the IN endpoint has halted and serves no transfer until the host clears the halt
+    bool in_held_ = false;
     bool out_held_ = false;
     bool out_refused_ = false;
     bool reads_ahead_ = false;
-    bool host_must_answer_ = true;  ///< the host has received a packet and has not sent one since
+    /// The host has received an IN packet and has not sent an OUT packet since
+    bool host_must_answer_ = true;
 };
 
 /// Decides when a frame begins.
@@ -239,15 +243,15 @@ class FrameClock {
     }
 
   private:
-    /// Time in which earlier packets arrive before lock-step begins; without it the host stays one packet behind the
-    /// device.
+    /// Pause before the first frame in lock-step, in which the host receives earlier packets; without this pause the
+    /// host would always stay one packet behind the device.
     static constexpr std::chrono::milliseconds settling{20};
 
     bool lock_step_;
     Clock::duration period_;
     Clock::duration lock_step_timeout_;
     Clock::time_point last_ = Clock::now();
-    Clock::time_point first_ = last_;  ///< time of the first frame in lock-step
+    Clock::time_point first_ = last_;  ///< time at which the first frame in lock-step begins
     bool host_is_connected_ = false;
 };
 

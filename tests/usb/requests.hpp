@@ -9,9 +9,9 @@
 
 namespace emulator {
 
-/// Answer of a device to a control transfer.
+/// Answer of the emulated device to a control transfer.
 struct Answer {
-    int status = 0;  ///< 0, or -EPIPE for a stall
+    int status = 0;  ///< 0 if the request succeeded, or -EPIPE if the device refuses the request (stall)
     Bytes data;
 };
 
@@ -19,7 +19,7 @@ struct Answer {
     return {-EPIPE, {}};
 }
 
-/// First eight bytes of a control transfer.
+/// First eight bytes of a control transfer, which state the request.
 struct Setup {
     std::uint8_t type;
     std::uint8_t request;

@@ -56,4 +56,5 @@ if __name__ == "__main__":
     if isinstance(found, str):
         print(f"skipped: {found}", file=sys.stderr)
         sys.exit(MISSING_PACKAGE_EXIT)
-    os.execv(found, [str(found), *sys.argv[1:]])  # the emulator receives the signals and forwards them
+    # This process becomes the emulator, which forwards signals to the command
+    os.execv(found, [str(found), *sys.argv[1:]])

@@ -24,7 +24,7 @@ STREAM_IN = 0x81
 
 
 def order(words: str) -> str:
-    """Sends an order to the emulated device without the USB libraries and returns the answer."""
+    """Sends an order to the emulator through a socket, not over USB, and returns the answer."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as orders:
         orders.bind("")
         orders.sendto(words.encode(), os.environ["PALPATE_EMULATOR"])
@@ -92,7 +92,7 @@ def main() -> dict[str, Any]:
         reported["enabled after it was cleared"] = state()["enabled"]
         device.disable()
 
-    # The endpoint of the stream halts; it reports the halt until it is cleared.
+    # The endpoint of the packet stream halts, and each read reports the halt until the host clears it.
     order("fault stall-in 1")
     handle = raw()
     stalls = []

@@ -38,7 +38,8 @@ SLOW_TICK = 2000
 DIRECT = "--uncertified --structure direct"
 NO_RATE_LIMIT = "--uncertified --lowest-rate-share 0"
 
-# Properties of the emulated device in GET_INFO and the echoes; mechanics and hand have the default values.
+# Properties that the emulated device reports over USB or that follow from its packets; for mechanics and hand
+# the default values apply.
 STATED_PROPERTIES: dict[str, Any] = {"id": "EMU-1", "delay_s": 1.25e-3, "force_step": 1e-6}
 DEVICE = DeviceProfile(**STATED_PROPERTIES)
 # A certificate needs friction. The emulated device is frictionless, but these tests only check the refusals.
@@ -61,7 +62,7 @@ done
 
 @dataclass
 class GuestRuns:
-    """Results of the runs in the guest."""
+    """Files, console text and plan of the runs of palpate in the guest Linux."""
 
     output: guest.GuestOutput
     plan: Plan
@@ -157,7 +158,8 @@ def test_force_error_is_at_most_twice_that_of_the_simulated_device(
     sweeps = round(SWEEP_S / DEVICE.period_s) * int((DURATION_S - 1.0) / SWEEP_S)
     trace = runs.table("whole.trace")
     trace = trace[(trace["status"] & 1).eq(1) & trace["started"].gt(0)][-sweeps - 1 - 10 : -10]
-    # A torque is in the row of the frame in which it arrived, and acts in the next frame.
+    # Each row of the trace holds the torque that arrived in its USB frame; this torque acts in the next
+    # frame.
     emulated = force_error(runs.plan, -trace["torque_Nm"].to_numpy()[:-1], trace["position_rad"].to_numpy())
     rendering = simulate(runs.plan, DEVICE, Hand(), DURATION_S)
     ends = rendering.columns["handle_end_rad"]
@@ -167,12 +169,12 @@ def test_force_error_is_at_most_twice_that_of_the_simulated_device(
             f"\nguest: force error {1e3 * emulated:.3f} mN*m RMS, simulated device {1e3 * simulated:.3f}, "
             f"ratio {emulated / simulated:.3f}; largest torque {trace['torque_Nm'].abs().max():.2f} N*m"
         )
-    assert trace["position_rad"].max() > 0.4  # the handle reached the wall
+    assert trace["position_rad"].max() > 0.4  # the handle has reached the wall of the model
     assert emulated <= 2.0 * simulated
 
 
 def force_error(plan: Plan, force: np.ndarray, ends: np.ndarray) -> float:
-    """Returns the RMS of applied force minus model force at tick ends; `ends` starts one tick earlier."""
+    """Returns the RMS of applied force minus model force; `ends`: handle positions, one more than forces."""
     return float(np.sqrt(np.mean(np.square(force - force_at(plan, ends)[1:]))))
 
 

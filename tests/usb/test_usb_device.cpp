@@ -84,9 +84,10 @@ TEST(UsbDevice, StreamsEverySampleOnceAndInOrder) {
     EXPECT_EQ(health.stalls, 0U);
     EXPECT_EQ(health.bus_errors, 0U);
     EXPECT_GE(health.stream.round_trip.count(), static_cast<std::uint64_t>(samples));
-    // A slow computer sometimes misses a frame, so that a command arrives late or is skipped.
+    // A slow computer sometimes misses a USB frame, so that a command arrives late or the host skips a command.
     EXPECT_LE(health.skipped_commands - before.skipped_commands, static_cast<std::uint64_t>(samples / 2));
-    // The median delay is one sample; the tolerance is the resolution of the histogram.
+    // The median delay from a sample to the effect of its command is one sample; the tolerance is the resolution of the
+    // histogram.
     EXPECT_NEAR(health.stream.delay.quantile(0.5), 1e6, 1e6 / 256);
 }
 

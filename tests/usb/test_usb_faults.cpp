@@ -75,7 +75,7 @@ TEST(UsbDevice, ReportsATimeoutWhileTheDeviceDoesNotAnswer) {
     EXPECT_EQ(status, Status::Ok);
 }
 
-// A certified run ends with the first late command, so a late command must not delay the next ones.
+// After a late command the next commands must arrive in time, because each late command ends a certified run.
 TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
     constexpr int rounds = 20;
     constexpr int commands = 40;
@@ -86,7 +86,7 @@ TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
     ASSERT_EQ(device.open().reason, "");
     int late = 0;
     int in_time_again = 0;
-    // The first round includes the first command of the stream.
+    // The first round of this loop sends the first command after the device was opened.
     for (int round = 0; round < rounds; ++round) {
         send_order("fault busy 1");
         int in_a_row = 0;
@@ -98,7 +98,8 @@ TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
         in_time_again += in_a_row >= commands / 2 ? 1 : 0;
     }
     EXPECT_GE(late, rounds);
-    EXPECT_GE(in_time_again, rounds / 2);  // on a fast computer, ticks are in time again in every round
+    // At least half of the rounds; on a fast computer the commands arrive in time again in every round
+    EXPECT_GE(in_time_again, rounds / 2);
 }
 
 TEST(UsbDevice, CountsSkippedSamplesInTheSequence) {
@@ -130,7 +131,8 @@ TEST(UsbDevice, WatchdogEndsTheTorqueUntilTheNextCommand) {
     ASSERT_TRUE(device.open());
     settled(device, 0.2);
     EXPECT_EQ(state("torque_uNm"), -200'000.0);
-    send_order("fault freeze 15");  // the fault lasts longer than the device applies a command
+    // The device answers no transfer for 15 frames, which is longer than it applies a command
+    send_order("fault freeze 15");
     const Reading tripped = device.exchange({0.2});
     EXPECT_EQ(tripped.status, Status::Timeout);
     EXPECT_EQ(tripped.applied, 0.0);
@@ -187,7 +189,7 @@ TEST(UsbDevice, ReportsAFaultAfterUnpluggingAndOpensAgainAfterPluggingIn) {
         device.close();
         EXPECT_EQ(device.in_flight(), 0);
         EXPECT_EQ(open_files(), files);
-        // The operating system may not have removed the device yet.
+        // The operating system may still list the device that was unplugged.
         const std::string reason = device.open().reason;
         EXPECT_TRUE(reason.find("is connected") != std::string::npos ||
                     reason.find("was unplugged") != std::string::npos)

@@ -71,7 +71,8 @@ TEST(UsbPlainDevice, MeasuredForceIsNanAndVelocityIsThePositionDifference) {
     }
 }
 
-// Each run has another device, with random choices of the firmware.
+// Each run of the tests below emulates a different device, whose firmware behaves randomly where the protocol allows
+// it.
 
 TEST(UsbOtherFirmware, BehavesLikeTheUsualDevice) {
     UsbDevice device = patient();
@@ -87,12 +88,13 @@ TEST(UsbOtherFirmware, BehavesLikeTheUsualDevice) {
         last = reading;
     }
     const double step = wire::position_of(1, device.info().counts_per_rev);
-    // The position that the host has read is one or two samples old.
+    // The handle position that the host has read is one or two samples older than the position in the emulator.
     EXPECT_NEAR(last.position - state("position_rad"), began, 4.0 * step + 2e-3);
     EXPECT_EQ(device.health().stream.lost, before.stream.lost);
     EXPECT_EQ(device.health().stream.late_echoes, 0U);
     EXPECT_EQ(device.health().stream.watchdog_trips, 0U);
-    // The last of 200 commands may still wait in the device; the median delay is at most two samples.
+    // The last of 200 commands may still wait in the device. The median delay from a sample to the effect of its
+    // command is at most two samples.
     EXPECT_GE(device.health().stream.delay.count(), 195U);
     EXPECT_LE(device.health().stream.delay.quantile(0.5), 2.1e6);
     EXPECT_NEAR(settled(device, 0.25).applied, 0.25, 1e-3);
@@ -118,7 +120,7 @@ TEST(UsbOtherFirmware, StateOfAnEarlierProgramIsNotAFault) {
     settled(rendering, 0.2);
     send_order("fault emergency-stop 1");
     Status status = Status::Ok;
-    // One or two packets from before the fault may wait in the device.
+    // The device may still hold one or two packets that it made before the emergency stop.
     for (int k = 0; k < 3 && status == Status::Ok; ++k) {
         status = rendering.exchange({0.2}).status;
     }
@@ -132,7 +134,7 @@ TEST(UsbOtherFirmware, StateOfAnEarlierProgramIsNotAFault) {
     ASSERT_EQ(connection.open("").reason, "");
     ASSERT_EQ(connection.request(wire::Request::Clear, 0), 0);
     ASSERT_EQ(connection.request(wire::Request::Enable, 1),
-              0);  // the device stays enabled, like after a killed program
+              0);  // the device stays enabled, as after a program that was killed
     connection.close();
     UsbOptions options;
     options.makes_force = false;

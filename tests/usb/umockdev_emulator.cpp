@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a command on a simulated USB port with the emulated device (library umockdev):
+// Emulates a USB device with the library umockdev and runs a command that uses this device.
 #include <sys/prctl.h>
 #include <unistd.h>
 
@@ -57,7 +57,7 @@ class Emulation {
         changed_.notify_all();
         frames.join();
         if (trace_.is_open() && !places_.empty()) {
-            // State of the device after the end of the command.
+            // The last row of the trace is the state of the emulated device after the command has ended.
             trace_ << places_.back()->node->port().device().trace_row();
         }
         return code;
@@ -101,7 +101,7 @@ class Emulation {
         fs::permissions(node, fs::perms::none);
     }
 
-    /// Sets the preloaded libraries and the user of the command, in the child process.
+    /// Sets the preloaded libraries and the user for the command; called in the child process that runs the command.
     void prepare() {
         const std::string first = settings_.preload_first;
         ::setenv("LD_PRELOAD", (first + (first.empty() ? "" : ":") + preload).c_str(), 1);
@@ -113,7 +113,7 @@ class Emulation {
         }
     }
 
-    /// Runs every frame whose time has come and returns the time of the next frame. The caller holds the mutex.
+    /// Executes every USB frame that is due and returns the time of the next frame. The caller must hold the mutex.
     FrameClock::Clock::time_point begin_frames() {
         auto next = FrameClock::Clock::now() + std::chrono::milliseconds{50};
         for (const std::unique_ptr<Place>& place : places_) {

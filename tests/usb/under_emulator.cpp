@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The test program starts itself again with the emulator, once for each combination of emulated devices.
+// The test program starts itself again under the emulator, once for each set of emulated devices.
 #include <sys/wait.h>
 #include <unistd.h>
 

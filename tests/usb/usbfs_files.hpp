@@ -45,7 +45,7 @@ class UsbfsFiles {
     /// Returns the real path of the file that represents the USB device.
     [[nodiscard]] const std::string& node_file() const { return node_file_; }
 
-    /// Makes the device file writable if a completed transfer can be collected.
+    /// Makes the device file writable if `ready` is true: a completed transfer then waits for the host.
     void show(bool ready) {
         if (ready == shown_ready_) {
             return;
@@ -77,7 +77,8 @@ class UsbfsFiles {
         return text;
     }
 
-    /// Replaces characters outside printable ASCII by '?', because the library does not read names from /sys.
+    /// Replaces each character outside printable ASCII by '?', which is sufficient because the library does not read
+    /// the device's names from /sys.
     static std::string ascii(const std::u16string& text) {
         std::string letters;
         for (const char16_t unit : text) {

@@ -41,7 +41,7 @@ class UsbfsNode {
     UsbfsNode(const UsbfsNode&) = delete;
     UsbfsNode& operator=(const UsbfsNode&) = delete;
 
-    // The caller of these functions holds the mutex.
+    // The caller of `port` to `frame` must hold the mutex.
     [[nodiscard]] Port& port() { return port_; }
     [[nodiscard]] FrameClock& clock() { return *clock_; }
     void set_clock(FrameClock& clock) { clock_ = &clock; }
@@ -60,7 +60,7 @@ class UsbfsNode {
         }
     }
 
-    /// Must be called without the mutex, because the testbed may be in an ioctl that waits for the mutex.
+    /// The caller must not hold the mutex, because the umockdev testbed may execute an ioctl that waits for the mutex.
     void announce_removal() { files_->announce_removal(); }
     void announce_arrival() { files_->announce_arrival(); }
 
@@ -92,7 +92,7 @@ class UsbfsNode {
         if (claimed_by_ == client) {
             reset_host();
         }
-        // The memory of these transfers was freed when the client process ended.
+        // The memory of the transfers of this client was freed when the client process ended.
         std::erase_if(urbs_, [&](const auto& urb) { return urb.first.first == client; });
         show_readiness();
     }
@@ -279,7 +279,7 @@ class UsbfsNode {
     std::unique_ptr<UsbfsFiles> files_;
     std::mutex& mutex_;
     std::function<void()> woken_;
-    std::map<UMockdevIoctlClient*, bool> clients_;  ///< true while the client process exists
+    std::map<UMockdevIoctlClient*, bool> clients_;  ///< the value is true while the client process runs
     const UMockdevIoctlClient* claimed_by_ = nullptr;
     std::map<std::pair<const UMockdevIoctlClient*, std::uint64_t>, UMockdevIoctlData*>
         urbs_;  ///< by client, address

@@ -44,7 +44,7 @@ class UsbIp {
         wire_ = ends[0];
         std::ofstream attach{std::string(controller) + "attach"};
         attach << "0 " << ends[1] << " " << device_id << " 2"
-               << std::flush;  // port number, socket, device number, 2 for full speed
+               << std::flush;  // port number, socket, device number, and 2 for a device at full speed
         ::close(ends[1]);
         if (!attach) {
             throw std::runtime_error("vhci_hcd refuses the device; check that its module is loaded");
@@ -74,7 +74,8 @@ class UsbIp {
         };
         const std::uint32_t number = word(4);
         if (word(0) == unlink_command) {
-            // The status zero means that the transfer had completed and its answer is already sent.
+            // The status zero in the answer means that the transfer had completed and that its own answer was already
+            // sent.
             const bool waited = port_.cancel(word(20), this, 0);
             if (waited) {
                 port_.done().pop_back();
@@ -221,7 +222,7 @@ int run(Settings settings) {
     over = true;
     bus.join();
     if (trace.is_open()) {
-        trace << port.device().trace_row();  // state of the device after the end of the command
+        trace << port.device().trace_row();  // state of the emulated device after the command has ended
     }
     return code;
 }

@@ -202,7 +202,8 @@ TEST(PacketStream, CountsLostRepeatedAndMalformedPackets) {
     EXPECT_EQ(stream.health().packets, 7U);
     EXPECT_EQ(stream.health().repeated, 2U);
     EXPECT_EQ(stream.health().malformed, 1U);
-    // Lost packets after number 2, after the repeated packet, and after number 6.
+    // Two packets are lost between the numbers 2 and 5, one between the repeated packet 4 and 6, and three between 6
+    // and 10.
     EXPECT_EQ(stream.health().lost, 2U + 1U + 3U);
 }
 
@@ -269,7 +270,8 @@ TEST(PacketStream, StatusIsThatOfTheMostSeriousBit) {
     EXPECT_EQ(status(1 | 16), Status::Fault);
     EXPECT_EQ(status(1 | 32), Status::Fault);
     EXPECT_EQ(status(1 | 64), Status::Fault);
-    EXPECT_EQ(status(0), Status::Fault);  // the enabled bit was set before and is now zero
+    // The previous packet had the enabled bit of the status, this packet has not
+    EXPECT_EQ(status(0), Status::Fault);
 }
 
 TEST(PacketStream, IgnoresAWatchdogTripOfAnEarlierSession) {

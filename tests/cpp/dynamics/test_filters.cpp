@@ -23,7 +23,7 @@ double degrees(std::complex<double> value) {
     return std::arg(value) * 180.0 / std::numbers::pi;
 }
 
-// Required: "poles 0.836 and 0.819 (179 and 199 rad/s)"
+// The differentiators G of the paper have the poles 0.836 and 0.819 (179 and 199 rad/s).
 TEST(Filters, DifferentiatorsHaveThePolesOfThePaper) {
     const auto poles = environment_filters(FilterPair::Implicit).g1.poles();
     EXPECT_NEAR(poles[0].real(), 0.836, 5e-4);
@@ -32,8 +32,8 @@ TEST(Filters, DifferentiatorsHaveThePolesOfThePaper) {
     EXPECT_NEAR(-std::log(poles[1].real()) / paper_sample_time, 199.0, 1.0);
 }
 
-// Required: "the paper's 31 makes the explicit G1 I1 4.8 % too large at low frequency (1.048; 29.58 is
-// exact); 14.8379 gives 1.0032"
+// With the explicit gain 31 of the paper the product of differentiator G1 and integrator I1 at low frequency is 1.048
+// (with the gain 29.58 it is 1); with the implicit gain 14.8379 it is 1.0032.
 TEST(Filters, LowFrequencyGainOfThePaperIsSlightlyAboveOne) {
     constexpr double low = 1e-3;
     EXPECT_NEAR(std::abs(product(FilterPair::Explicit, FilterDesign::Paper, low)), 1.048, 5e-4);
@@ -48,8 +48,8 @@ TEST(Filters, MatchedGainIsExactAtLowFrequency) {
     EXPECT_NEAR(std::abs(product(FilterPair::Implicit, FilterDesign::Matched, low)), 1.0, 1e-9);
 }
 
-// Required: "at 100 rad/s |G I| is 0.78 with -53 degrees (implicit pair), 0.82 with -62 degrees
-// (explicit)"
+// At 100 rad/s the product of differentiator G and integrator I has the size 0.78 and the phase -53 degrees (implicit
+// pair of the paper), or 0.82 and -62 degrees (explicit pair).
 TEST(Filters, PaperGainIsLowAtHundredRadiansPerSecond) {
     const auto implicit = product(FilterPair::Implicit, FilterDesign::Paper, 100.0);
     EXPECT_NEAR(std::abs(implicit), 0.78, 5e-3);

@@ -90,7 +90,8 @@ namespace palpate::energy_search {
     return lines;
 }
 
-/// Returns scene number `index` for an inequality of the certificate. The same number gives the same scene.
+/// Returns the random scene with the number `index` for an inequality of the certificate. The same `index` gives the
+/// same scene.
 [[nodiscard]] inline Trial scene_of(const Line& line, std::size_t index) {
     test::Random random{1000003 * (index + 1) + static_cast<std::size_t>(100.0 * line.delay)};
     for (;;) {

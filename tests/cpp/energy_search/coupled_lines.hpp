@@ -48,7 +48,8 @@ template <class Force>
     return least;
 }
 
-/// A virtual object behind a virtual coupling, with its scheme and the profile of the device.
+/// A virtual object behind a virtual coupling, with its scheme, the device profile, and the positions at which motions
+/// are tried.
 struct CoupledScene {
     Scheme scheme;
     DeviceProfile device;
@@ -186,7 +187,7 @@ template <class Structure>
         });
     };
     const auto placed = [&](double low, double high, double step, double slope, const auto& force) {
-        // Without mass the force limit of the device also limits the force of the object.
+        // For an object without mass, the force limit of the device also limits the force of the object.
         const double limit = has_mass(kind) ? 1e300 : scene.device.force_limit;
         const Least least = least_energy(low - 5.0 * (high - low), high + 5.0 * (high - low),
                                          [&](double x) { return std::clamp(force(x), -limit, limit); });

@@ -37,7 +37,7 @@ class Pieces {
     [[nodiscard]] std::size_t cells() const noexcept { return force_.size() - 1; }
     [[nodiscard]] const std::vector<double>& points() const noexcept { return force_; }
 
-    /// Returns force, slope and energy of the straight pieces.
+    /// Returns force, slope and energy of a force that consists of straight pieces, at the position x.
     [[nodiscard]] Curve at(double x) const noexcept {
         double u = (x - from_) / step_;
         const auto last = static_cast<double>(cells());
@@ -90,7 +90,7 @@ struct PieceObject {
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
 
-/// Returns the exact bounds of force and slope of straight pieces.
+/// Returns the exact bounds of force and slope of a force that consists of straight pieces.
 [[nodiscard]] inline ForceBounds bounds_of(const Pieces& pieces) {
     ForceBounds bounds;
     bounds.slope = pieces.slopes();
@@ -124,7 +124,7 @@ struct PieceObject {
     return bounds;
 }
 
-/// Steepest rising and falling slope of a random force.
+/// Steepest rising slope M and steepest falling slope s that a random force may have.
 struct Slopes {
     double M = 1.0;
     double s = 0.0;
@@ -149,7 +149,8 @@ enum class Shapes { Any, Steep };
     }
 }
 
-/// Returns forces at `count` points: runs of the extreme slopes, mixed slopes, a wall, or a spring.
+/// Returns a random force at `count` positions. Its shape is one of four: long parts with the steepest slopes, random
+/// slopes, a wall, or a spring.
 [[nodiscard]] inline std::vector<double> random_forces(test::Random& random, int count, double step,
                                                        Slopes slopes, Shapes shapes = Shapes::Any) {
     std::vector<double> force{0.0};

@@ -45,7 +45,8 @@ template <class MeanOf>
     return shifted(0.5 * (low + high));
 }
 
-/// Returns the grid positions of one revolution of a wheel: many for slow rotation, few for jumps.
+/// Returns the number of grid positions in one revolution of a wheel: many if the wheel rotates slowly, few if it may
+/// jump.
 [[nodiscard]] inline int wheel_nodes(double delay, bool slowly) {
     constexpr int slow[] = {3000, 1200, 600};
     constexpr int fast[] = {48, 24, 12};
@@ -149,7 +150,8 @@ template <class MeanOf>
     ForceBounds bounds = bounds_of(pair);
     bounds.mean_force = std::max({0.0, mean(-1.0), -mean(1.0)}) * (1.0 + 1e-6);
     if (bounds.mean_force <= 0.02 * size) {
-        return std::nullopt;  // play radius too small for this grid of positions
+        // The mean force of this wheel is too small to test on this grid of positions
+        return std::nullopt;
     }
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
@@ -161,7 +163,7 @@ template <class MeanOf>
     HeldScene scene;
     scene.read = even_grid(0.0, 1.0 / nodes, nodes, 1, true);
     scene.table = play_table_of(Direct{pair}, scene.read, radius, sent_on(device));
-    // So much stored energy that only a repeated motion can take out more energy.
+    // The wheel stores so much energy that the hand can take out more than the stored energy only by a repeated motion.
     scene.held.assign(static_cast<std::size_t>(nodes), 10.0 * (size + largest_hysteresis));
     return trial_of(std::move(scene), *need, device);
 }

@@ -20,7 +20,7 @@
 
 namespace palpate::energy_search {
 
-/// Grid of a search: a few positions with jumps between all of them, or many positions with short moves.
+/// Grid of positions of a search: a few positions with jumps between all of them, or many positions with short moves.
 struct Fineness {
     int nodes = 24;
     int reach = 23;
@@ -80,7 +80,8 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
     return std::clamp(force, -device.force_limit, device.force_limit);
 }
 
-/// Returns a trial that searches a force, held constant in each sample, on a grid of positions.
+/// Returns a trial that searches for a motion that takes energy out. The force is held constant during each sample; the
+/// positions lie on a grid.
 [[nodiscard]] inline Trial trial_of(HeldScene scene, const Need& need, const DeviceProfile& device) {
     scene.need = {need.damping / device.longest_period_s(), need.friction, device.whole_delay_samples(),
                   device.delay_fraction()};
@@ -116,7 +117,7 @@ inline void limit_by(test::Random& random, DeviceProfile& device, double largest
     return test::random_network(random, 1 + random() % 3);
 }
 
-/// Returns the position at which the absolute slope of the force is largest.
+/// Returns the position at which the absolute slope of `force` is largest.
 template <class Force>
 [[nodiscard]] double steepest_place(const Force& force) {
     double place = 0.0;
@@ -296,7 +297,7 @@ template <class Force>
         network.alpha[2 * i + 1] = std::exp(test::uniform(random, -1.0, 1.0)) / fastest;
         network.beta[2 * i + 1] = test::uniform(random, -1.0, 1.0) * fastest;
     }
-    // Velocity term comparable with the damping b that a spring requires.
+    // The slope of the force over velocity has a size similar to the damping b that a spring requires.
     network.linear[1] = test::uniform(random, -1.0, 0.3) * 4.0 * device.period_s;
     const ForceModel model =
         ForceModel::of_velocity(network, {{0.0, -fastest}, {1.0, fastest}, {}, {}, std::nullopt});

@@ -31,16 +31,18 @@ struct ScriptedDevice {
     void close() noexcept {}
 };
 
-/// Limits and rounding that a force passes between the structure and the handle.
+/// The guards and the rounding of the command that change the force of a structure before the device applies the force.
 struct Sent {
     Guards guards;
     double force_step = 0.0;  ///< step of the command; the force is rounded to the nearest step [N or N*m]
 
-    /// Returns the force after a start at rest at `first[0]` and ticks at the positions first[0] to first[count - 1].
+    /// Returns the force that the device receives after a start at rest at `first[0]` and ticks at the positions
+    /// first[0] to first[count - 1].
     template <class Structure>
     [[nodiscard]] double force(const Structure& structure, const double* first, int count) const {
         std::vector<double> read(first, first + count);
-        read.push_back(read.back());  // the last tick reads one more position
+        // The controller reads one more position at the end of the last tick
+        read.push_back(read.back());
         ScriptedDevice device{read.data()};
         Controller controller{device, structure, guards};
         (void)controller.start();
@@ -184,7 +186,8 @@ template <class Force>
     return energy;
 }
 
-/// A held force on a grid of positions, and the damping and friction of a device that has exactly the certified need.
+/// A force that is held during each sample, on a grid of positions, and the least damping and friction that its
+/// certificate requires.
 struct HeldScene {
     ReadGrid read;
     ForceTable table;

@@ -18,7 +18,8 @@ struct Need {
     double friction = 0.0;  ///< Coulomb friction f_c [N or N*m]
 };
 
-/// Returns the least damping and friction that `certify` accepts; nothing if `certify` refuses every value.
+/// Returns the least device damping and friction with which `certify` accepts the device; nothing if `certify` refuses
+/// every device.
 template <class Certify>
 [[nodiscard]] std::optional<Need> certified_need(DeviceProfile device, const Certify& certify) {
     constexpr double placeholder_damping = 1.2345e6;
@@ -40,8 +41,8 @@ template <class Certify>
     return need;
 }
 
-/// Returns the need with slightly less friction, if another inequality of `certify` then requires more damping
-/// instead.
+/// Returns required damping and friction with slightly less friction than `need`, if another inequality of `certify`
+/// then requires more damping instead.
 template <class Certify>
 [[nodiscard]] std::optional<Need> need_at_less_friction(DeviceProfile device, const Need& need,
                                                         const Certify& certify) {
@@ -68,7 +69,7 @@ template <class Certify>
 struct Trial {
     std::function<bool(double damping, double friction)> finds_energy;
     Need need;
-    std::string text{};  ///< description of the scene
+    std::string text{};  ///< description of the scene for the message of a failed test
 };
 
 enum class Part { Damping, Friction };

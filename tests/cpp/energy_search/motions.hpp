@@ -18,9 +18,10 @@ namespace palpate::energy_search {
 struct Motion {
     double centre = 0.0;
     double size = 1.0;
-    double period = 2.0;  ///< repeat length of the sum of sines [samples]
+    double period = 2.0;  ///< number of samples after which the sum of sines repeats
     bool sines = false;
-    /// Positions of one repetition, or cosine and sine amplitude of each harmonic.
+    /// Handle positions of one repetition of the motion, or for a sum of sines the cosine and sine amplitude of each
+    /// harmonic.
     std::vector<double> shape;
     /// Position of the handle within the encoder step, from -1/2 to 1/2 of the step.
     std::vector<double> within;
@@ -38,13 +39,14 @@ struct Motion {
     }
 };
 
-/// Energy that the hand pays for a motion, without the damping and friction of the device.
+/// Sums over the samples of a motion, from which follows the energy that the hand pays at any damping and friction of
+/// the device.
 struct Account {
     double work = 0.0;    ///< sum over the samples of the mean force times the displacement d [J]
     double square = 0.0;  ///< sum d^2
     double length = 0.0;  ///< sum |d|
-    /// Sum tau (1 - tau) (change of the force within a sample)^2. An uneven path within the samples gains this / (4
-    /// b / T).
+    /// Sum over the samples of tau (1 - tau) (change of the force within a sample)^2, with the delay fraction tau. If
+    /// the speed changes within the samples, the hand gains `spread` divided by (4 b / T).
     double spread = 0.0;
 
     /// Returns the value of damping over period, b / T, below which the motion takes energy out of an object that
@@ -57,25 +59,26 @@ struct Account {
         return 0.5 * (-paid + std::sqrt(paid * paid + square * spread)) / square;
     }
 
-    /// Returns the energy that the motion takes out at a device damping, divided by the total length of the motion.
+    /// Returns the energy that the hand takes out by the motion at a device damping, divided by the total length of the
+    /// motion.
     [[nodiscard]] double gain(double damping, double held, double friction) const noexcept {
         const double uneven = damping > 0.0 ? 0.25 * spread / damping : 0.0;
         return length > 0.0 ? (uneven - work - held - damping * square) / length - friction : 0.0;
     }
 };
 
-/// Start position, centres and sizes of the motions that are tried.
+/// Start position, centres and sizes of the motions that a search tries.
 struct Places {
-    /// Start position of the motion, at rest, where the stored energy of the object is least.
+    /// Position at which the handle rests before the motion; the stored energy of the object is least here.
     double start = 0.0;
     double held = 0.0;  ///< stored energy at the start minus the least stored energy, S_0 - S_min [J]
-    double low = 0.0;   ///< smallest centre of a motion
+    double low = 0.0;   ///< smallest centre position of a motion
     double high = 0.0;
-    double finest = 0.0;  ///< smallest size of a motion
+    double finest = 0.0;  ///< smallest size (amplitude) of a motion
     double widest = 0.0;
     double encoder_step = 0.0;
-    int delay = 0;      ///< whole samples
-    double late = 0.0;  ///< fractional part of the delay [samples]
+    int delay = 0;      ///< whole samples of the device's delay
+    double late = 0.0;  ///< fraction of a sample by which the device's delay exceeds its whole samples
 };
 
 /// Optimises motions of a structure so that they take out energy. `Structure` must have `reset` and `step`; `limit` is

@@ -27,7 +27,8 @@ namespace palpate::energy_search {
 /// Returns the least number a with h(rho) - l rho - g rho^2 <= a for all rho. h(rho) is the cost of one step as a
 /// function of rho.
 [[nodiscard]] inline double step_cost(double M, double s, double l, double g) {
-    // Maximum of the quadratic c0 + c1 rho + c2 rho^2 on [low, high]; either end may be infinite.
+    // Returns the largest value of the quadratic c0 + c1 rho + c2 rho^2 for low <= rho <= high; `low` and `high` may be
+    // infinite.
     const auto most = [](double c0, double c1, double c2, double low, double high) {
         const auto at = [&](double rho) { return c0 + (c1 + c2 * rho) * rho; };
         double best = -1e300;
@@ -111,10 +112,11 @@ namespace palpate::energy_search {
             step_g *= 0.5;
         }
     }
-    return best * (1.0 + 1e-4);  // margin for angles between the evaluated ones
+    return best * (1.0 + 1e-4);  // margin for the angles between those at which the damping was computed
 }
 
-/// Returns the needed damping at a delay of n + late samples, with n whole samples and a fraction `late`.
+/// Returns the required damping for slopes from -s to M at a delay of n + late samples, with n whole samples and a
+/// fraction `late`.
 [[nodiscard]] inline double late_need(double M, double s, int n, double late) {
     if (std::max(M, s) <= 0.0) {
         return 0.0;

@@ -14,7 +14,7 @@ namespace palpate::energy_search {
 /// to i + reach.
 struct Grid {
     std::vector<double> position;  ///< positions of the handle, never decreasing [m or rad]
-    int reach = 0;                 ///< longest move [nodes]
+    int reach = 0;                 ///< largest number of grid positions that one move can pass
     /// Length of one revolution of a wheel; 0 for positions that do not repeat [m or rad].
     double turn = 0.0;
 
@@ -96,7 +96,8 @@ class Windows {
     }
 
   private:
-    /// Returns the grid index with this remainder (division by `residues_`) that one move from `near` can reach.
+    /// Returns the grid index that one move from `near` can reach and whose remainder after division by `residues_` is
+    /// `residue`.
     [[nodiscard]] int resolved(int residue, int near) const noexcept {
         int offset = (residue - near) % residues_;
         offset = offset < 0 ? offset + residues_ : offset;
@@ -117,20 +118,24 @@ class Windows {
 /// each play state and each window (i_0, r_1, ..., r_memory); i_0 is the newest position, r_j the residue of an older
 /// one.
 struct ForceTable {
-    int memory = 0;              ///< number of older positions on which the force depends
-    int plays = 1;               ///< number of play states
-    std::vector<double> of;      ///< force for each play state and positions [N or N*m]
-    std::vector<int> next_play;  ///< play state after the reading at grid position i: [play * nodes + i]
-    std::vector<int> rest_play;  ///< play state at grid position i after a start at rest
+    int memory = 0;  ///< number of older positions on which the force depends
+    int plays = 1;   ///< number of states that the play operator can have
+    /// Force for each state of the play operator and each window of positions [N or N*m]
+    std::vector<double> of;
+    /// [play * nodes + node]: state of the play operator after the state `play`, when the handle is at grid position
+    /// `node`
+    std::vector<int> next_play;
+    /// State of the play operator after a start at rest at each grid position
+    std::vector<int> rest_play;
 
     [[nodiscard]] int play_after(int play, int node, int nodes) const noexcept {
         return plays == 1 ? 0 : next_play[static_cast<std::size_t>(play * nodes + node)];
     }
 };
 
-/// Costs of a motion for the hand in addition to the work against the force.
+/// Damping, friction and delay of the device, which increase the energy that a motion costs the hand.
 struct Cost {
-    double damping = 0.0;   ///< device damping over period, b / T [N/m or N*m/rad]
+    double damping = 0.0;   ///< device damping divided by the period, b / T [N/m or N*m/rad]
     double friction = 0.0;  ///< Coulomb friction f_c [N or N*m]
     int delay = 0;          ///< delay n [whole samples]
     double late = 0.0;      ///< tau, fraction of a sample in which the previous command still acts
@@ -162,7 +167,7 @@ struct Cost {
 /// their samples. Each position of the grid has two consecutive entries, one for each u_k.
 struct Clock {
     double period = 1.0;   ///< [s]
-    double jitter = 0.0;   ///< largest delay of a sample time, below the period [s]
+    double jitter = 0.0;   ///< largest delay of a sample after its nominal time, less than the period [s]
     double delay = 0.0;    ///< [s]
     double damping = 0.0;  ///< device damping b [N*s/m or N*m*s/rad]
 
@@ -174,10 +179,12 @@ struct Clock {
 
 /// Largest energy that a hand takes out of the rendering, found by value iteration.
 struct Finding {
-    double taken = 0.0;      ///< largest energy taken out, -E - (S_0 - S_min), over starts at rest [J]
-    bool cycle = false;      ///< in some repeated motion the hand takes energy out at each repetition
-    bool converged = false;  ///< in no motion on the grid the hand takes more energy out than `taken`
-    double scale = 0.0;      ///< largest force times the range of the grid [J]
+    double taken = 0.0;  ///< largest energy taken out, -E - (S_0 - S_min), over starts at rest [J]
+    bool cycle = false;  ///< in some repeated motion the hand takes energy out at each repetition
+    /// The value iteration ended: no motion on the grid takes more energy out than `taken`
+    bool converged = false;
+    /// Largest force times the distance between the first and last grid position [J]
+    double scale = 0.0;
 
     [[nodiscard]] bool violated() const noexcept { return cycle || taken > 1e-6 * scale; }
 };
@@ -201,7 +208,8 @@ class ValueIteration {
         fill();
     }
 
-    /// Makes a search with jitter of the sample times; the force table is that of a static force.
+    /// Makes a search for sample times with jitter; `table` must hold a force that depends only on the current
+    /// position.
     ValueIteration(const Grid& grid, const ForceTable& table, const Clock& clock)
         : grid_{grid},
           table_{&table},
@@ -275,7 +283,7 @@ class ValueIteration {
 
     void fill() {
         const bool late = cost_.late > 0.0;
-        // Place in the window of the position to which the play state belongs.
+        // Index, in the window of stored positions, of the position that the play operator has followed last.
         const int newest = cost_.delay + (late ? 1 : 0);
         const Windows read{grid_, table_->memory};
         now_.assign(value_.size(), 0.0);
@@ -292,7 +300,7 @@ class ValueIteration {
                 const std::size_t state = window * plays_ + play;
                 const double force = table_->of[play * read.count() + read.number(w, newest)];
                 if (!std::isfinite(force)) {
-                    continue;  // a play state that cannot occur at this position
+                    continue;  // the play operator cannot have this state at this position
                 }
                 const int before = static_cast<int>(play);
                 const int later =
@@ -318,11 +326,13 @@ class ValueIteration {
         }
     }
 
-    /// Cost of one sample from each state, for each of the two sample-time shifts u_k of the next sample.
+    /// Quantities that give the cost of one sample, for each state and for each of the two time shifts u_k of the next
+    /// sample.
     struct Sample {
-        double force = 0.0;    ///< mean force over the sample
-        double damping = 0.0;  ///< device damping b over the length of the sample
-        double uneven = 0.0;   ///< energy gained by uneven motion while the force changes [J]
+        double force = 0.0;    ///< mean force during the sample
+        double damping = 0.0;  ///< device damping b divided by the duration of the sample
+        /// Energy that the hand gains if its speed changes when the force changes [J]
+        double uneven = 0.0;
     };
 
     void fill(const Clock& clock) {
@@ -365,7 +375,7 @@ class ValueIteration {
     [[nodiscard]] bool can_move(int from, int jump) const noexcept {
         return grid_.repeats() || (from + jump >= 0 && from + jump < nodes_);
     }
-    /// Return the distances from one grid position to both ends of the grid.
+    /// `down` and `up` return the displacements from one grid position to the first and to the last grid position.
     [[nodiscard]] double down(int from) const noexcept {
         return grid_.repeats() ? -HUGE_VAL
                                : grid_.position.front() - grid_.position[static_cast<std::size_t>(from)];
@@ -453,7 +463,7 @@ class ValueIteration {
         return most;
     }
 
-    /// Returns true if the best moves from some state lead around a closed motion that takes energy out.
+    /// Returns true if the best moves from some state form a closed motion that takes energy out.
     [[nodiscard]] bool has_gaining_cycle(double least) const {
         std::vector<std::uint32_t> seen(value_.size(), 0);
         std::uint32_t walk = 0;
@@ -492,7 +502,8 @@ class ValueIteration {
 
     const Grid& grid_;
     const ForceTable* table_;
-    const ForceTable* before_;  ///< forces of the previous command
+    /// Table of the forces that the device applies until the new command acts
+    const ForceTable* before_;
     Cost cost_;
     Windows windows_;
     int nodes_;

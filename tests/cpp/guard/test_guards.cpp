@@ -78,8 +78,7 @@ Scheme direct() {
     return scheme;
 }
 
-// In the click-and-wall scene, with encoder steps and without friction, the guards do not change the
-// force.
+// In the click-and-wall scene, on a device with encoder steps and without friction, the guards do not change the force.
 TEST(Guards, DoNotChangeForcesOfTheComparisonScene) {
     const test::ClickAndWall object;
     double held = 0.0;
@@ -159,7 +158,8 @@ TEST(EnergyTank, GivesAtMostTheEnergyOfTheObject) {
 TEST(EnergyTank, ScalesForcesDownWithinItsReserve) {
     EnergyTank tank{TankSettings{{.within = 1.0}, 0.0, 0.0, 0.0, period}};
     double force = -2.0;
-    tank.book(-1.0, 1.0);  // the object gives its stored energy 1; the tank keeps its reserve of 0.25
+    // The object gives its stored energy of 1 J; the energy tank keeps its reserve of 0.25 J
+    tank.book(-1.0, 1.0);
     EXPECT_EQ(tank.apply(force), Status::Ok);
     tank.book(-0.15, 1.0);
     EXPECT_EQ(tank.apply(force), Status::EnergyLimited);
@@ -168,7 +168,7 @@ TEST(EnergyTank, ScalesForcesDownWithinItsReserve) {
     force = 2.0;
     EXPECT_EQ(tank.apply(force), Status::EnergyLimited);
     EXPECT_NEAR(force, 0.0, 1e-12);
-    tank.book(3.0, 1.0);  // the tank is never more than full
+    tank.book(3.0, 1.0);  // the energy tank never holds more than its initial energy
     EXPECT_NEAR(tank.given(), 0.0, 1e-12);
     EXPECT_NEAR(tank.most_given(), 1.25, 1e-12);
 }
@@ -362,7 +362,7 @@ class GuidedHandle {
                 Status::Ok};
     }
 
-    /// Returns the energy that the hand has put in, and the least value of this energy so far [J].
+    /// `energy` returns the energy that the hand has put in; `least` returns the least value of this energy so far [J].
     [[nodiscard]] double energy() const noexcept { return motor_ + dissipated_; }
     [[nodiscard]] double least() const noexcept { return least_; }
     [[nodiscard]] double motor() const noexcept { return motor_; }
@@ -426,7 +426,8 @@ Guards certified_guards(const ForceModel& model, const Scheme& scheme, const Dev
 struct Pressed {
     std::size_t energy_limited = 0;
     std::size_t limit_cycle_scaled = 0;
-    double least = 0.0;  ///< least energy that the hand has put in since the start ramp [J]
+    /// Least value, since the end of the start ramp, of the energy that the hand has put in [J]
+    double least = 0.0;
     std::uint64_t ticks = 0;
 };
 
@@ -548,7 +549,7 @@ TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
         test::Scene scene = test::random_certified_scene(random, 1.0 + 1e-9);
         scene.device.force_limit = std::exp(test::uniform(random, -2.0, 3.0));
         if (!certify(scene.model, scene.scheme, scene.device).certified()) {
-            continue;  // the proof for this structure does not hold with a force limit
+            continue;  // with a force limit the device cannot be certified for this structure
         }
         ++scenes[std::string(name_of(scene.scheme.structure))];
         Motions motion{random, scene};
@@ -569,7 +570,7 @@ TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
                 most = std::max(most, tank.most_given() / tank.stored().most());
             });
     }
-    // The bound of the stored energy is close to the largest energy that the object gave.
+    // The bound on the energy that an object stores is close to the largest energy that an object gave.
     EXPECT_GT(most, 0.3);
     EXPECT_GE(scenes.size(), 2U);
     for (const auto& [structure, count] : scenes) {
@@ -753,7 +754,8 @@ double stored_span(const ForceModel& model, double limit) {
         const double x = lower + travel * (k + 0.5) / cells;
         energy += std::clamp(force.inside(x).value, -limit, limit) * travel / cells;
         least = std::min(least, energy);
-        // Energy that the hysteresis adds while the play operator is at its end, at some positions.
+        // Energy that the hysteresis adds while the play operator is at a limit of its slack; computed at every 1000th
+        // position.
         double bent = 0.0;
         if (both != nullptr && k % 1000 == 0) {
             const double r = both->play_radius();
@@ -795,7 +797,7 @@ TEST(LargestStoredEnergy, CanExceedThatOfTheForce) {
     NetworkParameters network;
     network.alpha = {6.0};
     network.beta = {1.5};
-    network.weight = {-8.0};  // a force peak of 8 between two valleys
+    network.weight = {-8.0};  // a peak of the force of size 8 between two valleys of the force
     network.linear = {0.0};
     network.bias = -0.5;
     const ForceModel model{network, {{0.0}, {3.0}, Continuation::Linear, Continuation::Linear, {}}};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that a recording is locked while it grows and never replaces another file.
+// Tests that a recording file is locked while rows are added to it, and that a new recording never replaces an existing
+// file.
 #include <sys/stat.h>
 #include <unistd.h>
 

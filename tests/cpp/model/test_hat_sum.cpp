@@ -37,7 +37,8 @@ Plain plain(const NetworkParameters& network, double x) {
         add(&Curve::slope, weight * alpha * psi.slope);
         add(&Curve::integral, weight / alpha * psi.integral);
         add(&Curve::double_integral, weight / alpha / alpha * psi.double_integral);
-        // Rounding error of the argument u = alpha (x - beta) changes a term even if the term is zero.
+        // The rounding error of the argument u = alpha (x - beta) changes the value of a wavelet even where this value
+        // is zero.
         result.absolute.value += std::abs(weight) * std::abs(psi.integral);
         result.absolute.slope += std::abs(weight) * alpha * psi.double_integral;
         result.absolute.integral += 1e-290;
@@ -91,7 +92,7 @@ TEST(HatSum, BatchesAgreeWithSinglePositions) {
                 x[j] = position(random, static_cast<int>(j));
             }
             for (const auto quantity : {HatQuantity::Value, HatQuantity::Slope, HatQuantity::Integral}) {
-                // Array has one extra element that detects writes past its end.
+                // The array of results has one extra element, which detects writes past the end of the results.
                 std::vector<double> sums(x.size() + 1, 1.0);
                 hats.add(quantity, x, std::span{sums}.first(x.size()));
                 EXPECT_EQ(sums.back(), 1.0);

@@ -47,7 +47,8 @@ double work(const HysteresisNetwork& object, HysteresisNetwork::State& state, do
     return sum;
 }
 
-// Required: "h >= 0 makes every loop, inner ones and x-dependent h included, never generate energy"
+// A model with hysteresis h >= 0 gives no energy in any closed motion, also if h depends on the position or the motion
+// contains smaller loops.
 TEST(Hysteresis, NeverGivesMoreEnergyThanItStored) {
     Random random{11};
     for (int k = 0; k < cases(60); ++k) {

@@ -75,7 +75,8 @@ TEST(Network, LinearContinuationNeverFallsAndKeepsTheEnergyBoundedBelow) {
     for (int k = 0; k < cases(200); ++k) {
         const WaveletNetwork network{random_network(random, 6), unit_domain()};
         const double cap = network.curve().extent().slope_cap;
-        const double gentle = network.curve().extent().largest_force;  // largest force over the travel of 1
+        // Largest force in the domain, divided by the length 1 of the domain
+        const double gentle = network.curve().extent().largest_force;
         for (const double x : {-0.3, 1.3}) {
             const double slope = network.at(x, {}).slope;
             EXPECT_GE(slope, 0.0);

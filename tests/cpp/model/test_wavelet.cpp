@@ -15,7 +15,7 @@ double psi(double u) {
     return mexican_hat(u).value;
 }
 
-// Required: "|psi| < 9e-5 at 5, < 6e-7 at 6, < 1.5e-14 at 8.5, < 3e-15 at 8.7"
+// The mother wavelet psi(u) satisfies |psi| < 9e-5 at u = 5, < 6e-7 at 6, < 1.5e-14 at 8.5 and < 3e-15 at 8.7.
 TEST(Wavelet, IsNegligibleFarFromItsCentre) {
     EXPECT_LT(std::abs(psi(5.0)), 9e-5);
     EXPECT_GT(std::abs(psi(5.0)), 8.9e-5);
@@ -27,12 +27,14 @@ TEST(Wavelet, IsNegligibleFarFromItsCentre) {
     EXPECT_GT(std::abs(psi(8.7)), 2.7e-15);
 }
 
-// Required: "the slope needs a wider support (1.2e-13 alpha at 8.5)"
+// The slope of a wavelet is negligible only at a larger distance from the centre than its value: 1.2e-13 alpha at u =
+// 8.5.
 TEST(Wavelet, SlopeNeedsAWiderSupport) {
     EXPECT_NEAR(std::abs(mexican_hat(8.5).slope), 1.2e-13, 0.05e-13);
 }
 
-// Required: "|psi'| <= 1.38012 (1.3801190461 at |u| = sqrt(3 - sqrt 6) = 0.741964)"
+// The slope of the mother wavelet satisfies |psi'| <= 1.38012; the maximum 1.3801190461 is at |u| = sqrt(3 - sqrt 6) =
+// 0.741964.
 TEST(Wavelet, SlopeHasItsBoundAtTheSteepestPoint) {
     const double steepest = std::sqrt(3.0 - std::sqrt(6.0));
     EXPECT_NEAR(steepest, 0.741964, 5e-7);
@@ -40,7 +42,8 @@ TEST(Wavelet, SlopeHasItsBoundAtTheSteepestPoint) {
     EXPECT_LE(mexican_hat(steepest).slope, detail::hat_suprema[1]);
 }
 
-// Required: "|psi''| <= 3 (at 0); |psi'''| <= 5.7831"
+// The second derivative of the mother wavelet satisfies |psi''| <= 3 (largest at u = 0), the third derivative |psi'''|
+// <= 5.7831.
 TEST(Wavelet, DerivativesStayWithinTheirBounds) {
     double slope = 0.0;
     double curvature = 0.0;
@@ -58,7 +61,8 @@ TEST(Wavelet, DerivativesStayWithinTheirBounds) {
     EXPECT_NEAR(jerk, 5.7831, 5e-5);
 }
 
-// Required: "for any d: |grad psi| = r |d + 2 - r^2| e^{-r^2/2} (d = 2: <= 1.95209)"
+// The gradient of the mother wavelet of d inputs at the distance r from its centre has the size r |d + 2 - r^2|
+// e^{-r^2/2}; for d = 2 this is at most 1.95209.
 TEST(Wavelet, RadialGradientOfTwoInputsHasItsBound) {
     double largest = 0.0;
     for (int k = 0; k <= 100'000; ++k) {

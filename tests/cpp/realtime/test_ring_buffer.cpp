@@ -38,7 +38,8 @@ TEST(RingBuffer, RefusesElementsWhenFullAndKeepsThoseItAccepted) {
     EXPECT_EQ(out[0], 3);
 }
 
-/// A record of two numbers in a fixed relation: the test detects a record that is read while partly written.
+/// A record of two numbers, the second with all bits of the first inverted: the test detects a record that is read
+/// while only one number is written.
 struct Pair {
     std::uint64_t value = 0;
     std::uint64_t inverse = ~std::uint64_t{0};

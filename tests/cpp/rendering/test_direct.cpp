@@ -41,7 +41,7 @@ TEST(Prediction, MeanFormulaEqualsWeightedStepsFromTheFirstTick) {
     test::Random random{11};
     for (const int m : {1, 2, 3, 8, 16}) {
         HalfSamplePrediction prediction{m};
-        std::vector<double> x{0.4};  // handle at rest before the first tick
+        std::vector<double> x{0.4};  // positions; the handle rests at 0.4 before the first tick
         prediction.reset(x[0]);
         for (int k = 0; k < 40; ++k) {
             const double now = x.back() + (k == 0 ? 0.0 : test::uniform(random, -1.0, 1.0));
@@ -148,12 +148,15 @@ TEST(PredictedDirect, PlayFollowsTheMeasuredPosition) {
     const ConstantHysteresis object{{0.0, 0.0}, {0.0, 1.0}, 0.1};
     PredictedDirect structure{object, 1};
     structure.reset(0.0);
-    // Predicted position x_hat = 0.225; the play operator follows the measured position: to 0.05, not 0.125.
+    // The predicted position is 0.225. The play operator follows the measured position 0.15, so it moves to 0.05; with
+    // the predicted position it would move to 0.125.
     (void)structure.step(0.15);
-    // Direction state: (predicted position - play 0.05) / play radius 0.1, for the predicted positions 0.15 and 0.
+    // Direction state: (predicted position - position 0.05 of the play operator) / play radius 0.1. The predicted
+    // positions of these two ticks are 0.15 and 0.
     EXPECT_NEAR(structure.step(0.15).force, 1.0, 1e-12);
     EXPECT_NEAR(structure.step(0.05).force, -0.5, 1e-12);
-    EXPECT_NEAR(structure.step(0.05).force, 0.0, 1e-12);  // the play operator is still at 0.05
+    // The predicted position equals the position 0.05 of the play operator
+    EXPECT_NEAR(structure.step(0.05).force, 0.0, 1e-12);
 }
 
 TEST(PredictedDirect, SchemeBuildsItForEveryModelOfPosition) {

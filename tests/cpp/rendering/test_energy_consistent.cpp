@@ -31,7 +31,7 @@ TEST(EnergyConsistent, IsOfSecondOrderAndSwitchedOfFirstOrder) {
                 0.15);
 }
 
-// Required: "undamped amplitude constant"
+// An object without damping that oscillates keeps its amplitude.
 TEST(EnergyConsistent, KeepsTheEnergyOfAnUndampedObject) {
     const Hardening object;
     EnergyConsistent structure{object, {0.001, 0.0}, coupling, 1e-3, 1e-4, false};
@@ -81,7 +81,8 @@ struct SwitchedStep {
     }
     [[nodiscard]] double residual(double y) const { return generates(y) ? by_energy(y) : by_force(y); }
 
-    /// Returns the first root of `function` from `from` to `to`, by short steps and bisection.
+    /// Returns the position y nearest to `from` at which `function(y)` is zero, searched towards `to` by short steps
+    /// and bisection.
     template <class F>
     [[nodiscard]] static double first_root(F function, double from, double to) {
         const double step = std::copysign(shortest, to - from);
@@ -109,7 +110,7 @@ struct SwitchedStep {
         }
         return count;
     }
-    /// Returns the next object position by the rule in the class comment of the energy-consistent structure.
+    /// Returns the object position after the step, by the rule in the class comment of the energy-consistent structure.
     [[nodiscard]] double expected(double far) const {
         const double root = first_root([&](double y) { return by_energy(y); }, from, far);
         return generates(root) ? root : first_root([&](double y) { return by_force(y); }, from, root);
@@ -144,7 +145,8 @@ TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRuleAmongThree) {
             const double far = step.by_force(from) < 0.0 ? from + 2.0 : from - 2.0;
             const double expected = step.expected(far);
             if (std::abs(expected - from) < 1e-3) {
-                continue;  // the difference quotient loses digits in a short step
+                // In a short step the difference of two energies divided by the step has a large rounding error
+                continue;
             }
             ++tried;
             ASSERT_NEAR(rendered.environment_position, expected, 1e-9)

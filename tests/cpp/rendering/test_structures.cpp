@@ -32,8 +32,10 @@ constexpr double period = 1e-3;
 constexpr VirtualCoupling coupling{100.0, 0.02};
 
 struct ForceError {
-    double at_end;      ///< force error at the end of the tick that holds the force
-    double at_instant;  ///< force error at the instant of the sample
+    /// RMS of rendered force minus model force at the handle position at the end of the tick
+    double at_end;
+    /// RMS of rendered force minus model force at the handle position that the tick has read
+    double at_instant;
 };
 
 /// Returns the RMS of the rendered force F_k minus the model force f(handle position), over 4000 ticks of the
@@ -131,8 +133,8 @@ TEST(ExplicitLimit, IsThreeThousandForThePapersMassAndDamping) {
     EXPECT_GT(free_motion(3010.0), 10.0);
 }
 
-// Required: "with B_o = 0 the poles lie on the unit circle for 0 < K < 4m/T^2 (the paper's
-// oscillation)"
+// An explicit virtual object with mass m, stiffness K and object damping 0 oscillates with constant amplitude for 0 < K
+// < 4m/T^2 (period T).
 TEST(ExplicitLimit, UndampedOscillationKeepsItsAmplitude) {
     for (const double stiffness : {10.0, 400.0, 2000.0, 3900.0}) {
         const double ratio =
@@ -142,7 +144,8 @@ TEST(ExplicitLimit, UndampedOscillationKeepsItsAmplitude) {
     EXPECT_GT(growth(Explicit{Spring{4010.0}, Inertia{0.001, 0.0}, coupling, period}, 4000), 10.0);
 }
 
-// Required: "with coupling, at a held device: K + K_c < (4m - 2(B_o + B_c)T)/T^2"
+// With a virtual coupling and a handle that does not move, the explicit structure is stable for the object stiffness K
+// if K + K_c < (4m - 2(B_o + B_c)T)/T^2.
 TEST(ExplicitLimit, IncludesTheCoupling) {
     const auto held = [](double stiffness) {
         Explicit structure{Spring{stiffness}, Inertia{0.001, 0.5}, coupling, period};
@@ -209,7 +212,7 @@ struct PushingOut {
     using State = Stateless;
     double push;     ///< f_0
     double falling;  ///< s
-    double wall;     ///< position at which a wall of stiffness 1 begins
+    double wall;     ///< distance from position 0 at which a wall of stiffness 1 begins
 
     [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
         const double width = push / falling;
@@ -272,7 +275,8 @@ double work_of_a_throw(S structure, double limit) {
     return hand.work;
 }
 
-// Required: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
+// An object mass of 0.05 behind a coupling of stiffness 90 gives 1.99 J to the hand if the force limit 5 acts after the
+// time step, and no energy if the time step includes the force limit.
 TEST(ForceLimit, InsideTheStepPreventsEnergyFromAThrownMass) {
     const Inertia mass{0.05, 0.0};
     const VirtualCoupling spring{90.0, 0.0};
@@ -295,7 +299,7 @@ TEST(ForceLimit, FallingForceWithMassGivesEnergy) {
     const PushingOut object{1.0, 0.31, 7.5};
     const Inertia mass{7.0, 0.0};
     constexpr double limit = 1.34;
-    // State of the periodic motion when the hand reverses: position of the handle -0.0826, moved by 1.0850 in the last
+    // State of the object in a repeated motion when the hand reverses: position -0.0826, moved by 1.0850 in the last
     // sample.
     constexpr double last = -0.08262168687;
     constexpr double before = -1.16758952181;
@@ -304,7 +308,8 @@ TEST(ForceLimit, FallingForceWithMassGivesEnergy) {
     const double there =
         structure.drive(7.0 * (last - before) + object.at(last, {}).force).environment_position;
     ASSERT_NEAR(there, last, 1e-9);
-    const double side = limit + last + 1e-6;  // the coupling force is always at the force limit of the device
+    // The handle is so far from the object that the coupling force equals the force limit of the device
+    const double side = limit + last + 1e-6;
     HandWork hand{0.5, limit, side, limit};
     double force = limit;
     double moved = 0.0;
@@ -544,8 +549,8 @@ TEST(Scheme, IsRefusedAtAPeriodAtWhichItDiverges) {
     scheme.structure = StructureKind::Implicit;
     EXPECT_NO_THROW(validate(scheme, spring_model(1e6), period));
 
-    // Every function that renders a scheme must check the scheme, not only the function that reads the name of the
-    // structure.
+    // Every function that renders a scheme must check that the scheme is valid, not only the function that reads the
+    // name of the structure.
     scheme.structure = StructureKind::Explicit;
     EXPECT_THROW((void)simulate(spring_model(2861.0), scheme, {}, {}, 10), std::invalid_argument);
     EXPECT_THROW((void)motion_driven(spring_model(2861.0), scheme, {}, period), std::invalid_argument);
@@ -558,7 +563,7 @@ TEST(Scheme, IsRefusedAtAPeriodAtWhichItDiverges) {
     scheme.play_radius = 3e-5;
     EXPECT_THROW(validate(scheme, both, period), std::invalid_argument);
 
-    // Compensation makes a slope of 45 N*m/rad behind a coupling of 50 N*m/rad ten times steeper: 450 N*m/rad.
+    // A compensated model with the slope 45 N*m/rad behind a coupling of 50 N*m/rad is ten times steeper: 450 N*m/rad.
     scheme = {StructureKind::Explicit, {50.0, 0.0}, {2e-4, 0.15}, true, 0.0};
     EXPECT_NEAR(steepest_slope(scheme, spring_model(45.0)), 450.0, 1e-9);
     EXPECT_NO_THROW(validate(scheme, spring_model(40.0), period));

@@ -68,7 +68,8 @@ double order(Make make) {
     return std::log2(coarse / fine);
 }
 
-/// Moves the device to 0.2 and waits until the object rests at position y: 100 (0.2 - y) = 20 y + 300 y^3.
+/// Holds the handle at position 0.2 and waits until the virtual object rests at the position y at which coupling force
+/// and object force are equal: 100 (0.2 - y) = 20 y + 300 y^3.
 template <class S>
 void expect_the_force_of_the_coupling_at_rest(S structure) {
     structure.reset(0.0);

@@ -50,7 +50,7 @@ std::atomic<int> allocations{0};
 std::atomic<int> locks{0};
 std::atomic<int> exceptions{0};
 
-// Not used under sanitizers, which replace the same library functions.
+// Not called in builds with sanitizers, because sanitizers replace the same library functions as this test.
 [[maybe_unused]] void count_if_watched(std::atomic<int>& counter) {
     if (watched) {
         counter.fetch_add(1, std::memory_order_relaxed);
@@ -109,7 +109,8 @@ namespace {
 std::mutex a_mutex;
 std::atomic<void*> escaped{nullptr};
 
-/// A simulated device that does one forbidden action, in its fifth exchange.
+/// A simulated device that does one action that is forbidden in a real-time loop, in the fifth exchange of position and
+/// force.
 template <class ForbiddenAction>
 class FaultyHandle {
   public:
@@ -225,7 +226,7 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenActi
             if constexpr (std::is_same_v<After, std::remove_const_t<decltype(nothing)>>) {
                 loop.join();
             } else {
-                // The thread with the system-call filter cannot end in another way.
+                // The system-call filter of this thread allows no other way to end the thread.
                 _exit(counts.ticks > 0 ? 0 : 1);
             }
         });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that the session report states every defect of a session, with its cure.
+// Tests that the report of a session states every defect of the session, and how the user can remove the defect.
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -15,7 +15,7 @@ namespace {
 
 /// A session of 1000 ticks without delay, with handle positions over the whole domain of the model.
 struct Judged {
-    // On the heap, because a session is too large for the stack.
+    // `SessionReport` is on the heap, because it is too large for the stack.
     std::unique_ptr<SessionReport> report = std::make_unique<SessionReport>();
     LoopSettings settings;
     RecordSinks sinks;

@@ -30,7 +30,7 @@ namespace {
 
 constexpr double period_s = 1e-3;
 
-/// Timing in which one tick is late and all other ticks are on time.
+/// Makes the tick with the number `tick` late by the time `by` [ns]; all other ticks are on time.
 struct LateTick {
     std::uint64_t tick = 0;
     Nanoseconds by = 0;
@@ -148,7 +148,8 @@ void expect_safe(const Rendering& run) {
         }
         last = tick.force;
     }
-    // In addition to one force for each tick, the device receives one force at the start, and zero force at the end.
+    // The device receives one force for each tick, one force when the run starts, and a force of zero when the run
+    // ends.
     ASSERT_EQ(run.observed.forces.size(), run.ticks.size() + 2);
     for (std::size_t k = 0; k < run.ticks.size(); ++k) {
         ASSERT_EQ(run.observed.forces[k + 1], run.ticks[k].force);
@@ -195,7 +196,7 @@ struct Expected {
 };
 
 TEST(Faults, EachHasItsStatusAndZeroForceInItsTick) {
-    // At 0.4 s the hand is moving and the force is far from zero.
+    // Each fault occurs 0.4 s after the start, when the hand is moving and the force is far from zero.
     for (const Expected& expected :
          std::vector<Expected>{{FaultKind::Late, Status::Timeout, ExitReason::TimeUp},
                                {FaultKind::Lost, Status::Lost, ExitReason::TimeUp},
@@ -253,7 +254,7 @@ TEST(Faults, LostAndRepeatedSamplesAreCounted) {
     EXPECT_EQ(run.report->ticks_by_status[static_cast<std::size_t>(Status::Timeout)], 2U);
 }
 
-/// A temporary folder that is removed at the end.
+/// A temporary folder that the destructor removes.
 class Scratch {
   public:
     Scratch()

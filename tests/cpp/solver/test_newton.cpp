@@ -62,7 +62,8 @@ TEST(LoadLineSolver, StatusIsTheReasonOfTheEnd) {
 }
 
 TEST(LoadLineSolver, ReportsNotUniqueOnAFallingBranch) {
-    // The function f(y) + p y has the slope -2 + 1 < 0: y = 0 is a solution, but a motion would leave this solution.
+    // The function f(y) + p y has the slope -2 + 1 < 0 for the model force f and the load line slope p: y = 0 is a
+    // solution, but no stable one.
     const Solution solution = LoadLineSolver{}.solve(test::Spring{-2.0}, {}, {1.0, 0.0}, 0.0);
     EXPECT_EQ(solution.status, Status::NotUnique);
 }
@@ -80,7 +81,8 @@ TEST(LoadLineSolver, FindsARootForAnySlopesInItsBracket) {
     }
 }
 
-// Required: "from the previous solution, the first root met in the direction of -residual"
+// The solver starts at the previous solution, moves in the direction in which the residual approaches zero, and returns
+// the first solution that it meets.
 TEST(LoadLineSolver, EndsOnTheFirstRootInTheDirectionOfTheResidual) {
     // A force that falls with slope -15, more steeply than the load line rises (slope 5): up to three solutions.
     const test::ClickAndWall object;

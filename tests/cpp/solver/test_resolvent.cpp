@@ -28,7 +28,8 @@ WaveletNetwork random_scene(Random& random, std::size_t wavelets,
     return {test::random_network(random, wavelets), test::unit_domain(continuation, continuation)};
 }
 
-/// Returns a slope p of the load line for which p + f' > 0 at every position, with a small or large margin.
+/// Returns a slope p of the load line for which p + f' > 0 at every position (model slope f'); the least value of p +
+/// f' is random.
 double unique_slope(Random& random, const WaveletNetwork& network) {
     const double edges =
         std::min(network.curve().below().at_edge.slope, network.curve().above().at_edge.slope);
@@ -382,8 +383,8 @@ TEST(Resolvent, RepeatsWithEveryTurnOfAKnob) {
             const auto residual = [&](double y) { return network.at(y, {}).force + p * y - q; };
             ASSERT_NEAR(residual(solution.position), 0.0, 1e-11 * (p + fall) * (1.0 + std::abs(x)))
                 << k << " " << j;
-            // No solution may lie between the start and the returned solution; the test checks steps of 1 / 500 of the
-            // distance.
+            // No solution may lie between the previous position and the returned solution; the test checks positions at
+            // distances of 0.002.
             const double direction = residual(before) < 0.0 ? 1.0 : -1.0;
             const double distance = direction * (solution.position - before);
             ASSERT_GE(distance, -1e-9) << k << " " << j;
@@ -400,7 +401,8 @@ TEST(Resolvent, RepeatsWithEveryTurnOfAKnob) {
     EXPECT_GT(folded, cases(20) / 5);
 }
 
-// Required: "with the predictor ..., 1.008 evaluations a step (textbook: 2.5 to 3.4)"
+// With a predicted start position the solver needs 1.008 evaluations of the force for each time step; the implicit
+// solvers of textbooks need 2.5 to 3.4.
 TEST(CertifiedSolver, NeedsOneEvaluationAStep) {
     const WaveletNetwork network = switch_and_wall();
     const Inertia inertia{0.001, 0.5};
@@ -430,7 +432,8 @@ TEST(CertifiedSolver, IsExactAtTheKinksAtTheEdges) {
         ASSERT_TRUE(solver.unique(p));
         for (int j = 0; j < 100; ++j) {
             const double edge = j % 2 == 0 ? 0.0 : 1.0;
-            // If a step starts slightly farther away, its tangent may end on the wrong side of the domain edge.
+            // From a start position slightly farther from the edge of the domain, the tangent of the force may lead to
+            // a position on the wrong side of this edge.
             const auto near_kink = [&](double from, double to) {
                 return edge +
                        (uniform(random, -1.0, 1.0) < 0.0 ? -1.0 : 1.0) * std::exp(uniform(random, from, to));
@@ -502,8 +505,8 @@ TEST(CertifiedSolver, EndsWithinFourEvaluationsNearAFold) {
             continue;
         }
         const double p = fall * (1.0 + std::exp(uniform(random, std::log(1e-4), 0.0)));
-        // Solver with the table of the inverse function and the cells for the remaining positions, and solver with the
-        // cells alone.
+        // Compares two solvers: one uses the table of the inverse function, and cells for the positions outside the
+        // table; the second uses only cells.
         const Resolvent resolvent{network.curve(), p};
         const CertifiedSolver& solver = resolvent.solver();
         ASSERT_TRUE(resolvent.unique(p)) << k << " p / fall = " << p / fall;

@@ -86,7 +86,8 @@ TEST(Certificate, PredictionOfALateForceCanNeedLessDampingThanNoPrediction) {
     EXPECT_NEAR(predicted_share(0.0, 1, 1.0), 1.299, 0.001);
     EXPECT_NEAR(predicted_share(1.0, 1, 1.0), 1.414, 0.001);
     EXPECT_NEAR(predicted_share(0.0, 1, 2.0), 2.000, 0.001);
-    // The damping for a delay of a fraction of a sample lies between the values for the neighbouring whole delays.
+    // The damping that a delay of a fraction of a sample requires lies between the dampings that the next smaller and
+    // the next larger whole delay require.
     for (const int predict : {1, 4}) {
         double before = predicted_share(0.0, predict, 1.0);
         for (const double delay : {1.02, 1.25, 1.5, 1.75, 1.98, 2.0}) {
@@ -121,8 +122,8 @@ TEST(Certificate, JitterOfALateDeviceRaisesTheNeedOfAPredictionContinuously) {
 }
 
 TEST(Certificate, PredictionRaisesTheErrorOfTheEncoder) {
-    // A prediction from m samples increases the required friction to (m + 3) / (m + 1) half encoder steps: 2 at m = 1,
-    // 7/5 at m = 4.
+    // Prediction from m samples increases the required friction: it is the slope times half an encoder step times (m +
+    // 3) / (m + 1), which is 2 at m = 1 and 7/5 at m = 4.
     Scheme scheme = scheme_of(StructureKind::Direct);
     DeviceProfile device = smooth(10.0);
     device.encoder_step = 1e-3;
@@ -227,7 +228,7 @@ TEST(Certificate, CompensationCancelsTheCoupling) {
 }
 
 TEST(Certificate, CouplingAndDampingLimitTheFallingSlope) {
-    // Massless structure: the steepest falling slope s_ must be less than K_c + B_c / T = 120.
+    // Massless structure: the absolute value s_ of the steepest falling slope must be less than K_c + B_c / T = 120.
     const Scheme massless = scheme_of(StructureKind::Massless, {100.0, 0.02});
     EXPECT_TRUE(certify(slopes(-119.9, 5.0), massless, smooth(1.0)).certified());
     EXPECT_FALSE(certify(slopes(-120.1, 5.0), massless, smooth(1.0)).certified());
@@ -297,8 +298,8 @@ TEST(Certificate, ReportsCasesWithoutAKnownBound) {
 }
 
 TEST(Certificate, TheGainOfTheEncoderIsTheLargestOfBothEnds) {
-    // K_c = 100, B_c / T = 20, load line slope p = 120. Gain for the force slope 300: 300 (120 + 20) / 420 = 100; for
-    // the force slope -80: 80 (120 + 80) / 40 = 400.
+    // Ratio of the force change to the position change by an encoder step, for K_c = 100, B_c / T = 20, load line slope
+    // p = 120: 300 (120 + 20) / 420 = 100 at the force slope 300; 80 (120 + 80) / 40 = 400 at -80.
     EXPECT_NEAR(massless_gain(slopes(0.0, 300.0), {100.0, 0.02}, 1e-3), 100.0, 1e-9);
     EXPECT_NEAR(massless_gain(slopes(-80.0, 300.0), {100.0, 0.02}, 1e-3), 400.0, 1e-9);
 }
@@ -341,7 +342,8 @@ TEST(Certificate, DelayedNeedAgreesWithAFineScanAndIsNeverBelow) {
     }
 }
 
-// B >= s/2 + |H - s|^2 / (4 (A - s/2)). The form A |u|^2 - Re(H u d*) - (s/2) |d - u|^2 + B |d|^2 is never negative.
+// Required damping B of a force with the falling slope s behind a coupling: with B >= s/2 + |H - s|^2 / (4 (A - s/2))
+// the form A |u|^2 - Re(H u d*) - (s/2) |d - u|^2 + B |d|^2 is never negative.
 TEST(Certificate, NeedOfAFallingForceMakesEveryFormNonNegative) {
     test::Random random{17};
     for (int draw = 0; draw < test::cases(300); ++draw) {
@@ -404,7 +406,7 @@ TEST(ExplicitScheme, IsStableWithTheStiffestCouplingAndThenTheLeastDamping) {
         const DeviceProfile device = smooth(std::exp(test::uniform(random, -4.0, 0.0)));
         const Scheme chosen = explicit_scheme(bounds, device, {});
         if (!holds(bounds, chosen, chosen.coupling, device)) {
-            continue;  // no tried stiffness of the object is stable
+            continue;  // `explicit_scheme` found no scheme that satisfies all inequalities
         }
         ++stable;
         EXPECT_LE(chosen.coupling.stiffness, 0.9 * stiffest_coupling(0.0, 0.0, device));
@@ -422,7 +424,8 @@ TEST(ExplicitScheme, IsStableWithTheStiffestCouplingAndThenTheLeastDamping) {
     EXPECT_GT(stable, 5);
 }
 
-// Required: f_c >= ||g||_1 Delta / 2, "300 objects, bound over sum 1.000 to 1.009"
+// Encoder steps Delta require the friction f_c >= ||g||_1 Delta / 2, where ||g||_1 is the sum of the absolute impulse
+// response g. For 300 objects the bound is 1.000 to 1.009 times the computed sum.
 TEST(Certificate, GainOfAMassIsTheSumOfTheImpulseResponse) {
     test::Random random{19};
     for (int draw = 0; draw < test::cases(300); ++draw) {
@@ -481,8 +484,8 @@ TEST(Certificate, ExplicitNeedAgreesWithTheReference) {
 
 TEST(Certificate, TheExplicitStructureIsAtMostStable) {
     const Scheme scheme = scheme_of(StructureKind::Explicit, {100.0, 0.02}, {0.001, 0.5});
-    // Largest slope of the explicit structure (4 m - 2 (B_o + B_c) T) / T^2 = 2960, of which the coupling stiffness
-    // uses 100.
+    // Explicit structure: force slope plus coupling stiffness must be less than (4 m - 2 (B_o + B_c) T) / T^2 = 2960;
+    // the coupling stiffness is 100.
     const Certificate below = certify(slopes(2.0, 2800.0), scheme, smooth(0.24));
     EXPECT_EQ(below.verdict, Verdict::StableLocally) << below.reason;
     for (const Inequality& line : below.inequalities) {

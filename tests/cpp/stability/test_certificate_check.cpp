@@ -39,7 +39,7 @@ DeviceProfile strong() {
     return device;
 }
 
-/// Returns the message of the check; empty if the certificate is accepted.
+/// Returns the message with which `checked` refuses a stored certificate; empty if it accepts the certificate.
 std::string disagreement(const Certificate& stored, const ForceModel& model) {
     try {
         (void)checked(stored, model);
@@ -49,7 +49,8 @@ std::string disagreement(const Certificate& stored, const ForceModel& model) {
     }
 }
 
-/// Returns the certificate that follows from different bounds of the force.
+/// Returns a copy of a certificate that is computed again from its force bounds after `change` has changed these
+/// bounds.
 Certificate with_bounds(const Certificate& certificate, const std::function<void(ForceBounds&)>& change) {
     ForceBounds bounds = certificate.bounds;
     change(bounds);

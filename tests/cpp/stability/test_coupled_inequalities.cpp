@@ -46,7 +46,8 @@ struct Bumps {
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 
-    /// Returns the steepest slopes of the force, with a margin for positions between the samples.
+    /// Returns the steepest slopes of the force, with a margin because only positions at distances of 0.002 are
+    /// evaluated.
     [[nodiscard]] Interval slopes() const {
         Interval found{stiffness, stiffness};
         for (double x = -6.0; x <= 6.0; x += 0.002) {
@@ -150,7 +151,8 @@ Account account_of(const CoupledScene& scene, const Parts& parts) {
     }
 }
 
-/// Sets the device damping that the certificate requires, times `share`. Returns false if no damping is sufficient.
+/// Sets the device damping to `share` times the damping that the certificate requires. Returns false if no damping is
+/// sufficient.
 bool set_damping(CoupledScene& scene, double share) {
     ForceBounds bounds;
     bounds.slope = scene.slopes;
@@ -232,7 +234,7 @@ double optimised(test::Random& random, const CoupledScene& scene, int trials) {
             const double first = share > 0.0 ? test::uniform(random, 0.0, 1.2) : 0.0;
             const std::size_t end = samples / 2 + random() % (samples / 2);
             parts.assign(samples, {0.0, 0.0});
-            // Handle at constant speed, with rests between the strokes.
+            // The handle moves at constant speed in each stroke and rests between the strokes.
             const bool strokes = random() % 2 == 0;
             double speed = 0.0;
             for (std::size_t k = 0; k < end; ++k) {

@@ -151,11 +151,12 @@ TEST(DirectLines, EncoderErrorOfHysteresisIncludesStickingOnce) {
     profile.coulomb_friction *= 0.999;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
     profile.coulomb_friction = (20.0 + 80.0) * 0.5e-3;
-    profile.viscous_damping = 0.5e-3 * 60.0;  // the friction includes h / r twice: the slope 60 suffices
+    // The required friction already includes h / r, so the damping needs to include only the slope 60 of the mean force
+    profile.viscous_damping = 0.5e-3 * 60.0;
     EXPECT_TRUE(certify(bounds, direct, profile).certified());
     profile.coulomb_friction *= 0.99;
     EXPECT_FALSE(certify(bounds, direct, profile).certified());
-    // A play radius smaller than half an encoder step.
+    // Changes the play radius to a value smaller than half an encoder step; the required friction is then larger.
     bounds.hysteresis_per_play = bounds.hysteresis_force.upper / 0.4e-3;
     profile.coulomb_friction = (20.0 + 1.5 * bounds.hysteresis_per_play) * 0.5e-3;
     profile.viscous_damping = 10.0;
@@ -227,7 +228,8 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
             bounds.sliding = std::max(bounds.sliding, std::abs(g.slope(k)) + steep);
         }
         DeviceProfile profile = device(0.0, 1.0);
-        profile.coulomb_friction = 0.0;  // the friction follows from the inequality that counts h / r once
+        // Zero, because this test sets the friction from the inequality that counts h / r once
+        profile.coulomb_friction = 0.0;
         const std::vector<Inequality> lines = hysteresis_inequalities(bounds, profile);
         const double B = lines[1].right / profile.period_s;
         for (const double share : {1.0, 0.5}) {
@@ -245,7 +247,7 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
                         static_cast<std::size_t>(unit(random) * static_cast<double>(next.size()));
                     for (std::size_t k = 0; k < next.size(); ++k) {
                         next[k] += k == one || trial % 5 == 0 ? change * normal(random) : 0.0;
-                        // Handle near the border between two encoder counts.
+                        // Moves the handle close to a position at which the encoder count changes.
                         if (k == one && trial % 3 == 0) {
                             next[k] = std::floor(next[k]) + 0.5 + (unit(random) < 0.5 ? -1e-6 : 1e-6);
                         }
@@ -268,7 +270,8 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
             }
         }
     }
-    EXPECT_GE(found, 8);  // with too little damping the search finds motions that take energy out
+    // With half of the required damping and friction the search finds motions that take energy out
+    EXPECT_GE(found, 8);
 }
 
 }  // namespace

@@ -13,7 +13,8 @@
 namespace palpate {
 namespace {
 
-/// Returns the prediction over m samples as a filter of the steps: x + (x - mean of the m readings before) / (m + 1).
+/// Returns the filter weights of the prediction x + (x - mean of the m previous readings) / (m + 1), as factors of the
+/// displacements between the readings.
 std::vector<double> prediction(int m) {
     std::vector<double> taps;
     for (int j = 1; j <= m; ++j) {
@@ -76,8 +77,8 @@ TEST(HeldForce, FallingSlopesNeedLessThanRisingOnesWithDelay) {
     EXPECT_NEAR(delayed_need(1, 0.0, {0.0, 1.0}), 0.50, 0.005);
     EXPECT_NEAR(delayed_need(2, 0.0, {0.0, 1.0}), 0.82, 0.005);
     EXPECT_NEAR(delayed_need(3, 0.0, {0.0, 1.0}), 1.15, 0.005);
-    // With one sample of delay, falling slopes need no additional damping while they are at most twice the steepest
-    // rising slope.
+    // With one sample of delay, the required damping does not increase with the steepest falling slope while this slope
+    // is at most twice the steepest rising slope.
     EXPECT_NEAR(delayed_need(1, 0.0, {1.0, 2.0}), 1.5, 1e-12);
     EXPECT_GT(delayed_need(1, 0.0, {1.0, 2.2}), 1.505);
 }
@@ -138,7 +139,7 @@ TEST(HeldForce, AFilterWithAFractionOfASampleIsContinuousInTheDelay) {
     for (const int m : {1, 4}) {
         for (const SlopeRange slopes : {SlopeRange{1.0, 0.0}, {1.0, 1.0}, {0.2, 1.0}}) {
             const std::vector<double> taps = prediction(m);
-            // Filter weights of a prediction one sample later: 1, then `taps`.
+            // Filter weights of the same prediction with a delay of one more sample: 1, then `taps`.
             std::vector<double> late = taps;
             late.insert(late.begin(), 1.0);
             EXPECT_NEAR(filtered_need(taps, 1e-9, slopes), filtered_need(taps, slopes), 1e-3);
@@ -159,12 +160,12 @@ TEST(HeldForce, WithoutAFilterBothLinesOfAFractionAreClose) {
     }
 }
 
-/// Sample times, command times and prediction filter, in nominal periods.
+/// Delay and jitter in nominal periods, and the weights of the prediction filter.
 struct Timing {
     /// Filter weights: the command of sample k is f(x_k - sum of taps[j - 1] d_{k-j}), where d_i = x_{i+1} - x_i.
     std::vector<double> taps;
-    double delay = 0.0;   ///< delay from a sample to its command
-    double jitter = 0.0;  ///< sample k is taken at the time k + u_k, 0 <= u_k <= jitter
+    double delay = 0.0;   ///< time from a sample to the instant at which its command acts
+    double jitter = 0.0;  ///< sample k is taken at the time k + u_k, where 0 <= u_k <= jitter
 };
 
 /// A closed motion that repeats after as many samples as `late` has elements.
@@ -210,7 +211,8 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
         if (events[e].sample >= 0) {
             position[static_cast<std::size_t>(events[e].sample)] = x;
         } else {
-            acting = events[e].command;  // the last command of the repetition still acts at its start
+            // The last command of the closed motion still acts when the motion begins again
+            acting = events[e].command;
         }
         moved[e] -= time[e] > 1e-9 ? turn * time[e] / count : 0.0;
         x += moved[e];
@@ -237,7 +239,8 @@ double share_put_in(const Zigzag& law, const Cycle& cycle, const Timing& timing,
     return lost > 0.0 ? work / lost + 1.0 : 1.0;
 }
 
-/// Returns the least quotient of work and damping loss that hill descent over closed motions finds.
+/// Returns the least ratio of the energy that a hand must put in to the energy that the damping dissipates; the search
+/// changes closed motions at random and keeps each improvement.
 double worst_share(const Zigzag& law, const Timing& timing, double b, std::mt19937& random) {
     std::uniform_real_distribution<double> unit{0.0, 1.0};
     std::normal_distribution<double> normal;
@@ -320,7 +323,7 @@ TEST(HeldForce, NoMotionTakesEnergyOutOfADelayedForce) {
         return delayed_need(k % 3, tau, slopes);
     };
     EXPECT_EQ(violated(1.0, 40, need), 0);
-    // With too little damping the search finds motions that take energy out.
+    // With 0.6 times the required damping the search finds motions that take energy out.
     EXPECT_GE(violated(0.6, 40, need), 10);
 }
 

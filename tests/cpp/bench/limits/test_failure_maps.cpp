@@ -17,8 +17,8 @@
 namespace palpate::bench {
 namespace {
 
-/// Returns the least and largest quotient of measured and theoretical limit. A point at which no value failed counts
-/// as `none`.
+/// Returns the least and largest ratio of the measured limit to the theoretical limit over the given lines of a map. A
+/// point at which no tried value failed has the ratio `none`.
 Interval ratios(const FailureMap& map, std::size_t first, std::size_t last, double none = 1.0) {
     Interval found{1e300, -1e300};
     for (std::size_t line = first; line <= last; ++line) {
@@ -36,12 +36,14 @@ void expect_between(const Interval& found, double least, double most) {
     EXPECT_LE(found.upper, most);
 }
 
-// Required: "f = Kx without coupling is stable iff 0 < K < (4m - 2 B_o T)/T^2 and B_o T < 2m"
+// An explicit virtual object f = K x with mass m and damping B_o, rendered without coupling at the period T, is stable
+// only for 0 < K < (4m - 2 B_o T)/T^2 and B_o T < 2m.
 TEST(FailureMaps, ExplicitBoundIsExactOverTwoDecadesOfMassAndDamping) {
     expect_between(ratios(explicit_map(test::cases(5)), 0, 2), 0.99, 1.01);
 }
 
-// Required: the device damping b >= T M / 2 + t_d L is necessary, not only sufficient
+// The certificate requires the device damping b >= T M / 2 + t_d L (period T, steepest rising slope M, delay t_d,
+// largest absolute slope L). With less damping a spring oscillates.
 TEST(FailureMaps, SpringJustAboveItsBoundOscillatesWithAHeavyHand) {
     expect_between(ratios(damping_map(3), 0, 2), 1.0, 1.02);
 }
@@ -66,7 +68,8 @@ TEST(FailureMaps, SlopeOfAHysteresisIncludesSticking) {
     expect_between(ratios(play_map(test::cases(4)), 0, 2), 1.0, 1.01);
 }
 
-// Behind a coupling: "exact over all passive environments"
+// The largest coupling stiffness that a device damping allows is exact: with a stiffer coupling some passive virtual
+// object gives energy.
 TEST(FailureMaps, CouplingBoundsAreExactWithAndWithoutDelay) {
     const FailureMap map = coupling_map(1);
     expect_between(ratios(map, 0, 0), 1.0, 1.002);
@@ -78,7 +81,8 @@ TEST(FailureMaps, FallingForcesDoNotFailBelowTheirBound) {
     EXPECT_GE(ratios(falling_map(test::cases(3)), 0, 1, 10.0).lower, 1.0);
 }
 
-// Required: "mass behind a coupling and force limit: m = 0.05, K_c = 90, limit 5: -1.99 J"
+// An object mass of 0.05 behind a coupling of stiffness 90 gives 1.99 J to the hand if the force limit 5 acts after the
+// time step, and no energy if the time step includes the force limit.
 TEST(FailureMaps, ForceLimitOutsideTheStepMakesAMassActiveAndInsideItDoesNot) {
     const FailureMap map = limit_map(6);
     EXPECT_LT(map.lines[0].measured.back(), -1.9);
@@ -88,7 +92,8 @@ TEST(FailureMaps, ForceLimitOutsideTheStepMakesAMassActiveAndInsideItDoesNot) {
     }
 }
 
-// Required: "uniqueness: p + min f' > 0; fixed-point iteration converges if L < p"
+// The load line with slope p crosses the model once if p + min f' > 0 (model slope f'). Fixed-point iteration converges
+// to the crossing if p exceeds the largest absolute slope L.
 TEST(FailureMaps, SolversFailAtTheTheoreticalBound) {
     expect_between(ratios(solver_map(3), 0, 2), 0.999, 1.001);
 }
@@ -97,7 +102,8 @@ TEST(FailureMaps, BoundsAreExactForEverySampleTime) {
     expect_between(ratios(period_map(3), 0, 4), 0.999, 1.02);
 }
 
-// Required: "pole (B_c/T - K/2)/(K_c + B_c/T + K/2) -> -1"
+// The pole (B_c/T - K/2)/(K_c + B_c/T + K/2) of the energy-consistent time step approaches -1 as the stiffness K of the
+// object increases (coupling K_c and B_c, period T).
 TEST(FailureMaps, EnergyConsistentStepOscillatesAndTheSwitchedOneDoesNot) {
     const FailureMap map = pole_map(7);
     for (std::size_t k = 0; k < map.lines[0].at.size(); ++k) {
@@ -124,8 +130,8 @@ TEST(FailureMaps, GuardsStopTheLimitCycleOfATooStiffWall) {
     }
 }
 
-// The required damping is valid for every passive hand: a heavy hand needs all of the damping, a light hand almost
-// all.
+// The device damping that the certificate requires is valid for every passive hand. A heavy hand needs all of this
+// damping, a light hand almost all.
 TEST(FailureMaps, BoundSlackIsSmallForALightHandAndLargeForADampingHand) {
     const FailureMap map = hand_map(3);
     for (std::size_t delay = 0; delay <= 2; ++delay) {
@@ -148,7 +154,8 @@ TEST(FailureMaps, HeavyHandAllows18TimesTheStiffnessWithAPrediction) {
     EXPECT_NEAR(predicted.measured[2] / plain.measured[2], 18.3, 0.5) << "0.1 kg*m^2";
 }
 
-// Quantised: "massless f_c >= gamma Delta/2; B_c = 0: L' Delta/2"
+// Encoder steps Delta require the Coulomb friction f_c >= gamma Delta/2 of a massless structure with the gain gamma.
+// Without coupling damping gamma is the slope L' of model and coupling in series.
 TEST(FailureMaps, EncoderBoundOfACouplingIsExactWithoutADamperAndSufficientWithOne) {
     const FailureMap map = coupled_encoder_map(test::cases(3));
     expect_between(ratios(map, 0, 0, 10.0), 1.0, 1.01);
@@ -211,7 +218,8 @@ bool generates(const ForceModel& model, const DeviceProfile& device) {
     return false;
 }
 
-// Required: "hysteresis, direct: M_h = max(0, max(g' + |h'| + h/r)); without the h/r term it fails"
+// The damping that hysteresis requires in direct rendering follows from M_h = max(0, max(g' + |h'| + h/r)), for the
+// mean force g, hysteresis h and play radius r. Without the term h/r hysteresis gives energy.
 TEST(Hysteresis, GeneratesEnergyOnlyIfStickingIsIgnored) {
     test::Random random{5};
     int without = 0;
