@@ -20,7 +20,7 @@ BENCH_KNOB = DeviceProfile.load(profile_file("bench-knob"))
 
 
 def wheel() -> Model:
-    """Returns a wheel with one peak of about 8 N*m; its unlimited force has zero mean."""
+    """Returns the model of a wheel with one torque peak of about 8 N*m and a mean torque of zero."""
     model = model_by_hand(
         alpha=[[8.0], [0.6], [0.6]],
         beta=[[2.0], [4.5], [1.2]],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Device profiles, candidate structures, certificates in model files, and the verb."""
+"""Device profiles, candidate structures, certificates in model files, and the command palpate plan."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SMOOTH = DeviceProfile(id="smooth knob", encoder_step=0.0)
 
 
 def slide(viscous_damping: float) -> DeviceProfile:
-    """Returns a device for key switches."""
+    """Returns the profile of a device with a straight handle, for key switches."""
     return DeviceProfile(
         id="slide",
         position_unit="m",

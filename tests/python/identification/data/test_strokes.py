@@ -185,7 +185,7 @@ def test_the_command_identifies_and_verifies_two_columns(
     result = json.loads(captured.out)
     assert result["model_class"] == "hysteresis"
     assert result["verdict"] == "good"
-    # The average of the strokes has 0.16. One held-out row is at the reversal, where the force jumps.
+    # The mean of the strokes has an NRMSE of 0.16. One held-out row is at the reversal, where force jumps.
     assert result["nrmse"] < 0.04
     note = "The direction is taken from the order of rows: 1 turn."
     assert note in load_model(model).notes["identification"]

@@ -117,7 +117,7 @@ def test_the_bounded_least_squares_is_the_best_one() -> None:
     problem = problem_of(Compressor(np.tile(x, 2)[:, None], y, max_positions=500).rows(side), resolved_by=5)
     free = problem.solve(Basis.empty(1))
     kept = impose(problem, free, domain_bounds(problem, hysteresis=True, slopes=None))
-    # h is a straight line here: it is non-negative if both ends are, so there are only four active sets
+    # the hysteresis h is a straight line: only h >= 0 at its two ends can be active, so there are four cases
     best = np.inf
     ends = np.array([[0.5, 0.0, -0.5, 0.0], [0.5, 0.5, -0.5, -0.5]])
     design = np.zeros((120, 4))
