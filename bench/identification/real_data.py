@@ -85,7 +85,7 @@ SETS = {
 
 @dataclass(frozen=True)
 class Crossing:
-    """Rows of a recording whose release force exceeds the press force, which a passive model cannot fit."""
+    """Excess of release force over press force in a recording, which no passive model can fit."""
 
     floor: float
     """NRMSE of the best force with h >= 0: the measured strokes, replaced by their mean where they cross. It
@@ -97,7 +97,7 @@ class Crossing:
 
     @staticmethod
     def of(recording: palpate.Recording, compared: Rows) -> Crossing | None:
-        """Returns the rows (n,) where release exceeds press force; None if one of the strokes is missing."""
+        """Compares release and press force in the rows `compared` (n,); None if one stroke is missing."""
         x, direction, force = recording.position, recording.direction, recording.force
         if direction is None or not {-1, 1} <= set(direction.tolist()):
             return None

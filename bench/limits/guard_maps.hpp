@@ -68,7 +68,7 @@ namespace palpate::bench {
     return map;
 }
 
-/// Cost of one guard without a fault, and its effect on a fault.
+/// Force change that one guard causes without a fault, and the effect of a fault without and with the guard.
 struct GuardEffect {
     std::string guard;
     double cost = 0.0;  ///< RMS force change by the guard without fault, divided by the RMS force

@@ -61,7 +61,7 @@ double implicit_slope(palpate::Inertia inertia) {
     return palpate::Implicit<CompiledNetwork>::load_line_slope(inertia, coupling, period);
 }
 
-/// Force and motion of a structure in the closed loop.
+/// Force errors and motion of a structure in a simulated loop with device and hand.
 struct LoopResult {
     palpate::ForceError error;
     double force = 0.0;  ///< RMS of the model force f along the motion

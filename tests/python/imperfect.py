@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Force laws with known truth, and recordings of them with one imperfection."""
+"""Simulated objects with known force, and recordings of them with one kind of measurement error."""
 
 from collections.abc import Callable
 

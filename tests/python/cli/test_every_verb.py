@@ -24,7 +24,7 @@ VERBS = {
     "show": "show m.json",
     "demo": "demo -o demo",
 }
-"""One command line of each verb that ends quickly."""
+"""Command lines for the tests, one for each verb; each command ends quickly."""
 
 UNWRITABLE = {
     "stdout closed": ">&-",

@@ -254,7 +254,7 @@ def test_after_kill_the_watchdog_of_the_device_sets_zero_torque(tmp_path: Path) 
     sent_frames = frames(trace)
     assert min(frame.torque for frame in sent_frames) < -0.01
     assert sent_frames[-1].torque == 0.0
-    assert sent_frames[-1].status & 2  # bit 1: the watchdog of the device has stopped the motor
+    assert sent_frames[-1].status & 2  # bit 1 of the status: the device's watchdog has acted
 
 
 # Kind -> number of frames of the fault, True if nothing can follow it, frames until the torque is zero. The

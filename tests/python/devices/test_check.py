@@ -346,7 +346,7 @@ def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> Non
     assert result["inertia"] == pytest.approx(2e-4, rel=0.05)
     assert result["viscous_damping"] == pytest.approx(0.06, rel=0.05)
     assert result["delay_p50_us"] == pytest.approx(1000.0, rel=0.02)
-    assert 1e-3 < result["delay_s"] < 3e-3  # largest of a thousand measured delays
+    assert 1e-3 < result["delay_s"] < 3e-3  # the largest of 1000 measured delays
     assert result["round_trip_p50_us"] > 0.0
     assert (result["lost_samples"], result["repeated_samples"]) == (0, 0)
     written = DeviceProfile.load(profile)

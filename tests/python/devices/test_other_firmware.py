@@ -32,7 +32,7 @@ def firmware_of(seed: int, *words: Any) -> list[str]:
 def test_the_device_is_zeroed_found_by_serial_number_and_rendered_on(seed: int, tmp_path: Path) -> None:
     trace, record, listed = (tmp_path / name for name in ("trace.csv", "rendered.csv", "devices.json"))
     model = json.loads(SPRING.read_text(encoding="utf-8"))
-    model["continuation"] = {**model["continuation"], "below": "linear"}  # the handle may be anywhere
+    model["continuation"] = {**model["continuation"], "below": "linear"}  # for any handle position
     both_ways = tmp_path / "spring.json"
     both_ways.write_text(json.dumps(model), encoding="utf-8")
     control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified", *ANY_RATE, "--wait-ms", 10_000]))
@@ -51,7 +51,7 @@ def test_the_device_is_zeroed_found_by_serial_number_and_rendered_on(seed: int, 
     assert summary["usb"]["late_echoes"] == 0
     assert summary["usb"]["watchdog_trips"] == 0
     emulated_frames = frames(trace)
-    assert max(abs(frame.torque) for frame in emulated_frames) > 1e-3  # the rendered spring gave a force
+    assert max(abs(frame.torque) for frame in emulated_frames) > 1e-3  # the spring was rendered with force
     assert emulated_frames[-1].torque == 0.0
     assert not emulated_frames[-1].enabled
     assert abs(read_recording(record).force).max() > 1e-3

@@ -229,7 +229,7 @@ def test_measured_strokes_are_found_in_the_order_of_rows(data: Path) -> None:
 
 
 def test_measured_recordings_without_direction_are_identified_as_well(data: Path) -> None:
-    """The NRMSE is at most 1.05 times that with stated directions; equal strokes give equal models."""
+    """The NRMSE is at most 1.05 times that of the file with directions; equal strokes give equal models."""
     for path in measured_files(data):
         stated = replace(read_recording(path), time=None)
         unstated = replace(stated, direction=None)

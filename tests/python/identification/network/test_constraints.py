@@ -144,7 +144,7 @@ def test_vanishing_noisy_hysteresis_stays_nonnegative_without_error() -> None:
 
 
 def test_crossing_strokes_are_replaced_by_their_mean() -> None:
-    """If release force exceeds press force, h = 0 and g is their mean; elsewhere g and h do not change."""
+    """If release force exceeds press force, hysteresis h becomes 0 and mean force g is the mean of both."""
     x = np.linspace(0.0, 0.004, 400)
     h = 0.05 * np.sin(np.pi * x / 0.002)
     positions, force, side = strokes(h, x, 0.002)
