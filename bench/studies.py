@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Provides all studies with the scale of a run, JSON files with machine and date, and tables of pages."""
+"""Functions of all studies: scale of a run, JSON files with machine and date, tables of pages."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from palpate.recording.files import replacing
 ROOT = Path(__file__).parents[1]
 
 SCALE = float(os.environ.get("PALPATE_BENCH_SCALE", "1"))
-"""Scale of the sizes of all studies: 1 for published numbers, 0.01 for a quick test"""
+"""Factor of the numbers of draws and files of all studies: 1 for published results, 0.01 for a quick test"""
 
 
 def count(full: int) -> int:
-    """Number of draws or files at the current scale, at least 1."""
+    """Returns a number of draws or files multiplied by SCALE, at least 1."""
     return max(1, round(full * min(SCALE, 1.0)))
 
 
@@ -44,7 +44,7 @@ def commit() -> str:
 
 
 def where() -> dict[str, Any]:
-    """Returns machine, date and versions of a measurement."""
+    """Returns machine, date and program versions, which are stored with measured results."""
     return {
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()}",
         "python": platform.python_version(),
@@ -64,12 +64,12 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Writes one JSON value."""
+    """Writes a value to a JSON file."""
     write_text(path, json.dumps(content, indent=1) + "\n")
 
 
 def write_results(path: Path | None, results: Any) -> None:
-    """Writes results with their machine and date; does nothing without a path."""
+    """Writes results with machine and date to a JSON file; does nothing if the path is None."""
     if path is not None:
         write_json(path, {"where": where(), "results": results})
 
@@ -77,7 +77,7 @@ def write_results(path: Path | None, results: Any) -> None:
 def markdown_table(
     header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: Sequence[int] = (0,)
 ) -> str:
-    """Returns a table; all columns except `text_columns` are aligned right."""
+    """Returns a Markdown table; all columns except `text_columns` are aligned right."""
     rule = ["---" if k in text_columns else "---:" for k in range(len(header))]
     return "".join(f"| {' | '.join(line)} |\n" for line in (header, rule, *rows))
 

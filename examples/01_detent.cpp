@@ -28,7 +28,7 @@ int main() {
     const DeviceProfile device;
     const Hand hand;
 
-    // 3. List the structures, from the simplest to the explicit structure of the paper.
+    // 3. List the structures, from direct rendering to the explicit one, which the paper uses.
     Scheme direct;
     Scheme compensated;
     Scheme massless;

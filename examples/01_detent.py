@@ -22,7 +22,7 @@ detent = palpate.Model.from_network(
 # 2. Choose a simulated device and hand: a knob with a 16-bit encoder at 1 kHz, moved through the detent.
 device, hand = palpate.DeviceProfile(), palpate.Hand()
 
-# 3. List the structures, from the simplest to the explicit structure of the paper.
+# 3. List the structures, from direct rendering to the explicit one, which the paper uses.
 schemes = {
     "direct": palpate.Scheme(structure="direct"),
     "massless, compensated": palpate.Scheme(structure="massless", compensated=True, coupling_damping=0.005),

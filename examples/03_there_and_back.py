@@ -33,7 +33,7 @@ travel, step = switch.upper[0] - switch.lower[0], rig.device.encoder_step
 motion = switch.lower[0] + travel * (0.5 - 0.5 * np.cos(np.pi * time))
 position = step * np.floor(motion / step + 0.5)
 direct_plan = palpate.Plan(switch, rig.scheme(switch, structure="direct"))
-force = np.round(force_at(direct_plan, position), 4)  # 0.1 mN*m: step of the transducer
+force = np.round(force_at(direct_plan, position), 4)  # the force transducer has steps of 0.1 mN*m
 palpate.Recording.from_arrays(position, force, time, units={"position": "rad", "force": "N*m"}).write(
     real_csv
 )

@@ -28,7 +28,7 @@ DURATION = re.compile(r"\d+(?:\.\d+)? s$", re.MULTILINE)
 
 
 def output_of(command: str, folder: str) -> str:
-    """Returns the standard output of the last command of a list that is joined by &&."""
+    """Runs shell commands that are joined by &&; returns the standard output of the last command."""
     programs = Path(sysconfig.get_path("scripts"))
     text = ""
     for part in command.split(" && "):
@@ -43,7 +43,7 @@ def output_of(command: str, folder: str) -> str:
 
 
 def agree(written: str, printed: str) -> bool:
-    """Returns true if the words are equal and the numbers agree within 5 %."""
+    """Returns true if two outputs have equal words and if their numbers differ by at most 5 %."""
     written, printed = (DURATION.sub("T s", text) for text in (written, printed))
     if NUMBER.sub("0", written) != NUMBER.sub("0", printed):
         return False

@@ -43,7 +43,7 @@ def lateness_of_cyclictest(seconds: float, cpu: int) -> dict[str, float]:
 
 
 def quantile(ascending: list[float], share: float) -> float:
-    """Returns the smallest value that at least this share of all values does not exceed."""
+    """Returns a quantile: the smallest value that at least this share of all values does not exceed."""
     return ascending[math.ceil(share * len(ascending)) - 1]
 
 

@@ -23,7 +23,7 @@ LICENCE = "# SPDX-License-Identifier: Apache-2.0\n"
 
 
 def generated_files() -> dict[str, str]:
-    """Returns stub files and schema of the compiled module: name below the package -> text."""
+    """Returns path in the package -> text, for the type stubs and the schema of the compiled module."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pybind11_stubgen", MODULE, "--exit-code", "-o", folder]
         subprocess.run(command, check=True)

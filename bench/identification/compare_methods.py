@@ -29,13 +29,13 @@ from bench.studies import SCALE, count, write_results
 PALPATE = METHODS[0].name
 
 SLOW_TIME_RATIO = 5.0
-"""Computing time of a method over that of palpate; slower methods run only DRAWS_OF_SLOW_METHODS draws"""
+"""A method whose computing time divided by that of palpate is larger gets only DRAWS_OF_SLOW_METHODS draws"""
 
 DRAWS_OF_SLOW_METHODS = 3
 
 
 def reason_to_skip(method: Method, rows: Problem) -> str | None:
-    """Returns the reason why a method skips a problem, or None."""
+    """Returns the reason why a method is not applied to a problem; None if the method is applied."""
     if rows.X.shape[1] not in method.inputs:
         return "one input only"
     if len(rows.y) > method.most_rows:
@@ -44,7 +44,7 @@ def reason_to_skip(method: Method, rows: Problem) -> str | None:
 
 
 def measure(name: str, n_draws: int, methods: Sequence[Method]) -> list[dict[str, Any]]:
-    """Returns medians and ranges over the draws for each method, or the reason why it was skipped."""
+    """Returns medians and ranges of each method's results in all draws, or why the method was skipped."""
     results: dict[str, list[tuple[float, Fitted]]] = {method.name: [] for method in methods}
     reasons: dict[str, str] = {}
     for draw in range(n_draws):
@@ -72,7 +72,7 @@ def measure(name: str, n_draws: int, methods: Sequence[Method]) -> list[dict[str
 def is_skipped_as_slow(
     results: Sequence[tuple[float, Fitted]], palpate_results: Sequence[tuple[float, Fitted]] | None
 ) -> bool:
-    """Returns true if a method is so slow that only the first draws use the method."""
+    """Returns true if a method is so slow that it is not run on further draws of a problem."""
     return (
         len(results) >= DRAWS_OF_SLOW_METHODS
         and palpate_results is not None
@@ -117,7 +117,7 @@ def line(row: dict[str, Any]) -> str:
 
 
 def _with_range(row: dict[str, Any], key: str) -> str:
-    """Returns median and range of a count over the draws as text."""
+    """Returns as text the median, least and largest value of a count in the random draws of a problem."""
     if row[key] is None:
         return ""
     low, high = row[f"{key}_range"]

@@ -32,10 +32,10 @@ from palpate import WaveletNetworkRegressor
 Array = NDArray[np.float64]
 
 PUBLISHED = ("LTI SS", "polynomial NARX", "best known (SOTA row)")
-"""Published models in the printed table: a linear model, a black box, and the model with the least error."""
+"""Names of published models whose errors are printed: linear, polynomial, the one with the least error."""
 
 DRIVE_MASS = 90.0
-"""Start of the search for the mass of the drive [kg]."""
+"""First value in the numerical search for the mass of a drive [kg]."""
 
 SUBSTEPS = 10
 """Integration steps in each sample period of the simulated drive."""
@@ -43,16 +43,16 @@ SUBSTEPS = 10
 
 @dataclass(frozen=True)
 class Set:
-    """Name, unit and rows of one benchmark."""
+    """One published benchmark file: its name, its unit, and the test rows whose error is computed."""
 
     name: str
     unit: str
     factor: float = 1.0
-    """Factor from the unit of the file to the printed unit"""
+    """Factor that converts an error in the unit of the benchmark file into the printed unit"""
     skip: int = 0
-    """Number of first test rows that are not included in the error"""
+    """Number of rows at the beginning of the test set that do not count in the error"""
     comparable: bool = True
-    """True if the published errors were measured on the same test rows"""
+    """True if the published errors of other models were measured on the test rows that are used here"""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Row:
 
 
 def rms(error: Array) -> float:
-    """Returns the RMS; NaN if a free run diverged."""
+    """Returns the root mean square of a prediction error; NaN if the prediction diverged."""
     return float(np.sqrt(np.mean(error**2)))
 
 
@@ -95,7 +95,7 @@ def score(
 
 
 def silverbox(folder: Path) -> list[Row]:
-    """Measures an electronic oscillator with a cubic spring; the arrow has the largest amplitude."""
+    """Fits a measured electronic oscillator with a cubic spring; in the test "arrow" the amplitude grows."""
     table = pd.read_csv(folder / "silverbox" / "silverbox_snls80mv.csv")
     u, y = table.input_V1_V.to_numpy(), table.output_V2_V.to_numpy()
     multisine, last = slice(40_650, 127_410), 8_700
@@ -126,7 +126,7 @@ def cascaded_tanks(folder: Path) -> list[Row]:
 
 
 def study_of_halves(name: str, file: str, inputs: str, output: str, lags: int) -> Callable[[Path], list[Row]]:
-    """Returns the study of a file without a published split; fits one half and tests the other."""
+    """Returns the study of a file without stated test rows: one half is fitted, the other tested."""
 
     def rows(folder: Path) -> list[Row]:
         table = pd.read_csv(folder / "sysid_benchmarks" / file)
@@ -234,7 +234,7 @@ SETS: dict[str, Callable[[Path], list[Row]]] = {
 
 
 def with_published(folder: Path, row: Row) -> Row:
-    """Returns a row of the table with the published errors of the same test set, if there are any."""
+    """Returns a row of the error table, completed with published errors of other models on its test set."""
     table = pd.read_csv(folder / "sysid_benchmarks" / "published_results.csv")
     rows = table[(table.benchmark == row.benchmark) & (table.test_set == row.test_set)]
     errors = rows[(rows.metric == "RMSE") & (rows.unit == row.unit)].set_index("method").value

@@ -31,10 +31,10 @@ from bench.studies import fill_tables, markdown_table
 from palpate.plotting.look import grid
 
 ANY_SIGN, EARLIER = "_h_of_any_sign", "_force_25_ms_earlier"
-"""Suffixes in the names of sets that contain the files of another set, fitted with other options."""
+"""A set NAME + suffix has the files of the set NAME, fitted with h of any sign or with earlier force."""
 
 WORST_SPLINE_RATIO = 1.3
-"""Error of a model over the error of the splines; files with a larger ratio are counted."""
+"""Files for which the error of the model divided by the error of the splines is larger are counted."""
 
 METHOD_STYLES = (
     ("o", "black"),
@@ -42,7 +42,7 @@ METHOD_STYLES = (
     ("D", "0.55"),
     *((marker, "white") for marker in "^v<>pP*Xhd8"),
 )
-"""Marker and face color: palpate, its selection alone, its quasi-Newton refinement, then other methods."""
+"""Marker and its color: palpate, palpate's wavelet selection alone, its refinement alone, other methods."""
 
 DASHES = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (5, 2, 1, 2)), (0, (8, 3)))
 
@@ -71,7 +71,7 @@ def results_of(folder: Path, name: str) -> tuple[Any, str] | None:
 
 
 def problems(rows: Sequence[Row]) -> str:
-    """Returns median NRMSE, size and time for each problem and method, with the range over the draws."""
+    """Returns a table: median and range of NRMSE, parameters and time in all draws, by problem and method."""
     return markdown_table(
         (
             "problem, method",
@@ -101,7 +101,7 @@ def problems(rows: Sequence[Row]) -> str:
 
 
 def with_range(row: Row, key: str, form: str) -> str:
-    """Returns median and range of a value as text; empty for a method without this value."""
+    """Returns median, least and largest value of a result as text; empty if the method has no such result."""
     if row[key] is None:
         return ""
     low, high = row[f"{key}_range"]
@@ -109,7 +109,7 @@ def with_range(row: Row, key: str, form: str) -> str:
 
 
 def measured_objects(sets: Mapping[str, Sequence[Row]]) -> str:
-    """Returns a table of median NRMSE, size and time over the files of each set, for each method."""
+    """Returns a table by set of files and method: median of NRMSE, parameters and time of all files."""
     lines = []
     for name, files in sets.items():
         measured_rows = [row for row in files if "nrmse" in row]
@@ -132,7 +132,7 @@ def measured_objects(sets: Mapping[str, Sequence[Row]]) -> str:
 
 
 def crossings(sets: Mapping[str, Sequence[Row]]) -> str:
-    """Returns one table row for each file that was also fitted with any sign of h, and with earlier force."""
+    """Returns a table row for each file that was also fitted with h of any sign and with earlier force."""
     lines = []
     for name, files in sets.items():
         variants = [
@@ -176,7 +176,7 @@ def row_of_crossing(row: Row, any_sign: Row, earlier: Row) -> tuple[str, ...]:
 
 
 def worst_ratio(files: Sequence[Row], splines: str) -> str:
-    """Returns the largest ratio of a model's error to the splines' error, and the number of large ratios."""
+    """Returns the largest ratio of model to spline error, and how many files exceed WORST_SPLINE_RATIO."""
     errors = [(row["nrmse"], row[splines]["nrmse"]) for row in files if row[splines]]
     ratios = [
         error / splines_error
@@ -240,7 +240,7 @@ TABLES: Mapping[str, Callable[[Any], str]] = {
 
 
 def draw_error_over(path: Path, rows: Sequence[Row], label: str, cost: Callable[[Row], float]) -> None:
-    """Draws the error of each method over its size or time, one panel per problem; lower left is best."""
+    """Draws model error (y axis) and size or time (x axis) of each method, one panel for each problem."""
     measured_rows = [row for row in rows if "nrmse" in row]
     methods = list(dict.fromkeys(row["method"] for row in measured_rows))
     problems = list(dict.fromkeys(row["problem"] for row in measured_rows))
@@ -282,7 +282,7 @@ def draw_error_over(path: Path, rows: Sequence[Row], label: str, cost: Callable[
 
 
 def draw_legend(panels: Sequence[Axes], methods: Sequence[str]) -> None:
-    """Draws one legend below all panels."""
+    """Draws one legend below all panels of a figure."""
     handles = {
         name: handle
         for axes in panels
@@ -294,7 +294,7 @@ def draw_legend(panels: Sequence[Axes], methods: Sequence[str]) -> None:
 
 
 def draw_over_speed(path: Path, rows: Sequence[Row]) -> None:
-    """Draws the error over the speed of the motion, one line for each way to identify."""
+    """Draws model error (y axis) and highest motion frequency (x axis), a line for each identification."""
     with figure_file(path, height_inches=3.4) as (axes,):
         styles = zip(METHOD_STYLES, DASHES, (6.5, 5.5, 4.5, 4.0, 3.5), strict=False)
         for row, ((marker, face_color), dash, size) in zip(rows, styles, strict=False):
@@ -323,7 +323,7 @@ def draw_over_speed(path: Path, rows: Sequence[Row]) -> None:
 
 
 def decades(values: Iterable[float]) -> tuple[float, float]:
-    """Returns the least range of whole powers of ten that contains all values."""
+    """Returns the limits of an axis: the nearest powers of ten below and above all drawn values."""
     exponents = [math.log10(value) for value in values]
     low, high = math.floor(min(exponents)), math.ceil(max(exponents))
     return 10.0**low, 10.0 ** max(high, low + 1)

@@ -29,7 +29,7 @@ from palpate.recording.sample import LOWER, UPPER
 
 MASS, DAMPING = 1e-3, 0.06
 FASTEST_HZ = (0.5, 1.0, 2.0, 4.0, 8.0)
-"""Highest frequency of the hand motion; the lowest frequency is a tenth of the highest."""
+"""Compared highest frequencies of the hand motion [Hz]; the lowest frequency is a tenth of the highest."""
 
 CASES: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
     "matched, mass": ({"mass": MASS}, {}),
@@ -43,13 +43,13 @@ CASES: dict[str, tuple[dict[str, float], dict[str, Any]]] = {
         {"search": SearchOptions(filters="paper-explicit", assumed_mass=MASS, assumed_damping=DAMPING)},
     ),
 }
-"""Mass and damping of the object, and the options of its identification."""
+"""Name of a case -> (mass and damping of the simulated object, options of its identification)."""
 
 
 def error(
     object_properties: dict[str, float], options: dict[str, Any], fastest_hz: float, draw: int
 ) -> float:
-    """Returns the NRMSE of the identified f over the visited positions."""
+    """Returns the NRMSE of the identified force f against the true force at positions of the recording."""
     recording = simulate_recording(
         draw, seconds=20.0, slowest_hz=fastest_hz / 10.0, fastest_hz=fastest_hz, **object_properties
     )
@@ -61,7 +61,7 @@ def error(
 
 
 def mean_force(model: Model, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the force f, or the mean of press and release force if the model has (wrong) hysteresis."""
+    """Returns the model force; for a model with (wrong) hysteresis the mean of press and release force."""
     if not model.hysteretic:
         return np.asarray(model.force(x))
     strokes = [np.asarray(model.force(x, direction=np.full(len(x), direction))) for direction in (1.0, -1.0)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fits difference equations with a wavelet network and predicts one step ahead or in free run."""
+"""Difference equations with a wavelet network, which predict from measured or from predicted outputs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from palpate._core.model import wavelet_columns
 Array = NDArray[np.float64]
 
 N_FITS = 8
-"""Number of alternating fits of the linear part and of the network"""
+"""Number of times that first the linear part, then the wavelet network is fitted"""
 
 DIVERGENCE_LIMIT = 3.0
-"""Absolute output at which a free run counts as diverged [multiples of the range of the fitted outputs]"""
+"""Largest absolute output of a prediction that has not diverged [multiples of the measured output range]"""
 
 
 class Lagged:
@@ -32,7 +32,7 @@ class Lagged:
 
     @property
     def start(self) -> int:
-        """Number of measured outputs that start a free run; all later outputs are predicted."""
+        """Number of measured outputs before the first predicted output."""
         return max(self._p, self._q)
 
     @property
@@ -41,7 +41,7 @@ class Lagged:
         return linear + int(self._network.n_parameters_)
 
     def fit(self, u: Array, y: Array) -> Lagged:
-        """Fits the model to inputs u (n,) and outputs y (n,)."""
+        """Fits the difference equation to measured inputs u (n,) and outputs y (n,)."""
         X, target = self._lags(u, y), y[self.start :]
         if self._state is None:
             self._network.fit(X, target)
@@ -49,10 +49,10 @@ class Lagged:
             return self
         wavelets = np.zeros((len(target), 0))
         for _ in range(N_FITS):
-            # past outputs and wavelets are nearly collinear columns: alternating fits would converge slowly
+            # the linear part is fitted with the wavelets: past outputs are nearly collinear with the wavelets
             columns = np.concatenate([X, np.ones((len(X), 1)), wavelets], axis=1)
             self._linear = np.linalg.lstsq(columns, target, rcond=1e-10)[0][: X.shape[1]]
-            # f has the sign of a force, because a force outside the domain is continued to rise with position
+            # f enters with a minus sign, as a force does: the continuation of f outside the domain must rise
             self._network.fit(X[:, list(self._state)], X @ self._linear - target)
             network = self._network.network_
             wavelets = wavelet_columns(
@@ -61,13 +61,13 @@ class Lagged:
         return self
 
     def one_step(self, u: Array, y: Array) -> Array:
-        """Predicts every output after the start rows from the measured inputs and the outputs before it."""
+        """Predicts each output from the measured inputs and the earlier measured outputs."""
         lags = self._lags(u, y)
         inputs = lags if self._state is None else lags[:, list(self._state)]
         return np.asarray(lags @ self._linear + self._sign * self._network.predict(inputs))
 
     def free_run(self, u: Array, y: Array) -> Array:
-        """Predicts all later outputs from the inputs and the measured outputs of the start; NaN: diverged."""
+        """Predicts outputs after the first `start` ones from inputs and predicted outputs; NaN: diverged."""
         limit = DIVERGENCE_LIMIT * float(np.ptp(y))
         simulated = y.copy()
         simulated[self.start :] = np.nan

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Provides each method as a function (X, y) -> Fitted; a fifth of the rows chooses its settings."""
+"""Identification methods: functions of inputs X and forces y; every fifth row tunes their settings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Predict = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Fitted:
-    """Model that a method has fitted to all rows with the setting that the method has chosen."""
+    """Result of an identification method: the model fitted to all rows with the tuned setting, and times."""
 
     predict: Predict
     n_parameters: int
@@ -41,13 +41,13 @@ class Fitted:
 
     @property
     def seconds(self) -> float:
-        """Returns the time of fit and tuning."""
+        """Returns the sum of the times of tuning the settings and of the final fit [s]."""
         return self.fit_seconds + self.tuning_seconds
 
 
 @dataclass(frozen=True)
 class Method:
-    """A method and the problems that it solves in reasonable time."""
+    """An identification method, and the numbers of inputs and rows for which the method is run."""
 
     name: str
     fit: Callable[[Array, Array], Fitted]
@@ -56,7 +56,7 @@ class Method:
 
 
 def palpate_with(**options: Any) -> Callable[[Array, Array], Fitted]:
-    """Returns the fit of palpate with some options; it chooses the size automatically, without tuning."""
+    """Returns palpate as a method with these options; palpate chooses the number of wavelets itself."""
 
     def fit(X: Array, y: Array) -> Fitted:
         start = time.perf_counter()
@@ -70,7 +70,7 @@ def palpate_with(**options: Any) -> Callable[[Array, Array], Fitted]:
 def _tuned(
     fit: Callable[[Any, Array, Array], tuple[Predict, int]], settings: Iterable[Any], X: Array, y: Array
 ) -> Fitted:
-    """Chooses the setting with the least error on every fifth row, then fits all rows with it."""
+    """Fits each setting without every fifth row, and fits all rows with the setting of least error there."""
     start = time.perf_counter()
     held_out = np.arange(len(y)) % 5 == 4
     scores = []
@@ -116,13 +116,13 @@ def univariate_spline(X: Array, y: Array) -> Fitted:
         interior = len(spline.get_knots()) - 2
         return lambda x_new: spline(x_new[:, 0]), len(spline.get_coeffs()) + interior
 
-    # without noise the spline interpolates; with many rows FITPACK would take minutes
+    # 1e-6 makes the spline pass through rows without noise; with many rows this would take minutes
     shares = (0.98, 0.99, 1.0, 1.005, 1.01, 1.02, 1.05, 1.1)
     return _tuned(fit, (1e-6, *shares) if len(y) <= 1_000 else shares, X, y)
 
 
 def spline_ridge(X: Array, y: Array) -> Fitted:
-    """Fits B-splines of one input, or their products for two inputs, by ridge regression."""
+    """Fits B-splines (one input) or products of B-splines (two inputs) by ridge regression."""
 
     def fit(setting: tuple[int, float], X: Array, y: Array) -> tuple[Predict, int]:
         knots, penalty = setting
@@ -148,7 +148,7 @@ def spline_ridge(X: Array, y: Array) -> Fitted:
 
 
 def frame_pursuit(X: Array, y: Array) -> Fitted:
-    """Fits by orthogonal matching pursuit on the frame of palpate's selection."""
+    """Fits wavelets that orthogonal matching pursuit selects from the frame that palpate also uses."""
     lower, width = X.min(axis=0), np.ptp(X, axis=0)
 
     def columns(atoms: Any, x_new: Array) -> Array:
@@ -168,7 +168,7 @@ def frame_pursuit(X: Array, y: Array) -> Fitted:
     for n_tried in (8, 16, 24, 32, 48, 64, 96, 128):
         pursuit = OrthogonalMatchingPursuit(n_nonzero_coefs=min(n_tried, len(y) // 3))
         with warnings.catch_warnings():
-            # the solver warns when no further wavelet of the frame can be selected
+            # the pursuit warns when no further wavelet of the frame can be selected
             warnings.simplefilter("ignore", RuntimeWarning)
             pursuit.fit(columns_at_rows[~held_out], y[~held_out])
         scores.append(
@@ -258,4 +258,4 @@ METHODS = (
     Method("Gaussian process", gaussian_process, most_rows=500),
     Method("MARS (pyearth)", mars, most_rows=100_000),
 )
-"""The compared methods, palpate first; a method that is not installed is skipped with a message."""
+"""The compared identification methods, palpate first; a method that is not installed is left out."""

@@ -22,10 +22,10 @@ from bench.studies import count, write_results
 from palpate import Model, Recording, identify
 
 MASS, DAMPING = 1e-3, 0.06
-"""True values of the moving object [N*m*s^2/rad, N*m*s/rad]."""
+"""True mass and damping of the simulated moving object [N*m*s^2/rad, N*m*s/rad]."""
 
 TOLERANCE = 0.05
-"""Allowed relative error of mass and damping."""
+"""Largest relative error with which an identified mass or damping counts as correct."""
 
 
 def spring(draw: int) -> Recording:
@@ -76,7 +76,7 @@ CLAIMS: dict[str, tuple[int, Callable[[int], Recording], Callable[[Model], bool]
         has_true_mass_and_damping,
     ),
 }
-"""Number of draws, function that makes the recording of a draw, and function that checks the model."""
+"""Claim -> (number of draws, function that simulates a draw's recording, function that checks the model)."""
 
 
 def is_correct_draw(claim: str, draw: int) -> bool:

@@ -26,7 +26,7 @@ TITLES = {
 
 @dataclass(frozen=True)
 class Problem:
-    """Noisy rows that fit a model and exact rows that test the model."""
+    """Identification problem: noisy rows to which a model is fitted, and exact rows to test the model."""
 
     name: str
     X: Array
@@ -84,7 +84,7 @@ def _one_input(name: str, x: Array, force, sigma: float, noise: np.random.Genera
 
 
 def hand(random: np.random.Generator, n: int, lower: float, upper: float) -> Array:
-    """Returns positions of a hand at 1 kHz: slow sweeps with varying frequency and width and with jitter."""
+    """Returns hand positions at 1 kHz: a slow oscillation of varying frequency and amplitude, with jitter."""
     n_knots = max(8, n // 1500)
     row, knot_rows = np.arange(n), np.linspace(0, n, n_knots)
     frequency = np.interp(row, knot_rows, random.uniform(0.2, 0.9, n_knots))
@@ -95,7 +95,7 @@ def hand(random: np.random.Generator, n: int, lower: float, upper: float) -> Arr
 
 
 def spring_wall(x: Array) -> Array:
-    """Returns a force of 2 N*m/rad up to 0.4 rad, then 60 N*m/rad; the change is 0.01 rad wide."""
+    """Returns a force with slope 2 N*m/rad below 0.4 rad and 60 N*m/rad above; 0.01 rad smooth the kink."""
     return 2.0 * x + 58.0 * 0.01 * np.logaddexp(0.0, (x - 0.4) / 0.01)
 
 

@@ -34,14 +34,14 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 EVERY = 5
-"""Rows i with i mod 5 = 4 are held out."""
+"""Number n: the rows i with i mod n = n - 1 of a recording are held out."""
 
 MOST_FILES = 16
-"""Largest number of files of a set."""
+"""Largest number of files of one folder that are identified."""
 
 
 AT_TURN = 0.01
-"""Share of the travel before the reversal from press to release"""
+"""Width of the part of the travel next to the reversal from press to release [share of the travel]"""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Set:
     folder: str = ""
     """Name of the folder, if it differs from the name of the set of recordings"""
     with_baselines: bool = True
-    """False if another set of the same files already includes the results of the baselines"""
+    """False if the baselines are fitted to the same files in another set, with the same results"""
 
 
 SETS = {
@@ -85,19 +85,19 @@ SETS = {
 
 @dataclass(frozen=True)
 class Crossing:
-    """Rows of a recording with release above press, which a passive model cannot fit."""
+    """Excess of release force over press force in a recording, which no passive model can fit."""
 
     floor: float
     """NRMSE of the best force with h >= 0: the measured strokes, replaced by their mean where they cross. It
     is fitted to the judged rows with their noise."""
     excess: float
-    """Largest difference of release and press [force]"""
+    """Largest release force minus press force at equal position [unit of the recording]"""
     at_turn: Rows
-    """(n,) rows in the last hundredth of the travel"""
+    """(n,) true for rows in the hundredth of the travel next to the reversal from press to release"""
 
     @staticmethod
     def of(recording: palpate.Recording, compared: Rows) -> Crossing | None:
-        """Returns the crossing of both strokes in the compared rows (n,); None without press and release."""
+        """Compares release and press force in the rows `compared` (n,); None if one stroke is missing."""
         x, direction, force = recording.position, recording.direction, recording.force
         if direction is None or not {-1, 1} <= set(direction.tolist()):
             return None
@@ -111,7 +111,7 @@ class Crossing:
 
 
 def _stroke(recording: palpate.Recording, side: int) -> tuple[Array, Array]:
-    """Returns the distinct positions of one stroke and the mean forces there."""
+    """Returns the distinct positions of one stroke and the mean recorded force at each of them."""
     assert recording.direction is not None
     in_stroke = recording.direction == side
     positions, index_of_position = np.unique(recording.position[in_stroke], return_inverse=True)
@@ -156,19 +156,19 @@ def fit_palpate(
 
 
 def row_of(path: Path, recording_set: Set) -> dict[str, Any]:
-    """Returns the results of palpate and of every baseline on the same rows of one file."""
+    """Returns the errors, sizes and times of palpate and of every baseline method on the rows of one file."""
     reading = dict(recording_set.reading)
     try:
         recording = palpate.read_recording(path, **reading)
     except palpate.InputError as first_error:
-        # The files of one folder have different columns, so the reader chooses the position column.
+        # The named position column is missing in this file, so `read_recording` chooses one.
         reading.pop("position", None)
         try:
             recording = palpate.read_recording(path, **reading)
         except palpate.InputError:
             return {"file": path.stem, "refused": str(first_error)}
     if "velocity" in recording_set.options.get("inputs", ""):
-        # computed before rows are held out, because a derivative needs neighbouring rows
+        # velocity is computed before rows are held out, because a derivative needs neighbouring rows
         speed, _ = velocity(recording)
         recording = replace(recording, inputs=speed[:, None], input_names=("velocity",))
     train, _ = recording.split(EVERY)
@@ -197,7 +197,7 @@ def _numbers(each: Compared) -> dict[str, Any]:
 
 
 def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Prints the median errors of one set of recordings, its refused files and diverged models."""
+    """Prints one set of files: median error of each method, refused files, and models that diverged."""
     measured_rows = [row for row in rows if "nrmse" in row]
     for row in rows:
         for prefix, numbers in (
@@ -222,7 +222,7 @@ def report(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _report_line(method: str, each: Sequence[Mapping[str, Any]], n_files: int) -> None:
-    """Prints NRMSE, size and time of one method, with the number of files if some are missing."""
+    """Prints NRMSE, parameters and time of one method, and the number of files if it did not fit all."""
     if each:
         name = method if len(each) == n_files else f"{method} ({len(each)} files)"
         nrmse, sizes, seconds = ([row[key] for row in each] for key in ("nrmse", "n_parameters", "seconds"))
@@ -230,7 +230,7 @@ def _report_line(method: str, each: Sequence[Mapping[str, Any]], n_files: int) -
 
 
 def _report_ratios(reference: str, pairs: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]]) -> None:
-    """Prints the ratio of the NRMSE of palpate to that of the reference method over the files."""
+    """Prints statistics of all files: NRMSE of palpate divided by NRMSE of the reference method."""
     ratios = {
         file: palpate_row["nrmse"] / spline_row["nrmse"]
         for file, (palpate_row, spline_row) in pairs.items()

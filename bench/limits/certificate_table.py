@@ -23,7 +23,7 @@ ROW = re.compile(
 
 
 def table_of(search_output: str) -> str:
-    """Returns the printed results of the energy search as Markdown table, and the number of scenes."""
+    """Returns the printed results of the energy search as Markdown table, and the number of its cases."""
     by_line: dict[tuple[str, str], dict[str, re.Match[str]]] = {}
     scenes = 0
     for row in ROW.finditer(search_output):

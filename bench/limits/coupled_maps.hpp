@@ -76,7 +76,7 @@ inline constexpr double coupling_time = 0.2e-3;
     return device.viscous_damping / (device.period_s * need);
 }
 
-/// Map: coupling stiffness over the damping of the device.
+/// Failure map: largest coupling stiffness as a function of the device damping.
 [[nodiscard]] inline FailureMap coupling_map(int points) {
     return {
         "coupling", "device damping b [N*m*s/rad]", "coupling stiffness K_c [N*m/rad]",
@@ -89,7 +89,7 @@ inline constexpr double coupling_time = 0.2e-3;
 /// damping that the coupling needs, and the force limit of the device is never reached. The theoretical slopes are
 /// sufficient: K_c + B_c/T without mass, K_c + (B_c + 2 B_o)/T with mass and backward Euler.
 [[nodiscard]] inline FailureMap falling_map(int points) {
-    constexpr double width = 0.1;  // half the travel of the object's snap [rad]
+    constexpr double width = 0.1;  // object snaps from -width to width [rad]
     const double period = smooth_knob().period_s;
     FailureMap map{"falling", "coupling stiffness K_c [N*m/rad]", "steepest fall s [N*m/rad]", {}};
     const auto gives = [&](auto build, double stiffness, double falling) {
@@ -197,7 +197,7 @@ template <Structure S>
     return map;
 }
 
-/// Map: stiffness limit of each structure over the sample time, at the damping of the default knob.
+/// Failure map: largest stiffness of each structure as a function of the period, for the default knob.
 [[nodiscard]] inline FailureMap period_map(int points) {
     constexpr Inertia inertia{0.001, 0.1};
     constexpr std::size_t ticks = 40'000;

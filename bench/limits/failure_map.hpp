@@ -11,24 +11,25 @@
 
 namespace palpate::bench {
 
-/// Limit of one method as a function of one quantity, measured in simulation and computed by theory.
+/// One line of a failure map: limit (for example of a stiffness) as a function of one quantity (for example the
+/// device damping), measured in simulation and computed by theory.
 struct FailureLine {
     std::string name;
     std::vector<double> at;  ///< values of the quantity on the horizontal axis
     /// Largest tried value of the limited quantity that did not fail; NaN: no tried value failed.
     std::vector<double> measured;
-    std::vector<double> theory;  ///< limit of the limited quantity by theory; NaN: unlimited or unknown
+    std::vector<double> theory;  ///< theoretical limit on the vertical axis; NaN: unlimited or unknown
 };
 
-/// A figure of limits: several lines with common axes.
+/// Figure of simulated and theoretical limits: several lines with common axes.
 struct FailureMap {
-    std::string name;   ///< for file names
+    std::string name;   ///< name of the map in the names of its files
     std::string along;  ///< the quantity on the horizontal axis, with its unit
     std::string limit;  ///< the quantity whose limit is drawn on the vertical axis, with its unit
     std::vector<FailureLine> lines;
     /// Largest tested value divided by the theoretical limit, for points at which no value failed.
     double searched = 0.0;
-    bool linear = false;  ///< true if the axis of the limit is linear, because the limit may be negative
+    bool linear = false;  ///< true if the vertical axis is linear, because limits may be negative
 };
 
 /// Values from `first` to `last`, evenly spaced on a logarithmic axis.

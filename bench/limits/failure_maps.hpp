@@ -19,7 +19,7 @@ struct NamedFailureMap {
     FailureMap (*measure)(int points);
 };
 
-/// All failure maps, in the order of the documentation page.
+/// All failure maps (figures of stability limits), in the order of the documentation page.
 inline constexpr auto failure_maps = std::to_array<NamedFailureMap>({
     {"explicit", explicit_map},
     {"damping", damping_map},
@@ -37,7 +37,7 @@ inline constexpr auto failure_maps = std::to_array<NamedFailureMap>({
     {"guard", guard_map},
 });
 
-/// Returns the fields of a map; NaN becomes null when it is printed.
+/// Returns a failure map as JSON; a value NaN is printed as null.
 [[nodiscard]] inline nlohmann::ordered_json as_json(const FailureMap& map) {
     nlohmann::ordered_json lines = nlohmann::ordered_json::array();
     for (const FailureLine& line : map.lines) {

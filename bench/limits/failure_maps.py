@@ -41,14 +41,14 @@ PAGE = "where-each-method-fails.md"
 MARKERS = "os^Dv"
 DASHES = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (5, 2, 1, 2)), (0, (8, 3)))
 LONGEST_NAME_IN_TWO_COLUMNS = 30
-"""Largest length of a line name for a legend of two columns [characters]"""
+"""The legend of a failure map has two columns if no name of a line is longer [characters]"""
 
 Map = Mapping[str, Any]
-"""A map as the program prints it; null means NaN."""
+"""A failure map (figure of limits) as JSON object; null means NaN."""
 
 
 def values(line: Map, key: str) -> NDArray[np.float64]:
-    """Returns the array (points,) `at`, `measured` or `theory` of a line in a map."""
+    """Returns the array (points,) called `at`, `measured` or `theory` of one line of a failure map."""
     return np.array(line[key], dtype=np.float64)
 
 
@@ -102,7 +102,7 @@ def draw_map(axes: Axes, failure_map: Map) -> None:
 
 
 def label_decades(axis: Axis) -> None:
-    """Labels powers of ten on an axis; for less than two decades also 1, 2 and 5 as plain numbers."""
+    """Labels powers of ten on an axis; on an axis of less than two decades also 2 and 5 times them."""
     lower, upper = axis.get_view_interval()
     axis.set_minor_formatter(NullFormatter())
     if upper < 100.0 * lower:
@@ -111,13 +111,13 @@ def label_decades(axis: Axis) -> None:
 
 
 def printed_form(text: str) -> str:
-    """Replaces products, squares and indices by their printed form."""
+    """Replaces * by a dot, ^2 by a raised 2, and x_y by x with the index y, as in print."""
     text = text.replace("*", "·").replace("^2", "²")
     return re.sub(r"\b([A-Za-z])_([a-z])\b", r"$\1_\2$", text)
 
 
 def map_table(failure_map: Map) -> str:
-    """Returns a table of measured over theoretical limits, or of measured limits without a theory."""
+    """Returns a table of measured limits, divided by the theoretical limits if a theory exists."""
     lines = failure_map["lines"]
     if not failure_map["linear"] and any(np.isfinite(values(line, "theory")).any() for line in lines):
         return markdown_table(
@@ -133,7 +133,7 @@ def map_table(failure_map: Map) -> str:
 
 
 def spread(line: Map, largest_tried: float) -> str:
-    """Returns least and largest ratio of measured to theoretical limit, or the largest tried value."""
+    """Returns least and largest ratio of measured to theoretical limit; if nothing failed, the tried one."""
     measured, theory = values(line, "measured"), values(line, "theory")
     comparable = np.isfinite(measured) & np.isfinite(theory) & (theory != 0.0)
     ratio, without_failure = (
@@ -164,7 +164,7 @@ def guard_table(guards: Sequence[Mapping[str, Any]]) -> str:
 
 
 def write(program_output: Mapping[str, Any], to: Path, seconds: float) -> None:
-    """Draws the maps, writes the printed numbers, and fills the tables of the page."""
+    """Draws the failure maps, writes their numbers to a file, and fills the tables of the page."""
     measured = {
         **where(),
         "seconds": round(seconds, 1),

@@ -58,7 +58,7 @@ namespace palpate::bench {
                     squares += tick++ >= 2 * second ? handle.velocity * handle.velocity : 0.0;
                     return true;
                 });
-            // A speed below one encoder step a second counts as at rest.
+            // A handle speed below one encoder step a second is drawn as one encoder step a second.
             line.measured.push_back(
                 std::max(std::sqrt(squares / static_cast<double>(second)), device.encoder_step));
             line.theory.push_back(std::numeric_limits<double>::quiet_NaN());
@@ -68,16 +68,16 @@ namespace palpate::bench {
     return map;
 }
 
-/// Cost of one guard without a fault, and its effect on a fault.
+/// Force change that one guard causes without a fault, and the effect of a fault without and with the guard.
 struct GuardEffect {
     std::string guard;
-    double cost = 0.0;  ///< RMS change of the force of a certified click, over the RMS force [-]
+    double cost = 0.0;  ///< RMS force change by the guard without fault, divided by the RMS force
     std::string wrong;  ///< name of the fault, and the quantity that measures its effect, with unit
     double without = 0.0;
     double with = 0.0;
 };
 
-/// Force and speed of the handle, tick by tick.
+/// Force and handle speed at each tick of a simulation with a guard.
 struct GuardedRun {
     std::vector<double> force;
     std::vector<double> speed;
@@ -127,7 +127,7 @@ template <SimulatedHand H>
     return std::sqrt(squares / static_cast<double>(values.size() - first));
 }
 
-/// Returns a spring with a click that is certified for the default knob.
+/// Returns a spring with a click, whose direct rendering on the default knob is certified.
 [[nodiscard]] inline ForceModel certified_click() {
     return {NetworkParameters{1, {30.0}, {0.2}, {-0.3}, {20.0}, 0.0},
             {{0.0}, {0.5}, Continuation::Linear, Continuation::Linear, std::nullopt}};

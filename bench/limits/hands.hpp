@@ -6,17 +6,17 @@
 
 #include "palpate/simulation/hand.hpp"
 
-// Hands that test the limits of a rendering.
+// Simulated hands that try to make a rendering oscillate or give energy.
 
 namespace palpate {
 
 /// Passive hand: a mass on the handle, a spring and a damper between handle and a fixed point. All values are zero if
 /// there is no hand.
 struct PassiveHand {
-    double stiffness = 0.0;  ///< stiffness of the spring [N/m or N*m/rad]
-    double damping = 0.0;    ///< damping of the damper [N*s/m or N*m*s/rad]
+    double stiffness = 0.0;  ///< stiffness of the hand's spring [N/m or N*m/rad]
+    double damping = 0.0;    ///< damping of the hand's damper [N*s/m or N*m*s/rad]
     double mass = 0.0;       ///< mass of the hand on the handle [kg or kg*m^2]
-    double rest = 0.0;       ///< position of the fixed point [m or rad]
+    double rest = 0.0;       ///< fixed position at the other end of the hand's spring [m or rad]
 
     [[nodiscard]] Grip grip(double /*time*/, const Motion& /*handle*/) const noexcept {
         return {stiffness, damping, rest, 0.0, mass};
@@ -29,7 +29,7 @@ struct ShakingHand {
     double stiffness = 0.0;  ///< stiffness of the spring between hand and handle [N/m or N*m/rad]
     double centre = 0.0;     ///< mean position of the hand [m or rad]
     double amplitude = 0.0;  ///< amplitude of the hand motion [m or rad]
-    double share = 1.0;      ///< hand frequency over the Nyquist frequency; 1: one cycle in two ticks
+    double share = 1.0;      ///< hand frequency divided by Nyquist frequency; 1: one cycle in two ticks
     double period_s = 1e-3;  ///< duration of a tick [s]
 
     [[nodiscard]] Grip grip(double time, const Motion& /*handle*/) const noexcept {
@@ -42,10 +42,10 @@ struct ShakingHand {
 /// Hand that extracts energy: it moves the handle through the steepest part of the object at constant speed in both
 /// directions. In this part the held force lags the object's force most during each tick.
 struct GreedyHand {
-    /// Force of the hand for each difference of desired and real handle speed [N*s/m or N*m*s/rad].
+    /// Force of the hand divided by (desired minus real speed of the handle) [N*s/m or N*m*s/rad].
     double grip_damping = 1.0;
-    double centre = 0.0;     ///< position of the object's steepest part [m or rad]
-    double reach = 0.0;      ///< distance from this position to either end of the motion [m or rad]
+    double centre = 0.0;     ///< position where the object's force is steepest [m or rad]
+    double reach = 0.0;      ///< distance from `centre` to each reversal of the motion [m or rad]
     double speed = 0.0;      ///< desired speed of the handle [m/s or rad/s]
     double direction = 1.0;  ///< present direction of the motion, 1 or -1
 

@@ -18,7 +18,7 @@
 
 namespace palpate::bench {
 
-/// Returns the device of the maps: the default knob without encoder or force steps.
+/// Returns the device of the failure maps: the default knob without encoder steps and without force steps.
 [[nodiscard]] inline DeviceProfile smooth_knob() {
     DeviceProfile device;
     device.encoder_step = 0.0;
@@ -29,8 +29,8 @@ namespace palpate::bench {
 /// advances by 0.03 rad during the mean delay of the force, (1/2 + n_d) T. The spring fails at a stiffness just above
 /// the theoretical bound.
 [[nodiscard]] inline bool spring_oscillates(const DeviceProfile& device, double stiffness) {
-    constexpr double late_phase = 0.03;  // phase of the oscillation during the mean delay of the force [rad]
-    constexpr double radians = 1000.0;   // total phase of the simulated oscillation [rad]
+    constexpr double late_phase = 0.03;  // oscillation phase during the mean force delay [rad]
+    constexpr double radians = 1000.0;   // duration of the simulation as oscillation phase [rad]
     const double late = (0.5 + device.delay_s / device.period_s) * device.period_s;
     const double inertia = stiffness * late * late / (late_phase * late_phase);
     const PassiveHand heavy{0.0, 0.0, std::max(0.0, inertia - device.inertia), 0.0};
@@ -65,7 +65,7 @@ template <class Limit, class Fails>
     return lines;
 }
 
-/// Map: stiffness of a directly rendered spring over the damping of the device.
+/// Failure map: largest stiffness of a directly rendered spring as a function of the device damping.
 [[nodiscard]] inline FailureMap damping_map(int points) {
     return {"damping", "device damping b [N*m*s/rad]", "stiffness K [N*m/rad]",
             lines_over_damping(points, 10.0, direct_limit, spring_oscillates)};
@@ -79,7 +79,8 @@ template <class Limit, class Fails>
     return logarithmic(std::min(1e-3 * balance, 1e-2 * step), std::max(1e3 * balance, 1e3 * step), 24);
 }
 
-/// Stiffness of a spring over the encoder step, K <= min(2b/T, 2 f_c/Delta): Abbott and Okamura 2005.
+/// Failure map: largest stiffness K of a spring as a function of the encoder step Delta. Theory with device damping b,
+/// period T and Coulomb friction f_c: K <= min(2b/T, 2 f_c/Delta): Abbott and Okamura 2005.
 [[nodiscard]] inline FailureMap encoder_map(int points) {
     FailureMap map{"encoder", "encoder step [rad]", "stiffness K [N*m/rad]", {}};
     for (const double friction : {0.002, 0.02}) {
@@ -128,7 +129,7 @@ template <class Limit, class Fails>
     return map;
 }
 
-/// Stiffness of the stiffest spring that is certified for a device without steps and the force at a predicted position.
+/// Stiffness of the stiffest spring that is certified with prediction, for a device without encoder steps.
 [[nodiscard]] inline double predicted_limit(const DeviceProfile& device, int predict) {
     return device.viscous_damping / (device.longest_period_s() * predicted_need(device, predict, {1.0, 0.0}));
 }
@@ -152,7 +153,7 @@ template <class Limit, class Fails>
     return false;
 }
 
-/// Map: stiffness of a spring rendered at a predicted position over the number of samples of the prediction.
+/// Failure map: largest stiffness of a spring as a function of the number of past samples of the prediction.
 [[nodiscard]] inline FailureMap prediction_map(int points) {
     FailureMap map{"prediction", "samples m of the prediction", "stiffness K [N*m/rad]", {}};
     std::vector<double> taps;
@@ -186,7 +187,7 @@ template <class Limit, class Fails>
         map.lines.push_back(failure_line(
             name, logarithmic(1e-5, 1e-1, points), [&](double /*mass*/) { return bound; },
             [&](double mass, double stiffness) {
-                constexpr double radians = 1000.0;  // total phase of the simulated oscillation [rad]
+                constexpr double radians = 1000.0;  // duration of the simulation as oscillation phase [rad]
                 const double slowness = std::sqrt((mass + device.inertia) / stiffness);
                 const auto ticks = static_cast<std::size_t>(radians * slowness / device.period_s);
                 const PassiveHand hand{0.0, damping, mass, 0.0};

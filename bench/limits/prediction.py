@@ -35,11 +35,11 @@ from palpate.plotting.look import grid
 from palpate.recording.sample import sample_recording
 
 PREDICTIONS = (0, 1, 2, 4, 8, 16)
-"""Compared numbers of past samples that the prediction uses; 0: rendering without prediction"""
+"""Compared numbers of past positions from which the prediction is computed; 0: no prediction"""
 
 ERRORS = ("mean", "band", "end", "work")
 STEEPEST = 45.0
-"""Steepest slope of the random objects [N*m/rad]"""
+"""Largest absolute force slope of the randomly drawn objects [N*m/rad]"""
 RANDOM_OBJECTS = 6
 HANDS = ((0.5, 15.0), (1.0, 30.0), (2.0, 15.0), (2.0, 60.0), (4.0, 30.0))
 """Frequency [Hz] and stiffness [N*m/rad] of the simulated hands"""
@@ -48,17 +48,17 @@ DURATION_S = 2.0
 
 @dataclass(frozen=True)
 class PredictionGain:
-    """Result of a prediction from one number of past samples, over all objects and hands."""
+    """Results for one number of past samples in the prediction, with all simulated objects and hands."""
 
     samples: int
     damping: tuple[float, float]
-    """Required device damping b / (T M), for force slopes from 0 to M, and from -M to M"""
+    """Required device damping b divided by period T and slope M, for force slopes 0 to M, and -M to M"""
     friction: float
-    """Required Coulomb friction f_c divided by the required value without prediction"""
+    """Required Coulomb friction with prediction divided by that without prediction"""
     knob: dict[str, float]
-    """Force errors of the sample's knob at 2 Hz in 4 s [N*m], and the work of the error [J]"""
+    """Knob of the sample recording, hand at 2 Hz for 4 s: force errors [N*m] and their work [J]"""
     ratio: dict[str, NDArray[np.float64]]
-    """Force error without prediction divided by the error with prediction (cases,), for each kind of error"""
+    """Kind of error -> force error without prediction divided by that with prediction, (cases,)"""
 
     def spread(self, error: str) -> tuple[float, float, float]:
         """Returns the median, 10 % and 90 % quantile of the force-error ratio of one kind of error."""
@@ -67,7 +67,7 @@ class PredictionGain:
 
     @property
     def name(self) -> str:
-        """Returns the number of past samples of the prediction, or "none"."""
+        """Returns as text the number of past samples in the prediction; "none" without prediction."""
         return str(self.samples) if self.samples else "none"
 
     def as_json(self) -> dict[str, Any]:
@@ -81,7 +81,7 @@ class PredictionGain:
 
 
 def measure() -> list[PredictionGain]:
-    """Renders identified and random objects with several hands and each number of past samples."""
+    """Simulates identified and random objects with several hands, for each number of past samples."""
     device = DeviceProfile()
     knob = identify(sample_recording(seed=1))
     cases = [
@@ -111,7 +111,7 @@ def errors(
 
 
 def objects(knob: Model) -> Iterator[Model]:
-    """Yields two models identified from sample recordings, and random networks over the same travel."""
+    """Yields two models identified from sample recordings, and random networks over the same positions."""
     yield knob
     yield identify(sample_recording(seed=2))
     random = np.random.default_rng(0)
@@ -158,7 +158,7 @@ def friction(samples: int) -> float:
 
 
 def draw_prediction(axes: Axes, gains: Sequence[PredictionGain]) -> None:
-    """Draws force errors relative to no prediction (10 %, 50 %, 90 % quantiles) over the required damping."""
+    """Draws force errors divided by those without prediction; the x axis is the required device damping."""
     x = np.array([gain.damping[1] for gain in gains])
     for name, error, marker, filled, sign in (
         ("mean of a tick", "mean", "o", "white", -1),
@@ -229,7 +229,7 @@ def spread(gain: PredictionGain, error: str) -> str:
 
 
 def write(gains: Sequence[PredictionGain], to: Path) -> None:
-    """Draws the figure, writes its numbers and fills the tables of the page."""
+    """Draws the figure of the prediction, writes its numbers, and fills the tables of the page."""
     write_json(to / "figures" / "prediction.json", {"predictions": [gain.as_json() for gain in gains]})
     with figure_file(to / "figures" / "prediction.png", height_inches=3.2) as (axes,):
         draw_prediction(axes, gains)

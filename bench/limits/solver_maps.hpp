@@ -13,7 +13,7 @@
 
 namespace palpate::bench {
 
-/// Returns true if the solver finds different solutions from different start positions.
+/// Returns true if the load-line solver finds different positions when it starts from different positions.
 [[nodiscard]] inline bool jumps_branches(double p, double falling) noexcept {
     constexpr int lines = 400;
     const SnappingObject object{falling, 0.1};
@@ -29,7 +29,7 @@ namespace palpate::bench {
     return false;
 }
 
-/// Returns true if the fixed-point iteration y <- (q - f(y)) / p diverges for a spring.
+/// Returns true if the iteration y <- (q - f(y)) / p for the load line f(y) + p y = q diverges for a spring f.
 [[nodiscard]] inline bool iteration_diverges(double p, double stiffness) noexcept {
     constexpr int most = 100'000;
     double y = 1.0;

@@ -17,7 +17,7 @@
 
 namespace palpate::bench {
 
-/// f = stiffness x, an object with known bounds.
+/// Object whose force f is stiffness times position x.
 struct LinearObject {
     using State = Stateless;
     double stiffness = 0.0;
@@ -29,7 +29,7 @@ struct LinearObject {
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
 
-/// f = falling (x^3 / width^2 - x): slope -falling at 0, snaps from -width to width.
+/// Object with the force `falling` (x^3 / width^2 - x) at position x: slope -falling at 0, snaps from -width to width.
 struct SnappingObject {
     using State = Stateless;
     double falling = 0.0;
@@ -56,7 +56,7 @@ struct StraightCurve {
     [[nodiscard]] bool extrapolated(double /*x*/) const noexcept { return false; }
 };
 
-/// f = g x + s h: a spring of stiffness g with constant hysteresis h and direction state s.
+/// Object with the force g x + s h: spring of stiffness g, constant hysteresis h, direction state s.
 using ConstantHysteresis = HysteresisPair<StraightCurve>;
 
 static_assert(Environment<LinearObject> && Environment<ConstantHysteresis> && Environment<SnappingObject>);
@@ -69,7 +69,8 @@ class Growth {
   public:
     explicit Growth(std::size_t ticks) noexcept : ticks_{ticks} {}
 
-    /// Adds an amplitude. Returns false if the oscillation has diverged, so that the simulation can stop.
+    /// Takes the next value of the oscillating quantity. Returns false if the oscillation has diverged, so that the
+    /// simulation can stop.
     [[nodiscard]] bool add(double quantity) noexcept {
         const std::size_t quarter = std::min<std::size_t>(3, 4 * tick_ / ticks_);
         ++tick_;
@@ -125,11 +126,11 @@ template <Structure S>
     return growth.grows();
 }
 
-/// Work that a hand with prescribed motion has put in, after all reversals and after half of the reversals.
+/// Work of a hand with prescribed motion on the rendering: `whole` in all, `half` in the first half of the reversals.
 struct PacedWork {
     double half = 0.0;      ///< [J]
     double whole = 0.0;     ///< [J]
-    double rounding = 0.0;  ///< bound of the rounding error of the work [J]
+    double rounding = 0.0;  ///< upper limit of the rounding error of `half` and `whole` [J]
 
     /// Returns true if the hand takes energy out of the rendering in each repetition of the motion.
     [[nodiscard]] bool negative() const noexcept { return whole - half < -rounding; }
@@ -156,10 +157,10 @@ template <Structure S>
     return work;
 }
 
-/// Half periods of the prescribed motions [ticks], starting at the Nyquist frequency.
+/// Ticks between two reversals of each prescribed hand motion; 1 is the Nyquist frequency.
 inline constexpr std::array<int, 9> paces{1, 2, 3, 4, 6, 10, 20, 60, 500};
 
-/// Returns true if a hand takes energy out in the steady state at one of the frequencies.
+/// Returns true if a hand takes energy out of the rendering in the steady state at a frequency of `paces`.
 template <class Build>
 [[nodiscard]] bool generates_energy(Build build, const DeviceProfile& device, double reach) {
     return std::any_of(paces.begin(), paces.end(), [&](int pace) {

@@ -53,7 +53,7 @@ LIMITED_PLAN_COLUMNS = (
 
 
 def tables(rows: list[Row], omitted: str) -> dict[str, str]:
-    """Returns the tables of the page; the keys are the marks at which the page contains them."""
+    """Returns the tables of the documentation page; a key is the name in the mark before the table."""
     errors, limited_plans = [], []
     for row in rows:
         percent_of_range = 100.0 / row.force_range

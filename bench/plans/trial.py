@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the plan of one object on one device with the best structure of a trial."""
+"""Compares the plan for an object on a device with the best of many simulated structures (the trial)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from palpate.recording import Recording
 
 SAMPLES = 1001
 PUSH_SHARE = 0.01
-"""Displacement of the handle from the steepest position at the start [share of the travel]"""
+"""The simulation starts with the handle at this distance from the steepest position [share of the travel]"""
 LARGEST_OSCILLATION = 4.0
 """Largest handle oscillation that counts as no oscillation, after four seconds [encoder steps]"""
 ROTARY_DEVICES = (
@@ -41,7 +41,7 @@ LINEAR_DEVICES = (
 
 @dataclass(frozen=True)
 class Row:
-    """Plan and trial of one object on one device; force errors in the unit of the model."""
+    """Force errors of the plan and of the best simulated structures, for one object on one device."""
 
     object: str
     device: str
@@ -49,10 +49,10 @@ class Row:
     verdict: str
     error: float
     best: str
-    """Structure with the least error among those that are certified, or stable at every equilibrium"""
+    """Tried structure with the least force error that is certified, or stable at every equilibrium"""
     best_error: float
     best_at_rest: str
-    """Structure with the least error among those that do not oscillate in simulation, proved or not"""
+    """Tried structure with the least force error that does not oscillate in simulation, proved or not"""
     best_at_rest_error: float
     oscillates: bool
     """True if the handle keeps oscillating after a push when the plan is simulated"""
@@ -79,7 +79,7 @@ def model_of(force: np.ndarray, x: np.ndarray) -> Model:
 
 
 def objects(switches: int) -> Iterator[tuple[str, Model, tuple[DeviceProfile, ...]]]:
-    """Yields name and model of an object, and the devices with its position unit."""
+    """Yields the name of an object, its model, and the devices with the position unit of the model."""
     x = np.linspace(0.0, 0.47, 3000)
     yield (
         "spring and wall",
@@ -92,7 +92,7 @@ def objects(switches: int) -> Iterator[tuple[str, Model, tuple[DeviceProfile, ..
 
 
 def measured_switches(n_files: int) -> list[Path]:
-    """Returns every n-th file of the measured switches, n_files in total; empty without measured data."""
+    """Returns n_files evenly chosen files of the measured switches; an empty list without measured data."""
     data_folder = os.environ.get("PALPATE_DATA")
     files = sorted((Path(data_folder) / "keyswitches").glob("*.csv")) if data_folder else []
     return files[:: max(1, len(files) // max(1, n_files))][:n_files]
@@ -106,7 +106,7 @@ def strokes(model: Model, x: np.ndarray) -> np.ndarray:
 
 
 def sweep(model: Model, device: DeviceProfile) -> Hand:
-    """Returns a hand that moves through the domain, up to 80 % of the force limit of the device."""
+    """Returns a hand that moves through the domain where the force is below 80 % of the force limit."""
     lower, upper = float(model.lower[0]), float(model.upper[0])
     x = np.linspace(lower + 0.02 * (upper - lower), upper - 0.02 * (upper - lower), 500)
     force = strokes(model, x)[0]
@@ -122,7 +122,7 @@ def sweep(model: Model, device: DeviceProfile) -> Hand:
 def error(
     model: Model, rendered: Model, scheme: Scheme, device: DeviceProfile, hand: Hand, seconds: float
 ) -> float:
-    """Returns the RMS of commanded minus identified force at the end of the tick; infinity if it diverges."""
+    """Returns the RMS of commanded minus identified force at the ends of ticks; infinity if it diverges."""
     start = float(np.clip(0.0, model.lower[0], model.upper[0]))
     try:
         trace = simulate(rendered, scheme, device, hand, seconds, start_position=start)
@@ -168,7 +168,7 @@ def oscillates(model: Model, rendered: Model, scheme: Scheme, device: DeviceProf
 
 
 def candidates(model: Model, device: DeviceProfile, play_radius: float, grid: int) -> Iterator[Scheme]:
-    """Yields each structure with several couplings, masses and dampings around their stability limits."""
+    """Yields each structure with couplings, masses and dampings below and above the stability limits."""
     play = {"play_radius": play_radius}
     yield Scheme(structure="direct", **play)
     stiffness_limit = 2.0 * device.viscous_damping / device.period_s
@@ -189,9 +189,9 @@ def candidates(model: Model, device: DeviceProfile, play_radius: float, grid: in
 
 
 def unchanged_part(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[float, float]:
-    """Returns the share of the travel without a limited slope, and the largest force error there.
+    """Returns the share of the travel where the plan keeps the slope, and the largest force error there.
 
-    h / r counts as slope.
+    Hysteresis divided by play radius counts as slope.
     """
     x = np.linspace(float(model.lower[0]), float(model.upper[0]), SAMPLES)
     hysteresis_slope = force_bounds(chosen.rendered, chosen.scheme.play_radius).loss_per_play
@@ -201,7 +201,7 @@ def unchanged_part(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[f
     for force in forces:
         nearest = slope_limited(x, force, lowest_slope, highest_slope)
         unchanged &= np.abs(nearest - force) <= 1e-6 * np.ptp(force)
-    # Limiting rounds kinks over 0.5 % of the travel; 3 % around a kink does not count as unlimited.
+    # Limiting the slope rounds kinks over 0.5 % of the travel, so 3 % around a kink counts as limited.
     margin = round(0.03 * SAMPLES)
     unchanged = np.convolve(~unchanged, np.ones(2 * margin + 1), mode="same") < 0.5
     force_error = np.abs(strokes(chosen.rendered, x) - forces).max(axis=0)
@@ -222,7 +222,7 @@ def compare(name: str, model: Model, device: DeviceProfile, seconds: float, grid
         try:
             is_certified = not certify(rendered_model, scheme, device).refused
         except ValueError:
-            continue  # a compensated model can be too steep for its coupling
+            continue  # compensating fails if the model is too steep for its coupling
         candidate = error(model, rendered_model, scheme, device, hand, seconds), scheme.structure + suffix
         if is_certified:
             best_certified = min(best_certified, candidate)

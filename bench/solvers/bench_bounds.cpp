@@ -67,7 +67,7 @@ void slope_bound(benchmark::State& state) {
     bound(state, random_network(static_cast<std::size_t>(state.range(0)), 1, 50.0));
 }
 
-/// Returns a network in which every second wavelet cancels the previous one up to a millionth.
+/// Returns the network, changed so that every second wavelet cancels the one before it except for a millionth.
 NetworkParameters cancelling(NetworkParameters network) {
     const std::size_t d = network.dimension;
     for (std::size_t i = 0; i + 1 < network.weight.size(); i += 2) {

@@ -43,7 +43,7 @@ class Playback {
 
 using Clock = std::chrono::steady_clock;
 
-/// Returns the sorted durations of `work` [ns].
+/// Returns the sorted durations of many calls of the function `work` [ns].
 template <class Work>
 std::vector<double> durations(Work work) {
     constexpr int count = 200'000;

@@ -67,7 +67,7 @@ struct Compiled {
 
 constexpr std::size_t cells = 4096;
 
-/// Model force and slope at the borders of equal cells of [0, 0.6].
+/// Model force and slope at the borders of equally wide position cells of [0, 0.6].
 struct Nodes {
     std::vector<Answer> at;
     double width = 0.6 / static_cast<double>(cells);
@@ -134,7 +134,7 @@ void latency(benchmark::State& state) {
         const Answer answer = method(x);
         x = 0.3 + 0.01 * (answer.value + 1e-9 * answer.slope);
     }
-    benchmark::DoNotOptimize(x);  // this call in the loop would store x in memory at every step
+    benchmark::DoNotOptimize(x);  // after the loop: inside it, x would be stored in memory at every step
     assert_answer(state, network, method);
 }
 
@@ -155,7 +155,7 @@ void throughput(benchmark::State& state) {
     assert_answer(state, network, method);
 }
 
-/// Evaluates many positions in one call, as Python does for arrays.
+/// Measures the time of one call that computes the forces at many positions, as Python does for arrays.
 void throughput_batch(benchmark::State& state) {
     const auto network = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
     const std::vector<double> motion = palpate::bench::hand_motion(4000);
@@ -177,7 +177,7 @@ void throughput_batch(benchmark::State& state) {
     }
 }
 
-/// Evaluates force and gradient of a network of several inputs.
+/// Computes force and gradient of a wavelet network of several inputs.
 struct Radial {
     palpate::RadialNetwork network;
 
@@ -239,7 +239,7 @@ void latency_of_inputs(benchmark::State& state) {
     }
 }
 
-/// Time of loading a model: building the table of the force and proving its error.
+/// Measures the time to build the force table of a model and to prove the error of the table.
 void compile(benchmark::State& state) {
     const auto network = palpate::bench::spring_and_wall(static_cast<std::size_t>(state.range(0)));
     for (auto _ : state) {

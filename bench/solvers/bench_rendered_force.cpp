@@ -61,7 +61,7 @@ double implicit_slope(palpate::Inertia inertia) {
     return palpate::Implicit<CompiledNetwork>::load_line_slope(inertia, coupling, period);
 }
 
-/// Force and motion of a structure in the closed loop.
+/// Force errors and motion of a structure in a simulated loop with device and hand.
 struct LoopResult {
     palpate::ForceError error;
     double force = 0.0;  ///< RMS of the model force f along the motion
@@ -109,7 +109,7 @@ LoopResult closed_loop(S structure) {
     return result;
 }
 
-/// `expected` is the error of the structure at the end of a tick [N*m], equal for every solver.
+/// `expected` is the force error of the structure at the end of a tick [N*m], which no choice of solver changes.
 template <class S>
 void tick(benchmark::State& state, const S& initial, double expected) {
     const LoopResult result = closed_loop(initial);
@@ -137,7 +137,7 @@ void tick(benchmark::State& state, const S& initial, double expected) {
     state.counters["evaluations"] = result.evaluations;
 }
 
-// Force errors of the structures for this object.
+// Expected force errors of the structures at the end of a tick for the benchmark's object [N*m].
 constexpr double of_the_hold = 0.00362;
 constexpr double of_the_predicted_hold = 0.00194;
 constexpr double of_the_coupling = 0.1202;

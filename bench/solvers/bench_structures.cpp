@@ -90,7 +90,7 @@ void step(benchmark::State& state, const WaveletNetwork& object, const S& initia
     }
 }
 
-/// Searches the solution over the sum of wavelets; the search steps are short enough to find every solution.
+/// Load-line solver that evaluates the sum of wavelets, with search steps short enough to find every solution.
 LoadLineSolver reference_solver() {
     LoadLineSolver solver;
     solver.longest_step = 0.002;
@@ -127,7 +127,7 @@ void massless(benchmark::State& state, const WaveletNetwork& object, const Solve
 template <class Scene>
 void explicit_step(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));
-    // With this inertia the explicit step is stable in every scene.
+    // With the inertia of the spring and wall the explicit step is stable for every object of this file.
     const auto over = [&](const auto& environment) {
         return palpate::Explicit{environment, SpringWall::inertia, Scene::coupling, period};
     };
@@ -162,7 +162,7 @@ void implicit_newton_network(benchmark::State& state) {
                          CertifiedSolver{palpate::piecewise(object.curve()), implicit_slope<SpringWall>()});
 }
 
-/// Newton's method without cells, from the last position until the Newton step is small.
+/// Implicit structure with Newton's method without table cells, from the last position until its step is small.
 void implicit_textbook(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
     implicit<SpringWall>(state, object, CompiledNetwork{object}, LoadLineSolver{});
@@ -185,7 +185,7 @@ void direct(benchmark::State& state) {
     step(state, object, palpate::Direct{CompiledNetwork{object}}, palpate::Direct{object}, exactly);
 }
 
-/// One step of Newton's method is exact only if the force is a straight line; otherwise its residual is the deviation.
+/// Implicit structure with a single step of Newton's method, which is exact only if the force is a straight line.
 void linearly_implicit(benchmark::State& state) {
     const WaveletNetwork object = SpringWall::object(size_of(state));
     step(state, object,
@@ -223,7 +223,7 @@ void substepped(benchmark::State& state) {
     step(state, object, over(CompiledNetwork{object}), over(object), exactly);
 }
 
-/// Time of loading a model: building the tables and proving their error.
+/// Measures the time to build the tables of a structure and to prove their error.
 template <class Scene>
 void build(benchmark::State& state) {
     const WaveletNetwork object = Scene::object(size_of(state));

@@ -29,17 +29,17 @@ using palpate::CompiledNetwork;
 constexpr palpate::VirtualCoupling coupling{100.0, 0.02};
 constexpr palpate::Inertia inertia{0.001, 0.5};
 constexpr double duration_s = 2.0;
-constexpr double settled_s = 0.2;  // start time of the comparison, after the initial transient has decayed
+constexpr double settled_s = 0.2;  // motion errors count from this time, after the initial transient
 constexpr std::int64_t longest_ns = 4'000'000;
 constexpr std::int64_t shortest_ns = 62'500;
-constexpr int truth_steps = 64;  // integration steps of the exact motion in each shortest period
+constexpr int truth_steps = 64;  // integration steps of the exact motion in shortest_ns
 
 const CompiledNetwork& object() {
     static const CompiledNetwork compiled{palpate::bench::spring_and_wall(16)};
     return compiled;
 }
 
-/// Returns position and velocity of a hand that presses through the whole object with a small oscillation.
+/// Position and velocity of a hand that presses through the whole object with a small oscillation.
 struct Motion {
     double position;
     double velocity;
@@ -52,7 +52,7 @@ Motion hand(double time) {
             0.22 * slow * std::sin(slow * time) + 0.01 * fast * std::sin(fast * time)};
 }
 
-/// Exact object position y at every multiple of the shortest period.
+/// Exact position y of the virtual object at every multiple of shortest_ns.
 const std::vector<double>& reference_positions() {
     static const std::vector<double> solution = [] {
         const auto acceleration = [](double time, double y, double v) {
@@ -84,7 +84,7 @@ const std::vector<double>& reference_positions() {
     return solution;
 }
 
-/// Returns the RMS of simulated minus exact object position after settling; infinity if the motion diverges.
+/// Returns the RMS of simulated minus exact object position from settled_s on; infinity if the motion diverges.
 template <class S>
 double motion_error(S structure, std::int64_t period_ns) {
     const auto stride = static_cast<std::size_t>(period_ns / shortest_ns);
@@ -128,7 +128,7 @@ void step(benchmark::State& state, Make make, double error_per_s, std::int64_t l
     for (auto _ : state) {
         benchmark::DoNotOptimize(structure.step(motion[k]));
         if (++k == motion.size()) {
-            // A diverging motion must not reach values that slow down the computation.
+            // The structure is reset, because very large or not finite positions would slow down the computation.
             k = 0;
             structure.reset(motion.front());
         }

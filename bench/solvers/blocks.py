@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures Python calls in alternating blocks and writes them in the format of Google Benchmark."""
+"""Measures Python calls in alternating order, and writes the durations in Google Benchmark's format."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ import scipy
 from bench.studies import SCALE, commit, write_json
 
 REPETITIONS = 9
-"""Number of blocks of each call; the blocks of all calls alternate, so a changing load affects all calls."""
+"""Number of measured blocks of each call; the blocks of all calls alternate, so load affects all."""
 
 
 def scaled(seconds: float) -> float:
-    """Returns a duration, multiplied by the scale of the current run."""
+    """Returns a duration multiplied by SCALE, so that a quick test measures for less time."""
     return seconds * SCALE
 
 
@@ -60,7 +60,7 @@ def _nanoseconds(call: Callable[[], object], n_calls: int, clock: Callable[[], i
 
 
 def result_row(name: str, nanoseconds: float, **counters: float) -> dict[str, Any]:
-    """Returns the time of one measured repetition in the format of Google Benchmark."""
+    """Returns one measured duration and its counters as a row in the format of Google Benchmark."""
     return {
         "name": name,
         "run_name": name,

@@ -43,7 +43,7 @@ Predict = Callable[[np.ndarray], np.ndarray]
 
 
 def models(X: np.ndarray, y: np.ndarray) -> Iterator[tuple[str, int, int, Predict]]:
-    """Yields method, wavelets (0: none), parameters and prediction."""
+    """Yields (name of the method, number of wavelets or 0, number of parameters, prediction function)."""
     used_sizes = set()
     for max_wavelets in WAVELETS:
         network = WaveletNetworkRegressor(max_wavelets=max_wavelets).fit(X, y)

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from bench.solvers.results import BenchmarkResults, Row, nanoseconds
 
 Runs = Mapping[str, Row]
-"""Results of the benchmarks of all files; the keys are the benchmark names."""
+"""Name of a benchmark -> its row in one of the result files."""
 
 
 class Claim(NamedTuple):
@@ -40,7 +40,7 @@ def slowest_over_fastest(names: list[str]) -> Callable[[Runs], float]:
 
 
 def largest_counter(prefix: str, key: str) -> Callable[[Runs], float]:
-    """Returns the largest value of a counter over all benchmarks whose names begin with this prefix."""
+    """Returns a function: the largest counter `key` of all benchmarks whose names begin with this prefix."""
     return lambda runs: max(row[key] for name, row in runs.items() if name.startswith(prefix) and key in row)
 
 
@@ -89,7 +89,7 @@ CLAIMS = [
 
 
 def measured_claims(folder: Path) -> list[tuple[str, float | None, float]]:
-    """Returns text, measured and required value of each claim; None if its benchmark did not run."""
+    """Returns each claim's text, its measured value (None: benchmark did not run) and its required value."""
     paths = sorted(folder.glob("bench_*.json"))
     runs = {str(row["name"]): row for path in paths for row in BenchmarkResults(folder, path.stem).rows}
     measured_values: list[tuple[str, float | None, float]] = []

@@ -47,25 +47,25 @@ class BenchmarkResults:
         self.rows: list[Row] = [
             {**rows[0], **_medians(rows), "name": name} for name, rows in repetitions.items()
         ]
-        # The file contains the interleaved repetitions of all benchmarks in any order.
+        # Repetitions of different benchmarks are mixed in the file, so the rows are sorted by benchmark.
         self.rows.sort(key=lambda row: (row.get("family_index", 0), row.get("per_family_instance_index", 0)))
 
     def number(self, row: Row, key: str) -> float:
-        """Returns a counter of one benchmark."""
+        """Returns the number with the name `key` in the result of one benchmark."""
         value = row.get(key)
         if not isinstance(value, (int, float)):
             raise SystemExit(f"{self.path}: {row.get('name')} lacks the number {key}; run make bench again")
         return float(value)
 
     def of(self, benchmark: str) -> list[Row]:
-        """Returns the rows NAME/ARGUMENTS of one benchmark, in their order."""
+        """Returns the results of one benchmark for all its arguments, in the order of the file."""
         rows = [row for row in self.rows if str(row["name"]).split("/")[0] == benchmark]
         if not rows:
             raise SystemExit(f"{self.path} lacks the benchmark {benchmark}; run make bench again")
         return rows
 
     def where(self) -> str:
-        """Returns machine, date, compiler and commit as one line."""
+        """Returns machine, date, compiler and commit of the benchmark run as one line."""
         context = self.context
         cache = ", ".join(
             f"L{each['level']} {each['size'] // 1024} KiB"
@@ -84,12 +84,12 @@ class BenchmarkResults:
 
 
 def nanoseconds(row: Row) -> float:
-    """Returns the processor time of one iteration [ns]."""
+    """Returns the processor time of one iteration of a benchmark [ns]."""
     return float(row["cpu_time"]) * NANOSECONDS.get(str(row.get("time_unit", "ns")), 1.0)
 
 
 def arguments(row: Row) -> dict[str, float]:
-    """Returns {"wavelets": 16} of a benchmark called NAME/wavelets:16."""
+    """Returns the arguments in a benchmark's name, such as {"wavelets": 16} for NAME/wavelets:16."""
     pairs = (part.split(":") for part in str(row["name"]).split("/")[1:] if ":" in part)
     return {name: float(value) for name, value in pairs}
 

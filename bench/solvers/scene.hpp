@@ -45,7 +45,7 @@ inline WaveletNetwork two_clicks(std::size_t size) {
     return {network, {{0.0}, {0.6}, Continuation::Linear, Continuation::Linear, std::nullopt}};
 }
 
-/// Returns a network whose force has waves over the unit box of several inputs.
+/// Returns a network of several inputs, each from 0 to 1, whose force rises and falls repeatedly.
 inline RadialNetwork several_inputs(std::size_t size, std::size_t inputs) {
     NetworkParameters network;
     network.dimension = inputs;

@@ -47,7 +47,7 @@ def readable_name(name: object) -> str:
 
 
 def finish_axes(axes: Axes, x: str, y: str) -> None:
-    """Sets logarithmic axes with a grid and labels."""
+    """Makes both axes of a figure logarithmic, with a grid and labels."""
     axes.set_xscale("log")
     axes.set_yscale("log")
     grid(axes)
@@ -113,7 +113,7 @@ def work_precision(results: BenchmarkResults, path: Path) -> str:
 
 
 def rendered_force(results: BenchmarkResults, path: Path) -> str:
-    """Draws the force error over the time of a tick, one point per structure and solver."""
+    """Draws force error (y axis) and time of a tick (x axis), one point for each structure and solver."""
     keys = ("evaluations", "force_error_end_Nm", "force_error_instant_Nm", "force_rms_Nm")
     points = [
         (readable_name(row["name"]), nanoseconds(row), *(results.number(row, key) for key in keys))
@@ -190,7 +190,7 @@ def ticks(results: BenchmarkResults) -> str:
 
 
 def model_error(results: BenchmarkResults, by_size: Path, by_time: Path) -> str:
-    """Draws the model error over size and over time, one line per method, with the number of wavelets."""
+    """Draws model error against parameters and against computing time, one line for each method."""
     points = [
         (
             *str(row["name"]).split("/")[:2],
@@ -280,7 +280,7 @@ def over_wavelets(
     path: Path,
     quantities: Sequence[tuple[str, Callable[[Row], float]]],
 ) -> str:
-    """Draws quantities of benchmarks over the number of wavelets, one panel for each quantity."""
+    """Draws measured quantities (y axes) against the number of wavelets (x axis), in separate panels."""
     rows_by_name = {name: results.of(benchmark) for benchmark, name in names.items()}
     height = 2.6 + 1.4 * (len(quantities) - 1)
     with figure_file(path, height_inches=height, rows=(1.0,) * len(quantities)) as panels:
@@ -314,7 +314,7 @@ def claims(folder: Path) -> str:
 
 
 def sections(folder: Path, to: Path) -> Iterable[str]:
-    """Draws the figures and yields the sections of the page."""
+    """Draws the figures of the speed page and yields the Markdown text of its sections."""
     steps, forces, tick, models, evaluations, bounds = (
         BenchmarkResults(folder, f"bench_{name}")
         for name in ("work_precision", "rendered_force", "controller", "model_error", "evaluation", "bounds")

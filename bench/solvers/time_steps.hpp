@@ -10,7 +10,7 @@
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/newton.hpp"
 
-// Integration methods of the virtual object that only serve for comparison.
+// Integration methods of the virtual object that are only compared with those of palpate, in benchmarks.
 namespace palpate::bench {
 
 /// One step of Newton's method from the last position. With it `Implicit` is the linearly implicit Euler scheme. It
@@ -112,7 +112,7 @@ class Trapezoidal {
         force_ = -object_force_;
     }
 
-    /// Renders behind the coupling: takes the measured position of the device, returns the force of the coupling.
+    /// Computes one tick with a virtual coupling: from the measured device position to the force of the coupling.
     [[nodiscard]] Rendered step(double device) noexcept {
         const double device_velocity = (device - device_) / period_;
         Rendered rendered = advance(coupling_, coupling_.force(device, device_velocity), force_);
@@ -125,7 +125,7 @@ class Trapezoidal {
         return rendered;
     }
 
-    /// Renders without the coupling: the force is held for the tick and drives the environment.
+    /// Computes one tick of the virtual object without a coupling: `force` drives the object during the tick.
     [[nodiscard]] Rendered drive(double force) noexcept {
         Rendered rendered = advance({0.0, 0.0}, force, force);
         rendered.force = rendered.status == Status::NonFinite ? 0.0 : force;
@@ -133,7 +133,7 @@ class Trapezoidal {
     }
 
   private:
-    /// `coupling_force` is the force of the coupling on an environment at rest at 0, `before` its force in the last tick.
+    /// `coupling_force`: force of the coupling if the object rests at position 0; `before`: force of the last tick.
     [[nodiscard]] Rendered advance(VirtualCoupling coupling, double coupling_force, double before) noexcept {
         const double inertia = 4.0 * inertia_.mass / (period_ * period_);
         const double damping = coupling.damping + inertia_.damping;
@@ -163,7 +163,7 @@ class Trapezoidal {
     double device_ = 0.0;        ///< x_{k-1}
     double position_ = 0.0;      ///< y_{k-1}
     double velocity_ = 0.0;      ///< v_{k-1}
-    double object_force_ = 0.0;  ///< object force without the coupling, -f(y_{k-1}) - B_o v_{k-1}
+    double object_force_ = 0.0;  ///< last force on the object without the coupling: -f(y_{k-1}) - B_o v_{k-1}
     double force_ = 0.0;         ///< F_{k-1}
 };
 

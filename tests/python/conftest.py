@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures: the measured data, and small files to read."""
+"""Test fixtures: the folder of measured recordings, and small recording files."""
 
 import os
 import signal
@@ -16,14 +16,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def measured_data() -> Path | None:
-    """Returns the folder of measured recordings, or None: they are not part of the project."""
+    """Returns the folder of measured recordings, which are not part of the project; None if missing."""
     folder = Path(os.environ.get("PALPATE_DATA", ROOT.parent / "shared" / "data"))
     return folder if folder.is_dir() else None
 
 
 @pytest.fixture(scope="session")
 def data() -> Path:
-    """Returns the folder of measured recordings; skips the test without it."""
+    """Returns the folder of measured recordings; skips the test if the folder is missing."""
     folder = measured_data()
     if folder is None:
         pytest.skip("needs measured data, set PALPATE_DATA")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs of palpate-control for the tests."""
+"""Functions with which the tests run the program palpate-control."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MODEL = ROOT / "tests" / "models" / "good" / "position.json"
 
 needs_program = pytest.mark.skipif(not PROGRAM.exists(), reason="needs palpate-control, run make control")
 
-# Any loop rate is accepted, because the test machine may be busy; only the test of the rate checks the rate.
+# palpate-control accepts any loop rate with these options, because the test machine may be busy.
 ANY_RATE = ["--lowest-rate-share", "0"]
 
 
@@ -45,7 +45,7 @@ def every_row(recording: Path) -> pd.DataFrame:
 
 
 def wait_for_rows(part: Path, process: subprocess.Popen[str]) -> float:
-    """Waits until a recording that is being written has rows; returns the time at which rows were found."""
+    """Waits until a recording that a program is writing has rows; returns the time of the first rows."""
     while process.poll() is None:
         if part.exists() and sum(not line.startswith(b"#") for line in part.read_bytes().splitlines()) > 15:
             return time.monotonic()

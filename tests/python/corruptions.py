@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 SEED = 20261122
 
 LARGEST_ERROR_RATIO = 1.2
-"""Ratio of the true to the reported NRMSE above which a warning is required."""
+"""A warning is required if the true NRMSE divided by the reported NRMSE is larger."""
 
 DATA = measured_data() or Path("without measured data")
 
@@ -55,7 +55,7 @@ MEASURED = (
 
 @dataclass(frozen=True)
 class Rows:
-    """Columns of one recording, which the functions below corrupt."""
+    """Columns of one recording, in which the tests place errors (corrupt it)."""
 
     x: Array
     f: Array
@@ -129,7 +129,7 @@ def _loop(random: Generator) -> Rows:
 
 
 def _sweeps(random: Generator) -> Rows:
-    """Returns several strokes, with time, of a spring whose friction force follows a play operator."""
+    """Returns strokes over time of a spring with friction, whose friction force follows a play operator."""
     t = 4e-3 * np.arange(3000)
     x = 0.01 * (1.0 - np.cos(2 * np.pi * 0.5 * t)) / 2 * (1.0 + 0.05 * np.sin(0.7 * t))
     d = np.where(np.gradient(x) >= 0, 1, -1)
@@ -148,7 +148,7 @@ SYNTHETIC: dict[str, Callable[[Generator], Rows]] = {
 
 @cache
 def _measured(name: str) -> Rows:
-    # the position must grow into the object: towards the magnet
+    # positions must increase into the object, here towards the magnet
     negate = ("position",) if name.startswith("magnet") else ()
     found = palpate.read_recording(DATA / name, negate=negate)
     time, direction = found.time, found.direction
@@ -167,7 +167,7 @@ def base_names() -> list[str]:
 
 
 def base(name: str, random: Generator) -> Rows:
-    """Returns the clean recording of a name; `random` gives noise and motion of a synthetic one."""
+    """Returns the recording without errors of this name; `random` draws a simulated one."""
     return SYNTHETIC[name](random) if name in SYNTHETIC else _measured(name)
 
 
@@ -177,7 +177,7 @@ Corruption = Callable[[Generator, Rows, Case], list[Rows]]
 
 
 def _restarted(rows: Rows, after: float) -> Rows:
-    """Returns the same rows with their times moved to begin after the given time."""
+    """Returns the columns with all times shifted, so that the first time is after the given time."""
     return rows if rows.t is None else replace(rows, t=rows.t - rows.t[0] + after)
 
 
@@ -239,7 +239,7 @@ def _reversed(random: Generator, rows: Rows, case: Case) -> list[Rows]:
 
 
 UNIT_RATIOS = (1e3, 1e6, 9.80665, 25.4, 10.0, 4.4482, 101.97, 57.29578)
-"""Ratios of units that are often confused in files: milli, micro, kgf, inch, cm, lbf, gf and degree."""
+"""Ratios of two units that users often confuse in files: milli, micro, kgf, inch, cm, lbf, gf and degree."""
 
 
 def _unit(random: Generator, rows: Rows, case: Case) -> list[Rows]:
@@ -252,7 +252,7 @@ def _unit(random: Generator, rows: Rows, case: Case) -> list[Rows]:
         case.strength.append(f"second recording: {role} times {ratio:.4g}")
         wrong = replace(other, x=ratio * other.x) if role == "position" else replace(other, f=ratio * other.f)
         return [rows, wrong]
-    # The force of a key switch times 1000 is a plausible force of another object and cannot be reported.
+    # A key switch force multiplied by 1000 is a plausible force of another object, so no warning is possible.
     role, ratio = "position", float(random.choice([1e-3, 1e3] if rows.units["position"] == "m" else [1e3]))
     case.strength.append(f"{role} times {ratio:g}")
     return [replace(rows, x=ratio * rows.x)]
@@ -355,7 +355,7 @@ PAIR_SHARE = 0.25
 
 
 def case_of(seed: int, kind: str | None = None) -> Case:
-    """Returns the case of a seed. Kinds of corruption alternate; a quarter of the cases has a second kind."""
+    """Returns the test case of a seed, with one kind of corruption; a quarter of the cases has two kinds."""
     random = np.random.default_rng([SEED, seed])
     names = list(KINDS)
     first = kind or names[seed % len(names)]
@@ -390,7 +390,7 @@ class Outcome:
 
     @property
     def correct_error(self) -> bool:
-        """True if the reported NRMSE is not far below the true NRMSE."""
+        """True if the true NRMSE is not much larger than the reported NRMSE."""
         return bool(self.reported >= self.true / LARGEST_ERROR_RATIO)
 
     @property
@@ -406,7 +406,7 @@ class Outcome:
 
     @property
     def unreported(self) -> bool:
-        """True if the reported error is far below the true one and no warning names a plausible cause."""
+        """True if the reported NRMSE is far below the true NRMSE and no warning names a plausible cause."""
         return bool(self.crashed) or not (self.correct_error or (self.warned and self.names_cause))
 
 
@@ -427,7 +427,7 @@ def true_nrmse(model: palpate.Model, clean: Sequence[Rows]) -> float:
 
 
 def outcome_of(case: Case) -> Outcome:
-    """Identifies the corrupted recordings, and judges the model on the clean ones."""
+    """Identifies a model from corrupted recordings, and computes its error on the uncorrupted recordings."""
     found = Outcome(case)
     start = time.perf_counter()
     try:
@@ -453,7 +453,7 @@ def outcome_of(case: Case) -> Outcome:
 
 
 def described(found: Outcome) -> str:
-    """Returns the outcome of one case in one line."""
+    """Returns one line of text: the result of identifying a corrupted case."""
     if found.refused:
         return f"{found.case}: refused: {found.refused}"
     if found.crashed:
@@ -464,7 +464,7 @@ def described(found: Outcome) -> str:
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
-    """Returns a table of the outcomes by kind of corruption; a case of two kinds counts for its first."""
+    """Returns a table of results, one row for each kind of corruption; two kinds count as the first one."""
     lines = [f"{'kind':16}{'cases':>7}{'correct':>8}{'warned':>8}{'cause named':>13}{'unreported':>12}"]
     for kind in (*KINDS, "all"):
         group = [each for each in outcomes if kind in ("all", each.case.kinds[0])]
@@ -477,7 +477,7 @@ def table(outcomes: Sequence[Outcome]) -> str:
 
 
 def clean_outcome(name: str) -> Outcome:
-    """Returns the outcome of a base recording without corruption."""
+    """Returns the result of identifying a recording without corruption."""
     rows = base(name, np.random.default_rng([SEED, base_names().index(name)]))
     return outcome_of(Case(-1, name, (), ["clean"], [rows], [rows]))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Force laws with known truth, and recordings of them with one imperfection."""
+"""Simulated objects with known force, and recordings of them with one kind of measurement error."""
 
 from collections.abc import Callable
 
@@ -21,7 +21,7 @@ def line(x: Array) -> Array:
 
 
 def wall(x: Array) -> Array:
-    """Returns the force of a soft spring that ends at a wall at 0.4."""
+    """Returns the force of a soft spring with a wall at position 0.4."""
     return 2.0 * x + 0.58 * np.logaddexp(0.0, (x - 0.4) / 0.01)
 
 

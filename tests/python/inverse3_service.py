@@ -23,7 +23,7 @@ STEP_S = 1e-3
 
 @dataclass
 class Service:
-    """Simulated Inverse Service: handle, hand and received commands; a fault occurs at message `after`."""
+    """Simulated server of an Inverse3: handle, hand, received commands; a fault occurs at message `after`."""
 
     devices: int = 1
     calibrated: bool = True
@@ -110,7 +110,7 @@ class Service:
 
 @contextmanager
 def serving(service: Service) -> Iterator[Service]:
-    """Runs the service at a free port of this machine."""
+    """Runs the simulated server at a free network port of this machine."""
     with serve(service.answer, "127.0.0.1", 0, compression=None) as server:
         service.port = server.socket.getsockname()[1]
         thread = Thread(target=server.serve_forever, daemon=True)

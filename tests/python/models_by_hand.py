@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small models with known parameters."""
+"""Small models with chosen parameters, for tests."""
 
 from typing import Any
 

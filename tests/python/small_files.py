@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small recordings to read, and the sentence of a refusal."""
+"""Small recording files for tests, and the error message if a file is refused."""
 
 import shlex
 from collections.abc import Callable

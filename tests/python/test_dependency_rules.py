@@ -15,7 +15,7 @@ HEADERS = ROOT / "cpp" / "include" / "palpate"
 # array shapes and the compiled core.
 COMMON = {"errors", "arguments", "verdict", "_typing", "_core"}
 
-# Modules of the package in order: a module may import the modules that are listed before it.
+# Modules of the package, lowest first: a module may import the modules that are listed before it.
 MODULE_ORDER = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
 
 # Modules of the package that may import any module except cli; only the module cli imports them.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Python entry: files, frames and arrays for identify and verify; help; comparison of models."""
+"""The Python functions identify and verify take files, data frames and arrays; help; model comparison."""
 
 import inspect
 import pickle

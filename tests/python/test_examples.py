@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The examples run and give the same results in both languages."""
+"""The examples run and give the same results in C++ and Python."""
 
 import os
 import shutil

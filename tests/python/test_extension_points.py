@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A new field, structure or verb enters one table; all other lists are made from it."""
+"""A new field, structure or command is added to one table only; the program makes other lists from it."""
 
 from __future__ import annotations
 

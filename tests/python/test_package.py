@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Installed package: version, types, entry points."""
+"""Tests of the installed package: version, type information, installed commands."""
 
 import importlib.metadata
 import importlib.resources

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The check of the language finds each kind of fault, and accepts the plain text."""
+"""tools/plain_english.py finds each kind of language fault in a text, and accepts a text without fault."""
 
 import runpy
 import subprocess

@@ -32,7 +32,7 @@ needs_emulation = pytest.mark.skipif(bool(MISSING), reason=MISSING or "emulation
 def emulated(
     *command: Any, device: Sequence[str] = (), timeout: float = 120.0
 ) -> subprocess.CompletedProcess[str]:
-    """Runs a command under the emulator; `device` are options of tests/usb/run_emulated.py."""
+    """Runs a command with the emulated USB device; `device` are options of tests/usb/run_emulated.py."""
     words = [sys.executable, RUNNER, *device, "--", *command]
     return subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=timeout)
 

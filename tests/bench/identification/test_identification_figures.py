@@ -43,7 +43,7 @@ def result_row(problem: str, method: str, nrmse: float, n_parameters: int) -> di
 
 @pytest.fixture
 def results_folder(tmp_path: Path) -> Path:
-    """Returns the folder of benchmark results without measured data."""
+    """Returns a folder with study results, as studies write them if measured recordings are missing."""
     rows = [
         result_row("P1", "palpate", 3e-4, 20),
         result_row("P1", "splines", 5e-4, 44),
@@ -60,7 +60,7 @@ def test_draws_figures_and_fills_tables_of_the_page(results_folder: Path) -> Non
     names = ("compare_methods", "filters", "parsimony", "real_data", "dynamic")
     page = results_folder / "identification.md"
     tables = "".join(f"<!-- {name} -->\nold {name}\n<!-- end -->\n" for name in names)
-    # a table that is new on the page is empty before the first run
+    # a new table of the page is empty until its study has run
     page.write_text(tables.replace("old filters\n", ""))
     main([str(results_folder), "--to", str(results_folder)])
     for name in ("parameters", "time", "filters"):
@@ -72,7 +72,7 @@ def test_draws_figures_and_fills_tables_of_the_page(results_folder: Path) -> Non
     assert "| no wavelet | 99 | 100 |" in text
     assert "2026-01-02, 2 cores, load 0.5, Python 3, commit abc; median (least" in text
     assert "of up to 12 draws" in text
-    # a study that did not run keeps its table
+    # the page keeps the table of a study that did not run
     assert "old real_data" in text
     assert "old parsimony" not in text
     assert text.count("| matched |") == 1

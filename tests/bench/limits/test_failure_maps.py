@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests figures and page of the failure maps, which are made from the output of the program."""
+"""Tests figures and documentation page of the failure maps (figures of simulated stability limits)."""
 
 import json
 import re
@@ -19,7 +19,7 @@ NAMES = [each["name"] for each in NUMBERS["maps"]]
 
 
 def program_output(*names: str) -> dict[str, Any]:
-    """Returns the output of the program with some of its maps."""
+    """Returns the output of the failure map program, reduced to the maps with these names."""
     maps = [each for each in NUMBERS["maps"] if each["name"] in names]
     return {"maps": maps, "guards": NUMBERS["guards"]}
 

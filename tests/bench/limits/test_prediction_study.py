@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the study of the prediction: it measures a few cases, draws them and fills its page."""
+"""Tests the study of predicted rendering: it simulates a few cases, draws them and fills its page."""
 
 import json
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the comparison of plans with an exhaustive trial: the page and the command that fills it."""
+"""Tests the comparison of plans with the best of many simulated structures: page and command."""
 
 import json
 import os

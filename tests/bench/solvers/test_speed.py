@@ -47,7 +47,7 @@ def model_row(name: str, wavelets: int, error: float) -> dict[str, Any]:
 
 
 def rows_of_both_sizes(name: str, **counters: float) -> list[dict[str, Any]]:
-    """Returns a benchmark for 8 and 16 wavelets, with three repetitions and their mean."""
+    """Returns result rows of a benchmark for 8 and 16 wavelets: three repetitions and their mean."""
     rows: list[dict[str, Any]] = []
     for wavelets in (8, 16):
         benchmark = f"{name}/wavelets:{wavelets}"
@@ -68,7 +68,7 @@ def rows_of_both_sizes(name: str, **counters: float) -> list[dict[str, Any]]:
 
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
-    """Returns the folder of benchmark results, with a time step that diverges."""
+    """Returns a folder of benchmark results, in which one integration method diverges."""
     context = {"num_cpus": 2, "mhz_per_cpu": 2000, "date": "2026-01-02T03:04:05", "commit": "abc"}
     benchmarks = {
         "bench_work_precision": [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Baselines: fits of representable forces, their parameters, and comparison with a model on the same rows."""
+"""Baseline force laws: they fit their own forces, and are compared with a model on the same rows."""
 
 import json
 from pathlib import Path
@@ -28,7 +28,7 @@ def named(estimator: object) -> str:
 
 
 def moving(n: int = 2000, seed: int = 0) -> np.ndarray:
-    """Returns position, velocity and acceleration of a hand, (n, 3)."""
+    """Returns the columns position, velocity and acceleration of a hand motion, (n, 3)."""
     random = np.random.default_rng(seed)
     return np.column_stack(
         [random.uniform(-0.002, 0.01, n), random.normal(0.0, 0.1, n), random.normal(0.0, 2.0, n)]

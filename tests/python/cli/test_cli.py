@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common behaviour of the command line: exit codes, one-sentence errors, help, output streams."""
+"""Behaviour that all commands share: exit codes, one-sentence errors, help, output streams."""
 
 import json
 import os

@@ -74,7 +74,7 @@ def test_json_is_one_object_with_the_fields_of_the_contract(
 def test_only_rows_with_a_velocity_are_held_out_for_a_model_over_velocity(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Every fifth row at 100 Hz gives no velocity, so velocity is computed before rows are held out."""
+    """Every fifth row of 100 Hz alone gives no velocity, so velocity is computed before rows are held out."""
     time = 0.01 * np.arange(2000)
     position = 0.3 - 0.3 * np.cos(2.0 * np.pi * 0.5 * time)
     speed = np.gradient(position, time)

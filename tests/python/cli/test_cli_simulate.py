@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate simulate and palpate demo."""
+"""Tests of the commands palpate simulate and palpate demo."""
 
 import json
 import re
@@ -197,7 +197,7 @@ def _raise_alarm(_number: int, _frame: Any) -> None:
 
 
 def test_a_signal_ends_a_long_simulation_within_200_ms() -> None:
-    """Takes the fastest of three attempts, because the test machine may be busy."""
+    """Judges the fastest of three simulations, because the test machine may be busy."""
     model = model_by_hand()
     scheme, device, hand = Scheme(), DeviceProfile(), Hand()
     delays_s = []
@@ -235,7 +235,7 @@ def test_progress_is_called_during_the_simulation() -> None:
         Scheme(structure="implicit"),
         DeviceProfile(),
         Hand(),
-        3000.0,  # simulated seconds: long enough for several progress calls
+        3000.0,  # simulated time [s] in which the progress is reported several times
         progress=ticks.append,
     )
     assert ticks[0] == 0

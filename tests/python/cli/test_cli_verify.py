@@ -134,7 +134,7 @@ def test_units_that_do_not_match_are_reported_in_one_sentence(
 
 
 def with_changed_field(content: dict[str, Any], path: str, value: Any) -> str:
-    """Returns a model file with one field changed; `value` None removes it."""
+    """Returns a model file with one field changed; the value None removes the field."""
     *parents, last_name = path.split(".")
     parent = content
     for name in parents:

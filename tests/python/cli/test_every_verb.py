@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common behaviour of all verbs: standard streams, verdict, control characters, width of the terminal."""
+"""Behaviour that all commands (verbs) share: standard streams, verdict, control characters, line width."""
 
 import subprocess
 import sys
@@ -24,7 +24,7 @@ VERBS = {
     "show": "show m.json",
     "demo": "demo -o demo",
 }
-"""One command line of each verb that ends quickly."""
+"""Command lines for the tests, one for each verb; each command ends quickly."""
 
 UNWRITABLE = {
     "stdout closed": ">&-",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure files of the verbs."""
+"""Tests of the figure files that the commands write."""
 
 from pathlib import Path
 from typing import Any

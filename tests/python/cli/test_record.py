@@ -24,7 +24,7 @@ from usb_emulation import emulated, frames, needs_emulation
 OBJECT = ROOT / "tests" / "models" / "good" / "position.json"
 STIFFNESS = 3.0
 SPRING = ["--lock-step", "--spring", str(STIFFNESS)]
-MOST_PACKETS_IN_FLIGHT = 5  # largest number of packets between the device and a host in lock-step
+MOST_PACKETS_IN_FLIGHT = 5  # largest number of sent USB packets that are not yet received
 
 
 def run_record(out: Path, *arguments: Any, device: list[str]) -> subprocess.CompletedProcess[str]:
@@ -33,7 +33,7 @@ def run_record(out: Path, *arguments: Any, device: list[str]) -> subprocess.Comp
 
 
 def stiffness(model: Model) -> float:
-    """Returns the stiffness between 10 % and 90 % of the domain, as the mean of press and release."""
+    """Returns the mean stiffness of press and release from 10 % to 90 % of the model's domain."""
     lower, upper = model.lower[0], model.upper[0]
     positions = np.array([0.9 * lower + 0.1 * upper, 0.1 * lower + 0.9 * upper])
     lower_force, upper_force = np.mean([model.force(positions, direction=sign) for sign in (1, -1)], axis=0)
@@ -51,7 +51,7 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
     assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
     assert summary["recorded"] == summary["ticks"] == 3000
-    # the device is never enabled: only the hand moves the handle
+    # the motor of the device is never enabled: only the hand moves the handle
     assert not any(frame.enabled for frame in frames(trace))
     recording = read_recording(recording_file)
     assert recording.metadata["force"].endswith("from the device's force transducer")
@@ -94,9 +94,9 @@ def test_a_probe_measures_the_stiffness_of_a_spring_without_a_hand(tmp_path: Pat
     recording = read_recording(out)
     assert "including the device's friction" in recording.metadata["force"]
     assert np.ptp(recording.position) == pytest.approx(0.3, rel=0.1)
-    # The motor also compensates the handle's damping: 0.018 N*m at this speed, of 0.72 N*m between the ends.
+    # The motor also compensates the handle's damping: 0.018 N*m at this speed; the force range is 0.72 N*m.
     model = identify(recording)
-    assert "velocity" not in model.inputs  # damping cannot be identified at one speed
+    assert "velocity" not in model.inputs  # at a single speed, damping cannot be identified
     assert model.damping is None
     assert stiffness(model) == pytest.approx(STIFFNESS, rel=2 * 0.018 / 0.72)
     assert max(abs(frame.torque) for frame in frames(trace)) <= 1.2
@@ -106,7 +106,7 @@ def test_a_probe_measures_the_stiffness_of_a_spring_without_a_hand(tmp_path: Pat
 @needs_emulation
 @pytest.mark.parametrize("arguments", [[], ["--force-limit", 0.05]], ids=["default", "the device's own"])
 def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], tmp_path: Path) -> None:
-    """The probe may use 50000 uNm = 0.05 N*m, although 1e-6 * 50000 is rounded to slightly less."""
+    """A torque limit of 50000 uNm allows the probe 0.05 N*m, although 1e-6 * 50000 is slightly less."""
     trace, out = tmp_path / "trace.csv", tmp_path / "a.csv"
     probe = ["--probe", "--upper", 0.1, "--stiffness", 1, "--lowest-rate-share", 0, *arguments]
     weak_device = ["--lock-step", "--no-hand", "--spring", 0.3, "--max-torque-uNm", 50000, "--trace", trace]

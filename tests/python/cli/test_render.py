@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate render: the loop of palpate-control, run from Python."""
+"""Tests of the command palpate render, which runs the control loop of palpate-control from Python."""
 
 import json
 import signal
@@ -144,7 +144,7 @@ def test_a_signal_ends_the_verb_with_exit_code_0_and_a_complete_recording(
     command = [*COMMAND, "--duration-s", "inf", "--record", str(out), "--json", *ANY_RATE]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     wait_for_rows(Path(f"{out}.part"), process)
-    time.sleep(0.8)  # longer than the start ramp, whose rows are not used
+    time.sleep(0.8)  # the run lasts longer than the start ramp, whose rows are not identified
     process.send_signal(signal_number)
     output, messages = process.communicate(timeout=30)
     assert process.returncode == 0, output + messages
@@ -152,7 +152,7 @@ def test_a_signal_ends_the_verb_with_exit_code_0_and_a_complete_recording(
 
 
 def test_a_missed_rate_ends_the_run_unless_any_rate_is_accepted(tmp_path: Path) -> None:
-    """The process is stopped for most of a second and misses the deadlines of more than half a second."""
+    """The test stops the process for most of a second, so that the ticks of half a second are missed."""
     for any_rate in (False, True):
         out = tmp_path / f"{any_rate}.csv"
         command = [
@@ -219,7 +219,7 @@ def test_a_usb_device_receives_the_force_and_zero_at_the_end(tmp_path: Path) -> 
     trace = tmp_path / "trace.csv"
     command = [*COMMAND, "--device", "usb", "--uncertified", "--wait-ms", "10000", "--duration-s", "0.6"]
     completed = emulated(*command, "--json", *ANY_RATE, device=["--lock-step", "--trace", str(trace)])
-    assert completed.returncode in (0, 1), completed.stderr  # the verdict depends on the load of the machine
+    assert completed.returncode in (0, 1), completed.stderr  # 0 or 1, depending on the load
     assert json.loads(completed.stdout)["ticks"] > 500
     sent_frames = frames(trace)
     assert max(abs(frame.torque) for frame in sent_frames) > 0.01

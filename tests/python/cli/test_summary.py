@@ -18,7 +18,7 @@ MOST_LINES = 10
 """Largest number of lines that a summary prints below the verdict and its reasons."""
 
 MOST_OPTION_LINES = 15
-"""Largest number of lines in the help of identify for the options that are not for experts."""
+"""Largest number of lines that the help of palpate identify uses for options that are not for experts."""
 
 SUMMARIES = {
     "identify": "identify dome.csv -o dome.json --hold-out-every 5",
@@ -47,7 +47,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def printed(arguments: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
-    """Returns the lines of standard output of a verb."""
+    """Runs a command and returns the lines of its standard output."""
     capsys.readouterr()
     main(arguments.split())
     return capsys.readouterr().out.splitlines()

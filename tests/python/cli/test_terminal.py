@@ -29,7 +29,7 @@ Terminal = Callable[..., str]
 
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    """Runs a function with a terminal of some width as standard output and error; returns the output."""
+    """Runs a function whose standard output and error are a terminal of this width; returns its output."""
 
     def run(work: Callable[[], object], columns: int = 80) -> str:
         reading_end, terminal_end = pty.openpty()
@@ -39,7 +39,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
             while True:
                 try:
                     received = os.read(reading_end, 65536)
-                except OSError:  # the program has closed the terminal
+                except OSError:  # reading fails when the program has closed the terminal
                     return
                 output.extend(received)
 
@@ -206,7 +206,7 @@ def test_ctrl_c_ends_a_long_library_computation_within_3_s() -> None:
         sent_at_s = time.monotonic()
         process.send_signal(signal.SIGINT)
         _, messages = process.communicate(timeout=60)
-        # The computation takes a minute. Ctrl-C ends it in 0.2 s, or later if other tests load the machine.
+        # Ctrl-C ends a computation of one minute after 0.2 s, or later if other tests load the machine.
         assert time.monotonic() - sent_at_s < 3.0
     assert process.returncode == 130
     assert messages == "error: interrupted; nothing was written\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control as a program: output, refusals, exit codes."""
+"""Tests of the program palpate-control: output, refused arguments, exit codes."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def test_a_signal_ends_the_run_with_exit_code_0_and_a_complete_recording(
     out = tmp_path / "rendered.csv"
     process = start_control(MODEL, "--duration-s", "inf", "--record", out, "--json", *ANY_RATE)
     wait_for_rows(tmp_path / "rendered.csv.part", process)
-    time.sleep(0.8)  # longer than the start ramp, whose rows cannot be used
+    time.sleep(0.8)  # the run lasts longer than the start ramp, whose rows cannot be identified
     process.send_signal(signal_number)
     output, messages = process.communicate(timeout=20)
     assert process.returncode == 0, messages
@@ -194,7 +194,7 @@ def test_a_short_fault_is_counted_and_the_run_continues(fault: str) -> None:
     assert (
         sum(json.loads(completed.stdout)["ticks_by_status"].values()) == json.loads(completed.stdout)["ticks"]
     )
-    assert len(json.loads(completed.stdout)["ticks_by_status"]) == 3  # Ok, Ramp, and that of the fault
+    assert len(json.loads(completed.stdout)["ticks_by_status"]) == 3  # Ok, Ramp, status of the fault
 
 
 def test_a_rate_too_low_is_reported_and_ends_the_run(tmp_path: Path) -> None:

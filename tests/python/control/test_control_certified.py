@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control with the plan of its model: used and kept only if it is certified."""
+"""palpate-control uses the plan that is stored in a model only if the plan is certified."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from palpate.planning import Plan
 
 pytestmark = needs_program
 
-# The longest period of this certificate is a tenth of a second, so that a busy machine keeps it.
+# Certificates for this knob allow periods up to 0.1 s, so that a busy machine keeps this limit.
 SLOW_PERIOD_KNOB = DeviceProfile(id="knob", inertia=0.05, viscous_damping=50.0, coulomb_friction=0.01)
 
 
@@ -50,7 +50,7 @@ def test_the_stored_plan_is_rendered(tmp_path: Path) -> None:
 
 @pytest.fixture
 def limited(tmp_path: Path) -> Path:
-    """Writes a model whose plan renders another network than the identified one; the device may be slow."""
+    """Writes a model whose plan renders a changed network; the certificate allows long periods."""
     knob = DeviceProfile(
         id="weak knob",
         inertia=0.05,

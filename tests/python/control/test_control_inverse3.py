@@ -28,7 +28,7 @@ MODEL = ROOT / "tests" / "models" / "good" / "spring.json"
 
 @pytest.fixture
 def spring(tmp_path: Path) -> Path:
-    """Writes a spring of 100 N/m over 20 mm."""
+    """Writes the model file of a spring of 100 N/m with a domain of 20 mm."""
     model = json.loads(MODEL.read_text(encoding="utf-8"))
     model["units"] = {"position": "m", "force": "N"}
     model["network"]["linear"] = [STIFFNESS]
@@ -52,7 +52,7 @@ def render_on_service(
             "--priority",
             0,
         ]
-        device += ["--wait-ms", 200]  # the server runs on the same, busy machine
+        device += ["--wait-ms", 200]  # the server runs on the same, busy machine as palpate-control
         yield control(model, *device, *arguments), running_service
 
 
@@ -69,7 +69,7 @@ def test_a_spring_is_rendered_along_one_axis_against_the_displacement(spring: Pa
     assert recording.metadata["service"] == "force gate 0.3, damping 0.5"
     assert recording.position.max() > 0.003
     after_ramp = slice(300, None)
-    expected_force = STIFFNESS * np.maximum(recording.position[after_ramp], 0.0)  # no force at positions < 0
+    expected_force = STIFFNESS * np.maximum(recording.position[after_ramp], 0.0)  # no force below position 0
     assert recording.force[after_ramp] == pytest.approx(expected_force, abs=1e-6)
     # The sent force has a component along the axis only, points out of the object, and is zero at the end.
     assert all(force["x"] == force["y"] == 0.0 for force in service.forces)
@@ -89,7 +89,7 @@ def test_only_the_first_message_names_the_program_and_it_sends_zero_force(spring
     assert all(set(message) == {"inverse3"} for message in later_messages)
     assert (
         ticks <= len(later_messages) <= ticks + 2
-    )  # one message a tick, since the host sets the rate; up to two more with zero force
+    )  # the program sends one message each tick, and at the end up to two more with zero force
 
 
 def test_a_negative_axis_reverses_the_force(spring: Path) -> None:

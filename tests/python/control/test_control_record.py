@@ -265,7 +265,7 @@ def test_a_full_standard_output_exits_with_code_1_and_one_sentence(arguments: li
 def test_the_verdict_is_the_first_line(
     tmp_path: Path, arguments: list[Any], level: str, sentence: str, code: int
 ) -> None:
-    """The first line is the verdict, also on a busy machine, where it reports missed deadlines."""
+    """The first printed line is the verdict, which on a busy machine reports missed ticks."""
     arguments = [
         MODEL,
         *(["--duration-s", 1.2] if "--duration-s" not in arguments else []),
@@ -366,7 +366,7 @@ def test_a_long_run_loses_no_row_and_its_memory_is_constant(tmp_path: Path) -> N
         lines = []
         while process.poll() is None:
             time.sleep(0.25)
-            with contextlib.suppress(OSError, StopIteration):  # the process may have just ended
+            with contextlib.suppress(OSError, StopIteration):  # the process may already have ended
                 memory.append(resident_kib(process))
             while True:
                 try:
@@ -412,7 +412,7 @@ def test_a_record_of_the_ramp_alone_is_refused_with_the_reason(tmp_path: Path) -
 
 
 def palpate(*arguments: Any) -> str:
-    """Runs the command line, which must succeed."""
+    """Runs a palpate command, which must succeed, and returns its standard output."""
     command = [sys.executable, "-m", "palpate", *map(str, arguments)]
     completed = subprocess.run(command, capture_output=True, text=True, check=False)
     assert completed.returncode == 0, completed.stderr

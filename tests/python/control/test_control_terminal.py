@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Live line of palpate-control: shown in a terminal, also in a narrow one, and nowhere else."""
+"""The live line (progress) of palpate-control is shown in terminals, also narrow ones, nowhere else."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from control_program import ANY_RATE, MODEL, PROGRAM, control, needs_program
 pytestmark = needs_program
 
 CLEAR_LINE = "\r\x1b[K"
-"""Returns to the start of the line and clears it."""
+"""Characters that move the cursor to the start of a terminal line and clear the line."""
 
 LIVE_LINE = re.compile(r"[\d.]+ s  -?[\d.e-]+ rad  -?[\d.e-]+ Nm  [\d.]+ Hz  missed \d+")
 
 
 class Terminal:
-    """Terminal of some columns that runs the program; the summary goes to a pipe."""
+    """Runs palpate-control in a terminal with this number of columns; the summary goes to a pipe."""
 
     def __init__(self, columns: int, *arguments: Any) -> None:
         self._reading_end, program_end = os.openpty()
@@ -55,14 +55,14 @@ class Terminal:
         os.close(self._reading_end)
 
     def watch(self, until_lines: int | None = None) -> None:
-        """Reads the output until it has some number of live lines, or until the program has ended."""
+        """Reads the terminal until it has shown `until_lines` live lines, or until the program has ended."""
         deadline_s = time.monotonic() + 30.0
         while until_lines is None or self.output.count(CLEAR_LINE) < until_lines:
             assert time.monotonic() < deadline_s
             if select.select([self._reading_end], [], [], 0.1)[0]:
                 try:
                     self.output += os.read(self._reading_end, 4096).decode()
-                except OSError:  # the program has closed the terminal
+                except OSError:  # reading fails when the program has closed the terminal
                     return
 
     def press(self, key: bytes) -> None:
@@ -74,7 +74,7 @@ class Terminal:
 
     @property
     def lines(self) -> list[str]:
-        """Live lines in order; each replaces the previous one."""
+        """All live lines that the terminal has shown, in order."""
         lines = self.output.split(CLEAR_LINE)[1:]
         return [line for line in lines if line and not line.endswith("\n")]
 
@@ -97,20 +97,20 @@ def test_a_terminal_shows_one_live_line_that_is_removed_at_the_end() -> None:
             assert LIVE_LINE.fullmatch(line), line
         seconds = [float(line.split()[0]) for line in session.lines]
         assert seconds == sorted(seconds)
-        ticking = [second for second in seconds if second > 0.0]  # 0 s is repeated during a slow start
+        ticking = [second for second in seconds if second > 0.0]  # 0 s may be shown repeatedly
         assert len(set(ticking)) == len(ticking) >= 3
         assert session.output.endswith(CLEAR_LINE)
 
 
 @pytest.mark.parametrize("columns", [40, 12, 5])
 def test_the_live_line_is_not_wrapped_in_a_narrow_terminal(columns: int) -> None:
-    """A live line that is one character wider than the terminal would leave a part of the line before."""
+    """If a live line is wider than the terminal, a part of it stays when the next live line replaces it."""
     with terminal(columns, MODEL, "--duration-s", 0.8) as session:
         session.watch()
         assert session.process.wait() == 0
         lines = session.lines
         assert all(len(line) < columns for line in lines)
-        if columns > 5:  # 5 columns are too few for any value
+        if columns > 5:  # a terminal of 5 columns is too narrow for the first value of the live line
             assert len(lines) >= 2
             assert all(re.match(r"[\d.]+ s", line) for line in lines)
 
@@ -132,7 +132,7 @@ def test_a_message_during_a_run_is_printed_on_a_separate_line() -> None:
         assert session.process.wait() == 1
         reported = session.output.partition("error: stopped by a fault of the device: Fault")
         assert reported[1]
-        # on a busy machine a warning may follow the live line
+        # on a busy machine a warning line may be printed after the last live line
         assert reported[0].endswith((CLEAR_LINE, "\n"))
 
 

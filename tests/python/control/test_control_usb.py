@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control on a USB device that is emulated below libusb: refusals and endings."""
+"""palpate-control on an emulated USB device, through libusb: refused devices and reasons to end a run."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PROGRAM = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "p
 SCALE = max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
 
-# The emulated time advances with each USB transfer, so the speed of this machine has no effect.
+# The time of the emulated device advances with each USB transfer, so a busy machine has no effect.
 LOCK_STEP = ["--lock-step"]
 ANY_RATE = ["--wait-ms", "10000", "--lowest-rate-share", "0", "--priority", "0"]
 
@@ -138,7 +138,7 @@ def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: P
     trace = tmp_path / "trace.csv"
     model = planned(tmp_path, delay_s=0.25e-3)
     arguments = ["--wait-ms", 500, "--duration-s", 0.3]
-    for _ in range(20):  # on a busy machine a lost packet may end the run before
+    for _ in range(20):  # on a busy machine a lost packet may end the run before the fault
         completed = control(*arguments, device=[*LOCK_STEP, "--trace", str(trace)], model=model)
         if "stopped by a fault of the device: Lost" not in completed.stderr:
             break
@@ -254,7 +254,7 @@ def test_after_kill_the_watchdog_of_the_device_sets_zero_torque(tmp_path: Path) 
     sent_frames = frames(trace)
     assert min(frame.torque for frame in sent_frames) < -0.01
     assert sent_frames[-1].torque == 0.0
-    assert sent_frames[-1].status & 2  # bit 1: the watchdog of the device has acted
+    assert sent_frames[-1].status & 2  # bit 1 of the status: the device's watchdog has acted
 
 
 # Kind -> number of frames of the fault, True if nothing can follow it, frames until the torque is zero. The

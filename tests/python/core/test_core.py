@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiled core in Python: numbers equal to a plain NumPy reference, and clear refusals."""
+"""The compiled module gives the same numbers as NumPy formulas, and refuses wrong arguments."""
 
 import os
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a rendering as values: pickled, copied and compared by one list of fields."""
+"""Settings of a rendering are pickled, copied and compared by their one list of fields."""
 
 from __future__ import annotations
 

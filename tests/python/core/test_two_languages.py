@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Equality of C++ and Python: the same networks and positions through a C++ program and the package."""
+"""A C++ program and the Python package compute equal forces of the same networks and positions."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Array = NDArray[np.float64]
 NETWORKS = 1000 * int(os.environ.get("PALPATE_TEST_SCALE", "1"))
 CONTINUATIONS = ("linear", "free")
 TOLERANCE = 1e-12
-"""Largest difference between the results of C++ and Python, relative to the sum of the absolute terms."""
+"""Largest allowed difference of C++ and Python results, divided by the sum of the absolute terms."""
 
 DIFFICULT = [0.0, -0.0, np.nan, np.inf, -np.inf, 5e-324, -2e-310, 1e300, -1e300, np.finfo(float).max]
 
 
 @dataclass
 class Case:
-    """Network over [lower, upper], and the positions of its evaluation."""
+    """Wavelet network with the domain [lower, upper], and the positions at which it is evaluated."""
 
     alpha: Array
     beta: Array
@@ -69,7 +69,7 @@ def cases() -> Iterator[Case]:
         travel = 10.0 ** random.uniform(-6, 3)
         lower = travel * random.uniform(-2, 1)
         x = lower + travel * random.uniform(-0.2, 1.2, 8)
-        # each network also has four positions made of random bits
+        # each network is also evaluated at four numbers made of random bits
         bits = random.integers(-(2**63), 2**63 - 1, 4, dtype=np.int64).view(np.float64)
         yield Case(
             np.exp(random.uniform(0.0, 5.0, size)) / travel,
@@ -88,7 +88,7 @@ def cases() -> Iterator[Case]:
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Compiles forces.cpp with only the include folder and C++20."""
+    """Compiles the test program forces.cpp as C++20 with no other option than the include folder."""
     compiler = shutil.which(os.environ.get("CXX", "c++"))
     if compiler is None:
         pytest.skip("needs a C++ compiler")

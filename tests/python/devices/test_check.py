@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate check-device: its observations of a device, and no pushes after a wrong sign."""
+"""palpate check-device measures a device, and applies no pushes if the force has the wrong sign."""
 
 from __future__ import annotations
 
@@ -249,7 +249,7 @@ def test_the_motion_of_the_handle_gives_the_sign_of_the_force(
 
 @pytest.fixture
 def faultless(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Replaces every measurement by that of a faultless device."""
+    """Replaces each measurement of check-device by the result of a device without faults."""
     push = {"kept": push_ticks(friction=0.01)}
     monkeypatch.setattr(
         check, "measure", lambda device, **settings: push if "push" in settings else summary_without_force()
@@ -281,7 +281,7 @@ def test_the_measured_profile_of_the_simulated_device_gives_a_certified_direct_p
 ) -> None:
     path = tmp_path / "knob.toml"
     words = ["--push", "--duration-s", "5", "--write-profile", str(path), "--json"]
-    assert main(["check-device", *words]) in (0, 1)  # a busy machine may not keep the loop's rate
+    assert main(["check-device", *words]) in (0, 1)  # a busy machine may miss ticks of the control loop
     result = json.loads(capsys.readouterr().out)
     assert result["written"] == str(path)
     assert result["coulomb_friction"] == pytest.approx(0.01, rel=0.1)
@@ -346,7 +346,7 @@ def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> Non
     assert result["inertia"] == pytest.approx(2e-4, rel=0.05)
     assert result["viscous_damping"] == pytest.approx(0.06, rel=0.05)
     assert result["delay_p50_us"] == pytest.approx(1000.0, rel=0.02)
-    assert 1e-3 < result["delay_s"] < 3e-3  # largest of a thousand measured delays
+    assert 1e-3 < result["delay_s"] < 3e-3  # the largest of 1000 measured delays
     assert result["round_trip_p50_us"] > 0.0
     assert (result["lost_samples"], result["repeated_samples"]) == (0, 0)
     written = DeviceProfile.load(profile)

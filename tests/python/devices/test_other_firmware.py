@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Devices with other firmware: a seed draws everything that the protocol leaves open."""
+"""Emulated devices with random firmware: a seed draws all behaviour that the USB protocol permits."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def firmware_of(seed: int, *words: Any) -> list[str]:
 def test_the_device_is_zeroed_found_by_serial_number_and_rendered_on(seed: int, tmp_path: Path) -> None:
     trace, record, listed = (tmp_path / name for name in ("trace.csv", "rendered.csv", "devices.json"))
     model = json.loads(SPRING.read_text(encoding="utf-8"))
-    model["continuation"] = {**model["continuation"], "below": "linear"}  # the hand may hold any position
+    model["continuation"] = {**model["continuation"], "below": "linear"}  # for any handle position
     both_ways = tmp_path / "spring.json"
     both_ways.write_text(json.dumps(model), encoding="utf-8")
     control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified", *ANY_RATE, "--wait-ms", 10_000]))
@@ -51,7 +51,7 @@ def test_the_device_is_zeroed_found_by_serial_number_and_rendered_on(seed: int, 
     assert summary["usb"]["late_echoes"] == 0
     assert summary["usb"]["watchdog_trips"] == 0
     emulated_frames = frames(trace)
-    assert max(abs(frame.torque) for frame in emulated_frames) > 1e-3  # the rendered spring gave a force
+    assert max(abs(frame.torque) for frame in emulated_frames) > 1e-3  # the spring was rendered with force
     assert emulated_frames[-1].torque == 0.0
     assert not emulated_frames[-1].enabled
     assert abs(read_recording(record).force).max() > 1e-3
@@ -60,7 +60,7 @@ def test_the_device_is_zeroed_found_by_serial_number_and_rendered_on(seed: int, 
 def test_the_sign_and_mechanics_of_the_device_are_measured(seed: int) -> None:
     words = [*PALPATE, "check-device", "--device", "usb", "--duration-s", 2, "--wait-ms", 2000, "--json"]
     answer = emulated(*words, "--push", "--yes", device=firmware_of(seed, "--no-hand"))
-    assert answer.returncode in (0, 1), answer.stderr  # 1: the loop was late
+    assert answer.returncode in (0, 1), answer.stderr  # exit code 1: the control loop was late
     result = json.loads(answer.stdout)
     findings = {one["name"]: one for one in result["findings"]}
     # A coarse encoder cannot detect the small displacement that the push of check-device causes.

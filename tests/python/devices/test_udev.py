@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Udev rule: shipped with the package, installed by one command."""
+"""The udev rule that permits access to the USB device is part of the package; one command installs it."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def test_after_an_emergency_stop_enabling_stalls_until_the_fault_is_cleared(repo
 
 def test_a_halted_endpoint_stalls_until_it_is_cleared(reported: dict[str, Any]) -> None:
     assert reported["stalls"][0] == errno.EPIPE
-    assert len(reported["stalls"]) == 2  # a second read before the halt is cleared also fails
+    assert len(reported["stalls"]) == 2  # reading fails until the USB halt is cleared
     assert reported["bytes after the stall"] == 32
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Binding of the decoder of GET_INFO: SI units, and refusals that name the field."""
+"""Python decoder of the device's GET_INFO answer: SI units, and errors that name the wrong field."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ def test_control_c_interrupts_identify_immediately(monkeypatch: pytest.MonkeyPat
 
 
 def held_out_nrmse(path: Path, **options: object) -> tuple[float, Model]:
-    """Fits both strokes without every fifth row; returns the NRMSE on these rows, and the model."""
+    """Fits both strokes without every fifth row; returns the NRMSE on the omitted rows, and the model."""
     kept, held = palpate.read_recording(path).split(every=5)
     model = identify(kept, **options)
     assert held.direction is not None

@@ -293,7 +293,7 @@ def test_a_hundred_million_rows_take_less_than_a_gigabyte(tmp_path: Path) -> Non
 
 
 BLOCK = 400
-"""Number of rows that these tests read from a file at once."""
+"""Number of rows in one part of a file that is read in parts."""
 
 SIZES = {"half": 200, "one": 400, "one-and-a-row": 401, "two": 800, "two-and-a-half": 1000, "five": 2000}
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wavelet network as a scikit-learn estimator: its rules, its tools, and weights of rows."""
+"""The wavelet network as scikit-learn estimator: scikit-learn's rules and tools, and weights of rows."""
 
 import inspect
 import pickle

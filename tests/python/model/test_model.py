@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Models in memory and on disk."""
+"""Tests of models in memory and of model files."""
 
 import copy
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every model file of the corpus, the published schema, and texts that are not JSON."""
+"""Reading the stored test model files, the published schema, and files that are not JSON."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def good_text(name: str) -> str:
 
 
 def patched(content: Any, patch: list[dict[str, Any]]) -> Any:
-    """Returns the content after a JSON patch of add, replace and remove."""
+    """Returns the content of a model file after a JSON patch with add, replace and remove."""
     for change in patch:
         *parents, last = change["path"].split("/")[1:]
         parent = content

@@ -20,7 +20,7 @@ BENCH_KNOB = DeviceProfile.load(profile_file("bench-knob"))
 
 
 def wheel() -> Model:
-    """Returns a wheel with one peak of about 8 N*m; its unlimited force has zero mean."""
+    """Returns the model of a wheel with one torque peak of about 8 N*m and a mean torque of zero."""
     model = model_by_hand(
         alpha=[[8.0], [0.6], [0.6]],
         beta=[[2.0], [4.5], [1.2]],
@@ -71,7 +71,7 @@ def test_with_delay_the_force_error_is_not_larger_than_with_equal_slopes(model: 
         id="late", viscous_damping=0.01, coulomb_friction=0.01, encoder_step=1e-4, delay_s=delay * 1e-3
     )
     held = device.viscous_damping / device.longest_period_s
-    # from b >= T M / 2 + n T L with slopes from -M to M, L = M, and the delay n in whole samples
+    # required device damping: b >= T M / 2 + n T M with force slopes from -M to M and a delay of n samples
     equal = held / (0.5 + device.late_samples)
     scheme = Scheme(structure="direct")
     before = limit_slopes(model, -equal, equal)

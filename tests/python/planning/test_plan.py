@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Device profiles, candidate structures, certificates in model files, and the verb."""
+"""Device profiles, candidate structures, certificates in model files, and the command palpate plan."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SMOOTH = DeviceProfile(id="smooth knob", encoder_step=0.0)
 
 
 def slide(viscous_damping: float) -> DeviceProfile:
-    """Returns a device for key switches."""
+    """Returns the profile of a device with a straight handle, for key switches."""
     return DeviceProfile(
         id="slide",
         position_unit="m",
@@ -100,7 +100,7 @@ def test_plan_takes_the_simplest_certified_structure() -> None:
     ("damping", "samples"), [(1.0, 1), (0.049, 2), (0.036, 4), (0.030, 8), (0.0278, 16), (0.027, 0)]
 )
 def test_prediction_takes_fewest_samples_certified_for_a_late_tick(damping: float, samples: int) -> None:
-    """Slope 40: damping 0.0400, 0.0303, 0.0255, 0.0231, 0.0218 for 1 to 16 samples; 1.25 times if late."""
+    """Damping for slope 40: 0.0400, 0.0303, 0.0255, 0.0231, 0.0218 for 1 to 16 samples; late: 1.25 times."""
     device = DeviceProfile(viscous_damping=damping, coulomb_friction=0.02)
     model = model_by_hand(weight=[0.0], linear=[40.0])
     chosen = plan(model, device)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Force error of a plan: its share, its verdict, the named device property, and the model file."""
+"""Force error of a plan: share of the force, verdict, device property that causes it, model file."""
 
 from __future__ import annotations
 

@@ -18,12 +18,12 @@ from palpate.cli.main import main
 from palpate.planning import force_at, force_error, rig_for
 
 KNOB = DeviceProfile(id="knob", coulomb_friction=0.02)
-# Certificate that holds on a busy machine: its longest period is a tenth of a second.
+# Certificates for this knob allow periods up to 0.1 s, so that a busy machine keeps this limit.
 PATIENT_KNOB = DeviceProfile(id="knob", inertia=0.05, viscous_damping=50.0, coulomb_friction=0.05)
 
 
 def fluid_by_hand(**changes: Any) -> Model:
-    """Returns f = 5 x + 0.01 v and one wavelet over both, to 0.5 rad and 4 rad/s."""
+    """Returns a model: 5 x + 0.01 v plus a wavelet of position x (to 0.5 rad), velocity v (to 4 rad/s)."""
     return model_by_hand(
         **{
             "kind": "position_velocity",

@@ -181,7 +181,7 @@ def test_play_radius_is_chosen_only_if_the_model_has_none() -> None:
     for model, radius in (
         (model_by_hand(), 0.0),
         (keyswitch_by_hand(play_radius=1e-4), 0.0),
-        (keyswitch_by_hand(), 4e-5),  # 1 % of the travel, far above the encoder's step
+        (keyswitch_by_hand(), 4e-5),  # 1 % of the travel, many encoder steps
     ):
         assert rig_for(model).scheme(model).play_radius == pytest.approx(radius)
     assert rig_for(model).scheme(model, play_radius=1e-3).play_radius == 1e-3

@@ -48,7 +48,7 @@ def test_poles_are_those_of_the_step_and_leave_the_circle_at_the_certificate_lim
     assert reach[2] > 1.0
     # The poles are the roots of z^2 + a z + b; their product b is 1 - T (B_o + B_c) / m.
     assert np.prod(locus.chosen[0]).real == pytest.approx(1.0 - T * 0.51 / 1e-3)
-    # One computed slope is where two poles meet, because the drawn line of the poles has a corner there.
+    # One computed slope is where two poles are equal, because the drawn line of the poles has a corner there.
     assert np.abs(np.diff(locus.poles[0], axis=-1)).min() < 1e-6
     # Handle at 0, total stiffness K: y_{k+1} = (1 + b) y_k - b y_{k-1} - T^2 K / m y_k.
     a, b = -np.sum(locus.chosen[0]).real, np.prod(locus.chosen[0]).real

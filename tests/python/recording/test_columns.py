@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rules for the choice of columns, and the refusals if no rule chooses."""
+"""Rules that choose position and force columns of a file, and errors if no rule can choose."""
 
 import re
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strokes from the order of rows."""
+"""Press and release strokes are found from the order of the rows."""
 
 import numpy as np
 import pytest

@@ -24,7 +24,7 @@ def sentences(*rows: Rows) -> list[str]:
 
 
 def only_sentence(*rows: Rows) -> str:
-    """Returns the sentence of the only finding on the recordings."""
+    """Returns the sentence of the finding; checks that the recordings have only one finding."""
     (sentence,) = sentences(*rows)
     return sentence
 

@@ -84,7 +84,7 @@ OPTIONS: dict[str, dict[str, object]] = {
 TEXT_TABLE = "sysid_benchmarks/published_results.csv"
 
 MOST_REFUSALS = 3
-"""Largest number of successive refusals: the header, then rows that cannot be used."""
+"""Largest number of times that one file is refused: for its header, then for rows that cannot be used."""
 
 
 def measured_files() -> list[str]:

@@ -70,7 +70,7 @@ def thinned(recording: Recording) -> Recording:
 
 @dataclass(frozen=True)
 class Variant:
-    """Text file, and the recording that reading the file must give."""
+    """Text of a file, and the recording that must result from reading the file."""
 
     data: bytes
     clean: Recording

@@ -16,7 +16,7 @@ N = 37
 
 
 def awkward_numbers(seed: int) -> np.ndarray:
-    """Returns numbers that lose digits in any short decimal form."""
+    """Returns random numbers that a text with few decimal digits cannot represent exactly."""
     random = np.random.default_rng(seed)
     return random.normal(size=N) * 10.0 ** random.integers(-12, 12, N)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The closed table of units."""
+"""Every unit that a recording may have, and its value in SI units."""
 
 import math
 

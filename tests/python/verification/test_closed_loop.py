@@ -31,7 +31,7 @@ def spring(stiffness: float = 2.0, hysteresis: float = 0.0, **change: Any) -> Mo
 
 
 def sweep(stiffness: float = 2.0, timed: bool = True, seconds: float = 4.0) -> Recording:
-    """Returns the recording of a slow motion of a spring that starts at rest."""
+    """Returns the recording of a spring whose handle starts at rest and moves slowly."""
     t = np.arange(round(seconds * 1000)) * 1e-3
     x = 0.25 * (1 - np.cos(np.pi * t))
     return Recording.from_arrays(x, stiffness * x, t if timed else None, units=RAD)
@@ -50,7 +50,7 @@ def test_a_recorded_motion_renders_the_recorded_force() -> None:
 
 def test_a_coupling_makes_the_rendered_spring_softer() -> None:
     loop = motion_driven(spring(50.0), sweep(50.0), Scheme(structure="massless", coupling_stiffness=100.0))
-    # In series with the coupling: K_c K / (K_c + K); its damping makes no difference at rest.
+    # In series with the coupling: K_c K / (K_c + K); the damping of the coupling has no effect at rest.
     turning = np.argmax(loop.recorded_position)
     assert loop.rendered_force[turning] == pytest.approx(0.5 * 50 * 100 / 150, rel=1e-3)
     assert loop.rmse > 1.0

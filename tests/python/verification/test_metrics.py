@@ -111,7 +111,8 @@ def spring(stiffness: float, reach: float = 1.0, loss: float = 0.0) -> Model:
 def test_difference_is_measured_in_just_noticeable_differences() -> None:
     (stroke,) = compare(spring(10.0), spring(10.35))
     assert stroke.name == ""
-    # 3.5 % of the force, with a just noticeable difference of 7 %; near zero force it is 1 % of the largest.
+    # The difference is 3.5 % of the force, half the just noticeable difference of 7 % (near zero force: 1 %
+    # of the largest force).
     assert stroke.worst == pytest.approx(0.5, rel=1e-6)
     assert stroke.perceptible[0] == pytest.approx(0.1, rel=1e-6)
     (same,) = compare(spring(10.0), spring(10.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A flight record of a model with hysteresis is verified with the rendered play."""
+"""A flight record of a model with hysteresis is verified with the play operator of the rendering."""
 
 import json
 from pathlib import Path

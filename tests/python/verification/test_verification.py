@@ -18,7 +18,7 @@ NOISE = 0.01
 
 
 def model_of(data: Source, hysteresis: bool = False, **change: Any) -> Model:
-    """Returns 2 x + 1 over [0, 1]; with hysteresis plus or minus (0.25 + 0.5 x)."""
+    """Returns a model of force 2 x + 1 for x in [0, 1]; with hysteresis h = 0.25 + 0.5 x if requested."""
     given: dict[str, Any] = {
         "kind": "hysteresis" if hysteresis else "position",
         "inputs": ["position"],
@@ -86,7 +86,7 @@ def test_direction_selects_press_or_release_force() -> None:
 
 
 def test_the_stiffness_is_that_of_each_stroke() -> None:
-    # Half steeper on the press, half flatter on the release: each is perceptible, their mean is not.
+    # The press is half steeper, the release half flatter: perceptible in each stroke, but not in their mean.
     recording = stroke()
     assert recording.direction is not None
     wrong = Recording.from_arrays(
@@ -124,7 +124,7 @@ def test_a_single_valued_model_keeps_rows_without_a_direction() -> None:
 def test_without_a_direction_the_play_operator_follows_the_motion() -> None:
     model = model_of(curve().source, hysteresis=True, play_radius=0.005)
     result = verify(model, stroke(direction=False))
-    # As with a stated direction, the direction state is 1 or -1, except for 2 play radii after reversals.
+    # The direction state is 1 or -1, as in a file with directions, except for 2 play radii after reversals.
     assert np.mean(np.abs(result.residual) < 4 * NOISE) > 0.98
     assert "the play operator follows the positions" in result.notes[0]
 
@@ -154,7 +154,7 @@ def test_a_play_radius_that_is_given_is_used_even_with_a_direction() -> None:
 
 
 def test_the_play_of_held_out_rows_follows_the_rows_between_them() -> None:
-    """Every 60th row of a fast motion is held out; its play depends on the rows between the held-out rows."""
+    """Every 60th row of a fast motion is held out; its direction state depends on the other rows."""
     time = np.arange(6000) * 1e-3
     x = 0.5 - 0.45 * np.cos(2 * np.pi * 3.0 * time) * np.cos(2 * np.pi * 0.11 * time)
     model = model_of(curve().source, hysteresis=True, play_radius=0.05)

@@ -63,7 +63,7 @@ def test_exactly_linear_data_are_linear() -> None:
 
 @pytest.mark.parametrize("encoder_step", [0.0, 9.6e-5], ids=["exact", "encoder"])
 def test_growth_on_data_without_noise_stops_at_sensor_resolution(encoder_step: float) -> None:
-    """A rendered recording is exact: the error could always be smaller, but no sensor would measure it."""
+    """In a recording without noise more wavelets always reduce the error, but no sensor measures this."""
     x = sweep(3000, 6, encoder_step)
     force = 2.0 * x + 0.58 * np.logaddexp(0.0, (x - 0.4) / 0.01)
     network = fit_environment(x[:, None], force, starts=[0])
@@ -135,7 +135,7 @@ def test_strokes_that_gain_energy_do_not_become_a_rapidly_changing_force() -> No
 
 
 def test_noise_in_rows_unused_by_a_model_class_does_not_favour_it() -> None:
-    """At the start of a motion its hysteresis input is unknown: a random gain there does not count."""
+    """At the start of a motion the direction state is unknown: a smaller error there does not count."""
     for draw in range(20 if not LONG else 200):
         time = np.arange(3000) / (2000.0 + 30.0 * draw)
         x = 1.0 - np.abs((2.0 * time) % 2.0 - 1.0)
@@ -328,7 +328,7 @@ def test_hysteresis_is_not_tested_if_the_motion_never_turns_back() -> None:
 
 
 def loop(height: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns a press and a release of 2 x with half the loop's height on either side."""
+    """Returns press and release of the force 2 x, plus and minus half the height of the hysteresis loop."""
     n = len(height)
     x = np.concatenate([np.linspace(0.0, 1.0, n), np.linspace(1.0, 0.0, n)])
     side = np.repeat([1.0, -1.0], n)
@@ -337,7 +337,7 @@ def loop(height: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def sentences(network: FittedNetwork) -> str:
-    """Returns the decisions on the model classes, one per line."""
+    """Returns the decisions of the model selection as text, one line for each model class."""
     return "\n".join(map(str, network.decisions))
 
 

@@ -204,8 +204,8 @@ def to_and_fro(seed: int, speeds: list[float], *, damping: float, noise: float =
 
 
 def test_damping_is_not_tested_at_one_speed_but_at_two() -> None:
-    """The velocity is then proportional to its sign, and Coulomb friction explains a loop of constant height
-    equally well."""
+    """At one speed the velocity is proportional to its sign, and Coulomb friction explains a loop of constant
+    height equally well."""
     for seed in range(1 if SCALE == 1 else 20):
         one = identify(to_and_fro(seed, [0.3] * 6, damping=0.06))
         assert (one.kind, one.damping) == ("hysteresis", None)

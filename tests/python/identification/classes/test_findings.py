@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reported error is that of the rows, and findings name errors that the inputs cannot explain."""
+"""The reported error is the error of the rows; findings name force errors that no input explains."""
 
 import os
 from pathlib import Path
@@ -204,7 +204,7 @@ def test_likely_cause_is_time_direction_or_another_input() -> None:
 def test_model_with_a_small_error_has_no_finding() -> None:
     x = strokes(N)
     assert explained_findings(x, wall(x) + noise(N), noise(N), None, 0.005) == []
-    # the model misses a part of the force; the position has no defect
+    # the model lacks a part of the force; the position column has no defect
     assert explained_findings(x, wall(x), wall(x) - wall(x).mean(), None, 1.0) == []
 
 

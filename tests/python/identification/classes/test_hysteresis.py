@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hysteresis from a motion with unknown beginning."""
+"""Identification of hysteresis if the direction state at the start of the motion is unknown."""
 
 import os
 
@@ -32,7 +32,7 @@ def test_known_hysteresis_input_does_not_depend_on_earlier_motion() -> None:
         edge = HysteresisInput.of_play([motion], radius, [1.0])
         far = HysteresisInput.of_play([motion], radius, [-1.0])
         first = int(np.argmax(edge.known))
-        if first:  # no row is left out without reason
+        if first:  # no row is left out of the fit without reason
             assert edge.side[first - 1] != pytest.approx(far.side[first - 1], abs=1e-9)
 
 
@@ -50,7 +50,7 @@ def test_a_motion_that_begins_in_the_middle_of_its_play_is_fitted_to_its_noise()
 @pytest.mark.parametrize("radius", [0.0033, 0.0071])
 @pytest.mark.parametrize("noise", [0.0, 2e-3], ids=["rendered", "measured"])
 def test_play_radius_between_the_options_is_found_without_more_wavelets(radius: float, noise: float) -> None:
-    """With a wrong play radius wavelets model the error of the radius, and their number is not limited."""
+    """With a wrong play radius, more and more wavelets are selected to model the resulting force error."""
     x = 0.45 * wandering(10_000, 1)
     side = HysteresisInput.of_play([x], radius).side
     force = 1.5 * np.tanh(12 * (x - 0.2)) + side * (0.1 + 0.1 * x)

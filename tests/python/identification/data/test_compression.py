@@ -54,7 +54,7 @@ def test_variance_within_cells_excludes_the_slope_across_them() -> None:
     x = random.uniform(0.0, 1.0, 50_000)
     noise = random.normal(0.0, 0.02, len(x))
     rows = Compressor(x[:, None], 40.0 * x + noise, max_positions=200).rows()
-    freedom = rows.samples - len(rows.force) * 1.25  # fitted: 1 mean a cell, 1 slope for 4 cells
+    freedom = rows.samples - len(rows.force) * 1.25  # fitted: a mean in each cell, a slope in every 4
     assert np.sqrt(rows.within / freedom) == pytest.approx(0.02, rel=0.01)
 
 

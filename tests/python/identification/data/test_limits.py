@@ -112,7 +112,7 @@ def test_repeats_are_rows_that_copy_others() -> None:
     assert not repeated(x, y, None)[0].any()
     assert np.count_nonzero(repeated(np.repeat(x, 5, axis=0), np.repeat(y, 5), None)[0]) == 800
     assert np.count_nonzero(repeated(np.tile(x, (3, 1)), np.tile(y, 3), None)[0]) == 400
-    # equal positions with independent forces are not repeats
+    # rows with equal positions but independent forces are not repeated rows
     assert not repeated(np.repeat(x, 5, axis=0), noise(1000), None)[0].any()
 
 

@@ -159,7 +159,7 @@ TURN = 2.0 * np.pi
 
 
 def knob(turns: float, n: int = 400, *, end: bool = False, seed: int = 0) -> Recording:
-    """Returns seven detents a turn, sampled from 0.3 rad; without `end`, one step of the turn is missing."""
+    """Returns one revolution with seven detents from 0.3 rad on; without `end` the last step is missing."""
     x = 0.3 + np.linspace(0.0, turns * TURN, n, endpoint=end)
     force = np.sin(7.0 * x) + 0.3 * np.cos(x) + np.random.default_rng(seed).normal(0.0, 0.01, n)
     return Recording.from_arrays(x, force)

@@ -185,7 +185,7 @@ def test_the_command_identifies_and_verifies_two_columns(
     result = json.loads(captured.out)
     assert result["model_class"] == "hysteresis"
     assert result["verdict"] == "good"
-    # The average of the strokes has 0.16. One held-out row is at the reversal, where the force jumps.
+    # The mean of the strokes has an NRMSE of 0.16. One held-out row is at the reversal, where force jumps.
     assert result["nrmse"] < 0.04
     note = "The direction is taken from the order of rows: 1 turn."
     assert note in load_model(model).notes["identification"]
@@ -229,7 +229,7 @@ def test_measured_strokes_are_found_in_the_order_of_rows(data: Path) -> None:
 
 
 def test_measured_recordings_without_direction_are_identified_as_well(data: Path) -> None:
-    """The NRMSE is at most 1.05 times that with stated directions; equal strokes give equal models."""
+    """The NRMSE is at most 1.05 times that of the file with directions; equal strokes give equal models."""
     for path in measured_files(data):
         stated = replace(read_recording(path), time=None)
         unstated = replace(stated, direction=None)

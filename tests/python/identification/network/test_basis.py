@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frame bounds against a published estimate and its printed digits, and the truncated frame."""
+"""The computed frame bounds agree with the digits of a published estimate; also of a finite frame."""
 
 import numpy as np
 import pytest

@@ -117,7 +117,7 @@ def test_the_bounded_least_squares_is_the_best_one() -> None:
     problem = problem_of(Compressor(np.tile(x, 2)[:, None], y, max_positions=500).rows(side), resolved_by=5)
     free = problem.solve(Basis.empty(1))
     kept = impose(problem, free, domain_bounds(problem, hysteresis=True, slopes=None))
-    # h is a straight line here: it is non-negative if both ends are, so there are only four active sets
+    # the hysteresis h is a straight line: only h >= 0 at its two ends can be active, so there are four cases
     best = np.inf
     ends = np.array([[0.5, 0.0, -0.5, 0.0], [0.5, 0.5, -0.5, -0.5]])
     design = np.zeros((120, 4))
@@ -144,7 +144,7 @@ def test_vanishing_noisy_hysteresis_stays_nonnegative_without_error() -> None:
 
 
 def test_crossing_strokes_are_replaced_by_their_mean() -> None:
-    """If release force exceeds press force, h = 0 and g is their mean; elsewhere g and h do not change."""
+    """If release force exceeds press force, hysteresis h becomes 0 and mean force g is the mean of both."""
     x = np.linspace(0.0, 0.004, 400)
     h = 0.05 * np.sin(np.pi * x / 0.002)
     positions, force, side = strokes(h, x, 0.002)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Variable projection: exact eliminations, valid bounds, and never worse than its start."""
+"""Variable projection (fit of dilations and translations): exact, within bounds, error never larger."""
 
 from typing import Any
 
@@ -82,7 +82,7 @@ def test_refinement_is_never_worse_than_its_start_and_keeps_its_bounds(seed: int
 
 @pytest.mark.parametrize("kind", ["one force", "two strokes", "play"])
 def test_quasi_newton_descends_along_the_gradient_of_all_parameters(kind: str) -> None:
-    """Checks the gradient with central differences in one random direction of all parameters."""
+    """Checks the gradient of the error by central differences in a random direction of all parameters."""
     problem, basis = noisy_switch(1, kind), any_basis(2)
     problem = problem.with_prior(1.0)
     random, table = np.random.default_rng(3), problem.solve(basis).coefficients
@@ -108,7 +108,7 @@ def test_refinement_finds_the_generating_wavelet() -> None:
 
 
 def test_dilations_stay_bounded_on_a_jump() -> None:
-    """A discontinuity pulls dilations to infinity; the resolution of the data limits them."""
+    """At a jump of the force dilations would grow to infinity; the resolution of the data limits them."""
     x = np.linspace(0.0, 1.0, 300)
     problem = problem_from(x, np.where(x < 0.5, 0.0, 1.0))
     start = problem.solve(Basis(np.full((4, 1), 60.0), np.array([[0.48], [0.49], [0.51], [0.52]])))

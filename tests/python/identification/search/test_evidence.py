@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stopping on held-out rows, model classes accepted on them, and outliers."""
+"""Held-out rows decide when to stop adding wavelets and which model class is accepted; outliers."""
 
 import re
 from typing import Any
@@ -55,7 +55,7 @@ def test_criteria_on_held_out_rows_stop_earlier_and_set_stop_reason(criterion: s
 
 
 def test_held_out_rows_outside_fitted_range_do_not_refuse_a_network() -> None:
-    """One held-out stretch continues into a wall without fitted rows."""
+    """One group of successive held-out rows is at a wall where no row is fitted."""
     n = 2000
     x = 0.5 - 0.5 * np.cos(20.0 * np.pi * np.arange(n) / n)
     fresh = np.flatnonzero(held_out_rows(n, (0,)))

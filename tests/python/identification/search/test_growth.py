@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Growth ends with finer wavelets without noise, or with wide ones alone, and in no other case."""
+"""Adding wavelets ends with finer wavelets only without noise, and with wide ones only if these suffice."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,7 +26,7 @@ OPTIONS = IdentifyOptions()
 
 
 def kinked(noise: float, seed: int = 0) -> SeparableProblem:
-    """Returns the fit of 200 rows of a force with two kinks, which are 100 rows apart."""
+    """Returns the fit problem of 200 rows of a force with two kinks, which are 100 rows apart."""
     x = np.linspace(0.0, 1.0, 200)
     y = 2.0 * np.abs(x - 0.25) - 3.0 * np.maximum(x - 0.75, 0.0)
     y = y + np.random.default_rng(seed).normal(0.0, noise, len(x))
@@ -59,7 +59,7 @@ def test_noise_is_not_taken_for_structure(noise: float) -> None:
 def over_two_inputs(
     law: Callable[[Float1D, Float1D], Float1D], n: int, noise: float = 0.0
 ) -> SeparableProblem:
-    """Returns the fit of a force of two inputs, at n random points of the unit box."""
+    """Returns the fit problem of a force of two inputs at n random points, each input from 0 to 1."""
     random = np.random.default_rng(1)
     x = random.uniform(size=(n, 2))
     y = law(x[:, 0], x[:, 1]) + random.normal(0.0, noise, n)
@@ -82,7 +82,7 @@ def errors_between_rows(found: Grown, law: Callable[[Float1D, Float1D], Float1D]
 
 
 def test_smooth_force_over_two_inputs_has_wide_wavelets(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Between distant rows, their error is less than half that of the network that fits the rows best."""
+    """Between distant rows, wide wavelets have less than half the error of the best fit of the rows."""
     problem = over_two_inputs(smooth, 200)
     found = grown(problem)
     assert problem.rmse(found.solution) <= FINER_ERROR_RATIO * FORCE_RESOLUTION * problem.force_range
@@ -117,7 +117,7 @@ def test_wide_wavelets_are_not_tried_where_there_is_noise(monkeypatch: pytest.Mo
 
 
 def detents(noise: float, seed: int = 0) -> SeparableProblem:
-    """Returns a knob with 20 detents of either sign, each five samples wide."""
+    """Returns the fit problem of a knob with 20 detents of random sign, each five rows wide."""
     random, x = np.random.default_rng(seed), np.linspace(0.0, 1.0, 300)
     alpha, beta = np.full((20, 1), 2.0 * CORE_RADIUS / (5.0 / len(x))), np.linspace(0.03, 0.97, 20)[:, None]
     y = wavelet_columns(x[:, None], alpha, beta) @ random.choice([-1.0, 1.0], 20)

@@ -57,7 +57,7 @@ def test_gains_equal_those_of_a_new_least_squares(kind: str) -> None:
     for index in np.argsort(gains)[-5:]:
         added = Basis(library.basis.alpha[[index]], library.basis.beta[[index]])
         direct = start.rss - problem.solve(start.basis.joined(added)).rss
-        # the library has single precision; orthogonalisation amplifies its rounding errors
+        # the wavelet library has single precision, and orthogonalisation amplifies the rounding errors
         column = wavelet_columns(x, added.alpha, added.beta)[:, 0]
         new = column - before @ (before.T @ column)
         rounding = float(np.finfo(np.float32).eps) * (column @ column) / (new @ new)
