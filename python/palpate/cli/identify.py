@@ -212,10 +212,10 @@ def identify(
     seconds = time.perf_counter() - start
     verified = [(recording, verify(model, recording)) for recording in judged_on]
     nrmse = model.fit.nrmse if hold_out_every is None else _pooled_nrmse(verified)
+    compared = sum(verification.n for _, verification in verified)
     verdict = model.verdict
     if hold_out_every is not None:
-        held_out = sum(verification.n for _, verification in verified)
-        verdict += Verdict(tuple(error_findings(nrmse, f"{held_out} held-out rows")))
+        verdict += Verdict(tuple(error_findings(nrmse, f"{compared} held-out rows")))
         verdict += Verdict(tuple(chain.from_iterable(circumstances(model, *each) for each in verified)))
     result = {
         "model": str(output),
@@ -228,11 +228,10 @@ def identify(
         "seconds": seconds,
     }
     if hold_out_every is not None:
-        result["held_out_rows"] = sum(verification.n for _, verification in verified)
+        result["held_out_rows"] = compared
     if with_baselines:
         result["baselines"] = [asdict(each) for each in others]
     rows = sum(len(recording) for recording in judged_on)
-    compared = sum(verification.n for _, verification in verified)
     of_rows = str(rows) if compared == rows else f"{compared} of {rows}"
     judged = "the rows of the identification" if hold_out_every is None else f"{of_rows} rows held out"
     if hold_out_every is None and settings["loss"] == "huber":
@@ -259,8 +258,8 @@ def identify(
             if with_baselines:
                 _print_baselines(nrmse, model.n_parameters, seconds, others)
             if verbose:
-                notes = model.notes.get("identification", ())
-                print_details([f"growth of the network stopped by {model.stop_reason}", *notes])
+                reason = f"growth of the network stopped by {model.stop_reason}"
+                print_details([reason, *model.notes["identification"]])
     end_with(verdict)
 
 

@@ -50,7 +50,6 @@ class OutputError(Exception):
 def prepare_streams() -> None:
     """Makes standard input, output and error usable, even if the program is started with one of them closed.
 
-    A closed descriptor is occupied, so that no file that is opened later gets its number. Writing to a closed
     A closed stream is replaced by /dev/null, so that no file that is opened later gets the stream's number.
     Writing to a closed standard output then fails like writing to a full disk. A character outside the
     encoding is escaped.

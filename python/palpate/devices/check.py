@@ -76,7 +76,6 @@ class Check:
     def profile(self) -> DeviceProfile:
         """Returns the measured device.
 
-        Friction is a lower bound, as a certificate requires; encoder, force step and force limit are those
         The friction is a lower bound, as a certificate requires. Encoder step, force step and force limit are
         those that the device states.
 

@@ -19,7 +19,7 @@ from .columns import Choice, Column, choose_columns
 from .files import Layout, sha256_of_file
 from .rows import RowCheck
 from .table import Cells, Places, Table, parse_number, to_numbers
-from .units import COLUMN_SUFFIX, UNITS, Unit
+from .units import COLUMN_SUFFIX, UNITS, UNSTATED_UNIT, Unit
 
 UNSTATED = ""
 """Unit symbol of an array given without a unit: an SI unit, but it is not known which one."""
@@ -167,9 +167,9 @@ class Conversion:
 
     @property
     def file_units(self) -> dict[str, Unit]:
-        """Unit that position and force have in the table, if the unit is known."""
-        roles = {"position": self.choice.position.unit, "force": self.choice.force.unit}
-        return {role: unit for role, unit in roles.items() if unit is not None}
+        """Unit of position and force in the table."""
+        roles = {"position": self.choice.position, "force": self.choice.force}
+        return {role: column.unit or UNSTATED_UNIT for role, column in roles.items()}
 
     @property
     def names(self) -> dict[str, str]:

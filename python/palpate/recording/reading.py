@@ -244,7 +244,7 @@ class LongRecording:
 
     def file_unit(self, role: str) -> Unit:
         """Returns the unit that the file uses for "position" or "force", for messages."""
-        return self.conversion.file_units.get(role, Unit.of_si(self.units[role]))
+        return self.conversion.file_units[role]
 
     def blocks(self, part: tuple[int, int]) -> Iterator[Block]:
         """Yields position, force and direction of the rows of a part in blocks.
