@@ -86,7 +86,8 @@ struct Frame {
     /// the compiler vectorises. A block so far from the wavelet that all its values are 0 needs no exponentials.
     template <class Visitor>
     void radial(std::size_t i, Visitor visit) const {
-        // Values below exp(-80) = 2e-35 become 0: their products would be denormal, which slows linear algebra tenfold.
+        // Values below exp(-80) = 2e-35 become 0: products of still smaller values are denormal numbers, which make
+        // linear algebra about ten times slower.
         constexpr double negligible_square = 160.0;
         constexpr double most = detail::hat_reach * detail::hat_reach;
         Hats hats;

@@ -167,7 +167,8 @@ def base_names() -> list[str]:
 
 
 def base(name: str, random: Generator) -> Rows:
-    """Returns the recording without errors of this name; `random` draws a simulated one."""
+    """Returns the recording of this name before any corruption: a measured one from its file, or a simulated one
+    whose noise comes from the random number generator `random`."""
     return SYNTHETIC[name](random) if name in SYNTHETIC else _measured(name)
 
 

@@ -54,7 +54,8 @@ inline constexpr const char* options_text =
     "  --denied               The device cannot be opened.\n"
     "  --preload-first FILE   Library of a sanitizer, which must be loaded before umockdev.\n";
 
-/// Reads the options of the command line. Throws std::invalid_argument if an option is unknown or its value is wrong.
+/// Reads the options of the command line. Throws std::invalid_argument if an option is unknown or its value is not a
+/// number, and std::out_of_range if the number is too large.
 [[nodiscard]] inline Settings read_settings(int count, char** words) {
     Settings settings;
     Identity common;

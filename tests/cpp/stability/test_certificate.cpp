@@ -212,8 +212,8 @@ TEST(Certificate, MasslessWithoutDampingIsAStaticForceOfTheSeriesSlope) {
 }
 
 TEST(Certificate, CompensationCancelsTheCoupling) {
-    // With coupling damping B_c = 0 the compensated massless structure gives the same force as direct rendering, so
-    // all inequalities are equal.
+    // With coupling damping B_c = 0 the compensated massless structure gives the same force as direct rendering. Its
+    // inequalities are therefore those of direct rendering, after one more: the load line has a unique solution.
     Scheme scheme = scheme_of(StructureKind::Massless, {100.0, 0.0});
     scheme.compensated = true;
     DeviceProfile device = smooth(0.06, 1);

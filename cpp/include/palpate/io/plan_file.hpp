@@ -19,7 +19,8 @@
 // Readers for the two parts of a model file that describe its rendering: the plan and the certificate of the plan.
 namespace palpate::detail {
 
-/// Throws if the structure uses the field and the field is null, or if the structure does not use it and it is given.
+/// Throws if the structure needs this JSON field and its value is null, or if the structure does not use the field and
+/// its value is not null.
 inline void require_given(const JsonField& field, bool used, const char* structure_has) {
     field.require(field.is_null() != used, (used ? "given: " : "null: ") + std::string("the structure has ") +
                                                (used ? "" : "no ") + structure_has);

@@ -58,7 +58,7 @@ struct ClosedLoopSettings {
     Guards guards{};                ///< guards of the rendering; by default only the device's force limit
 };
 
-/// Result of a simulated run: energies, motion of the handle and number of ticks.
+/// Result of a simulated run: energies, position and velocity of the handle at two times, and number of ticks.
 struct ClosedLoopEnd {
     EnergyAccount energy;
     Motion at_first_force;  ///< position and velocity of the handle when the first computed force acts

@@ -111,8 +111,8 @@ class UsbTransfers {
         return code;
     }
 
-    /// Sends a control request without data and waits for its end. Returns 0 or an error code of libusb. Only the
-    /// control loop's thread may call this function, one request at a time.
+    /// Sends a control request without data and waits for its end. Returns 0 or an error code of libusb. One thread
+    /// at a time may call this function, but never the event thread of libusb, which completes the request.
     [[nodiscard]] int request(wire::Request request, std::uint16_t value) noexcept {
         if (requests_in_flight_.load(std::memory_order_acquire) != 0) {
             return LIBUSB_ERROR_BUSY;
@@ -311,6 +311,7 @@ class UsbTransfers {
     }
 
     /// Called when libusb has sent a command or failed to send it: counts a failure, and allows the next command.
+    /// After a stall the next command waits until the halt of the endpoint is cleared.
     void write_ended(const libusb_transfer& transfer) noexcept {
         if (transfer.status != LIBUSB_TRANSFER_COMPLETED) {
             lost_writes_.fetch_add(1, std::memory_order_relaxed);
