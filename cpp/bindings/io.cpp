@@ -94,8 +94,9 @@ Json to_json(const py::handle& value, int depth = 0) {
         }
         return items;
     }
-    throw std::invalid_argument("the file cannot contain a value of type " +
-                                py::str(py::type::of(value).attr("__name__")).cast<std::string>());
+    throw std::invalid_argument("the content has a value of type " +
+                                py::str(py::type::of(value).attr("__name__")).cast<std::string>() +
+                                ": must be a number, text, list, dict, true, false or null");
 }
 
 }  // namespace

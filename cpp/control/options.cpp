@@ -177,12 +177,14 @@ void add_guards(CLI::App& app, RenderOptions& options) {
 }
 
 void add_running(CLI::App& app, RenderOptions& options) {
-    app.add_option("--device", options.device,
+    app.add_option(
+           "--device", options.device,
 #ifdef PALPATE_HAS_USB
-                   "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z")
+           "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z and PORT "
+           "of its service")
 #else
-                   "simulated, or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z; built without "
-                   "libusb: no usb[:SERIAL]")
+           "simulated, or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z and PORT "
+           "of its service. This program was built without libusb and has no usb[:SERIAL]")
 #endif
         ->type_name("NAME")
         ->capture_default_str();

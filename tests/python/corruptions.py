@@ -167,8 +167,10 @@ def base_names() -> list[str]:
 
 
 def base(name: str, random: Generator) -> Rows:
-    """Returns the recording of this name before any corruption: a measured one from its file, or a simulated one
-    whose noise comes from the random number generator `random`."""
+    """Returns the recording of this name before any corruption.
+
+    A measured one is read from its file; the noise of a simulated one comes from the generator `random`.
+    """
     return SYNTHETIC[name](random) if name in SYNTHETIC else _measured(name)
 
 

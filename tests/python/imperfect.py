@@ -30,6 +30,13 @@ def sweep(n: int) -> Array:
     return np.linspace(0.0, TRAVEL, n)
 
 
+def wandering(n: int, seed: int) -> Array:
+    """Returns a motion in [0, 1] that reverses at random positions and starts anywhere."""
+    rng = np.random.default_rng(seed)
+    turns = rng.uniform(0.0, 1.0, n // 200 + 2)
+    return np.interp(np.arange(n) / 200.0, np.arange(len(turns)), turns)
+
+
 def strokes(n: int, cycles: float = 7.0) -> Array:
     """Returns the positions of alternating strokes into the object and out of it."""
     return TRAVEL * (0.5 - 0.5 * np.cos(2.0 * np.pi * cycles * np.arange(n) / n))

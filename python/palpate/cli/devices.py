@@ -90,7 +90,8 @@ def _verdict(found: Sequence[Found]) -> Verdict:
     """Returns a verdict: good if all found devices can be used, no if none can; usable if none is found."""
     problems = [f"{one.serial or one.place}: {one.problem}" for one in found if one.info is None]
     if not found:
-        return Verdict((usable("no haptic USB device is plugged in; --device simulated needs none"),))
+        none_found = "no haptic USB device is plugged in; record and render need none with --device simulated"
+        return Verdict((usable(none_found),))
     judge = no if len(problems) == len(found) else usable
     return Verdict(tuple(judge(problem) for problem in problems))
 

@@ -31,7 +31,7 @@ from .verb import PATH, json_option, require_writable, verb
     "--speed",
     type=float,
     show_default="0.2 rad/s, scaled",
-    help="Speed of the probe's motion, in position units per second.",
+    help="Speed at which the device moves the handle in a probe, in rad/s or m/s.",
 )
 @click.option(
     "--stiffness",

@@ -27,7 +27,8 @@ _LOOP = LoopSettings()
     "--device",
     default="simulated",
     metavar="NAME",
-    help="simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z.",
+    help="simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z and PORT "
+    "of its service.",
 )
 @click.option(
     "--uncertified",

@@ -49,7 +49,8 @@ from .verb import (
 @click.argument("recording_file", metavar="RECORDING", type=PATH)
 @plot_option("measured and modelled force over position, residuals beneath")
 @plot_option(
-    "recorded and rendered force over position, driven by recorded motion and by recorded force",
+    "recorded and simulated force over position: the recorded motion drives the device, and the recorded "
+    "force drives the virtual object alone",
     "--plot-closed-loop",
 )
 @json_option

@@ -111,7 +111,11 @@ def test_devices_lists_every_connected_device() -> None:
 @pytest.mark.parametrize(
     ("device", "level", "sentence"),
     [
-        (["--no-device"], "usable", "no haptic USB device is plugged in; --device simulated needs none"),
+        (
+            ["--no-device"],
+            "usable",
+            "no haptic USB device is plugged in; record and render need none with --device simulated",
+        ),
         (["--info-bytes", "33"], "no", "the answer to GET_INFO has 33 bytes, must have 32"),
         (["--wrong-magic"], "no", "the answer to GET_INFO begins with 0x58, must begin with 'I'"),
     ],

@@ -373,8 +373,11 @@ static_assert(Device<Inverse3Device>);
         is_valid = end == last && error == std::errc{} && port > 0 && port < 65536;
     }
     if (!is_valid) {
-        throw std::invalid_argument("device is 'inverse3" + text +
-                                    "', must be inverse3[:AXIS[@PORT]], AXIS of x, y, z, -x, -y, -z");
+        throw std::invalid_argument(
+            "device is 'inverse3" + text +
+            "', must be inverse3[:AXIS[@PORT]]: AXIS is x, y, z, -x, -y or -z, PORT is the TCP port of the "
+            "Inverse Service (" +
+            std::to_string(Inverse3Settings{}.port) + ")");
     }
     settings.axis = static_cast<int>(axis_index);
     settings.direction = axis.starts_with('-') ? -1.0 : 1.0;

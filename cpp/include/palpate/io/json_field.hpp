@@ -31,7 +31,7 @@ class JsonField {
                                 ? readable(value_.get<double>())  // not valid JSON
                                 : value_.dump();
         shown = shown.size() > 40 ? shown.substr(0, 37) + "..." : shown;
-        throw std::invalid_argument((path_.empty() ? "the file contains " : path_ + " is ") + shown +
+        throw std::invalid_argument((path_.empty() ? "the content is " : path_ + " is ") + shown +
                                     ": must be " + right);
     }
     /// Throws std::invalid_argument if `holds` is false; `right` describes valid values in the error message.

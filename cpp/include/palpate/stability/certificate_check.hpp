@@ -106,9 +106,10 @@ namespace detail {
         detail::require(difference.empty(), difference);
     };
     if (const std::string now = fingerprint(model); stored.model != now) {
-        require("certificate.model is \"" + stored.model + "\": must be \"" + now +
-                "\", the fingerprint of this network; the model was changed after it was certified, plan the "
-                "model again");
+        require(
+            "certificate.model is \"" + stored.model + "\": must be \"" + now +
+            "\", the fingerprint of this network; the model or its certificate was changed, plan the model "
+            "again");
     }
     ForceBounds bounds;
     try {

@@ -120,6 +120,10 @@ MOST_ROWS = 50_000
 evenly spread part is used."""
 
 
+FULL_STROKE_STATE = 0.999
+"""Size of the direction state s above which a row belongs to a complete stroke [-]; 1 except for rounding."""
+
+
 def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None = None) -> float:
     """Returns the variance of the force (n,) around the straight line between its two neighbours in position
     (n,).
@@ -149,10 +153,20 @@ def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None
 
 
 def unexplained_share(position: Float1D, force: Float1D, side: Float1D | None) -> float:
-    """Returns the share of the variance of the force that position and stroke cannot explain [-]."""
+    """Returns the share of the variance of the force that position and direction state cannot explain [-].
+
+    Rows inside the play (|s| < 1) are not compared: between a reversal and the next complete stroke the force
+    at one position may have any value between press and release.
+    """
     rows, spread = _thinned(force), float(np.var(force))
-    side = None if side is None else np.sign(side[rows])
-    return unexplained_variance(position[rows], force[rows], side) / spread if spread > 0.0 else 0.0
+    if spread == 0.0:
+        return 0.0
+    position, force = position[rows], force[rows]
+    if side is None:
+        return unexplained_variance(position, force) / spread
+    full = np.abs(side[rows]) > FULL_STROKE_STATE
+    variance = unexplained_variance(position[full], force[full], np.sign(side[rows][full]))
+    return float(np.mean(full)) * variance / spread
 
 
 def large_unexplained_share(nrmse: float) -> float:
@@ -232,13 +246,13 @@ def explained_findings(
         return []
     judge = no if nrmse > UNFIT_NRMSE else usable
     share = max(0.0, 1.0 - least)
-    inputs = "position explains" if side is None else "position and direction explain"
+    inputs = "position" if side is None else "position and direction state"
     cause, cure = likely_cause(position[rows], residual[rows])
     apart = float(np.sqrt(2.0 * least * spread))
     return [
         judge(
-            f"{inputs} at most {share:.0%} of the variance of the force: rows at neighbouring positions "
-            f"differ by {force_unit.text(apart)} RMS. No model of these inputs has an NRMSE below "
+            f"{inputs} can explain at most {share:.0%} of the variance of the force: rows at neighbouring "
+            f"positions differ by {force_unit.text(apart)} RMS. No model of {inputs} has an NRMSE below "
             f"{np.sqrt(least):.2g}. Likely cause: {cause}. Cure: {cure}"
         )
     ]

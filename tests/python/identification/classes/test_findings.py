@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 
 import palpate
-from imperfect import Array, line, noise, recorded, strokes, sweep, wall
+from imperfect import Array, line, noise, recorded, strokes, sweep, wall, wandering
 from palpate import WaveletNetworkRegressor
 from palpate.identification.classes.findings import (
     cell_findings,
     explained_findings,
     extreme_force_findings,
     likely_cause,
+    unexplained_share,
     unexplained_variance,
 )
+from palpate.identification.data.strokes import HysteresisInput
 from palpate.identification.search.evidence import RowError
 
 N = 4000
@@ -187,7 +189,7 @@ def test_unexplained_variance_is_that_of_the_noise() -> None:
 def test_relaxation_is_named_and_gives_no_steep_slope() -> None:
     x, force, time = relaxation()
     model = palpate.identify(recorded(x, force, time))
-    assert "explains at most" in str(model.verdict)
+    assert "can explain at most" in str(model.verdict)
     assert "changes with time at a constant position (relaxation, creep or drift)" in str(model.verdict)
     assert model.slope_bounds is not None
     assert max(np.abs(model.slope_bounds)) < 200.0
@@ -199,6 +201,18 @@ def test_likely_cause_is_time_direction_or_another_input() -> None:
     assert "time" in likely_cause(x, np.linspace(0.0, 1.0, N))[0]
     assert "press and release" in likely_cause(x, np.sign(np.gradient(x)) * x)[0]
     assert "another input" in likely_cause(x, random.normal(size=N))[0]
+
+
+def test_rows_inside_the_play_are_not_compared() -> None:
+    x = wandering(4000, 1)
+    side = HysteresisInput.of_play([x], 0.01).side
+    force = x + 0.2 * side
+    assert unexplained_share(x, force, side) < 1e-3
+    # a play radius that is too large leaves fewer complete strokes, and these are explained
+    assert unexplained_share(x, force, HysteresisInput.of_play([x], 0.02).side) < 1e-3
+    # one that is too small takes rows inside the play for complete strokes
+    assert unexplained_share(x, force, HysteresisInput.of_play([x], 0.001).side) > 0.01
+    assert unexplained_share(x, force, np.zeros(len(x))) == 0.0
 
 
 def test_model_with_a_small_error_has_no_finding() -> None:
@@ -237,7 +251,7 @@ def test_measured_probing_at_several_places_is_named() -> None:
     )
     model = palpate.identify(recording)
     assert model.n_wavelets <= 3
-    assert "position explains at most 62%" in str(model.verdict)
+    assert "position can explain at most 62%" in str(model.verdict)
     assert "another input" in str(model.verdict)
 
 

@@ -6,19 +6,13 @@ import os
 import numpy as np
 import pytest
 
+from imperfect import wandering
 from palpate import InputError, SearchOptions, identify, verify
 from palpate.identification.data.strokes import HysteresisInput
 from palpate.recording import Recording
 from palpate.verification import compare
 
 MOTIONS = 20 * max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
-
-
-def wandering(n: int, seed: int) -> np.ndarray:
-    """Returns a motion in [0, 1] that reverses at random positions and starts anywhere."""
-    rng = np.random.default_rng(seed)
-    turns = rng.uniform(0.0, 1.0, n // 200 + 2)
-    return np.interp(np.arange(n) / 200.0, np.arange(len(turns)), turns)
 
 
 def test_known_hysteresis_input_does_not_depend_on_earlier_motion() -> None:
