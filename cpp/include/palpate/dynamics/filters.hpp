@@ -38,7 +38,7 @@ struct EnvironmentFilters {
 };
 
 /// Returns the integrators and differentiators of the paper. Both differentiators G have the denominator z^2 - 1.6556 z
-/// + 0.68518 with the poles 0.836 and 0.819 (179 and 199 rad/s), so G I with the integrator I is about 0.8 at 100
+/// + 0.68518 with the poles 0.836 and 0.819 (179 and 199 rad/s), so |G I| with the integrator I is about 0.8 at 100
 /// rad/s. With c = 1 - 1.6556 + 0.68518 and the sample time T, the gain for which G I = 1 at frequency 0 (z = 1) is c /
 /// (2T) for the numerator z^2 - 1 and c / T for z - 1.
 [[nodiscard]] constexpr EnvironmentFilters environment_filters(FilterPair pair,

@@ -28,7 +28,8 @@ namespace palpate {
 
 /// Verdict of a certificate about a rendering.
 enum class Verdict : std::uint8_t {
-    /// Passive, proved: in no motion of the handle does the device give more energy than it received from the hand
+    /// Passive, proved: in no motion of the handle does the device give more energy than it received from the hand,
+    /// plus the energy that the object stored at the start
     Certified,
     StableLocally,  ///< the linearised rendering is stable; it is not proved that the rendering is passive
     Refused,
@@ -104,8 +105,9 @@ void hash_value(NumberHash& hash, const T& value) {
 
 }  // namespace detail
 
-/// Returns 16 hexadecimal digits that change with every number and name of a certificate: model, scheme, each field of
-/// the device, bounds, sides of each line, verdict. The digits detect an edited certificate; they are not a signature.
+/// Returns 16 hexadecimal digits that change with every stored number and name of a certificate: model, scheme (without
+/// coupling and object mass that its structure does not use), device, bounds, sides of each line, verdict. The digits
+/// detect an edited certificate; they are not a signature.
 [[nodiscard]] inline std::string fingerprint_of(const Certificate& certificate) {
     detail::NumberHash hash;
     for_each_field<Certificate>([&](const auto& field) {
@@ -175,7 +177,7 @@ namespace detail {
     return low * T;
 }
 
-/// Returns the inequality with the smallest reserve, that is (left side - right side) / left side.
+/// Returns the inequality with the smallest `reserve`, of those whose left side is not 0; null if there is none.
 [[nodiscard]] inline const Inequality* tightest(const std::vector<Inequality>& lines) noexcept {
     const Inequality* least = nullptr;
     for (const Inequality& line : lines) {
