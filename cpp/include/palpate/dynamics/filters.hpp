@@ -19,7 +19,7 @@ enum class FilterPair : std::uint8_t { Implicit, Explicit };
 /// Choice of the gain of each differentiator G. G must invert the integrator I, so the product G I should be 1.
 enum class FilterDesign : std::uint8_t {
     Paper,  ///< gains of the paper, 14.8379 and 31: the product G I at low frequency is 1.0032 and 1.048
-    /// Gains for which the product of differentiator G and integrator I is exactly 1 at low frequency
+    /// Gains for which the product of differentiator G and integrator I is exactly 1 at frequency 0
     Matched,
 };
 

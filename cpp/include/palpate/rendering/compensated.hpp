@@ -47,8 +47,8 @@ class Compensated {
     /// Returns the stiffness K_c of the coupling [N/m or N*m/rad].
     [[nodiscard]] double stiffness() const noexcept { return stiffness_; }
 
-    /// Returns force and slope of the stiffer environment at the position `shifted`. The equation x - f(x)/K_c =
-    /// shifted for the position x of the original environment is the load line -f(x) + K_c x = K_c shifted.
+    /// Returns force, slope and energy of the stiffer environment at the position `shifted`. The equation x - f(x)/K_c
+    /// = shifted for the position x of the original environment is the load line -f(x) + K_c x = K_c shifted.
     [[nodiscard]] EnvironmentSample at(double shifted, const State& state) const noexcept {
         const Solution found = LoadLineSolver{}.solve(Scaled<E>{environment_, -1.0}, state,
                                                       {stiffness_, stiffness_ * shifted}, shifted);

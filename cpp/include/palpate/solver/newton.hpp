@@ -13,9 +13,8 @@ namespace palpate {
 ///
 ///     f(y) + slope * y = intercept.
 ///
-/// `slope` and `intercept` contain object mass, object damping and the virtual coupling, so every implicit structure
-/// solves the same scalar equation. The equation has one solution for every intercept if slope + f' > 0 at all
-/// positions.
+/// `slope` and `intercept` contain object mass, object damping and the virtual coupling, so all structures that solve
+/// an equation solve this one. The equation has one solution for every intercept if slope + f' > 0 at all positions.
 struct LoadLine {
     double slope = 0.0;      ///< slope p of the load line [N/m]
     double intercept = 0.0;  ///< right side q of the load line [N]

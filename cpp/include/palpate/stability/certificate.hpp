@@ -39,8 +39,8 @@ template <>
 inline constexpr auto words_of<Verdict> =
     std::array<std::string_view, 3>{"certified", "stable-locally", "refused"};
 
-/// Proved properties of a rendering (model, structure with its numbers, device): all inequalities with both sides, and
-/// the verdict.
+/// Result of the checks of a rendering (model, structure with its numbers, device): all inequalities with both sides,
+/// and the verdict.
 struct Certificate {
     std::string model;
     Scheme scheme;
@@ -212,7 +212,7 @@ namespace detail {
     return scheme.compensated ? compensated(bounds, scheme.coupling.stiffness) : bounds;
 }
 
-/// Returns a certificate that holds for any rendered force whose slopes and hysteresis lie within `bounds`. Wider
+/// Returns a certificate that holds for any rendered force whose slopes, hysteresis and mean lie within `bounds`. Wider
 /// bounds never prove more.
 [[nodiscard]] inline Certificate certify_rendered(const ForceBounds& bounds, const Scheme& scheme,
                                                   const DeviceProfile& device) {
@@ -238,8 +238,8 @@ namespace detail {
     return certificate;
 }
 
-/// Returns a certificate that holds for any model whose slopes and hysteresis lie within `bounds`, rendered by a scheme
-/// on a device.
+/// Returns a certificate that holds for any model whose slopes, hysteresis and mean lie within `bounds`, rendered by a
+/// scheme on a device.
 [[nodiscard]] inline Certificate certify(const ForceBounds& bounds, const Scheme& scheme,
                                          const DeviceProfile& device) {
     return certify_rendered(rendered_bounds(bounds, scheme), scheme, device);
