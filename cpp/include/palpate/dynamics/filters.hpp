@@ -19,7 +19,7 @@ enum class FilterPair : std::uint8_t { Implicit, Explicit };
 /// Choice of the gain of each differentiator G. G must invert the integrator I, so the product G I should be 1.
 enum class FilterDesign : std::uint8_t {
     Paper,  ///< gains of the paper, 14.8379 and 31: the product G I at low frequency is 1.0032 and 1.048
-    /// Gains for which the product of differentiator G and integrator I is exactly 1 at low frequency
+    /// Gains for which the product of differentiator G and integrator I is exactly 1 at frequency 0
     Matched,
 };
 
@@ -38,7 +38,7 @@ struct EnvironmentFilters {
 };
 
 /// Returns the integrators and differentiators of the paper. Both differentiators G have the denominator z^2 - 1.6556 z
-/// + 0.68518 with the poles 0.836 and 0.819 (179 and 199 rad/s), so G I with the integrator I is about 0.8 at 100
+/// + 0.68518 with the poles 0.836 and 0.819 (179 and 199 rad/s), so |G I| with the integrator I is about 0.8 at 100
 /// rad/s. With c = 1 - 1.6556 + 0.68518 and the sample time T, the gain for which G I = 1 at frequency 0 (z = 1) is c /
 /// (2T) for the numerator z^2 - 1 and c / T for z - 1.
 [[nodiscard]] constexpr EnvironmentFilters environment_filters(FilterPair pair,

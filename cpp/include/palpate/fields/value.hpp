@@ -14,7 +14,7 @@ struct NamedValue;
 using NamedValues = std::vector<NamedValue>;
 
 /// One value of a report, which is converted to JSON or to a Python object. An empty value and a number that is not
-/// finite become null.
+/// finite become null in JSON and None in Python.
 using Value = std::variant<std::monostate, bool, std::uint64_t, double, std::string, std::vector<double>,
                            std::vector<std::string>, NamedValues, std::vector<NamedValues>>;
 

@@ -146,14 +146,15 @@ template <std::size_t terms>
 }  // namespace detail
 
 /// Returns a proved lower and upper bound of the value f of a network of one input over [from, to], rounding included.
-/// The bounds lie outside the true minimum and maximum of f by at most `relative` times max|f|.
+/// Unless the limit of the number of cells is reached, the bounds lie outside the true minimum and maximum of f by at
+/// most `relative` times max|f|, plus rounding.
 [[nodiscard]] inline Interval value_bounds(const NetworkParameters& network, double from, double to,
                                            double relative = 0.01) {
     return detail::enclose(std::array{detail::Term{network, 0}}, from, to, relative);
 }
 
-/// Returns a proved lower and upper bound of the slope f' of a network of one input over [from, to]. The bounds lie
-/// outside the true minimum and maximum of f' by at most `relative` times max|f'|.
+/// Returns a proved lower and upper bound of the slope f' of a network of one input over [from, to]. They are as
+/// accurate as those of `value_bounds`, relative to max|f'|.
 [[nodiscard]] inline Interval slope_bounds(const NetworkParameters& network, double from, double to,
                                            double relative = 0.01) {
     return detail::enclose(std::array{detail::Term{network, 1}}, from, to, relative);

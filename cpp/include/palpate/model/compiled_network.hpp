@@ -75,12 +75,12 @@ class CompiledCurve {
         return outside_table(x);
     }
 
-    /// Returns true if position x lies outside the domain and the force is not periodic.
+    /// Returns true if x is not finite, or lies outside the domain of a force that is not periodic.
     [[nodiscard]] bool extrapolated(double x) const noexcept { return curve_.extrapolated(x); }
 
   private:
     /// Returns force, slope and antiderivatives at a position outside the domain, or at any position if there is no
-    /// table.
+    /// table or the force is periodic.
     [[nodiscard, gnu::noinline]] Curve outside_table(double x) const noexcept {
         if (!compiled() || !std::isfinite(x)) {
             return curve_.at(x);
@@ -145,7 +145,7 @@ class CompiledCurve {
     }
 
     /// Returns an upper bound of the eighth derivative |f^(8)| over the domain and the parts of the outermost cells
-    /// outside the domain. The domain is divided into 256 pieces, because few wavelets are large in all of them.
+    /// outside the domain. This interval is divided into 256 pieces, because few wavelets are large in all of them.
     [[nodiscard]] double largest_eighth_derivative() const noexcept {
         constexpr int cuts = 256;
         const double beyond = (upper_ - lower_) / 16.0;

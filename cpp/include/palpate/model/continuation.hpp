@@ -31,9 +31,9 @@ enum class Continuation : std::uint8_t {
 template <>
 inline constexpr auto words_of<Continuation> = std::array<std::string_view, 2>{"linear", "free"};
 
-/// Force outside one edge of the domain: a straight line that starts with the force at the edge and ends with zero
-/// force at the distance `reach` from the edge. The force is continuous at the start and at the end of the line; the
-/// slope is not.
+/// Force outside one edge of the domain: a straight line that starts with the force at the edge and, if `reach` is
+/// finite, ends with zero force at the distance `reach` from the edge. The force is continuous at the start and at the
+/// end of the line; the slope is not.
 struct EdgeLine {
     double edge = 0.0;  ///< end of the domain at which the line starts [m]
     Curve at_edge;      ///< force at the end of the domain, and slope of the straight line
@@ -61,7 +61,9 @@ struct EdgeLine {
 struct CurveExtent {
     double travel = 0.0;         ///< length of the domain, upper - lower [m]
     double largest_force = 0.0;  ///< max |f| over the domain [N]
-    double slope_cap = 0.0;      ///< max f' over the domain without the 2 % at its ends, at least 0 [N/m]
+    /// Largest slope that a line may have: bound of max f' over the domain, at least 0; for a force of position alone
+    /// without the 2 % at the ends of the domain [N/m]
+    double slope_cap = 0.0;
 };
 
 /// Returns the straight line that continues a force outside the edge `edge` of the domain. `outward` is -1 for the

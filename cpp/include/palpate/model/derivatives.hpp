@@ -61,10 +61,9 @@ inline constexpr DerivativeBounds hat_suprema{1.0,    1.3801190462, 3.0,     5.7
 inline constexpr DerivativeBounds hat_tails{1.5366,  2.6614,   5.3228,   11.9021,   29.1540,
                                             77.1341, 218.1682, 654.5044, 2069.7211, 6864.48};
 
-/// Rounding error of the derivative f^(n)(x) of a network, divided by epsilon and by the sum of |weight| dilation^n.
-/// The polynomial of the Mexican hat psi, the exponent u^2/2 and u itself have errors of a few epsilon each. The
-/// numbers are suprema over u of ((n + 6 + u^2) P_n + 1.5 |u| P_{n+1}) e^{-u^2/2}, where P_n is the polynomial of
-/// psi^(n) with absolute coefficients.
+/// Rounding error of derivative n of one wavelet, divided by epsilon |weight| dilation^n. The polynomial of the Mexican
+/// hat psi, the exponent u^2/2 and u itself have errors of a few epsilon each. The numbers are suprema over u of ((n +
+/// 6 + u^2) P_n + 1.5 |u| P_{n+1}) e^{-u^2/2}, where P_n is the polynomial of psi^(n) with absolute coefficients.
 inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
 
 }  // namespace detail
@@ -97,8 +96,8 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
 }
 
 /// Returns proved upper bounds of the absolute value of a network f and of its first nine derivatives over [from, to].
-/// Each bound is the sum of the largest contributions of all wavelets at their distance from [from, to]. The bounds are
-/// wider than those of `value_bounds` and `slope_bounds`, but need no search.
+/// Each bound is the sum of the largest contributions of all wavelets at their distance from [from, to]. The bounds can
+/// be much wider than those of `value_bounds` and `slope_bounds`, but need no search.
 [[nodiscard]] inline DerivativeBounds derivative_bounds(const NetworkParameters& network, double from,
                                                         double to) noexcept {
     const double c = std::abs(network.linear[0]);

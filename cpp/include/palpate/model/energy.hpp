@@ -16,10 +16,11 @@ struct EnergyRange {
     /// Smallest stored energy over all positions, continuation included; -infinity if the energy has no lower bound [J]
     double least = 0.0;
     double largest = 0.0;  ///< largest stored energy over the domain, hysteresis included [J]
-    /// Upper bound of the error of `least` and `largest`: both are computed at finitely many positions [J]
+    /// Upper bound of the error of `least` and `largest`, which are computed at finitely many positions [J]; not
+    /// computed (0) for a force of position and velocity
     double missed = 0.0;
 
-    /// Returns an upper bound of the energy that the object can give from any position in its domain [J].
+    /// Returns the energy that the object can give from any position in its domain, plus the error `missed` [J].
     [[nodiscard]] double span() const noexcept { return largest - least + missed; }
 };
 
@@ -27,7 +28,7 @@ namespace detail {
 
 /// Returns the energy that a force limit removes between two positions [J]: the integral of f - c(f), where c(f) is the
 /// force f limited to +-`limit`. `at(x)` returns force and antiderivative at x. The interval is halved until |f| is at
-/// most `limit` at both ends, or exceeds `limit` with the same sign at both ends.
+/// most `limit` at both ends, or exceeds `limit` with the same sign at both ends, but at most `halvings` times.
 template <class At>
 [[nodiscard]] double work_beyond(const At& at, double from, const Curve& at_from, double to,
                                  const Curve& at_to, double limit, int halvings = 40) noexcept {
@@ -125,7 +126,7 @@ template <class At>
 }  // namespace detail
 
 /// Returns the smallest and largest stored energy of a force of position and velocity, at velocity zero and with a
-/// force limit [N]. Uses Simpson's rule, because this force does not have a closed antiderivative.
+/// force limit [N]. Uses Simpson's rule, because this force does not have an elementary antiderivative.
 [[nodiscard]] inline EnergyRange energy_range(const VelocityNetwork& force, double force_limit) {
     const auto at = [&](double x) noexcept {
         return Curve{std::clamp(force.force(x, 0.0), -force_limit, force_limit), 0.0, 0.0, 0.0};

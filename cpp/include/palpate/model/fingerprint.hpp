@@ -13,7 +13,7 @@ namespace palpate {
 
 namespace detail {
 
-/// Computes the FNV-1a hash of the bits of numbers and texts. If one number changes, the hash changes.
+/// Computes the FNV-1a hash of the bits of numbers and texts. If one number changes, the hash almost certainly changes.
 class NumberHash {
   public:
     /// Adds the 64 bits of a number to the hash.

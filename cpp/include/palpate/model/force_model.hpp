@@ -72,8 +72,9 @@ class ForceModel {
     }
 
     /// Returns proved bounds of the slope of the force inside the domain [N/m], for press and release, and at velocity
-    /// zero. With a play radius r, the bounds also hold during the motion after a reversal that changes press force to
-    /// release force, which adds h / r (hysteresis / play radius) to the slope.
+    /// zero. With a play radius r and h >= 0, the bounds also hold during the motion after a reversal that changes
+    /// press force to release force, which adds h / r (hysteresis / play radius) to the slope. Only for models that can
+    /// be rendered (`require_renderable`).
     [[nodiscard]] Interval slope_bounds(std::optional<double> radius = std::nullopt) const {
         if (const WaveletNetwork* single = network()) {
             return single->curve().slope_bounds();
@@ -89,8 +90,8 @@ class ForceModel {
     }
 
     /// Throws std::invalid_argument if the slope bounds stored in a model file do not contain the slopes of this
-    /// network. A difference of 1 % of the steepest slope is accepted, because two releases of the program may compute
-    /// bounds that differ by this amount.
+    /// network of one input; accepts networks of several inputs. A difference of 1 % of the steepest slope is accepted,
+    /// because two releases of the program may compute bounds that differ by this amount.
     void require_slopes_within(Interval stored) const {
         if (parameters().dimension != 1) {
             return;

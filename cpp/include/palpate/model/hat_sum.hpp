@@ -82,7 +82,7 @@ inline constexpr std::array<double, 12> exponential{
 
 /// The sum of the wavelets of a network of one input, w_i psi(alpha_i (x - beta_i)), with its derivative and
 /// antiderivatives. Computes one vectorised exponential for each wavelet, with the widest registers of the processor.
-/// Any position x is allowed: a distant wavelet adds less than 1e-300, and NaN gives NaN.
+/// Any position x is allowed: a distant wavelet adds less than rounding, and NaN gives NaN.
 class HatSum {
   public:
     explicit HatSum(const NetworkParameters& network, const detail::HatKernel& kernel = detail::hat_kernel())

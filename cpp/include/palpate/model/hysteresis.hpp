@@ -66,8 +66,8 @@ class HysteresisPair {
     /// Returns the function h, half the difference between press force and release force.
     [[nodiscard]] const C& hysteresis_force() const noexcept { return hysteresis_force_; }
 
-    /// Returns force, slope and energy at position x for a direction state s that does not change: +1 press, -1
-    /// release.
+    /// Returns force and slope at position x for a direction state s that does not change (+1 press, -1 release), and
+    /// the energy of the mean force.
     [[nodiscard]] EnvironmentSample sliding(double x, double s) const noexcept {
         const Curve g = force_.at(x);
         const Curve h = hysteresis_force_.at(x);

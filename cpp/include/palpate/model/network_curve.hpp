@@ -62,7 +62,7 @@ class NetworkCurve {
         return periodic_ ? wrapped(x, inside) : x < lower_ ? below_.at(x) : above_.at(x);
     }
 
-    /// Returns true if position x lies outside the domain and the force is not periodic.
+    /// Returns true if x is not finite, or lies outside the domain of a force that is not periodic.
     [[nodiscard]] bool extrapolated(double x) const noexcept {
         return periodic_ ? !std::isfinite(x) : !(x >= lower_ && x <= upper_);
     }
@@ -115,8 +115,8 @@ class NetworkCurve {
     }
 
   private:
-    /// Returns force, slope and antiderivatives of a periodic force. Force and slope repeat; the antiderivatives grow
-    /// with each period.
+    /// Returns force, slope and antiderivatives of a periodic force. Force and slope repeat; the antiderivatives change
+    /// from period to period.
     template <class Inside>
     [[nodiscard]] Curve wrapped(double x, Inside inside) const noexcept {
         const double period = upper_ - lower_;

@@ -59,7 +59,7 @@ inline void require_size(const std::vector<double>& values, std::size_t size, co
 }  // namespace detail
 
 /// Throws std::invalid_argument if a parameter of the network or its domain is invalid. The message states the name of
-/// the parameter, its value and the rule.
+/// the parameter and the rule.
 inline void validate(const NetworkParameters& network, const Domain& domain) {
     using detail::require;
     const std::size_t d = network.dimension;

@@ -16,7 +16,7 @@
 namespace palpate {
 
 /// A function of x as a table of polynomials of degree 7, one for each cell. All cells have the same width h, a power
-/// of two. An evaluation needs one look-up of a cell, one cache line and a few multiplications. Value and first three
+/// of two. `value` needs one look-up of a cell, one cache line and a few multiplications. Value and first three
 /// derivatives are continuous.
 ///
 /// The centre of cell k is x = k h. The variable of its polynomial is u = x - k h, which is computed without rounding
@@ -122,7 +122,7 @@ class PiecewiseSeptic {
     /// bounds of the derivatives.
     [[nodiscard]] std::array<double, 2> rounding(std::size_t k) const noexcept {
         const auto c = coefficients(k);
-        // Bounds of the polynomial and of its derivatives with respect to t = x / h (cell width h)
+        // |c_0|, then bounds of the polynomial's derivatives with respect to t
         Jet bounds{std::abs(c[0]), 0.0, 0.0, 0.0};
         for (std::size_t j = 1; j < c.size(); ++j) {
             double term = std::ldexp(std::abs(c[j]), -static_cast<int>(j));

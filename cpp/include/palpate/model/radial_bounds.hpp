@@ -92,7 +92,7 @@ class RadialEnclosure {
                                        third_derivatives / 6.0 + fourth / 24.0);
     }
 
-    /// Returns the index of the input along which the value of the network can change most in the box.
+    /// Returns the index of the input along which the value of the network is likely to change most in the box.
     [[nodiscard]] std::size_t widest() const noexcept {
         std::size_t widest = 0;
         double largest_change = 0.0;

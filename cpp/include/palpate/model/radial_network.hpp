@@ -21,7 +21,8 @@ namespace palpate {
 ///
 /// where psi is the radial Mexican hat and o is the product component by component. Outside the domain, f is the value
 /// at the nearest point of the domain plus the gradient at this point times the distance from this point. Each
-/// component of that gradient is limited to values from 0 to its largest value inside the domain.
+/// component of that gradient is limited to values from 0 to the largest value found inside the domain
+/// (`largest_gradient`).
 class RadialNetwork {
   public:
     RadialNetwork(NetworkParameters network, Domain domain,
@@ -61,8 +62,9 @@ class RadialNetwork {
         return sum;
     }
 
-    /// Returns the value of the network at the input x, and writes its gradient to `gradient` (d values each),
-    /// continuation included.
+    /// Returns the value of the network at the input x (d values), continuation included. Writes to `gradient` the d
+    /// components of the gradient at the nearest point of the domain; components along which x lies outside are limited
+    /// as in the continuation.
     [[nodiscard]] double at(std::span<const double> x, std::span<double> gradient) const noexcept {
         double sum = network_.bias;
         for (std::size_t j = 0; j < dimension(); ++j) {

@@ -47,8 +47,8 @@ class Compensated {
     /// Returns the stiffness K_c of the coupling [N/m or N*m/rad].
     [[nodiscard]] double stiffness() const noexcept { return stiffness_; }
 
-    /// Returns force and slope of the stiffer environment at the position `shifted`. The equation x - f(x)/K_c =
-    /// shifted for the position x of the original environment is the load line -f(x) + K_c x = K_c shifted.
+    /// Returns force, slope and energy of the stiffer environment at the position `shifted`. The equation x - f(x)/K_c
+    /// = shifted for the position x of the original environment is the load line -f(x) + K_c x = K_c shifted.
     [[nodiscard]] EnvironmentSample at(double shifted, const State& state) const noexcept {
         const Solution found = LoadLineSolver{}.solve(Scaled<E>{environment_, -1.0}, state,
                                                       {stiffness_, stiffness_ * shifted}, shifted);
@@ -80,11 +80,11 @@ class CompensatedResolvent {
           factor_{1.0 - p / coupling_stiffness},
           resolvent_{scaled(std::move(force), factor_), p, options} {}
 
-    /// Returns true if this solver has a table of load-line solutions, so that no search is needed.
+    /// Returns true if this solver has at least one table of load-line solutions.
     [[nodiscard]] bool tabulated() const noexcept { return resolvent_.tabulated(); }
     /// Returns true if every load line of slope p is proved to have exactly one solution.
     [[nodiscard]] bool unique(double p) const noexcept { return p == slope_ && resolvent_.unique(p); }
-    /// Returns the load-line solver for force laws whose slope has no proved bounds.
+    /// Returns the solver for load lines that are not proved to have exactly one solution.
     [[nodiscard]] const LoadLineSolver& uncertified() const noexcept { return resolvent_.uncertified(); }
 
     /// Solves the load line and stores the solution in `memory`, where the search of the next tick starts.

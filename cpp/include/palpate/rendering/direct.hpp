@@ -38,7 +38,7 @@ class Direct {
 };
 
 /// Direct rendering of a model f of position x and velocity v: F = f(x, v), v = (x_k - x_{k-1}) / T. The velocity is
-/// computed from the last two samples, because the proof of the certificate requires this velocity.
+/// computed from the last two samples, because the proof of the certificate is valid for this velocity.
 class DirectVelocity {
   public:
     DirectVelocity(VelocityNetwork force, double period_s) : force_{std::move(force)}, period_s_{period_s} {}

@@ -117,7 +117,7 @@ class EnergyConsistent {
             const double moved = y - from;
             const double quotient = mean(y, sample, state);
             if (!switched || (sample.force - quotient) * moved < 0.0) {
-                // Slope of the mean force D over y: D' = (f - D) / (y - from), or f' / 2 for y = from.
+                // Slope of the mean force D over y: D' = (f - D) / (y - from), or about f' / 2 for y near `from`.
                 sample.slope =
                     std::abs(moved) > shortest ? (sample.force - quotient) / moved : 0.5 * sample.slope;
                 sample.force = quotient;

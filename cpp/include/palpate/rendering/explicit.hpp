@@ -11,7 +11,7 @@ namespace palpate {
 
 /// Returns the slope of the model below which the explicit structure is stable while the device is held still, behind a
 /// coupling, or driven by a force without a coupling (K_c = B_c = 0). For a model of slope K > 0 at an equilibrium, the
-/// poles of the linearised step are inside the unit circle if
+/// poles of the linearised step are inside the unit circle if B_o + B_c > 0 and
 ///
 ///     K + K_c < (4 m - 2 (B_o + B_c) T) / T^2.
 [[nodiscard]] constexpr double explicit_slope_limit(const Inertia& inertia, const VirtualCoupling& coupling,
@@ -30,7 +30,7 @@ namespace palpate {
 }
 
 /// Virtual object with mass m, m v' = F_c - f(y) - B_o v, with the paper's delayed integrator (figure 14). F_c is the
-/// coupling's force and f the model's force. All terms on the right are one sample old, so no equation is solved. The
+/// coupling's force and f the model's force. The forces on the object are one sample old, so no equation is solved. The
 /// step is stable only for model slopes below `explicit_slope_limit`:
 ///
 ///     v_k = v_{k-1} + (T/m)(F_{k-1} - f(y_{k-1}) - B_o v_{k-1}),   y_k = y_{k-1} + T v_k,

@@ -64,7 +64,7 @@ class Massless {
     }
 
   private:
-    /// Returns true if the environment has a force limit and the solved force has reached this limit.
+    /// Returns true if the environment has a force limit, and the load line was solved with a force at this limit.
     [[nodiscard]] bool limited(const Solution& solution) const noexcept {
         if constexpr (requires { environment_.force_limit(); }) {
             return solution.status == Status::Ok &&

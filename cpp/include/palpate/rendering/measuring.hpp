@@ -125,7 +125,7 @@ struct PulseSettings {
     double force = 0.02;    ///< force of a push [N or N*m]; the sign alternates
     double smaller = 0.6;   ///< every second group of three pushes has `force` times this factor [-]
     double push_s = 0.03;   ///< duration of a push [s]
-    double rest_s = 0.17;   ///< pause after a push [s]
+    double rest_s = 0.17;   ///< pause before a push [s]
     double farthest = 0.2;  ///< distance from the start position beyond which pushes have no force [m or rad]
 };
 

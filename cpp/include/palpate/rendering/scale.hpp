@@ -26,7 +26,8 @@ namespace detail {
 
 /// A model whose domain has this length gets the position factor 1 [rad]
 inline constexpr double knob_travel = 0.5;
-/// The default force limit of a simulated device is this factor times the model's largest force [-]
+/// The default force limit of a simulated device is this factor times the model's largest force, unless the positions
+/// are angles [-]
 inline constexpr double force_reserve = 1.05;
 
 /// Returns the force of a model at a position during a long stroke in a direction, +1 for press and -1 for release. A

@@ -170,7 +170,8 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
 }
 
 /// Returns the method that solves the load line of a scheme: "table" if a table of solutions is used for at least a
-/// part of the positions, else "newton"; nothing if the structure has no load line.
+/// part of the positions, else "newton"; nothing if the structure has no load line. For the energy-consistent structure
+/// always "newton", because it also solves by Newton's method when it has a table.
 [[nodiscard]] inline std::optional<std::string_view> solver_name(const ForceModel& model,
                                                                  const Scheme& scheme, double period_s) {
     return with_structure(model, scheme, period_s, std::numeric_limits<double>::infinity(),

@@ -52,7 +52,7 @@ struct StructureNumbers {
 
 namespace detail {
 
-/// Returns the result of a step whose input or force is not finite: zero force, unchanged position of the object.
+/// Returns the result of a step whose input or force is not finite: zero force, and the given position of the object.
 [[nodiscard]] inline Rendered refused(double environment_position) noexcept {
     return {0.0, environment_position, 0, Status::NonFinite, false};
 }

@@ -414,8 +414,8 @@ class CertifiedSolver {
         return hysteresis;
     }
 
-    /// Returns the intervals of force and hysteresis in the order of position; the first and the last interval are
-    /// infinite.
+    /// Returns the intervals of force and hysteresis in the order of position; unless the force is periodic, the first
+    /// and the last interval are infinite.
     [[nodiscard]] static std::vector<Piece> pieces_of(const PiecewiseForce& force,
                                                       const PiecewiseForce& hysteresis) {
         std::vector<Piece> pieces;
@@ -473,8 +473,9 @@ class CertifiedSolver {
     };
 
     /// Returns c = max|F''| / (2 min F') over a cell for the force g + s h with a fixed direction state s. With
-    /// `by_radius` = 1 / r the direction state grows with the position (the play operator sticks). The bounds of F' and
-    /// F'' are linear in s, so their values at s and -s are valid for all direction states between.
+    /// `by_radius` = 1 / r the direction state grows with the position (the play operator sticks). F' and F'' are
+    /// linear in s, so bounds for s and for -s also hold for all direction states between. Returns infinity if
+    /// condition (C) is not proved.
     [[nodiscard]] static double sheet_curvature(const Expansion& g, const Expansion& h, double s,
                                                 double by_radius, double radius, double p) noexcept {
         // Element n is derivative n of the force in the middle of the cell, and a bound of the rounding error of this
@@ -505,7 +506,7 @@ class CertifiedSolver {
     }
 
     /// Makes the cells in the order of position, each about as wide as condition (C) can be proved. Makes no cells if
-    /// (C) cannot be proved for one of them.
+    /// (C) cannot be proved for one of them or too many are needed.
     void cut(const std::vector<Piece>& pieces, double p) {
         constexpr std::size_t most_cells = 4096;
         constexpr double narrowest = 1e-12;

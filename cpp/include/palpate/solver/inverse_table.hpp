@@ -181,11 +181,12 @@ class InverseCells {
     }
 
     /// Number stored as the error of a cell in which rounding alone exceeds the required error. Such a cell is not
-    /// divided, because narrower cells would not reduce the error.
+    /// counted as improvable, because a narrower cell would not reduce the error.
     static constexpr double rounding_limited = std::numeric_limits<double>::max();
 
-    /// Returns a proved bound of the position error of the polynomial in cell k; infinity if no bound is proved. `of_f`
-    /// has bounds of the rounding errors of f and its derivatives.
+    /// Returns a proved bound of the position error of the polynomial in cell k; infinity if no bound is proved,
+    /// `rounding_limited` if rounding alone exceeds the required error. `of_f` has bounds of the rounding errors of f
+    /// and its derivatives.
     [[nodiscard]] double cell_error(std::size_t k, const Jet& of_f) noexcept {
         constexpr std::size_t order = 8;
         const auto c = table_.coefficients(k);
@@ -274,10 +275,11 @@ class InverseCells {
 
 }  // namespace detail
 
-/// Returns tables of the inverse of a rising function F. The cell width is halved until the tables contain all values
-/// of F, or until narrower cells do not add values. Near a fold of F the inverse is a square root, which polynomials do
-/// not approximate well, so the tables omit some cells there. The tables also omit cells in which F is so flat that
-/// rounding alone exceeds the required error.
+/// Returns tables of the inverse of a rising function F. The cell width is halved until no cell could be improved (near
+/// folds: at most 1/32 of the cells), or until a narrower cell width would need more than `largest_table` cells.
+/// Returns the tables of the cell width with the largest share of proved cells. Near a fold of F the inverse is a
+/// square root, which polynomials do not approximate well, so the tables omit some cells there. The tables also omit
+/// cells in which F is so flat that rounding alone exceeds the required error.
 [[nodiscard]] inline std::vector<InverseTable> inverse_tables(const RisingForce& force, double largest_error,
                                                               std::size_t largest_table) {
     const double range = force.values.upper - force.values.lower;

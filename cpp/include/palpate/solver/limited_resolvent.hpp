@@ -41,7 +41,7 @@ class LimitedResolvent {
     [[nodiscard]] bool tabulated() const noexcept { return unlimited_.tabulated(); }
     [[nodiscard]] const Solver& unlimited() const noexcept { return unlimited_; }
 
-    /// Solves the load line for the limited force, and stores the solution in the memory for the next call.
+    /// Solves the load line for the limited force, and updates `memory` for the next call.
     template <Environment E>
     [[nodiscard, gnu::always_inline]] inline Solution solve(const LimitedEnvironment<E>& environment,
                                                             const typename E::State& state, LoadLine line,

@@ -13,9 +13,8 @@ namespace palpate {
 ///
 ///     f(y) + slope * y = intercept.
 ///
-/// `slope` and `intercept` contain object mass, object damping and the virtual coupling, so every implicit structure
-/// solves the same scalar equation. The equation has one solution for every intercept if slope + f' > 0 at all
-/// positions.
+/// `slope` and `intercept` contain object mass, object damping and the virtual coupling, so all structures that solve
+/// an equation solve this one. The equation has one solution for every intercept if slope + f' > 0 at all positions.
 struct LoadLine {
     double slope = 0.0;      ///< slope p of the load line [N/m]
     double intercept = 0.0;  ///< right side q of the load line [N]
@@ -51,8 +50,8 @@ struct Bracket {
 /// exactly one solution.)
 ///
 /// Until the residual f(y) + p y - q changes its sign, the search moves the position y in the direction of -residual,
-/// by at most `longest_step` in each iteration. If the load line has several solutions, the search ends at the first
-/// solution in this direction. A slow motion would reach the same solution.
+/// by at most `longest_step` in each iteration. If `longest_step` is shorter than the distance between two solutions,
+/// the search ends at the first solution in this direction. A slow motion would reach the same solution.
 struct LoadLineSolver {
     int max_evaluations = 64;  ///< number of evaluations of the force after which the search stops
     double tolerance = 1e-13;  ///< largest accepted |residual / slope of the residual| / (1 + |y|)
@@ -138,8 +137,8 @@ struct LoadLineSolver {
             if (bracketed && high - low <= tolerated) {
                 return at;
             }
-            // Newton's step is used while the slope p + f' of the residual is > 0 and each step at least halves the
-            // residual.
+            // Newton's step is used while the slope p + f' of the residual is > 0, the step stays inside the bracket,
+            // and each step at least halves the residual.
             const double newton = slope > 0.0 ? -at.residual / slope : 0.0;
             const double direction = at.residual < 0.0 ? 1.0 : -1.0;
             double step = newton;

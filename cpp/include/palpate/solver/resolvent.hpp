@@ -43,7 +43,8 @@ struct Branch {
     }
 
     /// Returns a first position for Newton's method at the value q. Near a fold (an end at which F changes from rising
-    /// to falling) it lies on a parabola; elsewhere it is the last position `last`.
+    /// to falling) it lies on a parabola; elsewhere it is the last position `last`. If this position lies outside the
+    /// interval, the middle of the interval is returned.
     [[nodiscard]] double first_guess(double q, double last) const noexcept {
         const double near = 0.1 * (values.upper - values.lower);
         if (curvature_high > 0.0 && values.upper - q < near) {
@@ -69,7 +70,7 @@ struct Branch {
 /// A short branch near a fold (a position at which F changes between rising and falling) has no table, nor has a branch
 /// whose required error cannot be proved. In such a branch `CertifiedSolver` solves load lines that have exactly one
 /// solution, and Newton's method between the ends of the branch solves other load lines. If the folds cannot be
-/// located, `CertifiedSolver` solves all load lines.
+/// located, or F falls far outside the domain, `CertifiedSolver` is called for all load lines.
 class Resolvent {
   public:
     /// State between two calls of `solve`: the branch (interval of rising F) that contains the last solution, and the
@@ -207,7 +208,7 @@ class Resolvent {
     }
 
     /// Returns the solution from the table or the straight line of the first branch that contains q; the position is
-    /// NaN if that branch has neither.
+    /// NaN if that branch has neither, or if the load line has another slope than the branches.
     [[nodiscard, gnu::noinline]] Solution from_any_branch(LoadLine line, Memory& memory) const noexcept {
         if (!(branches_.size() > 1 && line.slope == slope_ && std::isfinite(line.intercept))) {
             constexpr double nan = std::numeric_limits<double>::quiet_NaN();

@@ -14,12 +14,13 @@
 namespace palpate {
 
 /// Returns the intervals of positions between `lower` and `upper` over which F(y) = f(y) + p y rises, in the order of
-/// position; f is a network of one input without continuation. The ends of the intervals are folds, positions with p +
-/// f' = 0 at which F changes between rising and falling. Each fold is located to the last digit.
+/// position; f is a network of one input without continuation. Each end of an interval is `lower`, `upper` or a fold: a
+/// position with p + f' = 0 at which F changes between rising and falling. Each fold is located to the last digit.
 ///
 /// Bisection divides [lower, upper] into cells. For every cell it is proved that the slope p + f' keeps its sign, or
 /// that the slope is monotone and has one zero. The proof uses p + f' and f'' in the middle of the cell and a bound of
-/// |f'''| over the cell. Returns nothing if rounding hides whether F has a fold at some position.
+/// |f'''| over the cell. Returns nothing if rounding hides whether F has a fold at some position, or too many cells are
+/// needed.
 [[nodiscard]] inline std::optional<std::vector<Interval>> rising_intervals(const NetworkParameters& network,
                                                                            double p, double lower,
                                                                            double upper) {

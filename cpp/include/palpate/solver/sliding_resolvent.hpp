@@ -40,7 +40,8 @@ class SlidingResolvent {
           solver_{pair, p},
           radius_{pair.play_radius()} {}
 
-    /// Returns true if press force and release force both have a table.
+    /// Returns true if press force and release force both have a table, and load lines of slope p are proved to have
+    /// exactly one solution.
     [[nodiscard]] bool tabulated() const noexcept {
         return solver_.cells() > 0 && press_.tabulated() && release_.tabulated();
     }

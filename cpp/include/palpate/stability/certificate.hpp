@@ -28,7 +28,8 @@ namespace palpate {
 
 /// Verdict of a certificate about a rendering.
 enum class Verdict : std::uint8_t {
-    /// Passive, proved: in no motion of the handle does the device give more energy than it received from the hand
+    /// Passive, proved: in no motion of the handle does the device give more energy than it received from the hand,
+    /// plus the energy that the object stored at the start
     Certified,
     StableLocally,  ///< the linearised rendering is stable; it is not proved that the rendering is passive
     Refused,
@@ -38,8 +39,8 @@ template <>
 inline constexpr auto words_of<Verdict> =
     std::array<std::string_view, 3>{"certified", "stable-locally", "refused"};
 
-/// Proved properties of a rendering (model, structure with its numbers, device): all inequalities with both sides, and
-/// the verdict.
+/// Result of the checks of a rendering (model, structure with its numbers, device): all inequalities with both sides,
+/// and the verdict.
 struct Certificate {
     std::string model;
     Scheme scheme;
@@ -104,8 +105,9 @@ void hash_value(NumberHash& hash, const T& value) {
 
 }  // namespace detail
 
-/// Returns 16 hexadecimal digits that change with every number and name of a certificate: model, scheme, each field of
-/// the device, bounds, sides of each line, verdict. The digits detect an edited certificate; they are not a signature.
+/// Returns 16 hexadecimal digits that change with every stored number and name of a certificate: model, scheme (without
+/// coupling and object mass that its structure does not use), device, bounds, sides of each line, verdict. The digits
+/// detect an edited certificate; they are not a signature.
 [[nodiscard]] inline std::string fingerprint_of(const Certificate& certificate) {
     detail::NumberHash hash;
     for_each_field<Certificate>([&](const auto& field) {
@@ -175,7 +177,7 @@ namespace detail {
     return low * T;
 }
 
-/// Returns the inequality with the smallest reserve, that is (left side - right side) / left side.
+/// Returns the inequality with the smallest `reserve`, of those whose left side is not 0; null if there is none.
 [[nodiscard]] inline const Inequality* tightest(const std::vector<Inequality>& lines) noexcept {
     const Inequality* least = nullptr;
     for (const Inequality& line : lines) {
@@ -210,7 +212,7 @@ namespace detail {
     return scheme.compensated ? compensated(bounds, scheme.coupling.stiffness) : bounds;
 }
 
-/// Returns a certificate that holds for any rendered force whose slopes and hysteresis lie within `bounds`. Wider
+/// Returns a certificate that holds for any rendered force whose slopes, hysteresis and mean lie within `bounds`. Wider
 /// bounds never prove more.
 [[nodiscard]] inline Certificate certify_rendered(const ForceBounds& bounds, const Scheme& scheme,
                                                   const DeviceProfile& device) {
@@ -236,8 +238,8 @@ namespace detail {
     return certificate;
 }
 
-/// Returns a certificate that holds for any model whose slopes and hysteresis lie within `bounds`, rendered by a scheme
-/// on a device.
+/// Returns a certificate that holds for any model whose slopes, hysteresis and mean lie within `bounds`, rendered by a
+/// scheme on a device.
 [[nodiscard]] inline Certificate certify(const ForceBounds& bounds, const Scheme& scheme,
                                          const DeviceProfile& device) {
     return certify_rendered(rendered_bounds(bounds, scheme), scheme, device);

@@ -16,7 +16,7 @@
 namespace palpate {
 
 /// Returns true if a stored number and its recomputed value differ by at most 1e-9 of the larger one, because another
-/// computer may round differently. A number that is not finite agrees with no other number.
+/// computer may round differently. A number that is not finite agrees with no number.
 [[nodiscard]] inline bool agree(double stored, double recomputed) noexcept {
     const double larger = std::max(std::abs(stored), std::abs(recomputed));
     return std::isfinite(larger) && std::abs(stored - recomputed) <= 1e-9 * larger;
@@ -100,7 +100,7 @@ namespace detail {
 /// Recomputes a stored certificate and returns the recomputed certificate, with the texts that files do not store. The
 /// stored inequalities, verdict and longest period must follow from the stored bounds of the force. The stored bounds
 /// must contain the bounds computed from the model. Throws std::invalid_argument with the first field that differs, its
-/// stored value and the recomputed value.
+/// stored value and the recomputed value; also if the verdict is `Refused`.
 [[nodiscard]] inline Certificate checked(const Certificate& stored, const ForceModel& model) {
     const auto require = [](const std::string& difference) {
         detail::require(difference.empty(), difference);

@@ -53,8 +53,8 @@ inline void add_hysteresis(std::vector<Inequality>& lines, const ForceBounds& bo
     }
 }
 
-/// Adds two inequalities for an object for which the effect of encoder steps has no proved bound: the encoder step must
-/// be 0, and Coulomb friction must exceed the effect of force steps.
+/// Adds two inequalities for an object for which the effect of encoder steps has no proved bound. The encoder step must
+/// be 0. Coulomb friction must be at least half a force step plus the mean force of a periodic model.
 inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                 const DeviceProfile& device, const char* name, const char* cure) {
     lines.push_back(unknown("encoder-step-coupling", name, "proved only for an encoder step Delta = 0", 0.0,
@@ -205,8 +205,8 @@ inline constexpr double usual_coupling_share = 0.95;
 }
 
 /// Returns the inequalities of the energy-consistent structure: a virtual object with mass behind a virtual coupling,
-/// whose integration stores exactly the work done on the object. The object is passive for any slope of the force, and
-/// for any solution of a step.
+/// whose integration never generates energy. The object is passive for any slope of the force, and for any solution of
+/// a step.
 [[nodiscard]] inline std::vector<Inequality> inequalities(EnergyConsistentStructure,
                                                           const ForceBounds& bounds, const Scheme& scheme,
                                                           const DeviceProfile& device) {

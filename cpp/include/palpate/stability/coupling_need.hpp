@@ -93,7 +93,8 @@ template <class Need>
 }
 
 /// Returns gamma: the largest error of the rendered force divided by the position error of the encoder that causes it
-/// [N/m], for a massless virtual object behind a virtual coupling.
+/// [N/m], for a massless virtual object behind a virtual coupling. Returns infinity if the force falls at least as
+/// steeply as K_c.
 [[nodiscard]] inline double massless_gain(const ForceBounds& bounds, VirtualCoupling coupling,
                                           double period_s) noexcept {
     const double falling = bounds.falling();
@@ -119,7 +120,7 @@ template <class Need>
 /// The poles are r_1 and r_2 with |r_2| <= |r_1| = rho. From N >= 3 on, g_{k+1} = r_1 g_k + r_2^{k+1-N} u with u = g_N
 /// - r_1 g_{N-1}. The terms after g_N therefore add at most (rho |g_N| + |u| |r_2| / (1 - |r_2|)) / (1 - rho). The
 /// summation ends when this remainder is at most 1 % of the sum; the result includes the remainder. Returns infinity if
-/// a pole does not lie inside the unit circle.
+/// a pole does not lie inside the unit circle, or if 10^7 terms are not enough.
 [[nodiscard]] inline double implicit_gain(double stiffness, Inertia inertia, VirtualCoupling coupling,
                                           double period_s) noexcept {
     constexpr double tail_share = 0.01;

@@ -91,8 +91,8 @@ namespace detail {
 
 /// Returns the inequalities of direct rendering of a force with hysteresis, f = g + s h with the play radius r. While
 /// the play operator sticks, h / r adds to the slope of the force. The encoder causes errors of the position x and of
-/// the play operator. Without delay, the play operator of the measured position may be treated as exact if the slope is
-/// increased slightly. With a prediction, the play operator follows the measured position.
+/// the play operator. Without delay and with r >= Delta / 2, the play operator of the measured position may be treated
+/// as exact if the slope is increased slightly. With a prediction, the play operator follows the measured position.
 [[nodiscard]] inline std::vector<Inequality> hysteresis_inequalities(const ForceBounds& bounds,
                                                                      const DeviceProfile& device,
                                                                      int predict = 0) {

@@ -46,8 +46,8 @@ namespace palpate {
                                           double period_s, int delay_samples) noexcept {
     constexpr int frequencies = 512;
     constexpr int slope_steps = 32;
-    // The search for the largest needed damping halves the distance between the tried frequencies, and between the
-    // tried slopes, this number of times
+    // Number of refinements around the largest needed damping; after each one the distance between the tried
+    // frequencies, and between the tried slopes, is halved
     constexpr int halvings = 20;
     constexpr double lowest = 1e-4;  // lowest tried frequency, as angular frequency times the period T [rad]
     const double octaves = std::log(std::numbers::pi / lowest);

@@ -77,8 +77,8 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
     return coupling_stiffness * slope / (coupling_stiffness + slope);
 }
 
-/// Returns the bounds of a compensated force without hysteresis; its slopes are K_c f' / (K_c - f') for the slopes f'
-/// of the model.
+/// Returns the bounds of a compensated force without hysteresis; its slopes are K_c f' / (K_c - f') for the slopes f' <
+/// K_c of the model, otherwise infinite.
 [[nodiscard]] inline ForceBounds compensated(const ForceBounds& bounds, double coupling_stiffness) noexcept {
     const auto hardened = [&](double slope) {
         return slope < coupling_stiffness ? -slope_behind_coupling(-slope, coupling_stiffness)
@@ -92,11 +92,11 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
 
 namespace detail {
 
-/// Largest difference between the proved bounds of a slope and its true minimum and maximum, as a share of the steepest
-/// slope. A wider bound reduces the stiffness that can be rendered.
+/// Requested accuracy of the proved bounds of a slope: their difference from its true minimum and maximum, as a share
+/// of the steepest slope. A wider bound reduces the stiffness that can be rendered.
 inline constexpr double slope_slack = 1e-4;
-/// Largest difference between bounds and true slopes of a force of position and velocity, as a share of the steepest
-/// slope. It is larger than `slope_slack`, because two inputs need many more cells.
+/// The same accuracy for a force of position and velocity. It is coarser than `slope_slack`, because two inputs need
+/// many more cells.
 inline constexpr double velocity_slack = 1e-3;
 
 /// Coefficients a, b, c of the slope a g' + b h' + c h of a force with hysteresis (mean force g, hysteresis h).

@@ -43,10 +43,10 @@ struct SlopeRange {
 
 namespace detail {
 
-/// Returns a = max over rho of h(rho) - l rho - gamma rho^2, gamma > 0: a bound of the energy that a held force gives
-/// in one sample, divided by the square of the handle's step. The ratio rho is the position error divided by the
-/// handle's step, and l and gamma are weights. The function h(rho) is M (1/2 + rho) for rho > 0, M (1 + rho)^2 / 2 + s
-/// rho^2 / 2 for -1 <= rho <= 0, and s (-rho - 1/2) for rho < -1.
+/// Returns a = max over rho of h(rho) - l rho - gamma rho^2, gamma > 0. In one sample a held force gives at most the
+/// energy (a + l rho + gamma rho^2) d^2, where d is the handle's step and rho the position error divided by d. The
+/// function h(rho) is M (1/2 + rho) for rho > 0, M (1 + rho)^2 / 2 + s rho^2 / 2 for -1 <= rho <= 0, and s (-rho - 1/2)
+/// for rho < -1.
 [[nodiscard]] inline double step_energy(SlopeRange slopes, double l, double gamma) noexcept {
     const double M = slopes.rising;
     const double s = slopes.falling;
@@ -184,9 +184,10 @@ template <class Function>
     return at_left <= at_right ? Minimum{left, at_left} : Minimum{right, at_right};
 }
 
-/// Returns the minimum over l and gamma of cost(gain, l, gamma), which is convex in l and gamma. Every pair (l, gamma)
-/// gives a proved bound, so the search may use approximate maxima over the frequencies; the result uses proved maxima.
-/// A small penalty for large l and gamma makes the search end at the same values on every computer.
+/// Returns an upper bound of the minimum over l and gamma of cost(gain, l, gamma), which is convex in l and gamma.
+/// Every pair (l, gamma) gives a proved bound, so the search may use approximate maxima over the frequencies; the
+/// result uses proved maxima. A small penalty for large l and gamma makes the search end at the same values on every
+/// computer.
 template <class Gain = FilterGain, class Cost>
 [[nodiscard]] double least_cost(std::span<const double> taps, SlopeRange slopes, Cost cost) {
     constexpr double weight = 1e-8;
@@ -283,7 +284,8 @@ class SplitGain {
     [[nodiscard]] double size() const noexcept { return size_; }
 
     /// Returns the largest eigenvalue over all frequencies of the quadratic form of both parts of a sample, with the
-    /// shares `fraction` and `rest` and a separate gamma for each part.
+    /// shares `fraction` and `rest` and a separate gamma for each part. For each unit vector the form is a
+    /// trigonometric polynomial, so `maximum_of` also holds for its largest eigenvalue.
     [[nodiscard]] double most(double fraction, double rest, SlopeRange slopes, double l, double gamma_first,
                               double gamma_second) const noexcept {
         const double first = step_energy(slopes, l, gamma_first);
@@ -362,9 +364,9 @@ namespace detail {
 }
 
 /// Returns the device damping divided by the longest period, b / T [N/m], for samples at the times k period + u_k with
-/// 0 <= u_k <= jitter, if each force acts the time `delay` after its sample. The result is the smaller of two bounds.
-/// One is R(Lambda) of `held_need`; the other is the damping for n whole samples of delay plus the effect of the
-/// remaining delay, at most nu T.
+/// 0 <= u_k <= jitter, if each force acts the time `delay` after its sample. If each force acts before the next sample,
+/// `delayed_need` gives the result. Otherwise it is the smaller of two bounds. One is R(Lambda) of `held_need`; the
+/// other is the damping for n whole samples of delay plus the effect of the remaining delay, at most nu T.
 [[nodiscard]] inline double jittered_need(double delay, double period, double jitter, SlopeRange slopes) {
     const double T = period + jitter;
     if (delay <= period - jitter) {  // the force always acts before the next position is read
@@ -391,8 +393,7 @@ namespace detail {
 
 /// Returns the device damping divided by the longest period, b / T [N/m], that a held force with or without hysteresis
 /// needs on a device. Samples are taken at k period_s + u_k with 0 <= u_k <= jitter_s, because the control loop uses
-/// absolute times. Each force acts delay_s after its sample. If the delay of the device is given in samples, jitter
-/// does not increase the needed damping except by the longer period.
+/// absolute times. Each force acts delay_s after its sample.
 [[nodiscard]] inline double device_need(const DeviceProfile& device, SlopeRange slopes) {
     const bool steady = device.jitter_s == 0.0 || device.late_samples() == 0;
     return steady ? delayed_need(device.whole_delay_samples(), device.delay_fraction(), slopes)

@@ -50,8 +50,8 @@ struct PeriodicStrokes {
 
 /// Returns proved bounds of the mean force over a period of g + side h + shift, limited to +-`limit` [N]. Cells in
 /// which the force limit is certainly active at all positions, or certainly inactive at all positions, are integrated
-/// exactly. Other cells are halved until their error is below rounding; the error of a cell of width w is at most L w^2
-/// / 4 with the steepest slope L.
+/// exactly. Other cells are halved until their error is below rounding, or until there are too many; the error of a
+/// cell of width w is at most L w^2 / 4 with the steepest slope L.
 [[nodiscard]] inline Interval limited_mean(const PeriodicStrokes& strokes, double side, double shift,
                                            double limit) {
     constexpr std::size_t first_cells = 256;
@@ -99,7 +99,8 @@ struct PeriodicStrokes {
 
 /// Returns the mean force by which a periodic model with a force limit generates energy [N]: max(0, mean c(g - h),
 /// -mean c(g + h)), where c(f) is the force f limited to +-`limit`. If the result is above 0, the model generates
-/// energy in each period. Values below rounding count as 0.
+/// energy in each period. Values below rounding count as 0. Returns 0 for a force that is not periodic, NaN if
+/// `steepest` is not finite.
 [[nodiscard]] inline double active_mean(const PeriodicStrokes& strokes, double limit, double shift = 0.0) {
     if (!strokes.g.periodic()) {
         return 0.0;
@@ -112,9 +113,9 @@ struct PeriodicStrokes {
     return excess <= strokes.rounding() ? 0.0 : excess;
 }
 
-/// Returns the smallest constant force [N] that must be added to a periodic model so that it does not generate energy
-/// in a period. The mean of the limited force never decreases if this constant increases, and it is zero for one
-/// constant.
+/// Returns the constant force [N] with the smallest absolute value that must be added to a periodic model so that it
+/// does not generate energy in a period. The mean of the limited force never decreases if this constant increases, and
+/// it is zero for one constant.
 [[nodiscard]] inline double passive_shift(const PeriodicStrokes& strokes, double limit) {
     if (active_mean(strokes, limit) == 0.0) {
         return 0.0;

@@ -29,10 +29,6 @@ namespace palpate {
 /// predicted position. The force may have hysteresis if its play operator follows the measured position. The prediction
 /// changes the force by at most L |sum of w_j d_{k-j}| (steepest slope L, prediction weights w, handle's steps d),
 /// which adds L / 2 to the result.
-/// Returns the device damping divided by the longest period, b / T [N/m], for a held force that is computed at a
-/// predicted position. The force may have hysteresis if its play operator follows the measured position. The prediction
-/// changes the force by at most L |sum of w_j d_{k-j}| (steepest slope L, prediction weights w, handle's steps d),
-/// which adds L / 2 to the result.
 [[nodiscard]] inline double predicted_path_need(const DeviceProfile& device, SlopeRange slopes) {
     return device_need(device, slopes) + 0.5 * slopes.steepest();
 }

@@ -136,9 +136,9 @@ template <class Holds>
 }
 
 /// Returns the virtual object and the virtual coupling for the explicit structure: those with the stiffest coupling,
-/// then with the smallest object damping, for which the linearised rendering is stable. If no combination is stable,
-/// returns the last one tried. `chosen` contains the values that the user sets: object mass, object damping, coupling,
-/// play radius.
+/// then with the smallest object damping, for which every inequality of the certificate holds. If there is none,
+/// returns the last combination tried. `chosen` contains the values that the user sets: object mass, object damping,
+/// coupling, play radius.
 [[nodiscard]] inline Scheme explicit_scheme(const ForceBounds& bounds, const DeviceProfile& device,
                                             const SchemeChoices& chosen) {
     // Tried values of the coupling stiffness divided by the largest certified stiffness
