@@ -336,9 +336,9 @@ void bind_model(py::module_& module) {
         },
         "play_radius"_a = py::none(),
         "Returns proved bounds (smallest, largest) of the slope of the force inside the domain, in press\n"
-        "and in release. They are wider than the true range by at most 1 % of the steepest slope. With a\n"
-        "play radius r they include the slope h / r (hysteresis h), with which the force of a hysteresis\n"
-        "model changes after a reversal.");
+        "and in release. Without hysteresis they are wider than the true range by at most 1 % of the\n"
+        "steepest slope. With a play radius r they include the slope h / r (hysteresis h), with which\n"
+        "the force of a hysteresis model changes after a reversal.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
     type.def_property_readonly("n_wavelets",
