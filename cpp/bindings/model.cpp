@@ -309,8 +309,9 @@ void bind_model(py::module_& module) {
         "Returns the force of the object against the tool [N or N*m]: a number for one position, an\n"
         "array for an array of positions.\n\n"
         "A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius,\n"
-        "`play`, the state of the play operator. Arguments that the model does not use are ignored.\n"
-        "Raises ValueError with the name of a missing argument. A position that is not finite gives NaN.");
+        "`play`, the state of the play operator. Arguments that the model does not use do not change the\n"
+        "force. Raises ValueError with the name of a missing argument. A position that is not finite\n"
+        "gives NaN.");
     bind_quantity<&EnvironmentSample::slope>(
         type, "slope",
         "Returns the slope df/dx of the force [N/m or N*m/rad]; the arguments are "

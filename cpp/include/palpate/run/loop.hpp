@@ -24,7 +24,7 @@ struct LoopSettings {
     double duration_s = 10.0;  ///< duration of the run [s]; infinity = until a stop is requested
     /// Least share of rate_hz; a lower rate for half a second ends the loop; 0 = no check.
     double lowest_rate_share = 0.8;
-    std::uint64_t tolerated = 5;  ///< allowed consecutive ticks without a valid sample; more end the loop
+    std::uint64_t tolerated = 5;  ///< allowed consecutive ticks that send no force; more end the loop
     /// Longest time between two ticks [s]. A longer time ends the loop, because the certificate does not hold for it.
     double longest_period_s = std::numeric_limits<double>::infinity();
 };

@@ -104,7 +104,7 @@ struct Trace {
     std::vector<double> mean_applied;          ///< mean of the applied force during the tick [N or N*m]
     std::vector<int> evaluations;              ///< number of evaluations of the model in the tick
     std::vector<Status> status;
-    std::vector<std::uint8_t> extrapolated;  ///< 1 if y lies outside the model's domain
+    std::vector<std::uint8_t> extrapolated;  ///< 1 if the model was evaluated outside its domain
 };
 
 /// Largest number of ticks that `simulate` accepts: one hour at 1 kHz, which needs more than 300 MB of memory.
