@@ -5,8 +5,8 @@
 
 namespace palpate::bindings {
 
-// Each function adds the Python types and functions of one folder of headers to a submodule. They must be called in
-// this order, because later functions use types that earlier functions add.
+// Each function adds Python types and functions to a submodule. module.cpp calls the functions in an order in which
+// each type is added before it is used.
 void bind_status(pybind11::module_& module);
 void bind_model(pybind11::module_& module);
 void bind_wavelet(pybind11::module_& module);

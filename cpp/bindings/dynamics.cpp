@@ -53,7 +53,7 @@ void bind_dynamics(py::module_& module) {
         },
         "pair"_a, "design"_a = "paper",
         "Returns the paper's integrators and differentiators for the period T = 1 ms (section 4.3): as "
-        "published,\nor with unit gain at low frequency.");
+        "published,\nor such that integrator times differentiator is 1 at low frequency.");
 }
 
 }  // namespace palpate::bindings

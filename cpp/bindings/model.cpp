@@ -309,8 +309,9 @@ void bind_model(py::module_& module) {
         "Returns the force of the object against the tool [N or N*m]: a number for one position, an\n"
         "array for an array of positions.\n\n"
         "A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius,\n"
-        "`play`, the state of the play operator. Arguments that the model does not use are ignored.\n"
-        "Raises ValueError with the name of a missing argument. A position that is not finite gives NaN.");
+        "`play`, the state of the play operator. Arguments that the model does not use do not change the\n"
+        "force. Raises ValueError with the name of a missing argument. A position that is not finite\n"
+        "gives NaN.");
     bind_quantity<&EnvironmentSample::slope>(
         type, "slope",
         "Returns the slope df/dx of the force [N/m or N*m/rad]; the arguments are "
@@ -336,9 +337,9 @@ void bind_model(py::module_& module) {
         },
         "play_radius"_a = py::none(),
         "Returns proved bounds (smallest, largest) of the slope of the force inside the domain, in press\n"
-        "and in release. They are wider than the true range by at most 1 % of the steepest slope. With a\n"
-        "play radius r they include the slope h / r (hysteresis h), with which the force of a hysteresis\n"
-        "model changes after a reversal.");
+        "and in release. Without hysteresis they are wider than the true range by at most 1 % of the\n"
+        "steepest slope. With a play radius r they include the slope h / r (hysteresis h), with which\n"
+        "the force of a hysteresis model changes after a reversal.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
     type.def_property_readonly("n_wavelets",

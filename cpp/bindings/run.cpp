@@ -222,8 +222,8 @@ void bind_run(py::module_& module) {
         "force_unit"_a = "N*m", "progress"_a = py::none(),
         "Measures a real object in real time; on the simulated device the model `object` is mounted.\n\n"
         "A hand moves the handle. With `probe` the device moves it slowly between `lower` and `upper`. With\n"
-        "`push` the device gives short pushes of this force to either side. Options are keywords, None for\n"
-        "the default:\n\n"
+        "`push` the device gives short pushes of up to this force to either side. Options are keywords,\n"
+        "None for the default:\n\n"
         "- device (simulated or usb[:SERIAL]), wait_s.\n"
         "- rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.\n"
         "- probe, lower, upper, speed, stiffness, force_limit, push.\n"

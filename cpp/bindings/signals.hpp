@@ -9,8 +9,8 @@
 namespace palpate::bindings {
 
 /// Lets Ctrl-C interrupt long work that runs without the lock of the Python interpreter. The work calls it once for
-/// each step. Ten times a second it runs Python's signal handlers and calls `progress(step)`; an exception of them ends
-/// the work.
+/// each step. At most ten times a second it runs Python's signal handlers and calls `progress(step)`; an exception of
+/// them ends the work.
 class Interruptible {
   public:
     explicit Interruptible(const pybind11::function* progress = nullptr) : progress_{progress} {}

@@ -107,8 +107,9 @@ void bind_simulation(py::module_& module) {
     module.def(
         "rig_for", &rig_for, "model"_a, "is_angle"_a, "period_s"_a = DeviceProfile{}.period_s,
         "Returns the test rig for a model of position, or of position and velocity. With is_angle\n"
-        "(positions in rad) it is the default knob. For any other unit, lengths and forces of the knob\n"
-        "and its hand are scaled to the travel and the largest force of the model.");
+        "(positions in rad) the device is the default knob. For any other unit, its lengths and forces\n"
+        "are scaled to the travel and the largest force of the model. The hand moves the handle through\n"
+        "the domain of the model.");
 
     module.def(
         "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,

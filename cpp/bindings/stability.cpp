@@ -52,8 +52,8 @@ void bind_bounds(py::module_& module) {
         "With hysteresis these are slopes during a stroke; after a reversal h / r = `stick` is added\n"
         "(hysteresis by play radius).");
     module.def("steepest_stick", &steepest_stick, "device"_a,
-               "Returns the largest slope h / r (hysteresis by play radius) for which half of the\n"
-               "largest slope that the device can render remains for the model's strokes.");
+               "Returns the largest slope h / r (hysteresis by play radius) that is certified for a model\n"
+               "whose strokes have slopes as large as h / r.");
     module.def("narrowest_play", &narrowest_play, "sliding"_a, "device"_a, "least"_a, "most"_a,
                "Returns the smallest play radius from `least` to `most` for which a hysteresis model is\n"
                "certified; infinity if there is none. `sliding` are bounds of the model's force with a play\n"
@@ -78,9 +78,8 @@ void bind_inequality(py::module_& module) {
 void bind_stability(py::module_& module) {
     bind_bounds(module);
     bind_inequality(module);
-    py::class_<Certificate> type(
-        module, "Certificate",
-        "Proved inequalities and verdict for a model that a scheme renders on a device.");
+    py::class_<Certificate> type(module, "Certificate",
+                                 "Inequalities and verdict for a model that a scheme renders on a device.");
     bind_fields<Certificate, 8>(type, false);
     type.def_property_readonly("certified", &Certificate::certified)
         .def_property_readonly(
@@ -127,7 +126,7 @@ void bind_stability(py::module_& module) {
         "Searches the explicit structure with the stiffest coupling, then the least object damping, for\n"
         "which the structure is stable, and returns its scheme. If none is stable, returns the last\n"
         "scheme that was tried. Keywords: mass, object_damping, coupling_stiffness, coupling_damping and\n"
-        "play_radius; None: the search chooses the value.");
+        "play_radius; None: a default, or the result of the search.");
     module.def("device_difference", &device_difference, "certified"_a, "device"_a,
                "Returns a sentence about the first field in which a device profile differs from the "
                "certified profile;\n"

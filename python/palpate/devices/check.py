@@ -20,10 +20,10 @@ from .observations import Observation, compare, observe_at_rest
 from .pushes import Mechanics, Push, push_response
 
 NO_FORCE_SHARE = 0.7
-"""Share of a check's duration without force; during the remaining time the device pushes the handle [-]"""
+"""Share of the duration of a check with pushes in which no force is sent [-]"""
 
 PUSH_FORCE_SHARE = 0.005
-"""Force by which the check pushes the handle [share of the device's force limit]; too small to be felt"""
+"""Force by which the check pushes the handle [share of the device's force limit]"""
 
 _FRICTION_ADVICE = (
     "take the hand off the handle and check for 10 s; if the friction exceeds the force of the pushes, state "
@@ -54,7 +54,7 @@ class Check:
     observations: tuple[Observation, ...]
     numbers: Mapping[str, float | None]
     base: CoreProfile
-    """Properties that the device itself states; inertia, damping and friction are not among them."""
+    """Properties that the device itself states; its inertia, damping and friction are not used."""
     coulomb_friction: float | None = None
     """Coulomb friction of the device that the user states [N or N*m]"""
 
@@ -82,7 +82,7 @@ class Check:
         Raises
         ------
         InputError
-            The mechanics were not measured, or a sign is wrong.
+            The mechanics were not measured, or a wrong property forbids force.
         """
         if not self.may_push:
             raise InputError(
@@ -144,9 +144,9 @@ def check_device(
 
     First the device is disabled, and its rate, lost samples and encoder are measured. The user moves the
     handle against an object, and the signs of velocity and transducer are compared with the positions. A
-    reversed motor cannot be detected while the drive is disabled. With `push`, and only if the other signs
-    and the encoder are right, the drive is therefore enabled and pushes the free handle to both sides. Half a
-    percent of its force shows the sign of the force, the delay, inertia and damping. A wrong sign prevents a
+    reversed motor cannot be detected while the drive is disabled. With `push`, and only if no wrong property
+    forbids force, the drive is therefore enabled and pushes the free handle to both sides. Half a percent of
+    its force shows the sign of the force, the delay, inertia, damping and friction. A wrong sign prevents a
     profile, so nothing is certified for the device.
 
     Parameters

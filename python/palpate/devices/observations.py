@@ -36,7 +36,8 @@ _LEAST_CORRELATION = 0.3
 """|Correlation| of force and position that is needed to judge the sign of the force sensor [-]."""
 
 _STEP_TOLERANCE = 0.01
-"""Accepted difference of encoder step and force limit from the expected values [share of these values]"""
+"""Accepted difference of the encoder step, and accepted deficit of the force limit [share of the expected
+values]"""
 _DAMPING_TOLERANCE = 0.1
 """Measured damping and friction may be less than expected by this share of the expected values [-]."""
 
@@ -60,7 +61,7 @@ class Observation:
 
     @property
     def finding(self) -> Finding | None:
-        """Finding on the property for a verdict; None if the property is right or needs no advice."""
+        """Finding on the property for a verdict; None if it is right, or was not judged and has no advice."""
         if self.right or (self.right is None and not self.advice):
             return None
         return (usable if self.right is None else no)(
@@ -160,7 +161,7 @@ def _losses(summary: Mapping[str, Any]) -> Observation:
 
 
 def _encoder(position: Float1D, step: float, unit: str, rate_hz: float) -> Observation:
-    """Judges the encoder's noise in the piece with the least motion. A parabola removes the hand's drift."""
+    """Judges the least noise of the encoder over all pieces. A parabola removes the hand's drift."""
     length = max(10, round(_REST_DURATION_S * rate_hz))
     pieces = position[: len(position) // length * length].reshape(-1, length)
     if not len(pieces):
@@ -181,7 +182,7 @@ def _encoder(position: Float1D, step: float, unit: str, rate_hz: float) -> Obser
 
 
 def _velocity(ticks: Mapping[str, Any], step: float) -> Observation:
-    """Judges the sign of the reported velocity by the displacement: with a wrong sign damping adds energy."""
+    """Judges sign and size of the reported velocity; with a wrong sign damping adds energy."""
     name = "velocity"
     position, time, velocity = (np.asarray(ticks[key]) for key in ("position", "device_time", "velocity"))
     if np.ptp(position) < _LEAST_MOTION_STEPS * step or len(position) < 2 * _VELOCITY_SAMPLES:
@@ -234,7 +235,7 @@ def _transducer(position: Float1D, measured: Float1D, step: float) -> Observatio
 
 
 def compare(expected: DeviceProfile, measured: Mapping[str, float | None], *, name: str) -> Observation:
-    """Judges if a measured device is at least as good as the expected device.
+    """Judges if a measured device is at least as good as the expected device and has the same encoder step.
 
     Parameters
     ----------

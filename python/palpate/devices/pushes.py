@@ -89,8 +89,6 @@ class Push:
 def push_response(ticks: Mapping[str, Any], encoder_step: float = 0.0, friction: float | None = None) -> Push:
     """Computes sign of the force, delay, and mechanics of the handle from the ticks of alternating pushes.
 
-    A force F > 0 pushes towards smaller positions. A displacement is the difference to the motion without the
-    push, because a hand may hold the handle. All results except the delay use the device's clock, so a late
     A force F > 0 pushes towards smaller positions. A displacement is the position minus the position expected
     without the push, because a hand may hold the handle. All results except the delay use the device's clock,
     so a late host has no effect.
@@ -250,7 +248,8 @@ def _start_values(applied: Float2D, moved: Float2D, seconds: Float2D) -> tuple[f
 def _displacement(
     applied: Float2D, seconds: Float2D, inertia: float, damping: float, friction: float
 ) -> Float2D:
-    """Returns the exact displacement (p, n + 1) of a handle, first at rest, under p series of held forces."""
+    """Returns the displacement (p, n + 1) of a handle, first at rest, under p series of held forces. It is
+    exact except for a reversal within a sample, which begins with the next sample."""
     displacement = np.zeros((len(applied), applied.shape[1] + 1))
     velocity = np.zeros(len(applied))
     decay = inertia / damping

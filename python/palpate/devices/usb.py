@@ -56,7 +56,7 @@ class UsbSetup:
     Raises
     ------
     DeviceError
-        Raised by every method; names the device, the action, the reason and the likely cure.
+        Raised by every request to the device; names the device, the action, the reason and the likely cure.
     """
 
     def __init__(self, handle: Any) -> None:
@@ -255,7 +255,7 @@ def install_rule(report: Callable[[str], None], *, folder: Path = FOLDER) -> Non
     Raises
     ------
     DeviceError
-        The user is not root, or the system refuses. The message states the cure.
+        The folder is missing or not writable. The message states the reason.
     """
     target = folder / RULE
     if not folder.is_dir():

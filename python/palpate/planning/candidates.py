@@ -32,11 +32,11 @@ from .limited_network import (
 from .plan import static_force_error, with_network
 
 _COUPLING_DAMPING_SHARE = 0.2
-"""Default coupling damping of a structure with mass [share of the device's damping]"""
+"""Default coupling damping of the implicit and energy-consistent structures [share of the device's
+damping]"""
 
 _PLAY_ENLARGEMENT = 1.02
-"""Play radius that is tried if the computed play radius is refused by a rounding error [share of the computed
-radius]"""
+"""Play radius that is tried if the computed play radius is refused [share of the computed radius]"""
 
 _PREDICTION_SAMPLES = (1, 2, 4, 8, 16)
 """Numbers of previous samples that are tried for a prediction [-]. Few samples give less delay and force
@@ -81,7 +81,7 @@ class Task:
     coupling_damping: float | None = None
     mass: float | None = None
     object_damping: float | None = None
-    """Object damping B_o that the caller requires [force*s/position]"""
+    """Object damping B_o of the caller or of the model [force*s/position]"""
     play_radius: float | None = None
     predict: int | None = None
     """Number of previous position samples that the prediction uses. 0: no prediction; None: chosen by the
@@ -106,7 +106,8 @@ class Task:
 
     @property
     def usual_play(self) -> float:
-        """The caller's play radius, or the usual play radius for the device [position]."""
+        """The caller's play radius, or the usual play radius for the device; 0 if the model needs none
+        [position]."""
         return self.play_radius or default_play_radius(self.model, self.device.encoder_step)
 
     def certified(self, scheme: Scheme, rendered: ForceModel | None = None) -> Candidate:
@@ -116,7 +117,8 @@ class Task:
         return Candidate(rendered, certify(rendered, scheme, self.device))
 
     def direct_scheme(self, rendered: ForceModel) -> Scheme:
-        """Returns the direct structure with the narrowest play radius that is certified for a network."""
+        """Returns the direct structure. If the plan chooses the play radius, it is the narrowest that is
+        certified for the network."""
         radius = self.play_radius or 0.0
         if self.chooses_play:
             radius = min(play_radius_for(rendered, self.device), self.longest_play)
@@ -134,13 +136,13 @@ class Task:
         return Refusal(f"the object has {' and '.join(parts)}, which this structure cannot render")
 
     def not_direct(self) -> Refusal | None:
-        """Refuses direct rendering for an object with mass, or if a coupling is required."""
+        """Refuses direct rendering for an object with mass or damping, or if a coupling is required."""
         return self.not_static() or (
             Refusal("a coupling is required, and this structure has no coupling") if self.coupling else None
         )
 
     def only_direct(self) -> Refusal | None:
-        """Refuses a prediction: only the direct structure of the identified model supports a prediction."""
+        """Refuses a prediction that the caller requires; a plan can add one to any direct rendering."""
         if not self.predict:
             return None
         return Refusal(
@@ -188,8 +190,8 @@ def _direct_limited(task: Task) -> Candidate | Refusal:
 
 
 def _massless(task: Task) -> Candidate | Refusal:
-    """Renders the model as a massless virtual object behind a coupling, with limited slopes; without
-    hysteresis the model is compensated for the spring of the coupling."""
+    """Renders the model as a massless virtual object behind a coupling. A model without hysteresis has
+    limited slopes and is compensated for the spring of the coupling."""
     if refusal := task.not_static():
         return refusal
     if not task.coupling:
@@ -320,7 +322,8 @@ def _direct_with(play_radius: float, predict: int) -> Scheme:
 
 
 def _predicted(found: Candidate, task: Task) -> Candidate:
-    """Adds the certified prediction with the fewest samples; returns `found` if no prediction is certified.
+    """Adds the certified prediction with the fewest samples; returns `found` if no prediction is certified or
+    the caller chose the samples.
 
     A prediction needs damping, which shortens the allowed time between samples. This time must be at least
     `_LATE_TICK_PERIODS`, or the allowed time without prediction. If direct rendering is certified only with a
@@ -357,8 +360,8 @@ def _fits(model: ForceModel, low: float, high: float) -> bool:
 
 
 def _balanced(model: ForceModel, device: DeviceProfile) -> ForceModel:
-    """Subtracts a constant from the force of a periodic model, so that its mean, after the force limit, is
-    0."""
+    """Adds a constant to the force of a periodic model, so that the limited force gives no energy over a
+    period."""
     shift = passive_shift(model, device.force_limit)
     return with_network(model, bias=model.bias + shift) if shift else model
 

@@ -21,7 +21,7 @@ else:
     import tomli as tomllib
 
 EXAMPLES = Path(__file__).parent / "profiles"
-"""Profiles of published devices; a comment at the top of each gives its sources."""
+"""Example profiles; a comment at the top of each gives the sources of its numbers."""
 
 
 def example_profiles() -> dict[str, tuple[Path, tuple[str, ...]]]:

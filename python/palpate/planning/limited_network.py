@@ -144,8 +144,8 @@ def scale_hysteresis(model: ForceModel, share: float) -> ForceModel:
 def _limited_once(
     model: ForceModel, low: float, high: float, sigma: float, restoring: bool
 ) -> ForceModel | None:
-    """Returns the model plus the fitted change of its force, or None if a continuation is steeper than the
-    slope limit."""
+    """Returns the model plus the fitted change of its force, or None if a continuation can be steeper than
+    the slope limit."""
     x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
     forces = strokes(model, x)
     changes = _changes_needed(
@@ -230,8 +230,8 @@ def _extended(force: Float1D, margin: int) -> Float1D:
 def _fitted(
     model: ForceModel, x: Float1D, wanted: Float2D, alpha: Float1D, beta: Float1D, low: float, high: float
 ) -> ForceModel:
-    """Fits the wavelets of the model and further wavelets by least squares, with slope limits and h >= 0
-    imposed."""
+    """Fits the wavelets of the model and further wavelets by least squares, with slope limits and, if the
+    model has it, h >= 0 imposed."""
     lower, travel = model.lower, model.upper - model.lower
     box = ((x - lower) / travel)[:, None]
     ones = np.ones_like(x)

@@ -28,7 +28,7 @@ _CERTIFICATE = {
     "stable-locally": "stable (local) only",
     "refused": "refused",
 }
-"""Maps the verdict of a certificate to a sentence."""
+"""Maps the verdict of a certificate to its words."""
 
 ACCEPTED_FORCE_ERROR = 0.1
 """Default limit of the force error [share of the range of the identified force]"""
@@ -70,13 +70,14 @@ class Plan:
     certificate: Certificate | None = None
     """Certificate of the rendered model on a device; None for a plan made by hand"""
     refused: tuple[str, ...] = ()
-    """Refused simpler structures, each with the failed inequality and its margin"""
+    """Refused candidate structures, each with the reason"""
     limited: Model | None = None
     """Model rendered in place of `model` because the device is too weak; None: `model`"""
     accept_force_error: float = ACCEPTED_FORCE_ERROR
     """Largest force error that is accepted [share of the range of the identified force]"""
     needs: str = ""
-    """Device property that `model` needs; empty if `model` is rendered, or if no property helps"""
+    """Device property that `model` needs for a certificate or an accepted force error; empty if the plan has
+    both, or if no property helps"""
 
     def __post_init__(self) -> None:
         instance_of("model", self.model, Model, "make one with palpate.identify or palpate.load_model")
@@ -109,8 +110,7 @@ class Plan:
     def verdict(self) -> Verdict:
         """Verdict on the plan: on its certificate and its force error.
 
-        The verdict is "no" if no structure is certified for the device, or if the force error exceeds its
-        accepted limit.
+        The verdict is "no" if the certificate is refused, or if the force error exceeds its accepted limit.
         """
         return Verdict((*self._certificate_findings(), *self._force_findings()))
 
@@ -196,7 +196,7 @@ class Plan:
         return slope, slope if self.scheme.compensated else steepest
 
     def summary(self) -> dict[str, str]:
-        """Returns the main properties of a certified plan for display, by name."""
+        """Returns the main properties of a plan with a certificate for display, by name."""
         assert self.certificate is not None
         error, certificate = self.force_error, self.certificate
         rows = {"structure": self.description}
@@ -231,7 +231,7 @@ class Plan:
         return rows
 
     def certified_for(self, device: DeviceProfile) -> Plan:
-        """Returns the plan with its certificate on a device; the verdict of the certificate can be no."""
+        """Returns the plan with its certificate on a device; the certificate can be refused."""
         return replace(self, certificate=certify(self.rendered, self.scheme, device))
 
     def check_for(self, device: DeviceProfile) -> None:

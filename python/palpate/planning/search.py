@@ -38,7 +38,7 @@ def plan(
     predict: int | Literal["auto", "off"] = "auto",
     accept_force_error: float = ACCEPTED_FORCE_ERROR,
 ) -> Plan:
-    """Chooses the simplest structure that is certified for a model on a device.
+    """Chooses the first candidate structure that is not refused for a model on a device.
 
     ``palpate plan --help`` lists the candidate structures in the order in which they are tried. Missing
     numbers are chosen from the device.
@@ -52,7 +52,7 @@ def plan(
     coupling : bool
         Renders through a virtual coupling even if none is needed.
     coupling_stiffness, coupling_damping : float, optional
-        K_c and B_c [force/position, force*s/position]; either requires a coupling.
+        K_c and B_c [force/position, force*s/position]; either implies `coupling`.
     mass, object_damping : float, optional
         Mass and damping of the object [force*s^2/position, force*s/position]. Default: those of the model. 0
         removes them.
@@ -69,8 +69,9 @@ def plan(
     Returns
     -------
     Plan
-        Read its ``verdict`` first. It is "no" if the force error is larger than accepted, or if no structure
-        holds; the plan is then the last candidate. Its certificate lists the proved inequalities.
+        Read its ``verdict`` first. It is "no" if the force error is larger than accepted, or if every
+        structure is refused; in the latter case the plan is the last candidate with a certificate. Its
+        certificate lists all inequalities.
 
     Raises
     ------

@@ -34,7 +34,7 @@ MEAN_APPLIED = "mean_applied"
 act in one tick."""
 
 _GRID = 1001
-"""Number of positions at which the force range is computed [-]"""
+"""Number of positions, and of velocities, at which the force range is computed [-]"""
 _TOLERATED_ERROR_SHARE = 0.02
 """Largest force error without a finding [share of the force range]"""
 
@@ -50,8 +50,8 @@ _NAMES = {int(value): name for name, value in Status.__members__.items()}
 
 
 def rig_for(model: Model) -> TestRig:
-    """Returns the test rig for a model: default knob and hand, scaled to the model unless its position is an
-    angle."""
+    """Returns the test rig for a model: the default knob, scaled to the model unless its position is an
+    angle, and a hand that moves it through the model's domain."""
     return _core.simulation.rig_for(model, is_angle=model.units["position"] == "rad")
 
 
@@ -90,7 +90,8 @@ def simulate(
     Raises
     ------
     InputError
-        The structure would diverge on this device, or a number is out of range.
+        The structure would diverge on this device, the certificate is for another device, or a number is out
+        of range.
     """
     instance_of("plan", plan, Plan, "make one with palpate.plan")
     instance_of("device", device, DeviceProfile, "make one with palpate.DeviceProfile")
@@ -132,20 +133,23 @@ def simulate(
 
 @dataclass(frozen=True)
 class ForceError:
-    """Rendered minus identified force at the handle's true position, RMS over all ticks [N*m or N]."""
+    """Rendered minus identified force at the handle's true position: RMS over all ticks [N*m or N], and work
+    [J]."""
 
     end: float
     """RMS force error at the end of the tick in which the force is held; a force that is predicted for a
     later position makes this error smaller"""
     instant: float
-    """Force error at the instant of reading the position: only the effects of structure and encoder"""
+    """RMS of the held force minus the force at the position from the start of the tick; without delay, only
+    the effects of structure and encoder"""
     mean: float
     """RMS over all ticks of the mean force error in each tick"""
     band: float
     """RMS of the error of the mean force over each tick, only its frequencies below 50 Hz: the part that a
     hand can follow"""
     work: float
-    """Work of the force error over the whole time [J]; negative if the rendering gives energy to the hand"""
+    """Work of the force error over the whole time [J]; negative if the rendering absorbs less energy than the
+    identified model"""
 
 
 def force_error(plan: Plan, rendered: Recording) -> ForceError:
@@ -153,7 +157,7 @@ def force_error(plan: Plan, rendered: Recording) -> ForceError:
 
     With F the force of the device, x the true motion and T the period, the error of the mean over tick k is
     the integral of F(t) - f(x(t)) over the tick, divided by T. The error below 50 Hz is the sequence of these
-    errors after a low-pass filter without phase.
+    errors after a low-pass filter without phase shift.
 
     Parameters
     ----------
@@ -291,7 +295,7 @@ class Comparison:
 
 
 def compare_structures(model: Model, rig: TestRig, duration: float) -> tuple[Comparison, ...]:
-    """Renders a model with each structure and measures its force error.
+    """Renders a model with each structure except energy-consistent, and measures its force error.
 
     The order is that of the usual force errors: direct, with and without prediction; massless
     behind a coupling, with the coupling's spring subtracted from the model; massless. Implicit with mass

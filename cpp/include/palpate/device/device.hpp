@@ -38,7 +38,7 @@ struct Opened {
 };
 
 /// A haptic device of one degree of freedom. `exchange` sends a force command and returns the next sample. It waits for
-/// the sample if the device's clock sets the rate of the loop, and returns at once if the host's clock sets the rate.
+/// the next sample if the device's clock sets the rate of the loop.
 template <class D>
 concept Device = requires(D& device, const Command& command) {
     { device.open() } -> std::same_as<Opened>;
@@ -47,8 +47,7 @@ concept Device = requires(D& device, const Command& command) {
 };
 
 /// True if the device's clock sets the rate of the control loop: `exchange` waits for the device's next sample. Such a
-/// device class has a member `paces_host`. With other devices `exchange` returns at once, and the host's clock sets the
-/// rate.
+/// device class has a member `paces_host`. With other devices the host's clock sets the rate.
 template <Device D>
 inline constexpr bool paces_host = [] {
     if constexpr (requires { D::paces_host; }) {

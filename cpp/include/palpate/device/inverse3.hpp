@@ -60,11 +60,11 @@ struct Inverse3Info {
 ///   session.configure.profile.name is in the first message only.
 /// - config.filters.force_gate.gain and .damping.scalar. The service applies both filters and a global scale to forces.
 ///
-/// Older versions of the service name the vector `values` and ignore unknown keys. If the received state never shows a
-/// force after force commands, the exchange therefore returns the status Fault.
+/// Older versions of the service name the vector `values` and ignore unknown keys. If the received state shows zero
+/// force for more than 200 consecutive commands of a force, the exchange therefore returns the status Fault.
 ///
 /// Position 0 is the position of the handle on opening. The service does not send its time, so device_time is the
-/// host's time when the answer arrives. An exchange parses JSON and therefore allocates memory.
+/// host's time at the end of the exchange. An exchange parses JSON and therefore allocates memory.
 class Inverse3Device {
   public:
     explicit Inverse3Device(Inverse3Settings settings = {}) : settings_{std::move(settings)} {}
@@ -148,7 +148,7 @@ class Inverse3Device {
         double velocity = 0.0;
         double echoed = 0.0;  ///< force that the service reported last [N]
         std::uint64_t sequence = 0;
-        /// Number of consecutive messages in which the service reports zero force although a force was commanded
+        /// Number of consecutive exchanges in which the service reports zero force although a force was commanded
         int states_without_effect = 0;
         std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
 

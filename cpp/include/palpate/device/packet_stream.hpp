@@ -20,7 +20,7 @@ struct StreamHealth {
     std::uint64_t lost = 0;       ///< samples that the device sent and that did not arrive
     std::uint64_t repeated = 0;   ///< samples that arrived twice or out of order
     std::uint64_t malformed = 0;  ///< packets of a wrong size, first byte or version
-    /// Packets that confirm a command sent before this program opened the device, or never sent
+    /// Packets that confirm a command older than the last confirmed one, or not sent by this program
     std::uint64_t late_echoes = 0;
     std::uint64_t watchdog_trips = 0;  ///< number of times the watchdog ended a torque
 
@@ -71,10 +71,10 @@ class PacketStream {
         return true;
     }
 
-    /// Marks that packets were discarded. The step to the next packet then does not count lost samples, and commands
-    /// sent before the next packet have no delay.
+    /// Marks that packets were discarded. The step to the next packet then does not count lost samples, and the delay
+    /// of commands sent before the next packet is not measured.
     void pause() noexcept { follows_ = false; }
-    /// Returns true if no packet was discarded after the last packet that was read.
+    /// Returns true if a packet was read after the last pause().
     [[nodiscard]] bool follows() const noexcept { return follows_; }
 
     /// Returns the packet of the next command, to be sent at the time `now`.
@@ -105,8 +105,8 @@ class PacketStream {
         std::int64_t sample_us = std::numeric_limits<std::int64_t>::min();
     };
 
-    /// Finds the command that a packet confirms, and measures its delay. The numbers of commands start after the first
-    /// confirmed number, so that a confirmation of an earlier session's command is recognised.
+    /// Finds the command that a packet confirms, and measures its delay. The numbers of commands start after the last
+    /// number confirmed before the first command, so that a confirmation of an earlier session's command is recognised.
     void follow_echo(const wire::InPacket& packet, Nanoseconds now) noexcept {
         const auto ahead = static_cast<std::int16_t>(packet.out_sequence - echoed_);
         const auto unsent = static_cast<std::int16_t>(packet.out_sequence - sent_);
@@ -149,7 +149,7 @@ class PacketStream {
     }
 
     /// Returns the velocity that the device measured. If the device does not measure velocity, returns the difference
-    /// quotient of the last two positions.
+    /// quotient of the last two positions: 0 for the first packet, the last velocity for a repeated packet.
     [[nodiscard]] double velocity(const wire::InPacket& packet, const Reading& now, bool first,
                                   std::int64_t step) const noexcept {
         if ((info_.capabilities & wire::measures_velocity) != 0) {
@@ -160,9 +160,9 @@ class PacketStream {
         return follows ? (now.position - reading_.position) / elapsed : first ? 0.0 : reading_.velocity;
     }
 
-    /// Returns the status of a packet. A report of the watchdog counts only after a command of this session has reached
-    /// the device, because earlier reports belong to earlier sessions. If the torque is disabled after it was enabled,
-    /// the device has restarted.
+    /// Returns the status of a packet. A report of the watchdog or of an invalid command counts only after a command of
+    /// this session has reached the device, because earlier reports belong to earlier sessions. A torque that is
+    /// disabled after it was enabled is a fault.
     [[nodiscard]] Status status_of(std::uint16_t bits) noexcept {
         const bool tripped = (bits & wire::watchdog_tripped) != 0 && is_acknowledged_;
         const bool refused = (bits & wire::bad_packet) != 0 && is_acknowledged_;
@@ -194,7 +194,7 @@ class PacketStream {
     /// True if the delay of the command confirmed by the last packet was longer than allowed
     bool is_late_ = false;
     bool was_enabled_ = false;
-    bool follows_ = false;  ///< true if no packet was discarded after the last packet that was read
+    bool follows_ = false;  ///< true if a packet was read after the last pause()
     std::uint16_t status_bits_ = 0;
     std::array<SentCommand, 64> sent_commands_{};
     Reading reading_;

@@ -34,24 +34,26 @@ struct UsbHealth {
     std::uint64_t skipped_commands = 0;
     std::uint64_t lost_commands = 0;  ///< commands that did not arrive at the device
     std::uint64_t timeouts = 0;       ///< ticks in which no packet arrived before the deadline
-    std::uint64_t discarded = 0;      ///< received packets discarded unread, because the host was late
-    std::uint64_t stalls = 0;         ///< number of times a USB endpoint halted
-    std::uint64_t bus_errors = 0;     ///< USB transfers that failed on the bus
+    /// Received packets discarded unread, after opening or because the host was late
+    std::uint64_t discarded = 0;
+    std::uint64_t stalls = 0;      ///< number of times a USB endpoint halted
+    std::uint64_t bus_errors = 0;  ///< USB transfers that failed on the bus
 };
 
 /// A haptic device of one degree of freedom over USB; device/wire.hpp defines packets and signs.
 ///
-/// The packets of the device set the rate of the control loop. An exchange sends its command at once, then waits for
-/// the next packet, at most `UsbOptions::wait`. If the host is late by one or two packets, it processes all of them,
-/// and sends only the command for the last packet. If more than 4 packets wait, the host discards them. After opening
-/// and after discarded packets, the first exchange only reads, so that every command is sent directly after a packet.
-/// An exchange neither allocates nor throws; libusb uses its own locks, and the wait uses a futex.
+/// The packets of the device set the rate of the control loop. An exchange sends its command, then waits for the next
+/// packet, usually at most `UsbOptions::wait`. If the host is late by up to 4 packets, it processes all of them, and
+/// skips the commands for old packets, but not two in a row. If more than 4 packets wait, the host discards them. After
+/// opening and after discarded packets, the first exchange sends no command if a packet arrives within two periods, so
+/// that commands are sent directly after a packet. An exchange does not throw. It allocates only within libusb, which
+/// uses its own locks; the wait uses a futex.
 ///
 /// Reading::status:
 /// - Timeout: no packet arrived, the device's watchdog ended the torque, or a command took longer than
 ///   `UsbOptions::longest_delay_s`.
-/// - Fault: the device reported a fault, was disabled or was unplugged. This status is permanent.
-/// - Lost: a command did not arrive, or the device did not understand it.
+/// - Fault: the device reported a fault, was disabled or was unplugged. The control loop ends after this status.
+/// - Lost: a command could not be sent, did not arrive, or was not understood by the device.
 /// - Limited: the device limited the torque of a command.
 ///
 /// Reading::sequence, the number of the sample, shows lost and repeated samples.
@@ -91,7 +93,7 @@ class UsbDevice {
         }
         const Nanoseconds deadline = monotonic_now() + std::chrono::nanoseconds{options_.wait}.count();
         // After discarded packets no command is sent before the next packet. If no packet arrives, the exchange still
-        // sends a command, because a device may send no packets until the first command.
+        // sends a command.
         const bool is_reference = restarted() && next_packet(monotonic_now() + 2 * open_->frame);
         if (!is_reference) {
             send_or_skip(command.force, deadline);
@@ -194,7 +196,8 @@ class UsbDevice {
         std::uint64_t discarded = 0;
     };
 
-    /// Starts the packets of the device and enables its torque. Returns "", or a sentence with the reason and the cure.
+    /// Starts the packets of the device and, if `makes_force` is set, enables its torque. Returns "", or a sentence
+    /// with the reason and the cure.
     [[nodiscard]] std::string start() {
         detail::UsbConnection& connection = open_->connection;
         open_->stream = PacketStream{connection.info(), longest_delay()};
@@ -270,8 +273,8 @@ class UsbDevice {
         return true;
     }
 
-    /// Discards all waiting packets and returns true, if there are too many of them or if packets were discarded
-    /// before.
+    /// Discards all waiting packets and returns true, if there are too many of them or if no packet was read after the
+    /// last pause.
     [[nodiscard]] bool restarted() noexcept {
         if (open_->stream.follows() && open_->transfers->arrived() <= most_waiting_packets) {
             return false;
@@ -285,9 +288,9 @@ class UsbDevice {
         return true;
     }
 
-    /// Sends the command for the last packet. If a newer packet has already arrived, the command is skipped, and the
-    /// command for the newer packet is sent instead. Two consecutive commands are never both skipped, and the command
-    /// after an invalid reading is never skipped for a newer packet.
+    /// Sends the command for the last packet. The command is skipped if the previous command is still in flight, or if
+    /// a newer packet has already arrived. Two consecutive commands are never both skipped for newer packets, and the
+    /// command after an invalid reading is never skipped for one.
     void send_or_skip(double force, Nanoseconds deadline) noexcept {
         const bool ended = wait_for_last_write(deadline);
         const bool behind = !ended || (open_->reading_is_valid && open_->transfers->arrived() > 0);
@@ -300,10 +303,10 @@ class UsbDevice {
         }
     }
 
-    /// Waits until the last command has been sent. Returns true if it has. The end of a command and the packet that
-    /// wakes the host come in the same USB frame (1 ms), in any order. A command that ends much later was sent in the
-    /// next frame, close to a newer packet. Waiting for the newer packet prevents this command and all later commands
-    /// from being one frame late.
+    /// Waits until the last command has ended or a newer packet has arrived. Returns true if the command has ended. The
+    /// end of a command and the packet that wakes the host come in the same USB frame (1 ms), in any order. A command
+    /// that ends much later was sent in the next frame, close to a newer packet. Waiting for the newer packet prevents
+    /// this command and all later commands from being one frame late.
     [[nodiscard]] bool wait_for_last_write(Nanoseconds deadline) noexcept {
         detail::UsbTransfers& transfers = *open_->transfers;
         if (!transfers.writes()) {
@@ -350,7 +353,8 @@ class UsbDevice {
         return reading;
     }
 
-    /// Returns a copy of the last reading with the given status, for a failed tick. Only its position is valid.
+    /// Returns a copy of the last reading with the given status, for a failed tick; an empty reading if the device is
+    /// closed. Only the position of the copy is valid.
     [[nodiscard]] Reading failed(Status status) const noexcept {
         Reading reading = open_ == nullptr ? Reading{} : open_->stream.reading();
         reading.status = status;

@@ -88,7 +88,7 @@ inline constexpr std::size_t in_size = 32;
 inline constexpr std::size_t out_size = 16;
 inline constexpr std::size_t info_size = 32;
 
-/// Packet that the device sends once in each USB frame of 1 ms.
+/// Packet that the device sends `Info::rate_hz` times a second.
 struct InPacket {
     std::uint16_t sequence = 0;
     std::uint32_t clock_us = 0;      ///< time of the sample by the device's clock; 0 again after 71 minutes
@@ -262,7 +262,7 @@ class ByteWriter {
 }
 
 /// Extends a counter that restarts at 0 after its largest value to a 64-bit counter that does not restart. A step of
-/// more than half the counter's range counts as a negative step.
+/// half the counter's range or more counts as a negative step.
 template <std::integral Counter>
 class Unwrapped {
   public:

@@ -28,8 +28,9 @@ struct TankSettings {
 /// where F is the force that acted, u the measured motion of the handle, `unsure` the part of u without counted losses,
 /// b the counted device damping and f_c the counted friction. W is the bound of the stored energy (`StoredEnergy`). If
 /// G exceeds W, the tank reduces all forces, to zero at G = W + W / 4 (W of the domain). This includes forces against
-/// the motion of the handle, because a force that is held too long reverses the handle and then gives energy. The given
-/// energy minus the counted losses is at most W plus this reserve of W / 4.
+/// the motion of the handle, because a force that is held too long reverses the handle and then gives energy. Except
+/// for the work of forces that were already sent, the given energy minus the counted losses is at most W plus this
+/// reserve of W / 4.
 ///
 /// In a run with a certificate, u is the motion that the encoder readings prove (`ReadMotion`), and the tank counts all
 /// damping and friction of the device. A handle with the motion u can have caused the same readings. The certificate

@@ -44,8 +44,7 @@ struct GuardSettings {
     GuardSettings guards;
     guards.force_limit = device.force_limit;
     guards.largest_speed *= scale.length;
-    // Below a speed of a few encoder steps per sample, a moving handle can give equal readings, so it is not a frozen
-    // encoder.
+    // Below a speed of one encoder step per sample, a moving handle can give equal readings; the factor 3 is a reserve.
     guards.frozen_speed =
         std::max(guards.frozen_speed * scale.length, 3.0 * device.encoder_step / device.period_s);
     guards.limit_cycle_force *= scale.length * scale.stiffness();

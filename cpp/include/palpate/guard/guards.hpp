@@ -19,24 +19,24 @@
 
 namespace palpate {
 
-/// Checks of each position sample before the rendering uses the sample, and limits of each force before it is sent. A
-/// simulation uses only the force limit, because other faults cannot occur in a simulation.
+/// Checks of each position sample before the rendering uses the sample, and limits of each force before it is sent.
+/// `simulate` uses only the force limit.
 struct Guards {
     ReadingGuard reading{};  ///< checks the position measured in each tick
-    /// Limits the computed force to the device's force limit, before all other limits of the force
+    /// Limits the computed force to the force limit, before all other limits of the force
     ForceLimit limit{};
     /// Detects limit cycles; after each limit cycle, all forces are multiplied by a smaller factor
     LimitCycleDetector limit_cycle{};
-    ForceRamp ramp{};     ///< start ramp: increases the force from zero
-    SlewLimit slew{};     ///< limits the change of the force from tick to tick
-    EnergyTank tank{};    ///< limits the energy that the rendering may give
-    ReadMotion motion{};  ///< computes the handle motion that is certain in spite of encoder steps
+    ForceRamp ramp{};                   ///< start ramp: increases the force from zero
+    SlewLimit slew{};                   ///< limits the change of the force from tick to tick
+    EnergyTank tank{};                  ///< limits the energy that the rendering may give
+    ReadMotion motion{};                ///< computes the motion of the handle for the energy accounts
     PassivityObserver ramp_observer{};  ///< sums the energy that the rendering absorbs during the start ramp
     PassivityObserver observer{};       ///< sums the energy that the rendering absorbs after the start ramp
 };
 
 /// Returns an upper bound of the energy that a rendering stores while handle and virtual object do not move and are
-/// inside the domain of the model [J]. The bound is infinite for an active model, which gives energy in every period.
+/// inside the domain of the model [J]. The bound is infinite for a periodic model that gives energy in every period.
 ///
 /// The device receives c(f), the force f of the model limited to the force limit. The virtual object stores C = int
 /// c(f) dx, with hysteresis at most r max h / 2 more (`energy_range`). A virtual coupling stores P = K_c e^2 / 2 at a

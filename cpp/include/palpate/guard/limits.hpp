@@ -16,7 +16,8 @@ namespace palpate {
 struct ForceLimit {
     double largest = 5.0;  ///< force limit [N or N*m], > 0
 
-    /// Limits the force to the range from -`largest` to `largest`; returns `Limited` if the force was changed.
+    /// Limits the force to the range from -`largest` to `largest`; returns `Limited` if the force was clipped,
+    /// `NonFinite` if it was not finite.
     [[nodiscard]] Status apply(double& force) const noexcept {
         if (!std::isfinite(force)) {
             force = 0.0;
@@ -28,8 +29,7 @@ struct ForceLimit {
     }
 };
 
-/// Limits the change of the force between two ticks. Force zero, which is sent after a fault, can always be sent at
-/// once.
+/// Limits the change of the force between two ticks. The zero force after a fault does not pass through this limit.
 struct SlewLimit {
     double largest_step =
         std::numeric_limits<double>::infinity();  ///< largest change of force in a tick [N or N*m], > 0

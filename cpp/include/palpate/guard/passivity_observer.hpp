@@ -5,12 +5,12 @@
 
 namespace palpate {
 
-/// Observes the energy that a rendering has absorbed at the motor since its start,
+/// Sums the energy that a rendering absorbs at the motor,
 ///
 ///     E_k = E_{k-1} + F (x_k - x_{k-1}),   F the force that acted during the motion.
 ///
-/// x_k is the handle position of sample k. For a held force the computed energy is exact except for the effect of
-/// encoder steps. The observer never changes a force.
+/// x_k is the handle position of sample k, or the position that the readings prove (`ReadMotion`). For a held force the
+/// computed energy is exact except for the effect of encoder steps. The observer never changes a force.
 class PassivityObserver {
   public:
     /// Adds the energy that the force `applied` absorbed during the motion `moved` of the handle.
@@ -19,7 +19,7 @@ class PassivityObserver {
         least_ = std::min(least_, energy_);
     }
 
-    /// Returns the energy E_k that the rendering has absorbed since the start [J].
+    /// Returns the absorbed energy E_k [J].
     [[nodiscard]] double energy() const noexcept { return energy_; }
     /// Returns the smallest energy E_k since the start [J]. If it is less than minus the energy that the virtual object
     /// stored at the start, the rendering has generated energy; the damping of the device may have dissipated this

@@ -92,7 +92,7 @@ class ReadingGuard {
     bool started_ = false;
     bool was_fast_ = false;
     std::uint64_t last_sequence_ = 0;
-    std::uint64_t exchanges_ = 0;        ///< ticks since the last valid sample
+    std::uint64_t exchanges_ = 0;        ///< exchanges whose samples have not arrived
     std::uint64_t resting_samples_ = 0;  ///< consecutive ticks with equal position of the handle
     std::uint64_t lost_ = 0;
     std::uint64_t repeated_ = 0;

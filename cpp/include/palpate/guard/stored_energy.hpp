@@ -9,8 +9,7 @@ namespace palpate {
 
 /// Numbers from which the upper bound of the energy that a rendering stores is computed.
 struct StoredEnergySettings {
-    /// Largest energy of the virtual object inside its domain plus the largest energy of its virtual coupling at the
-    /// force limit [J]
+    /// Bound of the energy stored at rest inside the domain (`largest_stored_energy`) [J]
     double within = std::numeric_limits<double>::infinity();
     double lower = -std::numeric_limits<double>::infinity();  ///< lower end of the domain [m or rad]
     double upper = std::numeric_limits<double>::infinity();   ///< upper end of the domain [m or rad]
@@ -23,7 +22,7 @@ struct StoredEnergySettings {
 /// Upper bound W of the stored energy of a rendering minus its smallest stored energy, for all positions since the
 /// start,
 ///
-///     W <= W_domain + F_max (l_below + l_above + l_stretch) + m v^2 / 2,
+///     W = W_domain + F_max (l_below + l_above + l_stretch) + m v^2 / 2,
 ///
 /// where W_domain is the largest energy inside the domain, F_max the force limit, and v the largest speed of the
 /// virtual object. The lengths l_below and l_above are the largest distances of handle or virtual object from the

@@ -62,10 +62,10 @@ class GrowingFile {
     GrowingFile(const GrowingFile&) = delete;
     GrowingFile& operator=(const GrowingFile&) = delete;
 
-    /// Creates NAME.part. Returns the reason if the file cannot be created, otherwise "". An existing NAME.part without
-    /// a writer is the only copy of an interrupted recording; it is renamed to the first free name of NAME.1.part,
-    /// NAME.2.part, ... With `force` an existing NAME is replaced when the new file is finished; if NAME is a symbolic
-    /// link, the target of the link is replaced.
+    /// Creates NAME.part. Returns the reason if the file cannot be created, otherwise "". An existing NAME.part with
+    /// content but without a writer is the only copy of an interrupted recording; it is renamed to the first free name
+    /// of NAME.1.part, NAME.2.part, ... With `force` an existing NAME is replaced when the new file is finished; if
+    /// NAME is a symbolic link, the target of the link is replaced.
     [[nodiscard]] std::string open(const std::string& name, bool force = false) {
         force_ = force;
         name_ = name;
@@ -91,8 +91,9 @@ class GrowingFile {
                 }
             }
         }
-        // Locks NAME.part. Only a program that reads the new file can delay the lock. On a file system without locks
-        // (some network file systems) no other program writes the recording either, because O_EXCL created a new file.
+        // Locks NAME.part. Only a program that locks the new file first can delay the lock. On a file system without
+        // locks (some network file systems) no other program writes the recording either, because O_EXCL created a new
+        // file.
         (void)::flock(descriptor_, LOCK_EX);
         std::string reason = name_conflict();
         if (!reason.empty()) {

@@ -146,8 +146,9 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
         read, {hysteresis.numbers(), linear[0], network["bias_hysteresis"].number()}, domain, play_radius};
 }
 
-/// Returns the model that a plan renders instead of the identified model; nothing if the plan renders the identified
-/// model. Both models must have the same number of inputs, and both or neither must have hysteresis.
+/// Returns the model that a plan renders instead of the identified model; nothing without a plan, or if the plan
+/// renders the identified model. Both models must have the same number of inputs, and both or neither must have
+/// hysteresis.
 inline std::optional<ForceModel> read_limited(const JsonField& file) {
     if (file["plan"].is_null() || file["plan"]["network"].is_null()) {
         return std::nullopt;

@@ -65,7 +65,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
 }
 
 /// Reads the certificate of a plan and computes it again from the rendered model and the device. Throws if the stored
-/// certificate differs from the computed certificate.
+/// certificate does not agree with the computed certificate (`checked`).
 [[nodiscard]] inline std::optional<Certificate> read_certificate(const JsonField& file,
                                                                  const std::optional<Scheme>& plan,
                                                                  const ForceModel& model,

@@ -19,8 +19,8 @@ namespace palpate {
 /// Metadata at the start of a recording, as pairs of a key and its text.
 using Metadata = std::vector<std::pair<std::string, std::string>>;
 
-/// A flight record: a CSV recording with `#` lines of metadata, a header of names that end in a unit, and one row for
-/// each tick. The start of the file reserves space for the exit reason and the timing of the run, which are
+/// A recording that is written during a run: a CSV file with `#` lines of metadata, a header of names with units, and
+/// one row for each tick. The start of the file reserves space for the exit reason and the timing of the run, which are
 /// written at the end of the run.
 class RecordingFile {
   public:

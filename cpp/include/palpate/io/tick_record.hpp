@@ -72,9 +72,9 @@ inline void append_nanoseconds(std::string& text, double seconds) {
 
 }  // namespace detail
 
-/// Returns the column names of a recording: name of the quantity, underscore, unit. The columns `position` and `force`
-/// come first, so that a reader of recordings chooses them without options. The unit `radps` of the velocity is not in
-/// the reader's table of units, so that a reader does not take the velocity for another quantity.
+/// Returns the column names of a recording: name of the quantity, then underscore and unit, if it has one. A reader of
+/// recordings chooses `position` and `force` by these names, without options. The unit `radps` of the velocity is not
+/// in the reader's table of units, so that a reader does not take the velocity for another quantity.
 [[nodiscard]] inline std::string column_names(const RecordUnits& units) {
     const std::string position = suffix_of(units.position);
     const std::string force = suffix_of(units.force);

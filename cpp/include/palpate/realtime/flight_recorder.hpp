@@ -22,7 +22,7 @@ concept RecordConsumer = requires(C& consumer, std::span<const Record> records) 
 };
 
 /// Moves records out of a real-time loop. The loop adds records to a ring buffer; a separate thread passes the records
-/// to the consumer every few milliseconds. Records that do not fit into the ring buffer are lost and counted.
+/// to the consumer periodically. Records that do not fit into the ring buffer are lost and counted.
 template <class Record, RecordConsumer<Record> Consumer>
 class FlightRecorder {
   public:

@@ -73,7 +73,7 @@ class SleepInhibitor {
 
 namespace detail {
 
-/// Returns the highest core number among the processor cores that this process may use.
+/// Returns the highest core number among the processor cores that this thread may use.
 [[nodiscard]] inline int last_allowed_cpu() noexcept {
     cpu_set_t allowed;
     CPU_ZERO(&allowed);
@@ -96,9 +96,9 @@ inline void prefault_stack() noexcept {
 
 }  // namespace detail
 
-/// Makes the calling thread a real-time thread: it receives only signals of faults of the thread, such as SIGSEGV, runs
-/// on one processor core with first-in-first-out scheduling, and has its stack in memory. Returns one sentence for each
-/// request that the operating system refused.
+/// Makes the calling thread a real-time thread: it receives only signals of faults of the thread, such as SIGSEGV, has
+/// the core and the priority in `options`, and has 64 KiB of its stack in memory. Returns one sentence for each request
+/// that the operating system refused, those of `memory` and `inhibitor` included.
 [[nodiscard]] inline std::vector<std::string> become_real_time(const RealTimeOptions& options,
                                                                const LockedMemory& memory,
                                                                const SleepInhibitor& inhibitor) {

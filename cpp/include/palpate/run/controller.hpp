@@ -16,7 +16,7 @@ struct Tick {
     Reading reading;             ///< reading from which the force was computed
     Rendered rendered;           ///< force that the structure computed
     Command command;             ///< force sent to the device, after all guards
-    Status status = Status::Ok;  ///< most serious status of the tick
+    Status status = Status::Ok;  ///< status of the tick; `limit_force` states the order
 };
 
 /// Runs the ticks of the control loop: check the reading, compute the force, limit the force, exchange force and next

@@ -24,7 +24,7 @@ struct LoopSettings {
     double duration_s = 10.0;  ///< duration of the run [s]; infinity = until a stop is requested
     /// Least share of rate_hz; a lower rate for half a second ends the loop; 0 = no check.
     double lowest_rate_share = 0.8;
-    std::uint64_t tolerated = 5;  ///< allowed consecutive ticks without a valid sample; more end the loop
+    std::uint64_t tolerated = 5;  ///< allowed consecutive ticks that send no force; more end the loop
     /// Longest time between two ticks [s]. A longer time ends the loop, because the certificate does not hold for it.
     double longest_period_s = std::numeric_limits<double>::infinity();
 };
@@ -50,7 +50,7 @@ enum class ExitReason : std::uint8_t {
     TimeUp,
     StopRequested,
     Guard,        ///< a guard found a wrong position or force
-    DeviceFault,  ///< the device reported a fault or did not respond
+    DeviceFault,  ///< the device reported a fault, did not respond or lost samples
     RateTooLow,
     NotCertified,  ///< a tick came later than the certificate allows
 };
@@ -123,10 +123,11 @@ namespace detail {
 
 }  // namespace detail
 
-/// Runs the control loop (wake up, run a tick, pass the tick's record to `sink`) until the duration ends, a stop is
-/// requested, a guard or the device ends the loop, or the rate is too low. On every exit it sends zero force and closes
-/// the device. `clock` has start() and wait(); `sink` has push(record). Apart from the clock and the device's
-/// `exchange`, the loop does not allocate, lock, throw, log or make a system call.
+/// Runs the control loop: wake up, run a tick, pass the tick's record to `sink`. The loop runs until the duration ends,
+/// a stop is requested, a guard or the device ends the loop, the rate is too low, or a tick is later than the
+/// certificate allows. On every exit it sends zero force and closes the device. `clock` has start() and wait(); `sink`
+/// has push(record). Apart from the clock and the device's `exchange`, the loop does not allocate, lock, throw, log or
+/// make a system call.
 template <class Control, class Clock, class Sink>
 void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
               const std::atomic<bool>& stop_requested, Sink& sink, LoopProgress& progress,

@@ -24,7 +24,7 @@ namespace palpate {
 struct MeasureOptions : RunOptions {
     RecordUnits units;
     bool probe = false;  ///< true: the device moves the handle slowly between lower and upper
-    /// Settings of the slow motion; unset: default values scaled to the device
+    /// Settings of the slow motion; unset: defaults (`chosen_probe`)
     std::optional<double> lower, upper, speed, stiffness, force_limit;
     std::optional<double> push;   ///< force of the short pushes; unset: no pushes [N or N*m]
     bool keep = false;            ///< true: the summary contains the records of all ticks
@@ -47,7 +47,8 @@ inline constexpr auto fields_of<MeasureOptions> = std::tuple_cat(
 
 namespace detail {
 
-/// Returns the settings of the probe: the given values, otherwise default values multiplied by the scale of the device.
+/// Returns the settings of the probe: the given values, otherwise defaults. The default speed and stiffness are
+/// multiplied by the scale of the device; the default force limit is that of the device.
 [[nodiscard]] inline ProbeSettings chosen_probe(const MeasureOptions& options, const LiveDevice& device) {
     ProbeSettings probe;
     probe.lower = options.lower.value_or(probe.lower);

@@ -46,7 +46,7 @@ namespace palpate {
     const double period_s = 1.0 / options.loop.rate_hz;
     live->scale = scale_of(model.model, false);
     // The service does not send inertia, damping and friction of the device. The profile of the certificate is used;
-    // without a certificate, damping and friction are 0.
+    // without a certificate, or with `uncertified`, damping and friction are 0.
     if (!options.uncertified && model.certificate) {
         live->profile = model.certificate->device;
     } else {

@@ -59,7 +59,7 @@ struct RecordSinks {
     Range positions;  ///< smallest and largest position of the handle [m or rad]
     /// Smallest and largest sent force, or force of a real object [N or N*m]
     Range forces;
-    std::uint64_t extrapolated = 0;  ///< number of ticks with a position outside the model's domain
+    std::uint64_t extrapolated = 0;  ///< number of ticks with a model evaluation outside its domain
 
   private:
     std::vector<TickRecord> recorded_;

@@ -195,9 +195,9 @@ namespace detail {
 /// A certificate holds only if the measured rate is at least this factor times the certified rate [-].
 inline constexpr double certified_rate_share = 0.99;
 
-/// Sets guards and control loop to the values of the certificate: force limit, longest time between two ticks, and the
-/// device's damping and friction for the energy tank. Disables the slew limit, and lets the loop end after the first
-/// tick without a force, because the proofs of the certificate include neither.
+/// Sets guards and control loop to the values of the certificate: force limit, least rate, longest time between two
+/// ticks, and the device's damping and friction for the energy tank. Disables the slew limit, and lets the loop end
+/// after the first tick without a force, because the proofs of the certificate include neither.
 inline void apply_certificate(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
     guards.certified = true;
     guards.slew_s = 0.0;

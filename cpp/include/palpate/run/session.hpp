@@ -69,7 +69,7 @@ struct LoopSink {
 using Watch = std::function<void(const SessionView&)>;
 
 /// Runs the control loop on an open device until the loop ends. When it returns, the device is closed at zero force,
-/// and `sinks` has received the records of all ticks.
+/// and `sinks` has received the records of all ticks, except lost ones.
 template <class Control>
 [[nodiscard]] SessionReport run_session(Control& controller, const SessionSettings& settings,
                                         RecordSinks& sinks, const std::atomic<bool>& stop_requested,

@@ -110,7 +110,7 @@ namespace palpate {
 }
 
 /// Writes the exit reason and the timing into the recording, renames the file, and sets `name` to its final name.
-/// Returns a warning if rows are missing, and a warning if the file could not be renamed.
+/// Returns a warning if the disk failed, and a warning if the file could not be renamed.
 [[nodiscard]] inline std::vector<std::string> finish_record(RecordingFile& file, const SessionReport& report,
                                                             const LoopSettings& settings, std::string& name) {
     std::vector<std::string> warnings;

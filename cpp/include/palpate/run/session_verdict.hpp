@@ -39,7 +39,8 @@ namespace detail {
 /// A run is not good if missed ticks divided by planned ticks exceed this limit, or if lost and repeated samples
 /// divided by ticks exceed this limit [-]
 inline constexpr double tolerated_loss = 0.001;
-/// A run is not good if the ticks in which guards changed the force, divided by all ticks, exceed this limit [-]
+/// A run is not good if the ticks with one kind of finding in `judge_forces`, divided by all ticks, exceed this limit
+/// [-]
 inline constexpr double tolerated_change = 0.01;
 /// A recording of a real object is not good if the handle's travel is less than this number of encoder steps
 inline constexpr double fewest_encoder_steps = 50;
@@ -90,7 +91,7 @@ inline void judge_losses(const SessionReport& report, const LoopSettings& settin
     }
 }
 
-/// Adds findings about ticks in which the sent force differed from the model's force.
+/// Adds findings about ticks with a changed or unsolved force or outside the domain, and about a run without a force.
 inline void judge_forces(const LoopReport& loop, const RecordSinks& sinks, const SessionExpectation& expected,
                          std::vector<SessionFinding>& findings) {
     const std::uint64_t ticks = loop.timing.ticks();
@@ -165,7 +166,7 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
     for (const std::string& warning : expected.warnings) {
         findings.push_back({"usable", warning});
     }
-    if (is_orderly(report.loop.exit_reason)) {  // the motion of a run that was stopped early is not judged
+    if (is_orderly(report.loop.exit_reason)) {  // forces and motion are not judged after a fault
         detail::judge_forces(report.loop, sinks, expected, findings);
         detail::judge_motion(sinks, expected, findings);
     }

@@ -38,7 +38,7 @@ struct Summary {
     std::vector<TickRecord> kept;       ///< records of all ticks; empty if the caller did not require them
     std::vector<std::string> notes;     ///< messages to the user from the preparation of the run
     std::vector<std::string> warnings;  ///< warnings about the recording
-    /// Message that names the file NAME.fault.csv, which holds the last ticks before a fault; empty without a fault
+    /// Message about the file NAME.fault.csv with the last ticks before a fault; empty without a fault or a recording
     std::string last_ticks;
     std::vector<SessionFinding> findings;
     std::string device;

@@ -21,13 +21,14 @@
 
 namespace palpate {
 
-/// One tick of a simulated run, with the handle's motion and the applied force at the start and at the end of the tick.
+/// One tick of a simulated run, with the handle's motion at its start and end, and the applied force before it and at
+/// its end.
 struct SimulatedTick {
     std::size_t number = 0;
     Tick tick;
     Motion start;               ///< position and velocity of the handle at the start of the tick
     Motion end;                 ///< position and velocity of the handle at the end of the tick
-    double force_before = 0.0;  ///< force of the motor at the start of the tick [N or N*m]
+    double force_before = 0.0;  ///< force of the motor before the tick [N or N*m]
     double force = 0.0;         ///< force of the motor at the end of the tick [N or N*m]
 };
 
@@ -55,13 +56,13 @@ struct ClosedLoopSettings {
     int substeps = usual_substeps;  ///< number of integration steps in each tick
     double start_position = 0.0;    ///< start position of the handle [m or rad]
     double start_velocity = 0.0;    ///< start velocity of handle and hand [m/s or rad/s]
-    Guards guards{};                ///< guards of the rendering; by default only the device's force limit
+    Guards guards{};                ///< guards of the rendering; by default only a force limit of 5
 };
 
 /// Result of a simulated run: energies, position and velocity of the handle at two times, and number of ticks.
 struct ClosedLoopEnd {
     EnergyAccount energy;
-    Motion at_first_force;  ///< position and velocity of the handle when the first computed force acts
+    Motion at_first_force;  ///< motion of the handle at the end of the delay, rounded up to whole ticks
     Motion handle;          ///< position and velocity of the handle at the end of the run
     std::size_t ticks = 0;  ///< number of ticks of the run
 };
@@ -103,10 +104,10 @@ struct Trace {
     std::vector<double> mean_applied;          ///< mean of the applied force during the tick [N or N*m]
     std::vector<int> evaluations;              ///< number of evaluations of the model in the tick
     std::vector<Status> status;
-    std::vector<std::uint8_t> extrapolated;  ///< 1 if y lies outside the model's domain
+    std::vector<std::uint8_t> extrapolated;  ///< 1 if the model was evaluated outside its domain
 };
 
-/// Largest number of ticks that `simulate` accepts: one hour at 1 kHz, which needs about 270 MB of memory.
+/// Largest number of ticks that `simulate` accepts: one hour at 1 kHz, which needs more than 300 MB of memory.
 inline constexpr std::size_t most_simulated_ticks = 3'600'000;
 
 /// Returns the number of ticks in a simulated time. Throws std::invalid_argument if the number is not 1 to
@@ -160,7 +161,7 @@ template <class Each>
     return trace;
 }
 
-/// Renders a model on a simulated device and returns its trace: `simulate` without the function `watch`.
+/// Renders a model on a simulated device and returns its trace: `simulate` without the function `each`.
 [[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
                                     const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
                                     int substeps = usual_substeps, double start_position = 0.0) {

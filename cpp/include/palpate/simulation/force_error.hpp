@@ -20,7 +20,7 @@ namespace palpate {
 /// - instant: F(t_k + T) - f(x(t_k)), RMS
 /// - mean: e_k = (1/T) integral of F(t) - f(x(t)) dt, RMS
 /// - band: e_k after a low-pass of 50 Hz without phase shift, RMS
-/// - work: integral of (F - f) dx over all ticks; below 0 the rendering gives energy
+/// - work: integral of (F - f) dx over all ticks; below 0 the rendering absorbs less energy than the model
 ///
 /// The error `end` is small also for a force that wrongly leads the motion. The error `mean` is not, so it describes
 /// the error that a hand feels, because a hand is slow compared with the sample rate.
@@ -30,7 +30,7 @@ struct ForceError {
     double instant = 0.0;
     double mean = 0.0;  ///< RMS of the mean force error of each tick [N or N*m]
     double band = 0.0;  ///< RMS of the mean force error of each tick, parts above 50 Hz removed [N or N*m]
-    double work = 0.0;  ///< work of the force error on the handle [J]
+    double work = 0.0;  ///< work of the handle against the force error [J]
 };
 
 /// Parts of the force error above this frequency are removed for `ForceError::band` [Hz].

@@ -17,7 +17,7 @@ struct Mechanics {
     double friction = 0.0;  ///< Coulomb friction f_c [N or N*m]
 };
 
-/// Base class of integrators of the handle's motion that store nothing between ticks and have no force transducer.
+/// Base class of integrators of the handle's motion without a force transducer.
 struct PlainPlant {
     /// Does nothing, because this integrator stores nothing between ticks.
     void start() noexcept {}
@@ -30,7 +30,7 @@ struct PlainPlant {
 /// The semi-implicit Euler method, the usual integrator of a simulated handle. Coulomb friction can stop the handle,
 /// but never reverses its velocity.
 struct SemiImplicitEuler : PlainPlant {
-    /// Moves the handle over one tick.
+    /// Moves the handle over `substeps` steps of duration `step`.
     void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,
               Motion& motion) const noexcept {
         const double inertia = handle.inertia + grip.mass;
@@ -53,7 +53,7 @@ struct MountedObject {
 
     void start() noexcept {}
 
-    /// Moves the handle over one tick.
+    /// Moves the handle over `substeps` steps of duration `step`.
     void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,
               Motion& motion) const noexcept {
         for (int k = 0; k < substeps; ++k) {
@@ -94,7 +94,7 @@ class Midpoint : public PlainPlant {
     // NOLINTNEXTLINE(bugprone-derived-method-shadowing-base-method): never called through the base
     void start() noexcept { account_ = {}; }
 
-    /// Moves the handle over one tick and updates the energy account.
+    /// Moves the handle over `substeps` steps of duration `step` and updates the energy account.
     void tick(const Mechanics& handle, const Grip& grip, double applied, double step, int substeps,
               Motion& motion) noexcept {
         const double momentum = 2.0 * (handle.inertia + grip.mass) / step;

@@ -17,7 +17,7 @@
 
 namespace palpate {
 
-inline constexpr int usual_substeps = 20;   ///< number of integration steps of the handle in 1 ms
+inline constexpr int usual_substeps = 20;   ///< default number of integration steps in a tick of 1 ms
 inline constexpr int most_substeps = 1000;  ///< largest allowed number of integration steps in one tick
 
 /// A simulated haptic device with a hand. Each exchange simulates one tick. The simulation includes inertia, viscous
@@ -141,7 +141,8 @@ using SimulatedRig = SimulatedHandle<Hand, MountedObject>;
 static_assert(Device<SimulatedDevice>);
 static_assert(Device<SimulatedRig>);
 
-/// Returns the number of integration steps in one tick of a period [s], so that each step is 1/20 ms for every rate.
+/// Returns the number of integration steps in one tick of a period [s], so that each step is about 1/20 ms for every
+/// rate.
 [[nodiscard]] inline int simulated_substeps(double period_s) noexcept {
     return std::max(1, static_cast<int>(std::lround(usual_substeps * (period_s / 1e-3))));
 }

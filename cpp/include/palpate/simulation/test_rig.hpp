@@ -19,8 +19,9 @@
 
 namespace palpate {
 
-/// Simulated device and hand, scaled to a model. For a model with positions in rad it is the default knob. For any
-/// other unit, lengths and forces of the default knob and its hand are multiplied by the scale of the model.
+/// Simulated device and hand, scaled to a model. For a model with positions in rad the device is the default knob. For
+/// any other unit, lengths and forces of the default knob are multiplied by the scale of the model. The hand moves the
+/// handle through the model's domain.
 struct TestRig {
     DeviceProfile device;
     Hand hand;
@@ -57,11 +58,12 @@ namespace detail {
     return motion[last] + rendered[last].force / hand_stiffness;
 }
 
-/// Returns a simulated hand that moves the handle through the model's domain, except 1 % at both ends.
+/// Returns a simulated hand that moves the handle through the model's domain, except 1 % at both ends, as far as the
+/// force limit allows.
 ///
 /// The hand is a spring to a moving target. The distance from handle to target is the rendered force divided by the
 /// hand's stiffness. The target is computed for the default coupling, which reduces the force. With a stiffer structure
-/// the hand presses the handle less far, so the handle never leaves the domain.
+/// the hand presses the handle less far. The handle therefore stays in the domain during slow motion.
 [[nodiscard]] inline Hand sweeping_hand(const ForceModel& model, const TestRig& rig) {
     constexpr int steps = 1000;
     const double lower = model.domain().lower[0];

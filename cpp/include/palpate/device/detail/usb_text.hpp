@@ -15,7 +15,8 @@
 
 namespace palpate::detail {
 
-/// Returns a text with the cause of a libusb error and the action by which the user can correct it.
+/// Returns a text with the cause of a libusb error and the cure; only the name and meaning of an error without such a
+/// text.
 [[nodiscard]] inline std::string usb_reason(int code) {
     static_assert(LIBUSB_ERROR_IO == -1 && LIBUSB_ERROR_ACCESS == -3 && LIBUSB_ERROR_NO_MEM == -11);
     const std::string_view cause = wire::usb_cause(code);

@@ -33,10 +33,11 @@ struct UsbArrival {
 };
 
 /// The USB transfers between a device and this program: two queued reads, at most one unfinished write, at most one
-/// unfinished request, and one thread for libusb's events. All memory is allocated at the start.
+/// unfinished request, and one thread for libusb's events. Except within libusb, all memory is allocated at the start.
 ///
 /// The control loop's thread writes commands and takes received packets; the event thread runs the callbacks of libusb.
-/// Members that both threads use are atomic. A transfer counts as in flight until the last line of its callback.
+/// Counters and flags that both threads use are atomic. A transfer counts as in flight until the end of its callback, a
+/// stalled command until the halt of its endpoint is cleared.
 class UsbTransfers {
   public:
     UsbTransfers(libusb_context* context, libusb_device_handle* handle)
@@ -67,7 +68,7 @@ class UsbTransfers {
         return error_.load(std::memory_order_acquire);
     }
 
-    /// Cancels every transfer and waits until all transfers have ended. Errors of the device are ignored.
+    /// Cancels every transfer and waits until all transfers have ended, at most 5 s. Errors of the device are ignored.
     void stop() noexcept {
         if (!events_.joinable()) {
             return;
@@ -145,8 +146,8 @@ class UsbTransfers {
     [[nodiscard]] bool wait_for_write(Nanoseconds deadline) noexcept {
         return wait_until([&] { return !writes(); }, deadline);
     }
-    /// Waits until the command in flight has ended or a packet has arrived. Returns false if neither happened before
-    /// the deadline.
+    /// Waits until the command in flight has ended, a packet has arrived or the connection has failed. Returns false if
+    /// none of them happened before the deadline.
     [[nodiscard]] bool wait_for_write_or_arrival(Nanoseconds deadline) noexcept {
         return wait_until([&] { return !writes() || arrived() > 0 || has_failed(); }, deadline);
     }
@@ -156,7 +157,7 @@ class UsbTransfers {
     /// Takes the oldest received packet from the queue. Returns false if the queue is empty.
     [[nodiscard]] bool take(UsbArrival& arrival) noexcept { return arrivals_.pop({&arrival, 1}) == 1; }
 
-    /// Returns true after an error that ends the connection: the device was unplugged, or errors were repeated.
+    /// Returns true after an error that ends the connection, such as an unplugged device or repeated errors.
     [[nodiscard]] bool has_failed() const noexcept { return error_.load(std::memory_order_acquire) != 0; }
     /// Returns the first libusb error code that ended the connection; 0 without such an error.
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_acquire); }
@@ -198,8 +199,8 @@ class UsbTransfers {
 
     /// Processes libusb's events until stop() is called.
     void handle_events() noexcept {
-        // The event thread has a higher priority than the control loop, because an unprocessed packet makes the loop
-        // late.
+        // The event thread has a higher priority than the default of the control loop, because an unprocessed packet
+        // makes the loop late.
         const sched_param priority{90};
         (void)pthread_setschedparam(
             pthread_self(), SCHED_FIFO,
@@ -215,7 +216,8 @@ class UsbTransfers {
         }
     }
 
-    /// Restarts a halted USB endpoint: cancels the transfers of the endpoint, clears the halt, and submits them again.
+    /// Restarts a halted USB endpoint. For packets: cancels all reads, clears the halt, and submits the reads again.
+    /// For commands: clears the halt and allows the next command.
     void recover() noexcept {
         if (stopping_.load(std::memory_order_acquire) || has_failed()) {
             return;
