@@ -168,7 +168,7 @@ class ClassSelection:
         if kept is candidate.solution:
             return candidate
         if problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse and any(bound.seam for bound in bounds):
-            # If the constraints of a periodic model raise the error, equal slopes at its ends are not imposed.
+            # If the constraints of a periodic model raise the error, equal slopes of its ends are dropped.
             bounds = [bound for bound in bounds if not (bound.seam and bound.of_slope)]
             kept = impose(problem, candidate.solution, bounds)
         worse = problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse
