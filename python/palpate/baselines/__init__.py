@@ -3,7 +3,7 @@
 
 All methods have the same interface: ``fit(X, y)`` returns the estimator, ``predict(X)`` the force,
 ``n_parameters_`` counts every fitted real number. X (n, 1 to 3) holds position and, if known, velocity and
-acceleration.
+acceleration; for `PerStroke` the stroke is one more column.
 """
 
 from .comparison import PASSIVE_SPLINE, Compared, baselines, comparable, compare

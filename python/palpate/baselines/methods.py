@@ -27,7 +27,8 @@ SMOOTHINGS = (30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.0, 0.9, 0.8)
 the force]."""
 
 MOST_FITTED_ROWS = 20_000
-"""Largest number of fitted rows; of longer data an evenly spread part is used."""
+"""Largest number of rows to which the law of Hunt and Crossley is fitted; of more rows an evenly spread part
+is used."""
 
 EXPONENTS = (0.5, 6.0)
 """Smallest and largest exponent of the tissue law of Hunt and Crossley [-]."""
@@ -101,7 +102,7 @@ def merged(x: Float1D, y: Float1D) -> tuple[Float1D, Float1D, Float1D]:
 class PerStroke:
     """One copy of an estimator for each stroke.
 
-    The last column of X is the stroke: above 0 press, below 0 release.
+    The last column of X is the stroke: above 0 press, else release.
 
     Parameters
     ----------
@@ -140,13 +141,13 @@ class PerStroke:
 class LookupTable:
     """Forces at evenly spaced positions with straight lines between them, fitted by least squares.
 
-    f(x) = (1 - t) f_i + t f_(i+1), t = (x - x_i) / (x_(i+1) - x_i). Outside the table the force keeps its end
-    values.
+    Entries that the rows do not determine are left out. f(x) = (1 - t) f_i + t f_(i+1), t = (x - x_i) /
+    (x_(i+1) - x_i). Outside the table the force keeps its end values.
 
     Parameters
     ----------
     size : int, optional
-        Number of entries; by default the number that predicts held-out rows best.
+        Number of entries; by default the choice of :func:`best_of`.
     """
 
     size: int | None = None
@@ -180,7 +181,7 @@ class LookupTable:
 
 @dataclass
 class SmoothingSpline:
-    """Cubic spline with the fewest knots whose squared error is below a multiple of the noise.
+    """Cubic smoothing spline whose squared error is at most a multiple of the noise.
 
     FITPACK's algorithm (Dierckx 1975) adds knots at the largest error until sum_k (y_k - f(x_k))^2 <=
     smoothing * n * sigma^2. The noise sigma^2 is estimated from the difference of each row from the mean of
@@ -190,7 +191,8 @@ class SmoothingSpline:
     Parameters
     ----------
     smoothing : float, optional
-        Largest residual as a multiple of the noise; by default the one that predicts held-out rows best.
+        Largest mean squared residual as a multiple of the noise variance; by default the choice of
+        :func:`best_of`.
     """
 
     smoothing: float | None = None
@@ -317,13 +319,13 @@ class LinearZones:
     """Zones of the travel with F = m a + B v + k (x - x_0) in each, fitted by least squares.
 
     After MacLean (1996): a threshold on the error of a linear zone sets the number of zones. A zone with a
-    larger RMS error is divided at the place that reduces it most. Forces jump between zones.
+    larger RMS error and enough rows is divided at the place that reduces it most. Forces jump between zones.
 
     Parameters
     ----------
     threshold : float, optional
-        Largest RMS error of a zone, as a share of the force's range; by default the one that predicts
-        held-out rows best.
+        Largest RMS error of a zone, as a share of the force's range; by default the choice of
+        :func:`best_of`.
     """
 
     threshold: float | None = None

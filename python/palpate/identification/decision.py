@@ -56,7 +56,7 @@ def latest(decisions: Iterable[Decision]) -> tuple[tuple[Decision, ...], tuple[D
 
 
 def signed(value: float) -> str:
-    """Returns a number with its sign and three digits, whole from 100 on."""
+    """Returns a number with its sign: at most three digits below 100, else without decimals."""
     return f"{value:+.0f}" if abs(value) >= _ROUNDED else f"{value:+.3g}"
 
 

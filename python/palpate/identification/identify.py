@@ -41,7 +41,8 @@ def identify(
     """Identifies a model of force over position from recordings.
 
     Tries the model classes constant, linear, position and hysteresis, and takes the simplest that the data
-    supports. A recording with further inputs gives a force over all of them (constant, linear, network).
+    supports; with time, mass, damping and velocity too. A recording with further inputs gives a force over
+    all of them (constant, linear, network).
 
     Parameters
     ----------
@@ -91,8 +92,8 @@ def identify(
         require_in_range("position", each.position)
         require_in_range("force", each.force)
     rows = rows_of(recordings, settings)
-    # The matrices have a few hundred rows: several threads make the computation slower and change the last
-    # digits of the result.
+    # The matrices are small: several threads make the computation slower and change the last digits of the
+    # result.
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_rows(replace(rows, findings=(*isolated, *rows.findings)), settings)
     source = Source.merged(part.source for part in recordings)
@@ -128,7 +129,7 @@ def fit_environment(
     within: float = 0.0,
     units: Mapping[str, Unit] | None = None,
 ) -> FittedNetwork:
-    """Identify a force law from arrays.
+    """Identifies a force law from arrays.
 
     Parameters
     ----------
@@ -180,8 +181,8 @@ def fit_rows(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
 
 
 def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
-    """Identifies without the rows of direction 0; if hysteresis is then not accepted, identifies with all
-    rows."""
+    """Identifies without the rows of direction 0 if hysteresis is tested; if it is not accepted, identifies
+    again with all rows."""
     side = rows.side
     if side is not None and not ((side > 0).any() and (side < 0).any()):
         rows, side = replace(rows, side=None), None

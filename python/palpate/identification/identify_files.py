@@ -50,11 +50,12 @@ from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from
 
 LEAST_KNOWN_SHARE = 0.5
-"""Hysteresis is tested only if the direction of at least this share of the rows is known [-]."""
+"""Without a direction column, hysteresis is tested only if the order of rows shows the direction of at least
+this share of the rows [-]."""
 
 MOST_CELLS = 8192
-"""Largest number of position cells in a summary of the rows: enough for the resolution of an
-identification."""
+"""Largest number of distinct positions, or of cell widths in the range of positions, in a summary of the
+rows: enough for the resolution of an identification."""
 
 UNKNOWN_STROKES = "the files have no direction column, and the order of rows does not show the direction"
 """Text of the decision that hysteresis is not tested, if the directions of the rows are not known."""
@@ -83,12 +84,12 @@ def identify_files(
     invalid: Literal["refuse", "drop"] = "refuse",
     **options: Any,
 ) -> Model:
-    """Identify one environment from CSV or Parquet files that are read part by part.
+    """Identifies one environment from CSV or Parquet files that are read part by part.
 
     Only force, position and direction are read: the model classes are constant, linear, position and
     hysteresis. Without a direction the strokes are taken from the order of rows within each block of 500 000
-    rows. Positions that do not repeat are gathered in at most 8192 cells. Every row is used or left out and
-    counted.
+    rows. More than 8192 distinct positions are gathered in about 8192 cells at most. Every row is used or
+    left out and counted.
 
     Parameters
     ----------
@@ -156,7 +157,8 @@ def identify_files(
     notes: list[str] = []
     for recording, found in zip(recordings, of_file, strict=True):
         _require_all_rows(recording, found)
-        # Returns the source of a model: the columns of the files, without the format of the files.
+        # The first note repeats the columns of the source, and is used only if it states the format of the
+        # file.
         sentences = [note for note in recording.notes[:1] if "read as" in note]
         sentences += [*recording.notes[1:], *found.left_out.sentences(recording.places())]
         notes += [f"{recording.path}: {each}" for each in sentences] if len(recordings) > 1 else sentences
@@ -177,8 +179,7 @@ class PartRead:
     left_out: LeftOut = field(default_factory=LeftOut)
 
     def add(self, summary: Summary | None, rows: int) -> None:
-        """Adds the following rows: the numbers of read and left out rows, and the summary of the used
-        rows."""
+        """Adds the number of the following rows, and the summary of those that are used."""
         self.rows += rows
         if summary is not None:
             self.summary = summary if self.summary is None else merged(self.summary, summary)
@@ -292,8 +293,8 @@ def _known_strokes(summary: Summary) -> bool:
 
 
 def _untested(summary: Summary, force_unit: Unit) -> Finding:
-    """Returns a finding that hysteresis could not be tested, with the largest difference of strokes that the
-    rows allow."""
+    """Returns a finding that hysteresis could not be tested, with the standard deviation of the force at
+    equal positions."""
     scatter = summary.scatter
     reach = float(np.ptp(summary.force)) or 1.0
     return usable(
@@ -485,7 +486,7 @@ def in_order(
     scheduler: str | None = None,
     done: Callable[[int], None] = lambda count: None,
 ) -> Iterator[Result]:
-    """Returns work(item) of every item, in the order of items.
+    """Yields work(item) of every item, in the order of items.
 
     Parameters
     ----------

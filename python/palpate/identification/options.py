@@ -64,10 +64,11 @@ class SearchOptions:
     max_candidates: int = 4096
     """Largest number of candidate wavelets in the frame [-]"""
     resolved_by: int = 7
-    """Least number of distinct positions, on every stroke, in a wavelet's core |u| <= sqrt(3) [-]"""
+    """Least number of distinct positions, on every stroke, in a wavelet's core |u| <= sqrt(3) [-]; 5 may
+    suffice if the residual is not noise"""
     max_positions: int = 1024
-    """Largest number of distinct positions, doubled for each further input; with more, positions are gathered
-    in this number of cells [-]"""
+    """Largest number of distinct positions, doubled for each further input, and while cells are too wide (at
+    most three times); with more, positions are gathered in about this number of cells [-]"""
     filters: str = "matched"
     """Filters for the forces of mass and damping: matched, or as published with an assumed mass:
     paper-implicit (figure 11), paper-explicit (figure 13)"""
@@ -81,8 +82,8 @@ class SearchOptions:
     """Play radii tried for hysteresis if a recording has time but no direction; the best radius between the
     smallest and the largest is searched [share of the travel]"""
     contact_share: float = 0.02
-    """Largest force at the lower end of the domain, as a share of the force range, at which the tool leaves
-    the object there: continuation "free" below the domain [-]"""
+    """Largest |force| at the lower end of the domain, as a share of the force range, at which the tool leaves
+    the object there: continuation "free" below the domain; at least the RMS error [-]"""
 
     def __post_init__(self) -> None:
         _require(self)
@@ -267,7 +268,7 @@ def kind_of(each: Field[Any]) -> str:
 
 
 def default_of(each: Field[Any]) -> Any:
-    """The default of a field of the options."""
+    """Returns the default of a field of the options."""
     return each.default if each.default_factory is MISSING else each.default_factory()
 
 

@@ -40,7 +40,7 @@ SETTINGS = {
     for each in fields(IdentifyOptions)
     if each.name in ("max_wavelets", "criterion", "loss", "search")
 }
-"""Settings of :class:`IdentifyOptions` that need no recording, with their defaults. The value None of search
+"""Settings of :class:`IdentifyOptions` that the estimator has, with their defaults. The value None of search
 means the default search settings."""
 
 LEAST_RELATIVE_RANGE = 1e-12
@@ -55,7 +55,8 @@ most the third digit of the error."""
 class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """A wavelet network fitted to any X (n, d), y (n,).
 
-    Minimises sum_k v_k (y_k - f(x_k))^2 over w, alpha, beta, c and b, with sample weights v and
+    With the loss "squares", minimises sum_k v_k (y_k - f(x_k))^2 plus a small penalty on large w over w,
+    alpha, beta, c and b, with sample weights v and
 
         f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b,  psi(u) = (|u|^2 - d) exp(-|u|^2 / 2).
 
@@ -78,18 +79,23 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     n_wavelets_, n_parameters_ : int
         Size of the network; every fitted real number is counted.
     stop_reason_ : str
-        The criterion that stopped growth, "max_wavelets", or "data" where it allows no further parameter.
+        The criterion that stopped growth, "max_wavelets", or "data" if no further wavelet can be added.
     path_ : list of dict
         Every network that was considered: n_wavelets, rmse, criterion, model_class.
     n_features_in_, feature_names_in_
         As in every scikit-learn estimator.
 
-    Notes ----- The network's domain is the smallest box around the rows of X, made wider on each side by 1/(m
-    - 1) of its width for m distinct rows: the extremes of m random values lie inside their true range by
-    about this distance. Outside the domain the network continues as a straight line, with the gradient at the
-    nearest point of the domain; a falling gradient is set to 0, because a falling force would push a hand
-    further away. Q. Zhang, *Using wavelet network in nonparametric estimation*, IEEE Transactions on Neural
-    Networks 8 (2), 1997.
+    Notes
+    -----
+    The network's domain is the smallest box around the rows of X, made wider on each side by 1/(m - 1) of its
+    width for m distinct rows. The extremes of m random values lie inside their true range by about this
+    distance. Outside the domain the network continues as a straight line. Its gradient is that at the nearest
+    point of the domain, limited to values from 0 to the largest gradient inside. A falling force would push a
+    hand further away. With one input, a force that pushes out of the domain rises at least as steeply as
+    max|f| over the width of the domain.
+
+    Q. Zhang, *Using wavelet network in nonparametric estimation*, IEEE Transactions on Neural Networks 8 (2),
+    1997.
 
     Examples
     --------
@@ -121,7 +127,7 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     def fit(
         self, X: npt.ArrayLike, y: npt.ArrayLike, sample_weight: npt.ArrayLike | None = None
     ) -> WaveletNetworkRegressor:
-        """Fit the network.
+        """Fits the network.
 
         Parameters
         ----------
@@ -176,8 +182,9 @@ def fit_regression(
 ) -> tuple[NDArray[np.int64], FittedNetwork]:
     """Fits f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b (paper eq. 4) to rows of any meaning.
 
-    The model classes are constant, linear and network. The criterion compares them on n samples, where n is
-    the sum of the weights. A model class with n or more parameters is not tried.
+    The model classes are constant, linear and network. A criterion that uses the fitted rows compares them on
+    n samples, where n is the sum of the weights of the used rows. A model class with n or more parameters is
+    not tried.
 
     Parameters
     ----------
@@ -192,14 +199,14 @@ def fit_regression(
     Returns
     -------
     (columns, network)
-        Indices of the columns of X that are inputs of the network (constant columns are left out), and the
-        network. The domain of the network is wider than the range of the rows by the distance of
-        :func:`_margin`.
+        Indices of the columns of X that are inputs of the network, and the network. Constant columns are left
+        out; if all are constant, the first one is the input. The domain of the network is wider than the
+        range of the rows by the distance of :func:`_margin`.
 
     Raises
     ------
     palpate.InputError
-        No row has a weight above 0.
+        No row has a weight above 0, a value is too large, or there are too few rows to hold out.
     """
     if weight is None:
         weight = np.ones(len(y))
@@ -218,7 +225,7 @@ def fit_regression(
         return columns, scaled.unscaled(scale)
     varies = np.ptp(X, axis=0) > LEAST_RELATIVE_RANGE * np.abs(X).max(axis=0)
     # a network needs an input: if no column of X varies, the first column is the input, in a box as wide as
-    # its value
+    # its value, at least 1
     columns = np.flatnonzero(varies) if varies.any() else np.zeros(1, dtype=np.int64)
     lower, upper = X[:, columns].min(axis=0), X[:, columns].max(axis=0)
     if not varies.any():
@@ -244,8 +251,8 @@ def _margin(box: Float2D) -> float:
     """Returns the estimated distance of the true range of positions from the extreme rows, on each side
     [box].
 
-    The smallest and the largest of m random values lie inside their true range by 1/(m + 1) of this range on
-    average, which is 1/(m - 1) of the span of the m values.
+    The smallest and the largest of m uniformly distributed values lie inside their true range by 1/(m + 1) of
+    this range on average, which is 1/(m - 1) of the span of the m values.
     """
     distinct = np.unique(box) if box.shape[1] == 1 else distinct_rows(box)[0]
     return 1.0 / max(len(distinct) - 1, 1)

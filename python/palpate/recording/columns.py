@@ -121,9 +121,9 @@ def choose_columns(
 
     The rules for position and force apply in this order: (1) A named column wins. (2) If one stem occurs in
     several units, the SI unit wins over a converted one, and both win over counts. (3) A single candidate is
-    chosen. (4) The first stem of the role's list that is present is chosen. (5) The file is refused. The
-    message names all problems and one set of options that solves them. Time follows the same rules, but is
-    optional.
+    chosen. (4) The first stem of the role's list that only one candidate has is chosen. (5) The file is
+    refused. The message names all problems and one set of options that solves them. Time follows the same
+    rules, but is optional.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ def _choose(
 
 
 def _best(candidates: Sequence[Column], notes: list[str]) -> list[list[Column]]:
-    """Returns the candidate columns; if names differ only in the unit, only the columns in SI units."""
+    """Returns the candidate columns by stem; of names that differ only in the unit, those nearest to SI."""
     by_stem: dict[str, list[Column]] = {}
     for column in candidates:
         by_stem.setdefault(stem_key(column.stem), []).append(column)

@@ -33,7 +33,7 @@ LEAST_COMPARED_ROWS = 3
 PLAY_RADIUS_SHARE = 0.02
 """Play radius that separates the strokes, as a share of the distance between least and largest position.
 
-A motion back by less than two play radii does not end a stroke.
+After a reversal, the rows of the first two play radii belong to no stroke.
 """
 
 SPIKE_PERCENT = 0.5
@@ -210,7 +210,7 @@ The ratio is near 1, because the release begins where the press ends: 0.9 to 1.2
 """
 
 MOST_COMPARED_RECORDINGS = 20
-"""Largest number of recordings that are searched for the one that agrees best with all others."""
+"""Largest number of recordings among which the one that agrees best with the others is searched."""
 
 Curve = tuple[Float1D, Float1D]
 """Curve of force over position: mean positions in rising order, and the mean force at each."""
@@ -306,7 +306,7 @@ class _Strokes:
     def of(recording: Recording, side: Float1D | None) -> _Strokes:
         """Returns force over position of each stroke of a recording.
 
-        `side` (n,) is the direction of the rows; with None the recorded direction is used.
+        `side` (n,) is the direction of the rows; with None the result of :func:`sides` is used.
         """
         travel = Travel.of(recording.position)
         signs = sides(recording, travel) if side is None else side
@@ -389,7 +389,10 @@ def _curve(recording: Recording, rows: NDArray[np.bool_]) -> Curve:
 
 
 def _shared_curves(one: _Strokes, other: _Strokes) -> tuple[Curve, Curve]:
-    """Returns force over position of both recordings for the stroke that both contain, else for all rows."""
+    """Returns the curves of two recordings: of the stroke that one holds alone, else of all rows.
+
+    Opposite strokes are compared over all rows.
+    """
     direction = 0 if one.direction * other.direction < 0 else one.direction or other.direction
     return one.curves.get(direction, one.curves[0]), other.curves.get(direction, other.curves[0])
 

@@ -90,7 +90,7 @@ class FileBytes(io.RawIOBase):
 class CsvFile(LongTable):
     """A CSV recording. Opening reads the header; :meth:`read` reads the rows.
 
-    A name that ends in ``.part`` is an incomplete recording. A last line without line feed is ignored.
+    A name that ends in ``.part`` is an incomplete recording: its last line is ignored if it has no line feed.
     """
 
     def __init__(self, path: Path) -> None:

@@ -91,7 +91,7 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
     Raises
     ------
     InputError
-        The bytes are not text, or no header is found.
+        The bytes are not text, no header with usable names is found, or the decimal mark is ambiguous.
     """
     mark, encoding = _encoding(head)
     text = _decoded(file, head[mark:], encoding, whole)
@@ -169,7 +169,7 @@ def _decoded(file: str, head: bytes, encoding: str, whole: bool) -> str | None:
 
 
 def _is_binary(text: str) -> bool:
-    """Returns True if at least a tenth of the characters are control characters, or any character is NUL."""
+    """Returns True if more than a tenth of the first characters are control characters, or one is NUL."""
     start = text[:4096]
     control = sum(unicodedata.category(each) == "Cc" and each not in "\t\n\r\f" for each in start)
     return "\x00" in start or 10 * control > len(start)
@@ -270,10 +270,11 @@ class Header:
 
 
 def find_header(rows: Sequence[Row]) -> Header | None:
-    """Finds the header above the first run of rows with two or more numbers, or None without such rows.
+    """Finds the header above the first run of rows with two or more numbers, or None without one.
 
-    The header is a row above the run with the same number of cells and without numbers. Of several such rows
-    the one with the most units in its names is chosen, then the lowest one.
+    The header is a row above the run without numbers for which :func:`_may_be_header` is true. Of several
+    such rows the one above a row of units is chosen, else the one with the most units in its names, then the
+    lowest one.
     """
     first = next((k for k in range(len(rows)) if _starts_data(rows, k)), None)
     if first is None:

@@ -79,7 +79,8 @@ def readable(path: Path, kind: str) -> Iterator[None]:
 def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator[Path]:
     """Yields a temporary path in the folder of `path`, and renames it to `path` at the end.
 
-    An error removes the temporary file. Its name is unpredictable. An existing file keeps its mode and owner.
+    An error removes the temporary file. Its name is unpredictable. An existing file keeps its mode and, if
+    permitted, its owner.
     A symbolic link is kept and its target is replaced. The content is on the disk before the file is renamed.
 
     Parameters
@@ -209,7 +210,8 @@ def write_csv(
     Raises
     ------
     InputError
-        The folder does not exist or cannot be written, or the metadata does not fit on one line.
+        The folder does not exist or cannot be written, the file exists and `replace` is False, or the
+        metadata does not fit on one line.
     """
     stated = json.dumps({**layout.roles, "inputs": list(layout.inputs)})
     with (

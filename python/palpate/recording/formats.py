@@ -79,7 +79,7 @@ class MemoryTable(Table):
         float64, or objects of str.
     metadata : mapping, optional
     notes : sequence of str, optional
-        Sentences that state how the file was read.
+        Statements on how the file was read, as parts of one sentence.
     first : (str, int), optional
         Word for a row and number of the first one, for the sentences.
     decimal : str
@@ -330,14 +330,14 @@ def _matlab(path: Path) -> Table:
 
 
 def _refuse_damaged(content: bytes) -> None:
-    """Refuses a MATLAB file of version 5 with an element longer than the element or file that contains it.
+    """Refuses a MATLAB file of version 5 with a damaged element, for example one longer than the file.
 
-    `scipy.io.loadmat` crashes on some of them.
+    `scipy.io.loadmat` crashes on some of them. Compressed elements are not examined inside.
 
     Raises
     ------
     ValueError
-        An element is too long; the message names the byte at which it begins.
+        An element is damaged; the message names the byte at which it begins.
     """
     if len(content) < _MATLAB_HEADER_BYTES or 0 in content[:4] or content[125] + content[124] != 1:
         return
@@ -397,7 +397,7 @@ def _vector(array: Any) -> Cells:
 
 
 def _mcap(path: Path) -> Table:
-    """Returns the JSON messages of an MCAP file: each topic is a table of its numbers and of its log time."""
+    """Returns the JSON messages and log times of the only topic of an MCAP file with two values or more."""
     reader = _import_library("mcap.reader", path, "MCAP", "mcap")
     topics: dict[str, list[dict[str, Any]]] = {}
     others: Counter[str] = Counter()

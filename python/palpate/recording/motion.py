@@ -57,7 +57,10 @@ JUMPING_SHARE = 0.1
 """If a larger share of the rows is in jumps of position, the rows are not ordered in time [-]."""
 
 HOLD_SHARE = 0.1
-"""Rows at the last position of a stroke are a hold if they are more than this share of its rows [-]."""
+"""Rows at the last position of a stroke are a hold if they exceed this share of its rows [-].
+
+The share of a sinusoidal reversal within the position noise is added.
+"""
 
 HOLD_ROWS = 10
 """Rows at the last position of a stroke are a hold (direction 0) only if they are at least this many."""
@@ -78,7 +81,8 @@ def strokes_from_order(position: Float1D) -> Int8Vector | None:
     -------
     (n,) array of int8 or None
         +1 into the object, -1 out of it, 0 in a hold at the end of a stroke. All rows have one direction if
-        the position never turns back. None if the rows have no order or are too few.
+        the position never turns back. None if the rows have no order, are too few, or do not
+        move.
     """
     travel = float(np.ptp(position)) if len(position) > LEAST_STROKE_ROWS else 0.0
     if not 0.0 < travel < np.inf:

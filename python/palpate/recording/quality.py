@@ -76,7 +76,7 @@ The force changes while the position is constant; then the position jumps.
 LEAST_JUMP_RATIO = 5.0
 """Least jump of the position that reports a stuck position sensor in the rows before the jump.
 
-The jump is divided by the median change of position between rows.
+The jump is divided by the median change of position between rows with different positions.
 """
 
 LEAST_REGULAR_SHARE = 0.8
@@ -326,7 +326,7 @@ def _inner_range(values: Float1D) -> float:
 def hold_findings(recording: Recording) -> list[Finding]:
     """Returns findings if position or force changes only once in several rows: a repeated, slower sensor.
 
-    If both columns change in the same rows, this is a defect only with time: the time of most rows is wrong.
+    If both columns change equally often, this is a defect only with time: the time of most rows is wrong.
     """
     x, f = recording.position, recording.force
     rows = {"position": _held_for(x), "force": _held_for(f)}

@@ -68,7 +68,7 @@ def read_recording(
     inputs : sequence of str
         Further columns that the force depends on.
     units : mapping of str to str, optional
-        Unit of a column without a unit or with an unknown one. The key is the column's name, or "position",
+        Unit of a column, in place of the one in its name. The key is the column's name, or "position",
         "force" or "time" if that column is also named.
     torque_constant : float, optional
         Torque per current [N*m/A]: converts a force column from A to N*m. By default current remains in A.
@@ -83,8 +83,8 @@ def read_recording(
         Delay of the recorded force after its position [s], for example if the converter of a load cell
         averages. Every force is moved to its position. Needs time.
     invalid : {"refuse", "drop"}
-        Treatment of a row with a missing or infinite number, or with a time that does not increase: refuse
-        the file and name the row, or drop the row and count it.
+        Treatment of a row with a missing or infinite number, without a direction, or with a time that does
+        not increase: refuse the file and name the row, or drop the row and count it.
 
     Returns
     -------
@@ -197,7 +197,7 @@ def recordings_from(
 
 
 PART_ROWS = 4_000_000
-"""Number of rows of one part of a long file, which one process reads."""
+"""Approximate number of rows of one part of a long file, which one process reads."""
 
 BLOCK_ROWS = 500_000
 """Number of rows of a long file that one process holds in memory at a time."""
@@ -295,7 +295,7 @@ def open_long_recording(
     invalid: Literal["refuse", "drop"] = "refuse",
     part_rows: int = PART_ROWS,
 ) -> LongRecording:
-    """Chooses the columns of a file without reading its rows; the arguments are those of `read_recording`.
+    """Chooses the columns of a file and counts its rows; the arguments are those of `read_recording`.
 
     Raises
     ------

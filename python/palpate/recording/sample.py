@@ -31,7 +31,7 @@ SAMPLE_PERIOD = 1e-3
 SLOWEST_HZ, FASTEST_HZ = 0.2, 2.0
 """Lowest and highest frequency at which the simulated hand moves to and fro [Hz]."""
 WANDER_HZ = (0.031, 0.073, 0.127)
-"""Frequencies of the slow changes of the hand's frequency [Hz]; incommensurate, so no motion repeats."""
+"""Frequencies of the slow changes of the hand's frequency [Hz]; their sum repeats only after 1000 s."""
 
 
 def sample_force(x: npt.ArrayLike) -> Float1D:

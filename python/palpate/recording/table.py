@@ -29,7 +29,7 @@ class Places(Protocol):
 
 
 class Table(ABC):
-    """Table that is read in two steps: first its header, to choose the columns, then the chosen columns."""
+    """Table that is read in two steps: first its header, to choose the columns, then its cells."""
 
     names: tuple[str, ...]
     metadata: Mapping[str, str]
@@ -64,7 +64,7 @@ class LongTable(Table):
     def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
         """Returns the number of rows, counted without reading cells, and places (start, stop) of parts.
 
-        Each part has at least about `rows` rows.
+        Each part except the last has at least about `rows` rows.
 
         Raises
         ------

@@ -240,7 +240,8 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
     Raises
     ------
     InputError
-        The recording does not move, is shorter than two samples, or has a time and a speed was given.
+        The recording without time does not move, it lasts less than one period or more than MOST_SAMPLES
+        periods, a speed was given in addition to time, or period or speed is not positive and finite.
     """
     require_period(period_s)
     if recording.time is not None:
@@ -260,7 +261,7 @@ def even_motion(recording: Recording, period_s: float, stroke_speed: float | Non
 
 
 def require_period(period_s: float) -> None:
-    """Refuses a sample time that is not positive."""
+    """Refuses a sample time that is not positive and finite."""
     if not 0 < period_s < np.inf:
         raise InputError(f"period_s is {period_s}: must be > 0 and finite")
 

@@ -39,7 +39,7 @@ MOST_ROWS = 2000
 
 @dataclass(frozen=True)
 class Explanation:
-    """Change of a recording after which the model fits the recording."""
+    """Change of a recording after which the model may fit the recording."""
 
     nrmse: float
     sentence: str
@@ -48,7 +48,7 @@ class Explanation:
 
 
 def explanation(model: Model, recording: Recording, prediction: Prediction) -> Explanation | None:
-    """Returns the simplest change of the recording that at least halves the error, or None.
+    """Returns the simplest change of the recording that more than halves the error, or None.
 
     The changes are: the sign of the force, press and release exchanged, the sign of the position, an offset
     of the force, another unit of force or position, an offset of the position, and a factor of the force.

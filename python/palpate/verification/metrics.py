@@ -55,14 +55,14 @@ def durbin_watson(residual: Float1D) -> float:
 
 
 def force_floor(force: Float1D) -> float:
-    """Returns the smallest just noticeable difference of a recorded force, 1 % of its largest value, in its
-    unit."""
+    """Returns the smallest just noticeable difference of a recorded force, 1 % of its largest |force|, in
+    its unit."""
     return FORCE_FLOOR * float(np.abs(force).max())
 
 
 def share_within_force_jnd(reference: Float1D, error: Float1D) -> float:
-    """Returns the share of samples with an error below 7 % of the local force, or below the smallest just
-    noticeable difference."""
+    """Returns the share of samples with an error of at most 7 % of the local force, or at most the smallest
+    just noticeable difference."""
     allowed = np.maximum(FORCE_JND * np.abs(reference), force_floor(reference))
     return float(np.mean(np.abs(error) <= allowed))
 

@@ -48,7 +48,7 @@ class Prediction:
     position: Float1D
     """(k,) positions at which the force was computed"""
     side: Float1D | None = None
-    """(k,) direction state in [-1, 1]; None for a model without hysteresis"""
+    """(k,) direction state in [-1, 1]; None for a model without hysteresis, or with mass or damping"""
 
 
 def predict(model: Model, recording: Recording, *, play_radius: float | None = None) -> Prediction:
@@ -59,7 +59,7 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
     or with a play radius, the play operator follows the positions in their order. The play radius is the
     first one available of: `play_radius`, the radius of the flight record, of the model, of its plan, or 1 %
     of the travel. A flight record behind a virtual coupling is compared at the position of the virtual
-    object. A flight record with prediction is compared at the predicted position.
+    object, except a compensated one. A flight record with prediction is compared at the predicted position.
 
     Raises
     ------
@@ -246,9 +246,9 @@ def flight_of(recording: Recording) -> FlightRecord:
 def with_strokes(model: Model, recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     """Returns the recording with strokes from its order of rows and a note; otherwise unchanged.
 
-    Strokes are added if the model differs between press and release, and neither time nor a play radius is
-    known. A recording without reversal may be sorted by position; all rows then get the stroke whose model
-    force is nearer.
+    Strokes are added if the model differs between press and release, and no direction, time or play radius of
+    the model is known. A recording without reversal may be sorted by position; all rows then get the stroke
+    whose model force is nearer.
     """
     known = recording.direction is not None or recording.time is not None or model.play_radius is not None
     if known or not model.hysteretic:

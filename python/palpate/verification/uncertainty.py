@@ -52,11 +52,11 @@ class Uncertainty:
     sigma: float
     """Standard deviation of the residuals [force]"""
     autocorrelation: float
-    """Lag-1 autocorrelation of the residuals in recorded order [-]"""
+    """Lag-1 autocorrelation of the residuals in recorded order, limited to 0 to LARGEST_RHO [-]"""
 
     def force(self, position: Float1D, direction: Float1D | None = None) -> Float1D:
-        """Returns the standard error (n,) of the force; outside the domain, that at its edge. Twice this
-        value is a 95 % band."""
+        """Returns the standard error (n,) of the force; outside the domain, that at its edge. Plus and minus
+        twice this value is a 95 % band."""
         inside = np.clip(position, self.model.lower[0], self.model.upper[0])
         return self._error(_jacobian(self.model, inside, direction))
 

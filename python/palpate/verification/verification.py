@@ -119,8 +119,9 @@ def verify(
         As in :func:`palpate.identify`.
     play_radius : float, optional
         Play radius of a hysteresis model [m or rad]. With it the play operator follows the positions, and a
-        direction in the recording is ignored. Without it and without a direction, the radius is that of the
-        flight record, the model or its plan, else 1 % of the model's travel; the notes report its origin.
+        direction in the recording is ignored. Without it and without a direction, given or from the order of
+        rows, the radius is that of the flight record, the model or its plan, else 1 % of the model's travel;
+        the notes report its origin.
 
     Returns
     -------
@@ -187,7 +188,7 @@ def is_fresh(identified_on: Source, data: Source) -> bool:
 
 
 def _stiffness_share(recording: Recording, rows: NDArray[np.bool_], residual: Float1D) -> float | None:
-    """Returns the share of position cells within the stiffness JND, averaged over press and release."""
+    """Returns the share of position cells within the stiffness JND, averaged over the directions."""
     position, reference = recording.position[rows], recording.force[rows]
     strokes = np.zeros(len(position)) if recording.direction is None else recording.direction[rows]
     shares = [
@@ -210,8 +211,8 @@ def circumstances(model: Model, recording: Recording, found: Verification) -> tu
 
 
 def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Finding]:
-    """Returns findings on rows that the model was identified on, rows outside the domain, and rows left
-    out."""
+    """Returns findings on rows that the model was identified on, rows outside the domain, the handle behind a
+    virtual coupling, and rows left out."""
     findings = []
     if not found.fresh:
         findings.append(

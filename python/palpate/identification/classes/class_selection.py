@@ -3,8 +3,8 @@
 
 A model class is compared with the next simpler accepted class on the same samples by the same criterion, with
 constraints imposed. It is accepted only if the criterion decreases by at least `evidence` (of
-:class:`SearchOptions`) and the error on held-out rows decreases too. The notes hold the decrease for every
-class, accepted or not.
+:class:`SearchOptions`) and the error on held-out rows, if it is tested, decreases too. The notes hold the
+decrease for every class, accepted or not.
 """
 
 from __future__ import annotations
@@ -135,8 +135,8 @@ class ClassSelection:
 
     @cached_property
     def motion(self) -> Dynamics | None:
-        """Recorded motion, to which mass and damping are fitted; None if the option inputs is not "auto", or
-        if the force has inputs besides position."""
+        """Recorded motion, to which mass and damping are fitted; None if there is no time, the option inputs
+        is not "auto", the force has inputs besides position, or the filters are those of the paper."""
         data = self.data
         decides = data.parts and len(data.names) == 1 and self.options.inputs == "auto"
         return Dynamics(data, self.options) if decides else None
@@ -157,8 +157,8 @@ class ClassSelection:
     def constrained(self, candidate: Candidate) -> Candidate:
         """Returns the candidate with constraints imposed; adds the change of its error to the notes.
 
-        If the constraints raise the RMS error by more than a few percent, the network is grown further on
-        forces that keep the constraints. The larger network is taken if the criterion prefers it.
+        If the constraints raise the RMS error by more than 1 %, the network is grown further on forces that
+        keep the constraints. The new network is taken if the criterion prefers it.
         """
         options, problem = self.options, candidate.problem
         bounds = self.bounds(problem)
@@ -168,7 +168,7 @@ class ClassSelection:
         if kept is candidate.solution:
             return candidate
         if problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse and any(bound.seam for bound in bounds):
-            # If equal slopes at both ends of a period raise the error, only equal forces are imposed.
+            # If the constraints of a periodic model raise the error, equal slopes of its ends are dropped.
             bounds = [bound for bound in bounds if not (bound.seam and bound.of_slope)]
             kept = impose(problem, candidate.solution, bounds)
         worse = problem.rmse(kept) > REGROWTH_ERROR_RATIO * candidate.rmse
@@ -292,7 +292,7 @@ class Network(ModelClass):
         return below
 
     def _of_size(self, size: int) -> Candidate:
-        """Returns a network of at most `most` wavelets, with constraints imposed."""
+        """Returns a network of at most `size` wavelets, with constraints imposed."""
         selection = self._selection
         whole = size == selection.options.max_wavelets
         problem = selection.samples.problem(selection.rows)

@@ -3,9 +3,9 @@
 
 The force f over position is fitted to unfiltered positions and forces. For m and B every column is filtered
 by the same low-pass L without phase: L F is regressed on L a, L v, L 1, L x and L psi_i(x) (with hysteresis
-on L s, L s x, L s psi_i(x) too), which is exact for any f; L f(x) is not f(L x). Three time constants of L
-are left out at both ends of a piece. Filtered samples are not independent: the number of independent samples
-is computed from their autocorrelation.
+on L s, L s x, L s psi_i(x) too), which is exact for any f of these terms; L f(x) is not f(L x). Three time
+constants of L are left out at both ends of a piece. Filtered samples are not independent: the number of
+independent samples is computed from their autocorrelation.
 """
 
 from collections.abc import Callable, Sequence
@@ -102,11 +102,11 @@ def _rss(gram: Float2D, columns: list[int], solution: Float1D) -> float:
 
 
 SAMPLES_PER_TIME_CONSTANT = 2.0
-"""Number of samples that are kept of a filtered column in each time constant of the low-pass filter [-]: more
-samples would be nearly equal."""
+"""Least number of samples that are kept of a filtered column in the time 1/w_c, with the cutoff w_c of the
+low-pass filter [-]: more samples would be nearly equal."""
 
 LEAST_INDEPENDENT_SAMPLES = 40.0
-"""Least number of independent rows of a recording for a decision on damping and mass."""
+"""Least number of independent samples for a decision on damping and mass; each wavelet needs two more."""
 
 LEAST_SPEED_SPREAD = 0.19
 """Least standard deviation of the speed along the motion divided by the mean speed [-]: that of speeds spread
@@ -198,7 +198,7 @@ class Dynamics:
         return regression.solved(use, names), decisions
 
     def _unit_of(self, name: str) -> str:
-        """Unit of damping or mass; empty if the units of force and position are not known."""
+        """Returns the unit of damping or mass; empty if the units of force and position are not known."""
         force, position = self._data.force_unit.si, self._data.position_unit.si
         if not (force and position):
             return ""
@@ -231,7 +231,7 @@ class Dynamics:
         return at_rows(self._parts, self._low_pass, derive, len(self._data.force))
 
     def share_of_velocity(self, residual: Float1D, basis: Basis, *, friction: bool) -> float:
-        """Returns the share of the variance of a residual (n,) that functions of velocity and position
+        """Returns the share of the mean square of a residual (n,) that functions of velocity and position
         explain.
 
         The functions are v|v|, and v times 1, x and psi_i(x), with velocity v, position x and the wavelets

@@ -26,7 +26,7 @@ from .findings import USABLE_NRMSE
 
 REPORTED_ERROR_RATIO = 2.0
 """Ratio of the RMS error with the constraint hysteresis h >= 0 to the RMS error without this constraint,
-above which a finding names a cure [-]."""
+above which a finding or a note names a cure [-]."""
 
 FIRST_MAX_WAVELETS = 4
 """Largest number of wavelets that a network with hysteresis has before the play radius is searched for the
@@ -50,7 +50,7 @@ MOST_ROWS = 100_000
 
 
 class Hysteresis(ModelClass):
-    """Network with hysteresis, f = g + s h; it is grown if the criterion accepts hysteresis or the options
+    """Network with hysteresis, f = g + s h; it is grown if hysteresis lowers the criterion or the options
     name it."""
 
     name = "hysteresis"
@@ -65,12 +65,12 @@ class Hysteresis(ModelClass):
 
     @classmethod
     def possible(cls, selection: ClassSelection) -> bool:
-        """True if the options allow hysteresis and the rows show directions.
+        """True if the options allow hysteresis and the rows have directions or the starts of motions.
 
         Raises
         ------
         InputError
-            The inputs name hysteresis, and the rows show no directions.
+            The inputs name hysteresis, and the rows have neither.
         """
         inputs, data = selection.options.inputs, selection.data
         has_direction = data.side is not None or (data.starts is not None and len(data.names) == 1)
@@ -99,7 +99,8 @@ class Hysteresis(ModelClass):
         states.
 
         A hysteresis h >= 0 has a mean, which a fit with the wavelets of the simpler candidate already shows.
-        If the criterion does not decrease with these wavelets, no network with hysteresis is grown.
+        If the criterion does not decrease with these wavelets, and the options do not name hysteresis, no
+        network with hysteresis is grown.
         """
         selection, judge, named, samples = (
             self._selection,
@@ -130,8 +131,8 @@ class Hysteresis(ModelClass):
         return best
 
     def _grown(self, below: Candidate, found: Candidate) -> Candidate:
-        """Returns a network with hysteresis; the play radius is searched after the criterion accepts
-        hysteresis.
+        """Returns a network with hysteresis; its play radius is searched if hysteresis is accepted or the
+        options name it.
 
         Wavelets grown at a wrong play radius, or without hysteresis, model the error of the radius. A radius
         found with too few wavelets compensates for the missing wavelets. So growth starts again without
@@ -164,9 +165,9 @@ class Hysteresis(ModelClass):
         """Returns a single-valued force with the wavelets of a network with hysteresis; superfluous wavelets
         are removed.
 
-        This force is used if the data has hysteresis that contradicts h >= 0. A network grown without
-        hysteresis is not used: press and release, sampled at different positions by a periodic motion, would
-        look like one rapidly changing force.
+        This force is the simpler candidate if the constraints change the network with hysteresis. A network
+        grown without hysteresis is not used: press and release, sampled at different positions by a periodic
+        motion, would look like one rapidly changing force.
         """
         selection = self._selection
         problem = selection.samples.problem(selection.rows)
@@ -250,8 +251,8 @@ class PlaySearch:
         """Returns the direction states for the best play radius near the given one, on given wavelets.
 
         Keeps the given radius unless another radius lowers the criterion by as much as a model class must.
-        Call only for accepted hysteresis: a free play radius also fits other differences between press and
-        release, such as damping.
+        Call only for accepted or named hysteresis: a free play radius also fits other differences between
+        press and release, such as damping.
         """
         radius = strokes.play_radius or 0.0
         least, most = (each.play_radius or 0.0 for each in (self._usable[0], self._usable[-1]))

@@ -33,16 +33,17 @@ MOST_DYNAMIC_SELECTIONS = 2
 """Number of times that the model is selected again, each time with better values of damping and mass."""
 
 LEAST_GAIN_OVER_DAMPING = 0.05
-"""Least relative decrease of the squared error for velocity as an input in addition to constant damping [-].
-A force of two inputs is harder to render."""
+"""Least relative decrease of the squared error for velocity as an input if constant damping without mass was
+accepted [-]. A force of two inputs is harder to render."""
 
 LEAST_GAIN_WITHOUT_DAMPING = 0.25
-"""Least relative decrease of the squared error for velocity as an input without constant damping [-], for
-example for Coulomb friction, whose sign changes with that of the velocity."""
+"""Least relative decrease of the squared error for velocity as an input if neither this damping nor
+hysteresis was accepted [-], for example for Coulomb friction, whose sign changes with that of the
+velocity."""
 
 LEAST_GAIN_OVER_HYSTERESIS = 0.75
-"""Least relative decrease of the squared error for velocity as an input if hysteresis was accepted [-]:
-hysteresis is easier to render and certify."""
+"""Least relative decrease of the squared error for velocity as an input if hysteresis was accepted, but not
+constant damping without mass [-]: hysteresis is easier to render and certify."""
 
 MOST_CORRELATION_ESTIMATES = 5
 """Largest number of times that the correlation of the noise of successive rows is estimated."""
@@ -66,8 +67,8 @@ LEAST_HALF_CORE = 1.0 / 64.0
 def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) -> ClassSelection:
     """Selects a model: first the model classes without velocity, mass and damping, then those with them.
 
-    The width of position cells is halved until their error is small. Outliers get less weight if the loss is
-    Huber's.
+    The width of position cells is halved until their error is small, at most three times. Outliers get less
+    weight if the loss is Huber's.
     """
     rows = rows.limited()
     given, robust = rows.weight, options.loss == "huber"
@@ -165,7 +166,7 @@ class MassAndDamping(ModelClass):
 
     @classmethod
     def possible(cls, selection: ClassSelection) -> bool:
-        """True if the motion of the recording is known well enough to fit mass and damping."""
+        """True if `ClassSelection.motion` is known; it may be too short or too noisy for a fit."""
         return selection.motion is not None
 
     def better(self, below: Candidate) -> Candidate:

@@ -25,8 +25,8 @@ from ...verdict import FORCE_FLOOR, FORCE_JND
 from .limits import NO_LIMITS, RowLimits, distinct_rows
 
 SIDE_LEVELS = 16
-"""Number of cells of the direction state over [-1, 1]. Two cells have their centres at -1 and +1, the values
-during a stroke."""
+"""Number of cell widths of the direction state over [-1, 1]. The first and the last cell have their centres
+at -1 and +1, the values during a stroke."""
 
 POOLED_CELLS = 4
 """Number of neighbouring position cells that share one slope of the force; with several inputs at least 2 per
@@ -125,7 +125,7 @@ class Compressor:
         return float(self._weight.sum() if only is None else self._weight[only[self.kept]].sum())
 
     def rows(self, side: Float1D | None = None, only: NDArray[np.bool_] | None = None) -> Compressed:
-        """Returns compressed rows; rows with different direction state `side` (n,) in [-1, 1] are not merged.
+        """Returns compressed rows; rows in different cells of the direction state `side` (n,) are not merged.
 
         `only` (n,) selects rows of the recording.
         """
@@ -276,7 +276,7 @@ MOST_HELD_OUT_ROWS = 20_000
 
 @dataclass(frozen=True)
 class HeldOutRows:
-    """Rows of a recording that are not used for the fit; positions in the unit box."""
+    """Rows, usually held-out ones, at which the force of a network is computed; positions in the unit box."""
 
     positions: Float2D
     """(k, d)"""
@@ -317,8 +317,8 @@ class HeldOutRows:
 
 
 def held_out_rows(n: int, starts: Sequence[int] | None) -> NDArray[np.bool_]:
-    """Returns the held-out rows (n,): sections of a motion if the starts of motions are given, else single
-    rows."""
+    """Returns the held-out rows (n,): sections of the recording if the starts of motions are given and rows
+    suffice, else single rows."""
     index = np.arange(n)
     if starts is None or n < HELD_OUT_EVERY * HELD_OUT_BLOCKS:
         return np.asarray(index % HELD_OUT_EVERY == HELD_OUT_EVERY // 2)

@@ -36,8 +36,8 @@ ROWS_PER_LEVEL = 2.0
 coincidence."""
 
 MOST_SAMPLED_ROWS = 8192
-"""Largest number of rows that are searched for a force step: few distinct force values that are multiples of
-one step."""
+"""About this number of evenly spread rows is tested for few distinct force values, before all rows are
+searched for a force step."""
 
 GRID_TOLERANCE = 0.02
 """Largest deviation of a force difference from a multiple of the force step [steps]."""
@@ -58,7 +58,7 @@ LEAST_NOISE_EVENNESS = 0.8
 as noise [-]. Residuals of an unfitted force are large at a few positions and small at others."""
 
 MOST_ORDERED_ROWS = 50_000
-"""Largest number of successive rows for the estimate of position noise."""
+"""Largest number of successive rows for the estimates of position noise and of correlated force noise."""
 
 LEAST_REVERSALS = 0.1
 """If a smaller share of the position steps is opposite to the previous step, no position noise is estimated
@@ -185,8 +185,8 @@ def innovation_deviance(residual: Float1D, n_parameters: int, least: float) -> f
 
 
 def position_noise(position: Float1D) -> float:
-    """Returns the noise of a position (n,) in recorded order: median size of steps opposite to the previous
-    step [box].
+    """Returns the noise of a position (n,) in recorded order: median of the smaller of two successive
+    opposite steps [box]; 0 if such steps are few or large.
 
     During a pause the position changes only by noise, and a change of force in the pause does not depend on
     the position.

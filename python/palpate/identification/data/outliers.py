@@ -59,8 +59,7 @@ LEAST_OTHERS = 3
 """Least number of distinct values that the other rows must have for isolated rows to be dropped."""
 
 MOST_SAMPLED_ROWS = 10_000
-"""Largest number of evenly spread rows from which the range of the values without the largest and smallest 1
-% is computed."""
+"""About this number of evenly spread rows gives the range of values without the largest and smallest 1 %."""
 
 MOST_NAMED_ROWS = 3
 """Largest number of isolated rows or outliers that a finding lists with row number or position."""
@@ -190,8 +189,8 @@ def _judged(
 
 
 def _stretched(values: Float1D) -> bool:
-    """True if the range of all values (n,) is so much larger than that of most values that some may be
-    isolated."""
+    """True if values (n,) are few, or if their range is so much larger than that of most values that some may
+    be isolated."""
     low, high = np.quantile(
         values[:: max(1, len(values) // MOST_SAMPLED_ROWS)], (MOST_ISOLATED_SHARE, 1.0 - MOST_ISOLATED_SHARE)
     )
@@ -237,8 +236,7 @@ SETTLED_WEIGHT_CHANGE = 1e-3
 """Mean change of the weights of the rows below which no further fit is needed [-]."""
 
 MOST_OUTLIER_SHARE = 0.2
-"""Largest share of the rows that are dropped as outliers [-]. A larger share cannot be outliers: then the
-model is unfit."""
+"""Share of dropped rows above which the model is unfit [-]: so many rows cannot be outliers."""
 
 
 def standard_deviation(residual: Float1D) -> float:
@@ -254,7 +252,8 @@ def from_neighbours(
     Neighbours are adjacent rows in recorded order, or in order of position, on the same stroke if `side` (n,)
     is given. The order with the smaller differences is used: neighbours in position can be on different
     strokes, and a table can be shuffled. Of the three rows before and the three rows after, the group with
-    the closer median is used, so that a step of the force is not an outlier.
+    the closer median is used, so that a step of the force is not an outlier. With several inputs, the six
+    nearest rows are the neighbours.
     """
     known = np.flatnonzero(trusted)
     if box.shape[1] > 1:

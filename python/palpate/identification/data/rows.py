@@ -176,8 +176,8 @@ def require_usable(rows: Rows, options: IdentifyOptions) -> None:
     Raises
     ------
     InputError
-        There are too few rows or distinct positions, a value is not finite, an input is constant, or an
-        option requires a single input.
+        A shape is wrong, there are too few rows or distinct positions, a value is not finite, too large or
+        too small, an input is constant, or an option requires a single input.
     """
     names, positions, force = rows.names, rows.positions, rows.force
     if positions.ndim != 2 or force.shape != (len(positions),):
@@ -227,7 +227,8 @@ def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
     Raises
     ------
     InputError
-        A recording has no such input, or the inputs are hysteresis together with further inputs.
+        A recording has no such input, the inputs are hysteresis together with further inputs, or the filters
+        of the paper do not fit the time.
     """
     names = _input_names(recordings[0], options)
     found = [input_columns(recording, names) for recording in recordings]

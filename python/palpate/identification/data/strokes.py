@@ -43,7 +43,7 @@ neighbours in position."""
 
 LEAST_GROUP_VARIANCE = 0.85
 """Least share of the force variance of a window between its two groups, for two forces at one position [-]:
-0.68 for noise, 1 for two separate forces."""
+about 0.70 for normal noise, near 1 for two separate forces."""
 
 REPORTED_SPREAD = 0.02
 """If the rows are shuffled, a finding reports the standard deviation of the force at one position from this
@@ -60,7 +60,7 @@ class Strokes:
     """Directions of all rows of all recordings, if they are known."""
 
     side: Float1D | None
-    """(n,) +1 into the object, -1 out of it, 0 neither; None where hysteresis cannot be tested"""
+    """(n,) +1 into the object, -1 out of it, 0 neither; None if hysteresis is not tested"""
     notes: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     decisions: tuple[Decision, ...] = ()

@@ -70,12 +70,12 @@ COARSEST_CANDIDATE = 1.0
 """Dilation of the widest wavelets of the frame [1/range of recorded positions]."""
 
 MOST_LIBRARY_ENTRIES = 2**23
-"""Largest number of stored values of all candidate wavelets at all rows, 32 MiB. Many rows allow fewer
-candidates."""
+"""Largest number of stored values of all candidate wavelets at all rows, 32 MiB for each channel of a row.
+Many rows allow fewer candidates."""
 
 NEGLIGIBLE_SHARE = 1e-14
-"""A product of Fourier transforms in the sum for the frame bounds is left out below this share of the first
-product [-]: it cannot change a printed digit."""
+"""The sum of products of Fourier transforms for the frame bounds ends at a product below this share of the
+largest one [-]: further ones cannot change a printed digit."""
 
 
 def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
@@ -93,7 +93,7 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
     b0 : float
         Translation step, above 0, the same for every voice.
     voices : int
-        Dilations per octave.
+        Number of voices V.
 
     Returns
     -------
@@ -113,7 +113,7 @@ def frame_bounds(a0: float, b0: float, voices: int = 1) -> tuple[float, float]:
         raise InputError(f"b0, the translation step, is {b0!r}: must be a finite number > 0")
     if int(whole) != whole or whole < 1:
         raise InputError(f"voices is {voices!r}: must be a whole number >= 1")
-    # the Fourier transform of each voice is below 1e-15 of its peak outside the frequencies 2^-26 .. 2^4
+    # the Fourier transform of each voice is below 2e-15 of its peak outside the frequencies 2^-26 .. 2^4
     levels = np.arange(np.floor(-26.0 / np.log2(a0)), np.ceil(5.0 / np.log2(a0)) + 1.0)
     frequency = np.linspace(1.0, a0, 1001)[:, None] * a0**levels
     diagonal, cross = np.zeros(len(frequency)), 0.0
@@ -156,13 +156,14 @@ def truncated_frame(
 
     The translations of each dilation are the lattice points around the data, so that the full grid, whose
     size grows exponentially with the number of inputs, is never built. If a dilation would bring more than
-    max_candidates wavelets in total, only the lattice points nearest to most data are taken, and larger
-    dilations are left out: refinement can still make wavelets narrower.
+    max_candidates wavelets in total, only the lattice points nearest to data are taken. If these are still
+    too many, those with most data are taken, and larger dilations are left out: refinement can still make
+    wavelets narrower.
 
     positions (m, d) in the unit box; dilations coarsest * frame_scale^j [1/box]; step frame_step / dilation.
     """
     d = positions.shape[1]
-    # a lattice point has 3^d neighbours: with more than three inputs only neighbours along one input are used
+    # a lattice point has 3^d - 1 neighbours: with more than three inputs only those along one input are used
     around = product((-1, 0, 1), repeat=d) if d <= 3 else (*np.eye(d), *-np.eye(d), np.zeros(d))
     offsets = np.array(list(around), dtype=np.int64)
     alpha: list[Float2D] = []

@@ -2,7 +2,8 @@
 """Constraints of a force over one position: hysteresis h >= 0, slope bounds, a fixed force, a periodic force.
 
 Each constraint bounds a *reading* of the network, a linear combination of the mean force g and the hysteresis
-h, or the slope of this combination, at every position of the domain. The least squares is solved with the
+h, or the slope of this combination. It applies at every position of the domain, at one position, or to the
+difference of both ends. The least squares is solved with the
 constraint imposed at the positions where it was found violated. Elsewhere the constraint is proved: on an
 interval [a, b] a twice differentiable reading r stays above min(r(a), r(b)) - max|r''| (b - a)^2 / 8, where
 max|r''| over the interval comes from `derivative_bounds`. Intervals are halved until the constraint is proved
@@ -25,12 +26,12 @@ from .basis import Basis
 from .separable import SeparableProblem, Solution, factored
 
 IMPOSED_MARGIN = 1e-2
-"""Margin by which an imposed constraint is tighter than the proved one, as a share of the RMS error [-].
+"""Margin by which an imposed inequality is tighter than the proved one, as a share of the RMS error [-].
 Without the margin the proof may need endless rounds."""
 
 POINT_TOLERANCE = 1e-9
-"""Largest deviation of the force from a fixed force, as a share of the range of the force [-]; allows for
-rounding."""
+"""Largest deviation from a fixed force, or between the ends of a period, as a share of the range of the force
+[-]; allows for rounding."""
 
 MOST_ROUNDS = 60
 """Largest number of rounds of imposing and proving the constraints. After the last round the fitted force is
@@ -52,8 +53,8 @@ MOST_ALTERNATIONS = 50
 
 @dataclass(frozen=True)
 class Bound:
-    """Constraint sign * (reading - limit) >= 0 at every position; the reading is a combination of mean force
-    and hysteresis."""
+    """Constraint sign * (reading - limit) >= 0; the reading is a combination of mean force and hysteresis, or
+    its slope."""
 
     readouts: tuple[float, ...]
     """Factors of the mean force g (and the hysteresis h) in the reading, the quantity that the constraint
@@ -67,8 +68,8 @@ class Bound:
     it"""
     limit: float
     unit: float
-    """Change of the reading that weighs as much as a change of the force by 1; it is 1 if the reading is a
-    force"""
+    """Factor of the margin IMPOSED_MARGIN: 1 for a force, larger for a steep slope; 0 for an equality, which
+    has no margin"""
     at: float | None = None
     """Position of a constraint that applies at one position [share of the unit box]; None: it applies at
     every position"""
@@ -131,8 +132,8 @@ def domain_bounds(
 def moved_to_bounds(
     problem: SeparableProblem, rows: Compressed, solution: Solution, bounds: Sequence[Bound]
 ) -> Compressed:
-    """Returns the rows with their forces changed as the fitted force must change to keep the constraints;
-    noise stays.
+    """Returns the rows with their forces changed as the fitted force must change to keep h >= 0 and the slope
+    bounds; noise stays.
 
     A network grown on the changed rows has wavelets at the positions where the constrained force law needs
     wavelets. The hysteresis is limited at each position, h := max(h, 0), and slopes by isotonic regression.
@@ -265,8 +266,8 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
 
 
 def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Float1D:
-    """Returns the nearest force (k,) with slopes in [low, high], by alternating isotonic regressions (Dykstra
-    1983)."""
+    """Returns the nearest force (k,) with slopes in [low, high], up to the error of at most MOST_ALTERNATIONS
+    alternating isotonic regressions (Dykstra 1983)."""
     current = force
     lower_memory, upper_memory = np.zeros_like(force), np.zeros_like(force)
     for _ in range(MOST_ALTERNATIONS):
@@ -287,7 +288,7 @@ def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Flo
 def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequence[Bound]) -> Solution:
     """Mixes a solution with the least share of a straight line, such that the mixture keeps all constraints.
 
-    The straight line keeps the constraints with a margin.
+    The straight line keeps the inequalities with a margin.
     """
     everywhere = [bound for bound in bounds if not bound.seam]
     lows = [bound.limit for bound in everywhere if bound.of_slope and bound.sign > 0]
@@ -363,8 +364,8 @@ def crossing(problem: SeparableProblem, free: Solution) -> Crossing | None:
     """Returns the interval where the release force exceeds the press force most; None if the difference is
     small.
 
-    `free` is a fitted force g + s h without the constraint h >= 0. Only positions measured on both strokes
-    are used.
+    `free` is a fitted force g + s h without the constraint h >= 0. With one block of rows for each stroke,
+    only positions measured on both strokes are used.
     """
     first = max(float(block.positions.min()) for block in problem.blocks)
     last = min(float(block.positions.max()) for block in problem.blocks)

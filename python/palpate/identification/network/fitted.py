@@ -53,9 +53,9 @@ class FittedNetwork:
     """(d,)"""
     bias_hysteresis: float | None
     lower: Float1D
-    """(d,) lower end of the domain: least position of the data"""
+    """(d,) lower end of the domain"""
     upper: Float1D
-    """(d,) upper end of the domain: largest position of the data"""
+    """(d,) upper end of the domain"""
     below: str = "linear"
     """Continuation below the domain: "free" if the tool leaves the object there; otherwise linear"""
     play_radius: float | None = None
@@ -67,8 +67,8 @@ class FittedNetwork:
     model_class: str = ""
     """Name of the accepted model class"""
     stop_reason: str = ""
-    """Reason why growth stopped: name of the criterion, "max_wavelets", or "data" if the data allowed no more
-    wavelets"""
+    """Reason why growth stopped: name of the criterion, "max_wavelets", "held-out rows", or "data" if no
+    wavelet could be added"""
     n_parameters: int = 0
     """Number of fitted values, including play radius, mass and damping"""
     rmse: float = 0.0
@@ -175,7 +175,7 @@ class FittedNetwork:
         )
 
     def force(self, positions: Float2D, side: Float1D | None) -> Float1D:
-        """Returns the force at positions (n, d) with direction states (n,)."""
+        """Returns the force at positions (n, d), limited to the domain, with direction states (n,)."""
         two, model = self.weight_hysteresis is not None, ForceModel(**self.parameters())
         inside = np.clip(positions, self.lower, self.upper)
         if len(self.lower) > 1:

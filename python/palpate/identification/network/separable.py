@@ -87,7 +87,7 @@ LEAST_SLIDING_INPUT = 0.9
 """Absolute direction state |s| above which a row belongs to a stroke [-]."""
 
 TINY = float(np.finfo(float).tiny)
-"""Smallest positive number, which replaces 0 in quotients and logarithms."""
+"""Smallest normal number, which replaces 0 in quotients and logarithms."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,8 @@ class Block:
         return int(self.channels.shape[1])
 
     def strokes(self) -> list[Float2D]:
-        """Returns the positions of the rows of each stroke; rows within the play between the strokes are left
-        out.
+        """Returns the positions of the rows of each stroke, or of all rows for one channel or an empty
+        stroke; rows within the play between the strokes are left out.
 
         The two weights of a wavelet are determined only if the rows of both strokes resolve the wavelet.
         """
@@ -145,7 +145,7 @@ class Solution:
     """(channels, 1 + d + N) bias, slopes (d inputs) and weights (N wavelets) of the network of each
     channel"""
     rss: float
-    """Sum of squared differences between the mean forces of the rows and the fitted force [force^2]"""
+    """Weighted sum of squared differences between the forces of the rows and the fitted force [force^2]"""
     objective: float
     """Residual sum of squares plus the penalty on large weights [force^2]; refinement lowers this value"""
     designs: tuple[Float2D, ...]
@@ -169,9 +169,9 @@ class SeparableProblem:
     """Sum of squared differences of recorded forces from the mean force of the row that represents them
     [force^2]"""
     force_range: float
-    """Largest minus smallest force, above 0 [force]"""
+    """Largest minus smallest force, above 0 [force]; for a constant force its size, or 1"""
     resolved_by: int
-    """Least number of distinct positions, in every block of rows, that the core of a wavelet must contain"""
+    """Least number of distinct positions, on every stroke, that the core of a wavelet must contain"""
     held_out: HeldOutRows | None = None
     """Held-out rows, for the criteria that use held-out rows"""
     limits: RowLimits = NO_LIMITS
@@ -254,8 +254,8 @@ class SeparableProblem:
     def with_prior(self, rss: float) -> SeparableProblem:
         """Returns the problem with a penalty on weights that are large compared with the range of the force.
 
-        The penalty of one weight counts as much as one sample with the noise that `rss`, a residual sum of
-        squares, shows.
+        The penalty of a weight of the size of this range counts as much as one sample with the noise that
+        `rss`, a residual sum of squares, shows.
 
         Without the penalty, a wavelet at positions where one stroke has no data could get any weight for that
         stroke.
@@ -285,7 +285,7 @@ class SeparableProblem:
         """Returns a solution with the same wavelets, other coefficients (channels, 1 + d + N), and its
         errors.
 
-        `solution` may belong to another problem with the same positions.
+        `solution` may belong to another problem that differs only in the forces.
         """
         return self._solution(solution.basis, coefficients, solution.designs, solution.grams)
 
@@ -402,16 +402,16 @@ LONGEST_STEP = 0.7
 linearisation is not valid."""
 
 MOST_IDLE_STEPS = 2
-"""Number of successive refinement steps, each with a decrease of the error below the tolerance, after which
-refinement ends."""
+"""Number of successive accepted refinement steps, each with a decrease of the error below the tolerance,
+after which refinement ends."""
 
 
 def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
     """Refines the wavelets of `start` to lower the penalised squared error, by at most `steps` accepted or
     refused steps.
 
-    Refinement ends after MOST_IDLE_STEPS successive steps that each lowered the deviance by less than
-    `tolerance`.
+    Refinement ends after MOST_IDLE_STEPS successive accepted steps that each lowered the deviance by less
+    than `tolerance`.
     """
     best, linearised = start, None
     if len(start.basis) == 0:
@@ -483,9 +483,9 @@ shorter."""
 def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolerance: float) -> Solution:
     """Refines all fitted values of `start` by a quasi-Newton method; the result is never worse than `start`.
 
-    The unknowns are coefficients times the norm of their column over the norm of the target, log(alpha), and
-    alpha_start beta, so that all have a similar size. Refinement ends when a step lowers the deviance by less
-    than a tenth of `tolerance`.
+    The unknowns are coefficients times the norm of their column over the root of the squared error of
+    `start`, log(alpha), and alpha_start beta, so that all have a similar size. Refinement ends when a step
+    lowers the deviance by less than a tenth of `tolerance`.
     """
     basis, d = start.basis, problem.dimension
     if len(basis) == 0:

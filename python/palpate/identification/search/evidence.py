@@ -9,7 +9,8 @@ Wahba 1979, as n ln of the score), FPE (Akaike 1970, as n ln of the score). The 
 Two rules use the error on held-out rows instead, and need no penalty. "fresh" takes the smallest network
 whose error on held-out rows is within one standard error of the least error (Breiman et al. 1984).
 "perceptual" takes the smallest network whose error on held-out rows a hand cannot feel: the RMS of error/JND
-is below 1, where the JND is 7 % of the local force, at least 1 % of the largest force.
+is at most 1, where the JND is 7 % of the local force, at least 1 % of the largest force. Without such a
+network it takes the one with the least error.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ MOST_BINNING_SHARE = 0.05
 If the error is larger, the width of the cells is halved."""
 
 LEAST_TRIMMED_GAIN = 0.5
-"""Least relative decrease of the trimmed mean squared error for which it is used in place of the full mean,
-if the full mean does not decrease [-]. The few trimmed groups cannot hold half of the error."""
+"""Relative decrease of the trimmed mean squared error above which it is used in place of the full mean, if
+the full mean decreases by at most its standard error [-]."""
 
 LEAST_HELD_OUT = 20
 """Least number of held-out rows that can refuse a model class. The error on fewer rows is too uncertain."""
@@ -99,7 +100,7 @@ def standard_error(n: float) -> float:
 
 
 def enough(criterion: str, value: float) -> bool:
-    """True if the error is below the just noticeable difference, so that no larger network is needed."""
+    """True if the criterion is "perceptual" and the error is at most the just noticeable difference."""
     return criterion == "perceptual" and value <= 0.0
 
 
@@ -141,15 +142,15 @@ def held_out_deviance(criterion: str, rows: HeldOutRows, errors: Float1D) -> flo
 
 
 Reporter = Callable[[str, int], None]
-"""Function that is called with the name of the tested model class and its number of wavelets, to show
-progress."""
+"""Function that is called with the model class and the present number of wavelets of a growing network, to
+show progress."""
 
 _reporter: ContextVar[Reporter | None] = ContextVar("reporter", default=None)
 
 
 @contextmanager
 def reporting_to(reporter: Reporter) -> Iterator[None]:
-    """Calls `reporter` for every network that is tested inside the with statement."""
+    """Calls `reporter` before each added wavelet of a growing network inside the with statement."""
     token = _reporter.set(reporter)
     try:
         yield
@@ -158,8 +159,7 @@ def reporting_to(reporter: Reporter) -> Iterator[None]:
 
 
 def report(model_class: str, n_wavelets: int) -> None:
-    """Reports the model class and the number of wavelets of the network that is tested now, to show
-    progress."""
+    """Reports the model class and the present number of wavelets of a growing network, to show progress."""
     if (reporter := _reporter.get()) is not None:
         reporter(model_class, n_wavelets)
 
@@ -174,7 +174,7 @@ class Moving:
     """(n,) force m L a + B L v of mass m and damping B at every row, with acceleration a, velocity v and
     low-pass filter L [force]"""
     known: Float1D
-    """(n,) 1 in the rows that have a velocity and an acceleration, else 0"""
+    """(n,) 1 in the rows with the velocity or acceleration that the fitted terms need, else 0"""
 
 
 @dataclass(frozen=True)
@@ -199,13 +199,13 @@ class RowError:
 
     @property
     def nrmse(self) -> float:
-        """RMS error divided by the standard deviation of the force [-]; 0 for a constant force."""
+        """RMS error divided by `spread` [-]; 0 for a constant force."""
         spread = self.spread
         return self.rmse / spread if spread > 0.0 else 0.0
 
     @property
     def spread(self) -> float:
-        """Standard deviation of the force over the samples [force]."""
+        """Standard deviation of the forces of the rows, weighted by their samples [force]."""
         if not self.weight.any():
             return 0.0
         if np.all(self.weight == 1.0):
@@ -329,7 +329,7 @@ class Candidate:
 
     @cached_property
     def error(self) -> RowError:
-        """Error on all rows except outliers and rows that repeat others."""
+        """Error on all rows except outliers; the rows have the weights `data.counted`."""
         error, robust = self.error_on(self.data.counted), self.data.robust
         return (
             error if robust is None else replace(error, weight=np.where(robust.outliers, 0.0, error.weight))
@@ -449,8 +449,8 @@ class Samples:
         """Returns the relative decrease of the squared error on held-out rows, and its standard error.
 
         Only held-out rows inside the position range of the fitted rows are used. If the mean over all groups
-        of rows shows no decrease, but the trimmed mean shows a large decrease, the trimmed mean is returned:
-        then a few groups hold rows far from all fitted rows.
+        of rows shows no significant decrease, but the trimmed mean shows a large decrease, the trimmed mean
+        is returned: then a few groups hold rows far from all fitted rows.
         """
         known = None if above.strokes is None else above.strokes.known
         fitted = ~self._held_out if known is None else ~self._held_out & known
@@ -476,10 +476,10 @@ class Judgement:
     accepted: bool
     """True if the more complex of two compared candidates is accepted"""
     reason: str
-    """Change of criterion and RMS error from the simpler to the more complex candidate, in words"""
+    """Changes of the criterion and of the squared error on held-out rows if it was tested, in words"""
     criterion_falls: bool
-    """True if the criterion decreases enough; a more complex candidate that is not accepted was then refused
-    because of its error on held-out rows"""
+    """True if the criterion decreases enough and held-out rows are used; a more complex candidate that is not
+    accepted was then refused because of its error on held-out rows"""
 
 
 class Judge:
@@ -490,7 +490,7 @@ class Judge:
     samples : Samples
     options : IdentifyOptions
     report : Report
-        Receives a note on each decision.
+        Receives the decisions of `noted` and `better`.
     on_held_out : bool
         False: the criterion decides without held-out rows.
     """
@@ -525,7 +525,8 @@ class Judge:
     def compared(self, below: Candidate, above: Candidate, *, errors: float = 1.0) -> Judgement:
         """Compares the upper candidate with the lower one.
 
-        On held-out rows the squared error must decrease by more than `errors` of its standard errors.
+        On at least LEAST_HELD_OUT held-out rows, the squared error must decrease by more than `errors` of its
+        standard errors. Without `on_held_out` only the criterion decides.
         """
         name, evidence = self.criterion, self.evidence
         if not self.on_held_out:

@@ -4,7 +4,7 @@ removes superfluous wavelets and refines again.
 
 Growth adds the wavelet of the frame that reduces the error of the refined network most, by one step of
 forward orthogonal selection. Pruning removes wavelets that refinement made superfluous, the one first whose
-removal raises the error least. The number of wavelets is then decided again on the refined network.
+removal raises the error least.
 """
 
 from dataclasses import dataclass, replace
@@ -30,12 +30,11 @@ MOST_REMOVAL_COST = 6.0
 tried [penalty of one wavelet]. Refinement seldom recovers a larger rise."""
 
 LEAST_CORE_POSITIONS = 5
-"""Least number of distinct positions in a wavelet's core if the noise is too small to be mistaken for a part
-of the force."""
+"""Least number of distinct positions in a wavelet's core if the residuals are not noise."""
 
 LEAST_NOISE_EVENNESS = 0.5
-"""Least ratio of the median to the RMS of the residuals, 1 for normal noise, at which the residuals are taken
-as noise [-]. Narrower wavelets are then not tried."""
+"""Least ratio of the median to the RMS of the residuals, scaled to 1 for normal noise, at which uncorrelated
+residuals are taken as noise [-]. Narrower wavelets are then not tried."""
 
 FINER_ERROR_RATIO = 4.0
 """Narrower wavelets that the criterion does not accept are still accepted if they divide the RMS error by
@@ -60,12 +59,12 @@ CANDIDATE_STEPS = 4
 """Number of refinement steps of each candidate wavelet before one is chosen: enough to compare them."""
 
 GROWING_TOLERANCE = 0.4
-"""Decrease of the deviance by one refinement step below which refinement ends during growth [-]: far below
-the penalty of one wavelet."""
+"""Decrease of the deviance below which a refinement step during growth is too small to continue [-]: far
+below the penalty of one wavelet."""
 
 FINAL_TOLERANCE = 0.04
-"""Decrease of the deviance (-2 log likelihood) by one step below which refinement of the accepted network
-ends [-]."""
+"""Decrease of the deviance (-2 log likelihood) below which a refinement step of the accepted network is too
+small to continue [-]."""
 
 
 @dataclass(frozen=True)
@@ -112,9 +111,9 @@ class Growth:
         positions and no correlation between neighbouring positions. Narrower wavelets are accepted if they
         reduce the error by a large factor, or if neighbouring residuals are correlated and the criterion
         decreases as much as for a new model class. Narrower wavelets are tried only for a single-valued
-        force, with refinement, and without a criterion on held-out rows. They are not tried if noise is
-        correlated, if the error is near the resolution of the force, or if wide wavelets fit a force over
-        several inputs.
+        force, with refinement, without backward selection, and without a criterion on held-out rows. They are
+        not tried if noise is correlated, if the error is near the resolution of the force, or if wide
+        wavelets fit a force over several inputs.
         """
         search = self._search
         most = self._most if most is None else most
@@ -193,9 +192,9 @@ class Growth:
     ) -> Grown:
         """Grows the network of `start` until the criterion stops growth, then prunes and refines the network.
 
-        Growth continues for `patience` wavelets after the best criterion, and pruning starts from the largest
-        network: a few surplus wavelets let refinement find a better arrangement. If the criterion uses
-        held-out rows, it chooses the size and nothing is pruned. With `wide`, a network of wide wavelets
+        Growth continues for `patience` wavelets per input after the best criterion, and pruning starts from
+        the largest network: a few surplus wavelets let refinement find a better arrangement. If the criterion
+        uses held-out rows, it chooses the size and nothing is pruned. With `wide`, a network of wide wavelets
         alone is tried once, when the RMS error is below sqrt(`FORCE_RESOLUTION`) times the range of the
         force.
         """

@@ -6,8 +6,8 @@ Forward orthogonal least squares (Chen, Billings & Luo 1989) measures the gain o
 
 Only the Gram matrix of each candidate is kept orthogonal to the columns of the taken wavelets: taking a
 wavelet updates the projections of all other candidates by one product with its orthonormalised columns.
-Linear and bias columns are always included. A candidate that the taken columns already span is never taken,
-so that the factors stay well conditioned.
+Linear and bias columns are always included. Orthogonal selection never takes a candidate that the taken
+columns already span, so that the factors stay well conditioned.
 """
 
 from collections.abc import Sequence
@@ -169,8 +169,8 @@ def orthogonal_gains(library: Library, current: Solution) -> Float1D:
     """Returns the decrease of the residual sum of squares (candidates,) if a candidate were added to a fitted
     network.
 
-    The result equals the gains at the start of a selection; it is computed from the Gram matrix of the
-    solution.
+    The result equals the gains at the start of a selection, except for the weight penalty in the Gram matrix
+    of the solution, from which it is computed.
     """
     total = np.zeros(len(library))
     for columns, gram, design, own, residual in zip(
