@@ -282,8 +282,8 @@ class Recording:
         """Returns the recording corrected for a force that was recorded late_s [s] after its position.
 
         At a reversal on a steep force, a late force is larger in the release than in the press, which a
-        passive object cannot do. Positions and further inputs are shifted by late_s; the first rows, whose
-        shifted position was not recorded, are removed.
+        passive object cannot do. Positions, directions and further inputs are shifted by late_s; the first
+        rows, whose shifted position was not recorded, are removed.
 
         Raises
         ------
@@ -300,12 +300,16 @@ class Recording:
             last = float(time[-1] - time[0])
             raise InputError(f"late_s is {late_s} s; it must be a number from 0 to {last:g} s")
 
+        # The direction of a row is that of the motion which ends there.
+        moving_to = np.searchsorted(time, shifted_time)
+
         def at_shifted_time(values: Float1D) -> Float1D:
             return np.interp(shifted_time, time, values)
 
         shifted = replace(
             self,
             position=at_shifted_time(self.position),
+            direction=None if self.direction is None else self.direction[moving_to],
             inputs=np.column_stack([*map(at_shifted_time, self.inputs.T), np.empty((len(self), 0))]),
             notes=(*self.notes, f"each force belongs to the position {late_s:g} s before"),
             part_of=None,

@@ -183,8 +183,8 @@ def is_fresh(identified_on: Source, data: Source) -> bool:
     """Returns True if the model was identified on other data: another file, or other rows of the same
     file."""
     same_file = not set(data.sha256.split()).isdisjoint(identified_on.sha256.split())
-    held_out = data.held_out and data.held_out_every == identified_on.held_out_every
-    return not same_file or held_out
+    same_split = data.held_out_every == identified_on.held_out_every > 0
+    return not same_file or (same_split and data.held_out != identified_on.held_out)
 
 
 def _stiffness_share(recording: Recording, rows: NDArray[np.bool_], residual: Float1D) -> float | None:

@@ -219,6 +219,9 @@ def test_a_late_force_is_moved_to_its_position() -> None:
     assert np.abs(recording.force - 5.0 * recording.position).max() > 0.3
     assert back.time is not None
     assert back.time[0] == pytest.approx(late)
+    assert back.direction is not None  # the direction is that of the shifted position
+    moving = np.sign(np.gradient(back.position))[1:-1]
+    assert np.count_nonzero(moving * back.direction[1:-1] < 0) <= 3  # one at each reversal
     assert "0.025 s before" in back.notes[-1]
 
 

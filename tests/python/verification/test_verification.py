@@ -318,6 +318,8 @@ def test_data_is_fresh_unless_used_for_identification(tmp_path: Path) -> None:
     assert not verify(model_of(whole.source), test).fresh
     assert verify(model_of(train.source), test).fresh
     assert not verify(model_of(train.source), train).fresh
+    assert verify(model_of(test.source), train).fresh
+    assert not verify(model_of(test.source), test).fresh
     assert not verify(model_of(train.source), whole).fresh
     assert not verify(model_of(train.source), whole.split(4)[1]).fresh
     both = Source.merged([train.source, other.split(5)[0].source])

@@ -127,7 +127,7 @@ def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[
     again = np.zeros(len(force), dtype=bool)
     again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
     if again.mean() > REPEATED_ROWS_SHARE:
-        return again, f"{np.count_nonzero(again)} rows repeat the previous row and are not counted."
+        return again, f"{np.count_nonzero(again)} rows repeat the previous row and are left out of the fit."
     probes = np.linspace(0, len(force) - 1, PROBED_ROWS).astype(np.intp)
     if all(np.count_nonzero(force == force[row]) > 1 for row in probes):
         chosen, _, count = distinct_rows(np.column_stack(columns))

@@ -140,8 +140,15 @@ class Rows:
     def only(self, rows: NDArray[np.bool_]) -> Rows:
         """Returns some of the rows, without their continuous motions."""
         side, weight = (None if each is None else each[rows] for each in (self.side, self.weight))
+        share = np.mean(rows) if self.weight is None else self.weight[rows].sum() / self.weight.sum()
         return replace(
-            self, positions=self.positions[rows], force=self.force[rows], side=side, weight=weight, parts=()
+            self,
+            positions=self.positions[rows],
+            force=self.force[rows],
+            side=side,
+            weight=weight,
+            within=self.within * float(share),
+            parts=(),
         )
 
     def scaled(self, scale: ForceScale) -> Rows:
@@ -410,4 +417,5 @@ def _exact(value: float, unit: str) -> str:
 
 def modulo(box: Float1D) -> Float1D:
     """Returns positions (n,), in repeat lengths of a periodic force, moved by whole numbers into [0, 1)."""
-    return np.asarray(box - np.floor(box))
+    moved = box - np.floor(box)  # 1 for a negative number below the rounding error of 1
+    return np.where(moved < 1.0, moved, 0.0)

@@ -202,7 +202,7 @@ class Growth:
         problem = problem.with_prior(problem.solve(start).rss)
         if search.selection == "backward":
             selected = select_backward(problem, library, max_wavelets=most, criterion=criterion)
-            start = start.joined(library.members(selected.order[: selected.best]))
+            start = start.joined(library.members(selected))
         problem, current = self._improved(problem, problem.solve(start), search.refine_steps)
         path, grown = [self._point(problem, current, model_class)], [current]
         best, since, stop_reason = path[0].criterion, 0, "max_wavelets"

@@ -11,7 +11,6 @@ columns already span, so that the factors stay well conditioned.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
 from ..network.basis import Basis
 from ..network.separable import LEAST_DILATION, SeparableProblem, Solution, half_solved
-from .evidence import deviance
+from .evidence import choice, criterion_of
 
 LEAST_NEW_SHARE = 1e-5
 """Least share of the squared norm of a candidate that is orthogonal to the taken wavelets [-]: above the
@@ -195,86 +194,52 @@ def residual_gains(library: Library, current: Solution) -> Float1D:
     return total
 
 
-@dataclass(frozen=True)
-class SelectionPath:
-    """Result of a selection: candidates in order, and error and criterion with the first 0, 1, 2 ... of
-    them."""
-
-    order: tuple[int, ...]
-    rss: tuple[float, ...]
-    """Residual sum of squares with 0, 1, 2 ... wavelets, including the scatter of samples within a row
-    [force^2]"""
-    criterion: tuple[float, ...]
-    best: int
-    """Number of wavelets at which the criterion is smallest"""
-
-    @staticmethod
-    def judged(
-        problem: SeparableProblem, order: Sequence[int], rss: Sequence[float], criterion: str
-    ) -> "SelectionPath":
-        share = problem.limits.independent
-        values = [
-            deviance(criterion, share * total, problem.independent, problem.n_parameters(n))
-            for n, total in enumerate(rss)
-        ]
-        return SelectionPath(tuple(order), tuple(rss), tuple(values), int(np.argmin(values)))
-
-
 def select_forward(
-    problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
-) -> SelectionPath:
+    problem: SeparableProblem, library: Library, *, max_wavelets: int
+) -> tuple[list[int], list[float]]:
     """Forward orthogonal selection: each step adds the wavelet that reduces the error most, up to
-    max_wavelets."""
+    max_wavelets.
+
+    Returns
+    -------
+    order : list of int
+        The taken candidates of the library, in order.
+    totals : list of float
+        Sum of squared errors with 0, 1, 2 ... of them, including the scatter of samples within a row
+        [force^2].
+    """
     start = problem.solve(Basis.empty(problem.dimension))
     selection = OrthogonalSelection(library, start)
     order: list[int] = []
-    errors = [problem.total(start.rss)]
+    totals = [problem.total(start.rss)]
     while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.independent:
         gains = selection.gains()
         if len(gains) == 0 or gains.max() <= 0.0:
             break
         order.append(int(np.argmax(gains)))
-        errors.append(problem.total(selection.take(order[-1])))
-    return SelectionPath.judged(problem, order, errors, criterion)
-
-
-def select_by_residual(
-    problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
-) -> SelectionPath:
-    """Residual-based selection: each step adds the wavelet that fits the residual best, then refits all
-    weights."""
-    current = problem.solve(Basis.empty(problem.dimension))
-    order: list[int] = []
-    errors = [problem.total(current.rss)]
-    while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.independent:
-        gains = residual_gains(library, current)
-        gains[order] = 0.0
-        if len(gains) == 0 or gains.max() <= 0.0:
-            break
-        order.append(int(np.argmax(gains)))
-        current = problem.solve(library.members(order))
-        errors.append(problem.total(current.rss))
-    return SelectionPath.judged(problem, order, errors, criterion)
+        totals.append(problem.total(selection.take(order[-1])))
+    return order, totals
 
 
 def select_backward(
     problem: SeparableProblem, library: Library, *, max_wavelets: int, criterion: str
-) -> SelectionPath:
+) -> list[int]:
     """Backward elimination: removes, from max_wavelets on, the wavelet whose removal raises the error least.
+    Returns the candidates of the network that the criterion prefers.
 
     A library has more candidates than the data can distinguish, so a forward selection chooses the first
     max_wavelets.
     """
-    forward = select_forward(problem, library, max_wavelets=max_wavelets, criterion=criterion)
-    left = list(forward.order)
+    left, _ = select_forward(problem, library, max_wavelets=max_wavelets)
     current = problem.solve(library.members(left))
-    order: list[int] = []
-    errors = [problem.total(current.rss)]
+    networks, values = [list(left)], [criterion_of(problem, current, criterion)]
     while left:
-        order.append(left.pop(int(np.argmin(problem.removal_costs(current)))))
+        left.pop(int(np.argmin(problem.removal_costs(current))))
         current = problem.solve(library.members(left))
-        errors.append(problem.total(current.rss))
-    return SelectionPath.judged(problem, order[::-1], errors[::-1], criterion)
+        networks.append(list(left))
+        values.append(criterion_of(problem, current, criterion))
+    compared = problem.independent if problem.held_out is None else len(problem.held_out.force)
+    return networks[::-1][choice(criterion, values[::-1], compared)]
 
 
 def _products(rows: Float2D, columns: NDArray[np.float32]) -> Float2D:

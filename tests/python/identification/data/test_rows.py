@@ -12,7 +12,7 @@ from palpate import InputError, Recording, identify, load_model, read_recording,
 from palpate._core.dynamics import environment_filters
 from palpate.cli.main import main
 from palpate.identification import IdentifyOptions, SearchOptions, fit_environment
-from palpate.identification.data.rows import paper_target
+from palpate.identification.data.rows import Rows, modulo, paper_target
 from palpate.recording import sample_force, sample_recording
 
 
@@ -302,3 +302,15 @@ def test_other_periods_than_the_papers_are_refused() -> None:
             Recording.from_arrays(x, x, time=0.01 * np.arange(100)),
             search=SearchOptions(filters="paper-explicit"),
         )
+
+
+def test_positions_modulo_the_period_are_below_one() -> None:
+    assert modulo(np.array([-1e-17, -0.25, 0.0, 1.0, 2.75])).tolist() == [0.0, 0.75, 0.0, 0.0, 0.75]
+
+
+def test_fewer_rows_keep_their_share_of_the_scatter_within_a_row() -> None:
+    rows = Rows(("position",), np.arange(6.0)[:, None], np.zeros(6), within=3.0)
+    kept = np.array([True, True, True, True, False, False])
+    assert rows.only(kept).within == pytest.approx(2.0)
+    weighted = Rows(("position",), np.arange(6.0)[:, None], np.zeros(6), weight=np.arange(6.0), within=3.0)
+    assert weighted.only(kept).within == pytest.approx(3.0 * 6.0 / 15.0)

@@ -104,6 +104,17 @@ def test_every_selection_finds_a_wall(selection: str, refine: bool) -> None:
     assert len(network.weight) <= (12 if refine else 30)
 
 
+@pytest.mark.parametrize("criterion", ["fresh", "perceptual"])
+def test_backward_elimination_judges_the_size_on_held_out_rows(criterion: str) -> None:
+    x, _, y = wall(3000, 1)
+    options = IdentifyOptions(
+        criterion=criterion, max_wavelets=20, search=SearchOptions(selection="backward")
+    )
+    network = fit_environment(x[:, None], y, None, options)
+    assert 0 < len(network.weight) < 18
+    assert network.nrmse < (0.02 if criterion == "fresh" else 0.1)
+
+
 def test_outliers_do_not_move_the_force_under_hubers_loss() -> None:
     x, truth, y = wall(3000, 2)
     random = np.random.default_rng(3)
