@@ -42,7 +42,7 @@ core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree contain absolute paths: they are created again after the folder was moved.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python bench figures lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python test-packages bench figures lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved
 
 help:
@@ -59,7 +59,7 @@ $(stamps)/build: pyproject.toml tools/constraints.txt tools/system_packages.sh $
 	touch $@
 
 # The compiled module and the editable package: a change of a C++ source builds the module again. `make control` builds
-# palpate-control in its own folder.
+# palpate-control in another folder.
 $(stamps)/core: $(stamps)/build $(core_sources)
 	$(pip) install --quiet --no-build-isolation -C cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON \
 	    -C cmake.define.PALPATE_BUILD_CONTROL=OFF --editable .
@@ -103,10 +103,14 @@ test-full: test-full-native
 	$(MAKE) --no-print-directory test-python
 
 # Tests that `make test` never runs: sanitizers, the installed package, a USB device below a kernel.
-test-full-native: setup control $(stamps)/package
+test-full-native: setup control test-packages
 	tools/cpp_tests.sh release
 	for preset in asan tsan; do tools/cpp_tests.sh $$preset; done
-	$(python) -m pytest tests/install tests/usb
+	$(python) -m pytest tests/usb
+
+# The packages as users install them.
+test-packages: $(stamps)/core $(stamps)/control $(stamps)/test $(stamps)/package
+	$(python) -m pytest tests/install
 
 bench: setup
 	tools/bench.sh

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from consumer import ROOT, PROJECT, build_consumer, run
+from consumer import PROJECT, ROOT, build_consumer, run
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,8 @@ def test_pkg_config_and_cmake_state_the_version_of_the_headers(prefix: Path, tmp
     version = run("pkg-config", "--modversion", "palpate", env=environment).strip()
     source = tmp_path / "version.cpp"
     source.write_text(
-        "#include <cstdio>\n#include <palpate/version.hpp>\nint main() { std::puts(palpate::library_version); }\n"
+        "#include <cstdio>\n#include <palpate/version.hpp>\n"
+        "int main() { std::puts(palpate::library_version); }\n"
     )
     run(os.environ.get("CXX", "g++"), "-std=c++20", f"-I{prefix}/include", source, "-o", tmp_path / "version")
     assert run(tmp_path / "version").strip() == version
@@ -69,13 +70,9 @@ def test_pkg_config_and_cmake_state_the_version_of_the_headers(prefix: Path, tmp
 
 
 def test_without_cli11_the_program_is_left_out_with_one_line(tmp_path: Path) -> None:
-    completed = subprocess.run(
-        ["cmake", "-S", ROOT, "-B", tmp_path, "-G", "Ninja", "-DPALPATE_BUILD_CONTROL=AUTO"]
-        + ["-DCMAKE_DISABLE_FIND_PACKAGE_CLI11=ON"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    definitions = ["-DPALPATE_BUILD_CONTROL=AUTO", "-DCMAKE_DISABLE_FIND_PACKAGE_CLI11=ON"]
+    command = ["cmake", "-S", ROOT, "-B", tmp_path, "-G", "Ninja", *definitions]
+    completed = subprocess.run(command, capture_output=True, text=True, check=False)
     assert completed.returncode == 0
     line = "palpate-control not built: CLI11 not found, apt install libcli11-dev"
     assert completed.stderr.splitlines() == [line]

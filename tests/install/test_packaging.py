@@ -45,7 +45,7 @@ def test_conan_refuses_a_standard_before_cpp_20(tmp_path: Path) -> None:
     environment = os.environ | {"CONAN_HOME": str(tmp_path / "home")}
     run(CONAN, "profile", "detect", env=environment)
     command = [CONAN, "create", ROOT / "packaging" / "conan", "--no-remote", "-s", "compiler.cppstd=17"]
-    with pytest.raises(AssertionError, match="Current cppstd .17. is lower than the required C"):
+    with pytest.raises(AssertionError, match=r"Current cppstd .17. is lower than the required C"):
         run(*command, env=environment)
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Uses the installed package as a user does: try_wheel.py [--repaired]
 
-Runs both programs of the environment of this Python, and searches for a USB device. With --repaired, libusb must
-be the copy in the wheel. The last line is "ok".
+Runs both programs of the environment of this Python, and searches for a USB device. With --repaired, libusb
+must be the copy in the wheel. The last line is "ok".
 """
 
 import importlib.metadata

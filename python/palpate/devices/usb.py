@@ -46,8 +46,8 @@ def _pyusb() -> ModuleType:
 
 
 def _bundled_libusb() -> Any:
-    """Returns the backend of pyusb for the libusb that a wheel contains; None for the libusb of the system."""
-    bundled = sorted(Path(str(files("palpate"))).parent.glob("palpate.libs/libusb-1.0*"))
+    """Returns the pyusb backend for the libusb that a wheel contains; None without such a library."""
+    bundled = sorted(Path(str(files("palpate"))).parent.glob("palpate.libs/libusb-1*"))
     if not bundled:
         return None
     from usb.backend import libusb1
