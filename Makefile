@@ -34,13 +34,15 @@ export PIP_CONSTRAINT := tools/constraints.txt
 export MPLCONFIGDIR ?= $(CURDIR)/build/matplotlib
 
 python := .venv/bin/python
+# Two runs of pip must not change one environment at the same time.
+pip := flock .venv/pip.lock $(python) -m pip
 stamps := .venv/stamps
 
 core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree contain absolute paths: they are created again after the folder was moved.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python bench figures lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python test-packages bench figures lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved
 
 help:
@@ -51,23 +53,29 @@ help:
 $(stamps)/build: pyproject.toml tools/constraints.txt tools/system_packages.sh $(moved)
 	tools/system_packages.sh "$(PYTHON)" build
 	if [ "$$(cat .venv/folder 2>/dev/null)" != "$$(pwd -P)" ]; then rm -rf .venv build; "$(PYTHON)" -m venv .venv; fi
-	$(python) -m pip install --quiet --upgrade pip
-	$(python) -m pip install --quiet --group build
+	$(pip) install --quiet --upgrade pip
+	$(pip) install --quiet --group build
 	mkdir -p $(stamps) && pwd -P > .venv/folder
 	touch $@
 
-# The compiled module and the editable package: a change of a C++ source builds the module again.
+# The compiled module and the editable package: a change of a C++ source builds the module again. `make control` builds
+# palpate-control in another folder.
 $(stamps)/core: $(stamps)/build $(core_sources)
-	$(python) -m pip install --quiet --no-build-isolation -C cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON --editable .
+	$(pip) install --quiet --no-build-isolation -C cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON \
+	    -C cmake.define.PALPATE_BUILD_CONTROL=OFF --editable .
 	touch $@
 
-# After core, because two runs of pip must not change one environment at the same time.
-$(stamps)/develop: $(stamps)/build | $(stamps)/core
-	tools/system_packages.sh "$(PYTHON)" test
-	$(python) -m pip install --quiet --group test --group lint
+# The libraries of palpate-control and of the C++ tests.
+$(stamps)/control $(stamps)/test-cpp: $(stamps)/build
+	tools/system_packages.sh "$(PYTHON)" "$(@F)"
 	touch $@
 
-setup: $(stamps)/core $(stamps)/develop
+# Tools by their group in pyproject.toml: tests, linters, tests of the packages.
+$(stamps)/test $(stamps)/lint $(stamps)/package: $(stamps)/build
+	$(pip) install --quiet --group "$(@F)"
+	touch $@
+
+setup: $(stamps)/core $(stamps)/control $(stamps)/test-cpp $(stamps)/test $(stamps)/lint
 
 # ------------------------------------------------------------------------------------------------------------- use
 
@@ -84,7 +92,7 @@ test-python: setup control
 	$(python) -m pytest --numprocesses "$$(($(CMAKE_BUILD_PARALLEL_LEVEL) + 1))" --dist loadfile --no-loadscope-reorder
 
 # The real-time program; the build tool detects changed sources.
-control: $(stamps)/develop
+control: $(stamps)/control
 	cmake --preset control >/dev/null
 	cmake --build --preset control
 
@@ -95,11 +103,14 @@ test-full: test-full-native
 	$(MAKE) --no-print-directory test-python
 
 # Tests that `make test` never runs: sanitizers, the installed package, a USB device below a kernel.
-test-full-native: setup control
+test-full-native: setup control test-packages
 	tools/cpp_tests.sh release
 	for preset in asan tsan; do tools/cpp_tests.sh $$preset; done
-	tools/install_tests.sh
 	$(python) -m pytest tests/usb
+
+# The packages as users install them.
+test-packages: $(stamps)/core $(stamps)/control $(stamps)/test $(stamps)/package
+	$(python) -m pytest tests/install
 
 bench: setup
 	tools/bench.sh

@@ -5,7 +5,7 @@
 set -euo pipefail
 export LC_ALL=C
 
-find cpp tests bench examples \( -name '*.hpp' -o -name '*.cpp' \) -print0 |
+find cpp tests bench examples packaging \( -name '*.hpp' -o -name '*.cpp' \) -print0 |
     xargs -0r .venv/bin/clang-format --dry-run --Werror
 
 export commands cache headers

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the missing Debian or Ubuntu packages, or prints one line with the packages to install.
 #
-#   tools/system_packages.sh PYTHON build|test|guest
+#   tools/system_packages.sh PYTHON build|control|test-cpp|guest
 set -euo pipefail
 
 python=$1
@@ -25,10 +25,12 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
     compiles '#include <nlohmann/json.hpp>' || echo nlohmann-json3-dev
     compiles '#include <libusb-1.0/libusb.h>' || echo libusb-1.0-0-dev
     compiles '#include <boost/beast/websocket.hpp>' || echo libboost-dev
-    if [ "$purpose" = test ]; then
+    if [ "$purpose" = control ]; then
+        compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
+    fi
+    if [ "$purpose" = test-cpp ]; then
         compiles '#include <gtest/gtest.h>' || echo libgtest-dev
         compiles '#include <benchmark/benchmark.h>' || echo libbenchmark-dev
-        compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
         # for the emulated USB device of the tests
         [ -e /usr/include/umockdev-1.0/umockdev.h ] || echo libumockdev-dev
         command -v umockdev-run >/dev/null || echo umockdev

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "bindings.hpp"
+#include "palpate/version.hpp"
 
 namespace {
 
@@ -21,7 +22,7 @@ void translate_invalid_argument(std::exception_ptr thrown) {
 
 PYBIND11_MODULE(_core, module) {
     module.doc() = "The C++ core of palpate, one submodule for each folder of its headers.";
-    module.attr("__version__") = PALPATE_VERSION;
+    module.attr("__version__") = palpate::library_version;
     pybind11::register_local_exception_translator(&translate_invalid_argument);
 
     using namespace palpate::bindings;

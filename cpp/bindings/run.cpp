@@ -17,6 +17,7 @@
 #include "palpate/run/render.hpp"
 #include "palpate/run/summary.hpp"
 #include "palpate/simulation/open_device.hpp"
+#include "palpate/version.hpp"
 #include "settings.hpp"
 
 namespace palpate::bindings {
@@ -122,7 +123,7 @@ py::array_t<Value> column(const std::vector<TickRecord>& ticks, Value TickRecord
 template <class T>
 void set_options(T& options, const py::kwargs& given) {
     set_fields(options, given);
-    options.created_by = std::string("palpate ") + PALPATE_VERSION;
+    options.created_by = std::string("palpate ") + library_version;
     detail::require(!options.wait_s || (*options.wait_s > 0.0 && *options.wait_s <= 10.0),
                     "wait_s is " + readable(options.wait_s.value_or(0.0)) + ", must be > 0 and at most 10");
 }

@@ -15,6 +15,7 @@
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/fields/readable.hpp"
+#include "palpate/version.hpp"
 
 namespace palpate::control {
 
@@ -251,7 +252,7 @@ std::optional<int> read_options(int count, char** arguments, Options& options) {
         "palpate-control"};
     app.formatter(std::make_shared<Help>());
     app.footer(epilogue);
-    app.set_version_flag("--version", std::string("palpate-control ") + PALPATE_VERSION);
+    app.set_version_flag("--version", std::string("palpate-control ") + library_version);
     app.add_option("MODEL.json", options.model, "Model file, written by palpate identify")
         ->type_name("FILE")
         ->required();
@@ -266,7 +267,7 @@ std::optional<int> read_options(int count, char** arguments, Options& options) {
     try {
         app.parse(count, arguments);
         options.render.rate_given = app.count("--rate-hz") > 0;
-        options.render.created_by = std::string("palpate-control ") + PALPATE_VERSION;
+        options.render.created_by = std::string("palpate-control ") + library_version;
     } catch (const CLI::CallForHelp&) {
         std::cout << app.help();
         return 0;

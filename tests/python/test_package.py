@@ -3,6 +3,7 @@
 
 import importlib.metadata
 import importlib.resources
+import json
 import re
 import subprocess
 import sys
@@ -31,6 +32,14 @@ def test_package_core_citation_and_changelog_have_one_version() -> None:
     assert palpate.__version__ == _core.__version__ == version
     assert f"version: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_headers_and_packages_have_the_version_of_the_build() -> None:
+    version = version_of_the_build()
+    header = (ROOT / "cpp" / "include" / "palpate" / "version.hpp").read_text(encoding="utf-8")
+    assert f'library_version = "{version}";' in header
+    port = ROOT / "packaging" / "vcpkg" / "ports" / "palpate" / "vcpkg.json"
+    assert json.loads(port.read_text(encoding="utf-8"))["version-semver"] == version
 
 
 def test_the_package_contains_its_type_information() -> None:

@@ -12,3 +12,4 @@
 #include "palpate/simulation/test_rig.hpp"
 #include "palpate/stability/certificate_check.hpp"
 #include "palpate/stability/renderable_slopes.hpp"
+#include "palpate/version.hpp"

@@ -45,6 +45,16 @@ def _pyusb() -> ModuleType:
     return usb.core  # type: ignore[no-any-return]
 
 
+def _bundled_libusb() -> Any:
+    """Returns the pyusb backend for the libusb that a wheel contains; None without such a library."""
+    bundled = sorted(Path(str(files("palpate"))).parent.glob("palpate.libs/libusb-1*"))
+    if not bundled:
+        return None
+    from usb.backend import libusb1
+
+    return libusb1.get_backend(find_library=lambda name: str(bundled[0]))
+
+
 class UsbSetup:
     """Sets up one USB device. As a context manager it releases the device at the end.
 
@@ -159,7 +169,12 @@ def _candidates() -> Iterator[UsbSetup]:
     pyusb = _pyusb()
     try:
         handles = sorted(
-            pyusb.find(find_all=True, idVendor=core.usb_vendor, idProduct=core.usb_product),
+            pyusb.find(
+                find_all=True,
+                backend=_bundled_libusb(),
+                idVendor=core.usb_vendor,
+                idProduct=core.usb_product,
+            ),
             key=lambda handle: (handle.bus, handle.address),
         )
     except pyusb.NoBackendError:
