@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import difflib
 import unicodedata
 from collections.abc import Iterable
 
@@ -36,6 +37,13 @@ def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
     """Returns the escaped text; the end of a long text is cut."""
     shown = escaped(text)
     return shown if len(shown) <= longest else f"{shown[:longest]}..."
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Returns the end of a message on an unknown name: "; did you mean 'force_N'?", or empty text."""
+    by_lower_case = {each.lower(): each for each in known}
+    nearest = difflib.get_close_matches(name.lower(), by_lower_case, 1)
+    return f"; did you mean {shortened(by_lower_case[nearest[0]])!r}?" if nearest else ""
 
 
 def listed(names: Iterable[str]) -> str:

@@ -152,7 +152,7 @@ def test_options_of_identify_are_in_its_signature_and_help() -> None:
         assert parameters[each.name].default == getattr(IdentifyOptions(), each.name)
         assert f"\n{each.name} : " in (identify.__doc__ or "")
         assert f"\n{each.name} : " in (IdentifyOptions.__doc__ or "")
-    assert "Largest network that is tried" in (identify.__doc__ or "")
+    assert "Largest number of wavelets" in (identify.__doc__ or "")
     assert list(parameters)[:4] == ["recording", "force", "time", "direction"]
     with pytest.raises(InputError, match="identify has no option 'wavelets'"):
         identify(X, force(), wavelets=3)

@@ -18,7 +18,14 @@ from ..baselines import Compared, compare
 from ..identification import identify as identify_model
 from ..identification.classes.findings import error_findings
 from ..identification.identify_files import identify_files
-from ..identification.options import CHOICES, RESERVED_INPUTS, IdentifyOptions, SearchOptions, default_of
+from ..identification.options import (
+    CHOICES,
+    RESERVED_INPUTS,
+    IdentifyOptions,
+    SearchOptions,
+    default_of,
+    summaries,
+)
 from ..identification.search.evidence import reporting_to
 from ..recording import Recording
 from ..verdict import Verdict
@@ -61,21 +68,12 @@ def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-HELP = {
-    "inputs": "auto, or position,hysteresis,velocity,COLUMN.",
-    "max_wavelets": "Largest number of wavelets.",
-    "criterion": "When to stop adding wavelets.",
-    "loss": "squares: least squares; huber: outliers weigh less.",
-    "hysteresis_nonnegative": "Impose that every loop loses energy.",
-    "slope_bounds": "Smallest and largest slope imposed [N/m or N*m/rad].",
-    "monotone": "The force never falls with position.",
-    "fixed_force": "Position and force that the model goes through [SI].",
-    "coupling_stiffness": "Impose a slope below 0.9 of this stiffness [N/m or N*m/rad].",
-    "period": "Period of a repeating force [m or rad].",
+_HELP = summaries() | {
     "search": "Setting of the search, repeatable: "
     + ", ".join(f"{each.name}={_text(each.default)}" for each in fields(SearchOptions))
-    + ".",
+    + "."
 }
+"""Help of each option that is a field of `IdentifyOptions`; its docstring begins with the same sentence."""
 
 _METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE", "inputs": "NAMES"}
 """Placeholder that the help shows for the value of an option, by option."""
@@ -97,7 +95,11 @@ def _search(ctx: click.Context, param: click.Parameter, values: tuple[str, ...])
 
 def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
     flag = "--" + name.replace("_", "-")
-    text: dict[str, Any] = {"default": default, "help": HELP.get(name), "group": _GROUP.get(name, "Expert")}
+    text: dict[str, Any] = {
+        "default": default,
+        "help": _HELP.get(name, "").replace(" [-]", ""),
+        "group": _GROUP.get(name, "Expert"),
+    }
     alternatives = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     kinds = [kind for kind in alternatives if kind is not NoneType]
     if kinds == [bool]:

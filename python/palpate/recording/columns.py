@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..errors import InputError, listed, shortened
+from ..errors import InputError, did_you_mean, listed, shortened
 from .units import (
     FORCE_UNITS,
     POSITION_UNITS,
@@ -173,7 +173,8 @@ def _attempt(
     ]
     for option, name in (*options, *(("inputs", name) for name in request.inputs)):
         if name is not None and name not in names:
-            problems[option.strip("-")] = f"there is no column {shortened(name)!r} for {option}"
+            wrong = f"there is no column {shortened(name)!r} for {option}"
+            problems[option.strip("-")] = wrong + did_you_mean(name, names)
     columns = _with_units(names, request, problems)
     notes: list[str] = []
     chosen: dict[str, Column | None] = {}
