@@ -27,13 +27,16 @@ from ..identification.options import (
     summaries,
 )
 from ..identification.search.evidence import reporting_to
+from ..model import Model
 from ..recording import Recording
+from ..recording.units import Unit
 from ..verdict import Verdict
 from ..verification import Verification, verify
 from ..verification.verification import circumstances
 from .exit_status import end_with, finishing
 from .figures import picture_verification
 from .printing import (
+    WIDEST,
     number,
     print_details,
     print_json,
@@ -41,9 +44,12 @@ from .printing import (
     print_numbers,
     print_table,
     print_verdict,
+    prints_unicode,
     progress,
     talk,
+    terminal_width,
 )
+from .sketch import sketch_of
 from .verb import (
     PATH,
     ReadingOptions,
@@ -140,6 +146,12 @@ _IDENTIFY_OPTIONS = [
     help="Fit the usual methods to the same rows and compare; needs --hold-out-every.",
 )
 @expert_option(
+    "--sketch/--no-sketch",
+    default=None,
+    show_default="on a terminal",
+    help="Print the force curve as text.",
+)
+@expert_option(
     "--out-of-core", is_flag=True, help="Read files larger than memory part by part, each row once."
 )
 @expert_option(
@@ -162,6 +174,7 @@ def identify(
     hold_out_every: int | None,
     verbose: bool,
     with_baselines: bool,
+    sketch: bool | None,
     out_of_core: bool,
     jobs: int,
     scheduler: str | None,
@@ -259,10 +272,25 @@ def identify(
             )
             if with_baselines:
                 _print_baselines(nrmse, model.n_parameters, seconds, others)
+            if sketch or (sketch is None and terminal_width() is not None):
+                _print_sketch(model, recordings)
             if verbose:
                 reason = f"growth of the network stopped by {model.stop_reason}"
                 print_details([reason, *model.notes["identification"]])
     end_with(verdict)
+
+
+def _print_sketch(model: Model, recordings: Sequence[Recording]) -> None:
+    """Prints the force curve as text, in the units of the first file if it was read as a whole."""
+    position, force = (
+        recordings[0].file_unit(role) if recordings else Unit.of_si(model.units[role])
+        for role in ("position", "force")
+    )
+    columns = terminal_width() or WIDEST
+    if lines := sketch_of(model, position, force, columns=columns, unicode=prints_unicode()):
+        print_line()
+        for line in lines:
+            print_line(line)
 
 
 def _require_unused(**others: Any) -> None:

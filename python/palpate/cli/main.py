@@ -50,7 +50,8 @@ class _LazyVerbs(Verbs):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
         if name not in _VERBS and not name.startswith("-") and not ctx.resilient_parsing:
-            ctx.fail(f"there is no verb {name!r}{did_you_mean(name, _VERBS)}")
+            suggestion = did_you_mean(name, _VERBS) or f"; the verbs are {', '.join(_VERBS)}"
+            raise click.UsageError(f"there is no verb {name!r}{suggestion}")
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:

@@ -104,6 +104,11 @@ def set_quiet(ctx: click.Context, quiet: bool) -> None:
     ctx.meta[_QUIET] = quiet
 
 
+def prints_unicode() -> bool:
+    """Returns True if the encoding of standard output is UTF-8."""
+    return (getattr(sys.stdout, "encoding", None) or "").lower().replace("-", "") == "utf8"
+
+
 def print_line(text: str = "", *, err: bool = False, hanging: int = 2, elsewhere: int | None = None) -> None:
     """Prints one item: a line, wrapped on a terminal with an additional hanging indent.
 
@@ -327,7 +332,7 @@ class _Formatter(click.HelpFormatter):
         super().__init__(indent_increment, max(_NARROWEST_HELP, min(terminal, WIDEST)))
 
     def write_dl(self, rows: Iterable[tuple[str, str]], col_max: int = 30, col_spacing: int = 2) -> None:
-        super().write_dl(list(rows), min(col_max, self.width // 3), col_spacing)
+        super().write_dl(list(rows), min(col_max, 3 * self.width // 8), col_spacing)
 
 
 class _Context(click.Context):

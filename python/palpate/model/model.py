@@ -22,7 +22,7 @@ from ..errors import InputError
 from ..recording import Source
 from ..recording.files import require_file
 from ..verdict import Verdict
-from .display import frame_of, html_of
+from .model_display import frame_of, html_of
 from .model_file import Fit, PathStep, describe, write_json
 
 if TYPE_CHECKING:

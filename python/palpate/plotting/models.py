@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from .._typing import Float1D
 from ..model import Model
-from ..model.display import force_curves
+from ..model.model_display import force_curves
 from ..recording import Recording
 from ..verification import Stroke
 from .look import dots_of, grid, legend_above, of_stroke, plain_decades, scale_for, strokes, thinned
