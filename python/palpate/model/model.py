@@ -351,7 +351,7 @@ class Model(ForceModel):
         """
         return frame_of(self)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None, *, label: str = "model", color: str = "black") -> Axes:
         """Draws the force over the domain and returns the axes.
 
         A model with hysteresis has one curve for press and one for release. A model with further inputs has
@@ -361,11 +361,13 @@ class Model(ForceModel):
         ----------
         ax : matplotlib.axes.Axes, optional
             Axes to draw on; by default those of a new figure.
+        label, color : str
+            Name and colour of the curves, to draw several models on the same axes.
         """
         from ..plotting import axes_or_new, draw_model
 
         axes = axes_or_new(ax)
-        draw_model(axes, self)
+        draw_model(axes, self, label=label, color=color)
         return axes
 
     def _repr_html_(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any, Literal
+from weakref import WeakKeyDictionary
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from .._typing import Float1D
 from ..arguments import instance_of
+from ..errors import InputError
 
 MOST_POINTS = 6000
 """Largest number of drawn points; more are indistinguishable at the width of a column."""
@@ -85,6 +87,24 @@ def scale_for(unit: str, *values: npt.ArrayLike) -> Scale:
 def _least(size: float) -> float:
     """Returns the smallest value that is drawn with an SI prefix of this size."""
     return size if size > 1.0 else 0.1 * size
+
+
+_SCALES: WeakKeyDictionary[Axis, tuple[str, Scale]] = WeakKeyDictionary()
+"""SI unit and scale of the curves on each axis on which something was drawn."""
+
+
+def scale_on(axis: Axis, unit: str, *values: npt.ArrayLike) -> Scale:
+    """Returns the scale of the curves that are already on an axis; for an empty axis as `scale_for` does.
+
+    Raises
+    ------
+    InputError
+        The curves that are already on the axis have another unit.
+    """
+    drawn, scale = _SCALES.setdefault(axis, (unit, scale_for(unit, *values)))
+    if unit and drawn and unit != drawn:
+        raise InputError(f"ax already shows values in {drawn}, and these are in {unit}: use other axes")
+    return scale
 
 
 def legend_above(axes: Axes) -> None:

@@ -16,7 +16,7 @@ from ..model import Model
 from ..model.model_display import force_curves
 from ..recording import Recording
 from ..verification import Stroke
-from .look import dots_of, grid, legend_above, of_stroke, plain_decades, scale_for, strokes, thinned
+from .look import dots_of, grid, legend_above, of_stroke, plain_decades, scale_for, scale_on, strokes, thinned
 
 _LINES = {"press": "solid", "release": (0, (4, 2)), "": "solid"}
 """Line style of each stroke."""
@@ -81,8 +81,8 @@ def draw_forces(
         As in :func:`draw_measured_and_modelled`.
     """
     by_stroke = strokes(recording.direction, len(recording))
-    x = scale_for(recording.units["position"], recording.position)
-    y = scale_for(recording.units["force"], recording.force, modelled)
+    x = scale_on(axes.xaxis, recording.units["position"], recording.position)
+    y = scale_on(axes.yaxis, recording.units["force"], recording.force, modelled)
     for name, rows in by_stroke:
         position, force = thinned(recording.position[rows] * x.factor, recording.force[rows] * y.factor)
         axes.plot(position, force, **dots_of(name), color="0.65", markersize=2.2, label=of_stroke(seen, name))
@@ -116,8 +116,8 @@ def draw_residual(
     """
     residual = recording.force - modelled
     by_stroke = strokes(recording.direction, len(recording))
-    x = scale_for(recording.units["position"], recording.position)
-    z = scale_for(recording.units["force"], residual)
+    x = scale_on(axes.xaxis, recording.units["position"], recording.position)
+    z = scale_on(axes.yaxis, recording.units["force"], residual)
     for name, rows in by_stroke:
         position, rest = thinned(recording.position[rows] * x.factor, residual[rows] * z.factor)
         shade = "0.45" if name != "release" else "0.7"
@@ -142,7 +142,7 @@ def _draw_band(axes: Axes, position: Float1D, half: Float1D, line: Any) -> None:
         axes.plot(at, edge, color="black", linewidth=0.7, linestyle=line)
 
 
-def draw_model(axes: Axes, model: Model) -> None:
+def draw_model(axes: Axes, model: Model, *, label: str = "model", color: str = "black") -> None:
     """Draws the force of a model over its domain, one curve for each stroke.
 
     A model with further inputs has a curve for their least, middle and largest values.
@@ -153,25 +153,29 @@ def draw_model(axes: Axes, model: Model) -> None:
         Target axes.
     model : Model
         The model.
+    label, color : str
+        Name and colour of the curves.
     """
     curves: dict[str, tuple[Float1D, Any]] = {}
     position = np.linspace(model.lower[0], model.upper[0], _POSITIONS)
     if model.dimension == 1:
         _, forces = force_curves(model, _POSITIONS)
-        curves = {of_stroke("model", name): (force, _LINES[name]) for name, force in forces.items()}
+        curves = {of_stroke(label, name): (force, _LINES[name]) for name, force in forces.items()}
     else:
         for share, line in zip(_SHARES, _INPUT_LINES, strict=True):
             further = model.lower[1:] + share * (model.upper[1:] - model.lower[1:])
             inputs = np.column_stack([position, np.broadcast_to(further, (_POSITIONS, len(further)))])
             names = zip(model.inputs[1:], further, strict=True)
-            curves[", ".join(f"{name} {value:.4g}" for name, value in names)] = (model.predict(inputs), line)
-    x = scale_for(model.units["position"], position)
-    y = scale_for(model.units["force"], *(force for force, _ in curves.values()))
+            name = ", ".join([label, *(f"{name} {value:.4g}" for name, value in names)])
+            curves[name] = (model.predict(inputs), line)
+    x = scale_on(axes.xaxis, model.units["position"], position)
+    y = scale_on(axes.yaxis, model.units["force"], *(force for force, _ in curves.values()))
     for name, (force, line) in curves.items():
-        axes.plot(position * x.factor, force * y.factor, **_CURVE, linestyle=line, label=name)
+        look = _CURVE | {"color": color, "linestyle": line}
+        axes.plot(position * x.factor, force * y.factor, **look, label=name)
     axes.set_xlabel(x.label(model.inputs[0]))
     axes.set_ylabel(y.label("force"))
-    if len(curves) > 1:
+    if len(axes.lines) > 1:
         legend_above(axes)
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 
 from ..recording import Recording
-from .look import dots_of, legend_above, of_stroke, scale_for, strokes, thinned
+from .look import dots_of, legend_above, of_stroke, scale_on, strokes, thinned
 
 
 def draw_recording(axes: Axes, recording: Recording) -> None:
@@ -20,8 +20,8 @@ def draw_recording(axes: Axes, recording: Recording) -> None:
         The recording.
     """
     seen = "simulated" if "simulated" in recording.metadata else "recorded"
-    x = scale_for(recording.units["position"], recording.position)
-    y = scale_for(recording.units["force"], recording.force)
+    x = scale_on(axes.xaxis, recording.units["position"], recording.position)
+    y = scale_on(axes.yaxis, recording.units["force"], recording.force)
     for name, rows in strokes(recording.direction, len(recording)):
         shade = "0.3" if name != "release" else "0.6"
         axes.plot(

@@ -15,7 +15,7 @@ from .._core.rendering import Scheme, compensated_share, default_play_radius
 from .._core.stability import explicit_scheme, force_bounds
 from .._typing import Float1D
 from ..planning import Plan
-from .look import grid, legend_above, of_stroke, plain_decades, scale_for, thinned
+from .look import grid, legend_above, of_stroke, plain_decades, scale_for, scale_on, thinned
 
 _LINES = ("-", "--", ":", "-.")
 """Line styles of the object slopes in a figure of the root locus, in order."""
@@ -128,8 +128,8 @@ def draw_plan(axes: Axes, plan: Plan) -> None:
         The plan; its coupling and its limited network change the felt force.
     """
     position, identified, rendered = plan.forces_at_rest()
-    x = scale_for(plan.model.units["position"], position)
-    y = scale_for(plan.model.units["force"], identified, rendered)
+    x = scale_on(axes.xaxis, plan.model.units["position"], position)
+    y = scale_on(axes.yaxis, plan.model.units["force"], identified, rendered)
     names = ("press", "release") if len(identified) > 1 else ("",)
     # The line of the identified force is wider, so that both are visible if they agree.
     for curves, name, color, width in (

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import shortened
 from ..html_table import Curve, html_table
 from .files import Layout, free_name
 from .table import Cells
@@ -14,6 +15,9 @@ from .units import COLUMN_SUFFIX
 
 if TYPE_CHECKING:
     from .recording import Recording
+
+LONGEST_METADATA = 120
+"""Largest length of a value of the metadata in the HTML of a recording; longer values are cut [characters]"""
 
 
 def columns_of(recording: Recording) -> tuple[Layout, dict[str, Cells]]:
@@ -50,6 +54,6 @@ def html_of(recording: Recording) -> str:
         rows["inputs"] = ", ".join(recording.input_names)
     rows["source"] = ", ".join(recording.source.files) or "arrays"
     for name, value in recording.metadata.items():
-        rows.setdefault(name, value)
+        rows.setdefault(shortened(name), shortened(value, LONGEST_METADATA))
     curves = [Curve(recording.position, recording.force, "dots")] if len(recording) else []
     return html_table("Recording", recording.verdict, rows, curves)

@@ -79,8 +79,18 @@ def test_plot_of_several_inputs_has_a_curve_for_least_middle_and_largest_values(
     given = Figure().subplots()
     model = two_inputs()
     model.plot(given)
-    assert labels(given) == ["lateral_m 0", "lateral_m 0.25", "lateral_m 0.5"]
+    assert labels(given) == ["model, lateral_m 0", "model, lateral_m 0.25", "model, lateral_m 0.5"]
     assert np.asarray(given.lines[1].get_ydata())[0] == model.predict([[0.0, 0.25]])[0]
+
+
+def test_two_models_on_the_same_axes_have_their_names_and_colours() -> None:
+    given = Figure().subplots()
+    model_by_hand().plot(given, label="first")
+    assert given.get_legend() is None
+    model_by_hand(bias=1.0).plot(given, label="second", color="red")
+    assert labels(given) == ["first", "second"]
+    assert [line.get_color() for line in given.lines] == ["black", "red"]
+    assert given.get_legend() is not None
 
 
 def test_plot_without_axes_makes_a_figure(monkeypatch: pytest.MonkeyPatch) -> None:
