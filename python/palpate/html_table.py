@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""HTML of a result for notebooks: verdict, table of values and sketch of the force; no script, no colours of
-its own."""
+"""HTML of a result for notebooks: verdict, table of values and sketch of the force; no script and no
+colours."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def test_the_notebook_has_no_stored_outputs(notebook: nbformat.NotebookNode) -> 
     assert all(not cell.outputs and cell.execution_count is None for cell in code)
 
 
-# The kernel runs in a process and a thread of its own, which leave sockets and loops open.
+# The kernel is another process, and its client leaves sockets and loops open.
 @pytest.mark.filterwarnings("default")
 def test_the_notebook_runs_and_every_result_is_shown(
     notebook: nbformat.NotebookNode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -48,7 +48,7 @@ def completes(group: click.Group) -> bool:
 
 
 def suffixes_of(placeholder: str) -> tuple[str, ...]:
-    """Returns the suffixes of the files that the placeholder of a parameter in the help stands for."""
+    """Returns the suffixes of files for the placeholder of a parameter in the help."""
     if placeholder.startswith("RECORDING"):
         return _RECORDINGS
     if placeholder == "PNG":
