@@ -240,6 +240,9 @@ class Plan:
         The k strokes are press and release for a model with hysteresis.
         """
         x = np.linspace(self.model.lower[0], self.model.upper[0], SAMPLES)
+        if self.model.of_velocity:  # this model is always rendered without a coupling
+            force = self.model.predict(np.column_stack([x, np.zeros_like(x)]))[None, :]
+            return x, force, force
         return x, strokes(self.model, x), _at_rest(self.rendered, self.scheme, x)
 
     def plot(self, ax: Axes | None = None) -> Axes:
