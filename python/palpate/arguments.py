@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +109,18 @@ def vector_of(name: str, values: object) -> Float1D:
     if bad.size:
         raise InputError(f"{name}[{bad[0]}] is {array[bad[0]]}; it must be a finite number")
     return array
+
+
+def parameter_texts(function: Callable[..., Any]) -> dict[str, str]:
+    """Returns the text on each parameter in a NumPy docstring, by name; empty without a docstring."""
+    section = inspect.cleandoc(function.__doc__ or "").partition("Parameters\n----------\n")[2]
+    found = re.findall(r"^(\w+) : .*\n((?: +.*(?:\n|$))+)", section, re.MULTILINE)
+    return {name: inspect.cleandoc(text) for name, text in found}
+
+
+def first_sentence(text: str) -> str:
+    """Returns the text up to the first full stop, on one line."""
+    return " ".join(re.split(r"(?<=\.)\s", text)[0].split())
 
 
 def named_arguments(kind: Any) -> None:

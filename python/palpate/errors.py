@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import difflib
 import unicodedata
 from collections.abc import Iterable
 
@@ -36,6 +37,19 @@ def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
     """Returns the escaped text; the end of a long text is cut."""
     shown = escaped(text)
     return shown if len(shown) <= longest else f"{shown[:longest]}..."
+
+
+def nearest_name(name: str, known: Iterable[str]) -> str | None:
+    """Returns the known name that differs least from a misspelt one; None if none is similar."""
+    by_lower_case = {each.lower(): each for each in known}
+    nearest = difflib.get_close_matches(name.lower(), by_lower_case, 1)
+    return by_lower_case[nearest[0]] if nearest else None
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Returns the end of a message on an unknown name: " (did you mean 'force_N'?)", or empty text."""
+    nearest = nearest_name(name, known)
+    return "" if nearest is None else f" (did you mean {shortened(nearest)!r}?)"
 
 
 def listed(names: Iterable[str]) -> str:

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Test fixtures: the folder of measured recordings, and small recording files."""
+"""Test fixtures: the folder of measured recordings, small recording files, and a terminal."""
 
 import os
+import pty
 import signal
+import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -40,3 +43,33 @@ def csv_file(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
+    """Runs a function whose standard output and error are a terminal of this width; returns its output."""
+
+    def run(work: Callable[[], object], columns: int = 80) -> str:
+        reading_end, terminal_end = pty.openpty()
+        output = bytearray()
+
+        def read_output() -> None:
+            while True:
+                try:
+                    received = os.read(reading_end, 65536)
+                except OSError:  # reading fails when the program has closed the terminal
+                    return
+                output.extend(received)
+
+        reader = threading.Thread(target=read_output)
+        reader.start()
+        with os.fdopen(terminal_end, "w") as stream, monkeypatch.context() as context:
+            context.setenv("COLUMNS", str(columns))
+            context.setattr(sys, "stdout", stream)
+            context.setattr(sys, "stderr", stream)
+            work()
+        reader.join()
+        os.close(reading_end)
+        return output.decode().replace("\r\n", "\n")
+
+    return run

@@ -11,14 +11,15 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "python" / "palpate"
 HEADERS = ROOT / "cpp" / "include" / "palpate"
 
-# Modules that every folder may import: the error type, the checks of arguments, the verdict, the names of
-# array shapes and the compiled core.
-COMMON = {"errors", "arguments", "verdict", "_typing", "_core"}
+# Modules that every folder may import: the error type, the checks of arguments, the verdict, the HTML of a
+# result, the names of array shapes and the compiled core.
+COMMON = {"errors", "arguments", "verdict", "html_table", "_typing", "_core"}
 
 # Modules of the package, lowest first: a module may import the modules that are listed before it.
 MODULE_ORDER = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
 
-# Modules of the package that may import any module except cli; only the module cli imports them.
+# Modules of the package that may import any module except cli; only the module cli imports them. A method
+# `plot` may also import `plotting`, which draws its object.
 SIDE_MODULES = {"plotting", "baselines"}
 
 # Folder of C++ headers -> folders whose headers it may include, besides its own, status.hpp and fields.
@@ -93,11 +94,22 @@ def module_of(path: Path) -> str:
 def imported_modules(path: Path) -> set[str]:
     """Returns the modules of the package that a file imports, imports within functions included.
 
-    The package itself, which exports names of all modules, is ".".
+    The package itself, which exports names of all modules, is ".". The import of `plotting` in a method
+    `plot` is left out.
     """
     package_parts = ("palpate", *path.relative_to(PACKAGE).parts[:-1])
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    drawing = {
+        id(node)
+        for method in ast.walk(tree)
+        if isinstance(method, ast.FunctionDef) and method.name == "plot"
+        for node in ast.walk(method)
+        if isinstance(node, ast.ImportFrom) and node.level and node.module == "plotting"
+    }
+    for node in ast.walk(tree):
+        if id(node) in drawing:
+            continue
         targets: list[tuple[str, ...]] = []
         if isinstance(node, ast.Import):
             targets = [tuple(alias.name.split(".")) for alias in node.names]

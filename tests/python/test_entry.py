@@ -3,18 +3,21 @@
 
 import inspect
 import pickle
+import re
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 
+import click
 import numpy as np
 import pandas as pd
 import pytest
 
 import palpate
-from palpate import IdentifyOptions, InputError, Model, Recording, identify, load_model, verify
+from palpate import IdentifyOptions, InputError, Model, Recording, SearchOptions, identify, load_model, verify
+from palpate.cli.identify import identify as identify_verb
 
 X = np.concatenate([np.linspace(0.0, 4.0, 300), np.linspace(4.0, 0.0, 300)])
 DIRECTION = np.repeat([1.0, -1.0], 300)
@@ -152,10 +155,46 @@ def test_options_of_identify_are_in_its_signature_and_help() -> None:
         assert parameters[each.name].default == getattr(IdentifyOptions(), each.name)
         assert f"\n{each.name} : " in (identify.__doc__ or "")
         assert f"\n{each.name} : " in (IdentifyOptions.__doc__ or "")
-    assert "Largest network that is tried" in (identify.__doc__ or "")
+    assert "Largest number of wavelets" in (identify.__doc__ or "")
     assert list(parameters)[:4] == ["recording", "force", "time", "direction"]
     with pytest.raises(InputError, match="identify has no option 'wavelets'"):
         identify(X, force(), wavelets=3)
+
+
+def texts_on(option: click.Option, documentation: str) -> list[str]:
+    """Returns each entry on an option in a docstring, found by its Python name or its flag."""
+    flags = "|".join(f"``{flag}``" for flag in option.opts)
+    entries = re.findall(
+        rf"^((?:{option.name} : |.*(?:{flags})).*\n(?: +.*\n)+)", documentation, re.MULTILINE
+    )
+    return [" ".join(entry.split()).replace(" [-]", "") for entry in entries]
+
+
+def python_default(name: str) -> object:
+    """Returns the default of an argument of `read_recording`, or of an option of `identify`."""
+    of_reading = inspect.signature(palpate.read_recording).parameters
+    options = vars(IdentifyOptions())
+    return options[name] if name in options else of_reading[name].default
+
+
+def test_help_of_identify_has_every_option_of_the_command_line_with_its_meaning() -> None:
+    documentation = inspect.getdoc(identify) or ""
+    for option in identify_verb.params:
+        if not isinstance(option, click.Option):
+            continue
+        entries, name = texts_on(option, documentation), option.name or ""
+        assert entries, f"{option.opts[-1]} is missing"
+        if all(entry.startswith("``--") for entry in entries):
+            continue  # this option is another function in Python, which the entry names
+        meaning = (option.help or "").removesuffix(" Repeatable.").rstrip(".")
+        text = next((each for each in entries if meaning in each or name == "search"), None)
+        assert text is not None, f"{name}: no entry begins with the help of the command line"
+        default = "SearchOptions(" if name == "search" else repr(python_default(name))
+        assert f"default {default}" in text, name
+        if isinstance(option.type, click.Choice):
+            assert all(str(word) in text for word in option.type.choices), name
+    for setting in fields(SearchOptions):
+        assert f"{setting.name}={getattr(SearchOptions(), setting.name)!r}" in documentation
 
 
 def test_the_example_of_identify_runs() -> None:

@@ -18,15 +18,25 @@ from ..baselines import Compared, compare
 from ..identification import identify as identify_model
 from ..identification.classes.findings import error_findings
 from ..identification.identify_files import identify_files
-from ..identification.options import CHOICES, RESERVED_INPUTS, IdentifyOptions, SearchOptions, default_of
+from ..identification.options import (
+    CHOICES,
+    RESERVED_INPUTS,
+    IdentifyOptions,
+    SearchOptions,
+    default_of,
+    summaries,
+)
 from ..identification.search.evidence import reporting_to
+from ..model import Model
 from ..recording import Recording
+from ..recording.units import Unit
 from ..verdict import Verdict
 from ..verification import Verification, verify
 from ..verification.verification import circumstances
 from .exit_status import end_with, finishing
 from .figures import picture_verification
 from .printing import (
+    WIDEST,
     number,
     print_details,
     print_json,
@@ -34,9 +44,12 @@ from .printing import (
     print_numbers,
     print_table,
     print_verdict,
+    prints_unicode,
     progress,
     talk,
+    terminal_width,
 )
+from .sketch import sketch_of
 from .verb import (
     PATH,
     ReadingOptions,
@@ -61,21 +74,12 @@ def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-HELP = {
-    "inputs": "auto, or position,hysteresis,velocity,COLUMN.",
-    "max_wavelets": "Largest number of wavelets.",
-    "criterion": "When to stop adding wavelets.",
-    "loss": "squares: least squares; huber: outliers weigh less.",
-    "hysteresis_nonnegative": "Impose that every loop loses energy.",
-    "slope_bounds": "Smallest and largest slope imposed [N/m or N*m/rad].",
-    "monotone": "The force never falls with position.",
-    "fixed_force": "Position and force that the model goes through [SI].",
-    "coupling_stiffness": "Impose a slope below 0.9 of this stiffness [N/m or N*m/rad].",
-    "period": "Period of a repeating force [m or rad].",
+_HELP = summaries() | {
     "search": "Setting of the search, repeatable: "
     + ", ".join(f"{each.name}={_text(each.default)}" for each in fields(SearchOptions))
-    + ".",
+    + "."
 }
+"""Help of each option that is a field of `IdentifyOptions`; its docstring begins with the same sentence."""
 
 _METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE", "inputs": "NAMES"}
 """Placeholder that the help shows for the value of an option, by option."""
@@ -97,7 +101,11 @@ def _search(ctx: click.Context, param: click.Parameter, values: tuple[str, ...])
 
 def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
     flag = "--" + name.replace("_", "-")
-    text: dict[str, Any] = {"default": default, "help": HELP.get(name), "group": _GROUP.get(name, "Expert")}
+    text: dict[str, Any] = {
+        "default": default,
+        "help": _HELP.get(name, "").replace(" [-]", ""),
+        "group": _GROUP.get(name, "Expert"),
+    }
     alternatives = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     kinds = [kind for kind in alternatives if kind is not NoneType]
     if kinds == [bool]:
@@ -138,6 +146,12 @@ _IDENTIFY_OPTIONS = [
     help="Fit the usual methods to the same rows and compare; needs --hold-out-every.",
 )
 @expert_option(
+    "--sketch/--no-sketch",
+    default=None,
+    show_default="on a terminal",
+    help="Print the force curve as text.",
+)
+@expert_option(
     "--out-of-core", is_flag=True, help="Read files larger than memory part by part, each row once."
 )
 @expert_option(
@@ -160,6 +174,7 @@ def identify(
     hold_out_every: int | None,
     verbose: bool,
     with_baselines: bool,
+    sketch: bool | None,
     out_of_core: bool,
     jobs: int,
     scheduler: str | None,
@@ -257,10 +272,25 @@ def identify(
             )
             if with_baselines:
                 _print_baselines(nrmse, model.n_parameters, seconds, others)
+            if sketch or (sketch is None and terminal_width() is not None):
+                _print_sketch(model, recordings)
             if verbose:
                 reason = f"growth of the network stopped by {model.stop_reason}"
                 print_details([reason, *model.notes["identification"]])
     end_with(verdict)
+
+
+def _print_sketch(model: Model, recordings: Sequence[Recording]) -> None:
+    """Prints the force curve as text, in the units of the first file if it was read as a whole."""
+    position, force = (
+        recordings[0].file_unit(role) if recordings else Unit.of_si(model.units[role])
+        for role in ("position", "force")
+    )
+    columns = terminal_width() or WIDEST
+    if lines := sketch_of(model, position, force, columns=columns, unicode=prints_unicode()):
+        print_line()
+        for line in lines:
+            print_line(line)
 
 
 def _require_unused(**others: Any) -> None:

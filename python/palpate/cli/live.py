@@ -14,7 +14,7 @@ from ..devices import DeviceError
 from ..errors import InputError
 from ..verdict import Verdict
 from .exit_status import terminated_as_interrupted
-from .printing import OverwrittenLine, number, talk
+from .printing import OverwrittenLine, number, print_line
 from .verb import PATH, options
 
 device_options = options(
@@ -93,5 +93,5 @@ class LiveLine:
 def session_verdict(summary: Mapping[str, Any]) -> Verdict:
     """Returns the verdict in the summary of a run; prints on standard error why the run ended early."""
     if not summary["orderly"]:
-        talk(f"error: {summary['ended']}; zero force sent, device closed")
+        print_line(f"error: {summary['ended']}; zero force sent, device closed", err=True)
     return Verdict.from_record(summary["findings"])

@@ -9,9 +9,12 @@ from collections.abc import Sequence
 from importlib import import_module
 
 import click
+from click.shell_completion import CompletionItem
 
+from ..errors import did_you_mean
+from .completion import SHELLS, completes, script_of
 from .exit_status import INTERRUPTED, exit_status_of
-from .printing import TERMS, Verbs, drop_what_cannot_be_written, prepare_streams, print_line
+from .printing import TERMS, Verbs, drop_what_cannot_be_written, echo, prepare_streams, print_line
 
 _VERBS = {
     "identify": "Identify a model from recordings.",
@@ -42,6 +45,23 @@ class _LazyVerbs(Verbs):
         assert isinstance(command, click.Command)
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if name not in _VERBS and not name.startswith("-") and not ctx.resilient_parsing:
+            suggestion = did_you_mean(name, _VERBS) or f"; the verbs are {', '.join(_VERBS)}"
+            raise click.UsageError(f"there is no verb {name!r}{suggestion}")
+        return super().resolve_command(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
+        # Group.shell_complete would import the files of all verbs.
+        verbs = [CompletionItem(name, help=text) for name, text in _VERBS.items()]
+        return [
+            *(verb for verb in verbs if verb.value.startswith(incomplete)),
+            *click.Command.shell_complete(self, ctx, incomplete),
+        ]
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Verbs"):
             formatter.write_dl(list(_VERBS.items()))
@@ -50,6 +70,12 @@ class _LazyVerbs(Verbs):
 def _print_version(ctx: click.Context, param: click.Parameter, wanted: bool) -> None:
     if wanted:
         print_line(f"palpate {import_module('._core', 'palpate').__version__}")
+        ctx.exit()
+
+
+def _print_script(ctx: click.Context, param: click.Parameter, shell: str | None) -> None:
+    if shell is not None:
+        echo(script_of(shell))
         ctx.exit()
 
 
@@ -68,6 +94,14 @@ def _print_version(ctx: click.Context, param: click.Parameter, wanted: bool) -> 
     callback=_print_version,
     help="Print the version.",
 )
+@click.option(
+    "--completion",
+    type=click.Choice(SHELLS),
+    is_eager=True,
+    expose_value=False,
+    callback=_print_script,
+    help='Print the completion script of a shell: eval "$(palpate --completion bash)".',
+)
 def palpate() -> None:
     """Identify, verify, plan and render the force of a recorded object."""
 
@@ -79,6 +113,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     is one sentence on standard error, or with --json {"error": "..."} on standard output.
     """
     prepare_streams()
+    if arguments is None and completes(palpate):
+        return 0
     given = list(sys.argv[1:] if arguments is None else arguments)
     code = 0
     try:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from .._core.stability import Certificate
 from ..model import load_model
@@ -15,6 +16,7 @@ from ..model.model_file import certificate_record
 from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, profile_file
 from ..planning.candidates import CANDIDATES
 from ..planning.search import plan as choose
+from .completion import files_with
 from .exit_status import end_with, finishing
 from .figures import figure_file, source_name
 from .printing import (
@@ -45,11 +47,24 @@ class Samples(click.ParamType[int | str]):
             self.fail(f"'{value}' is not a number of samples: give 0 to 16, auto or off", param, ctx)
 
 
+class Profile(click.ParamType[str]):
+    """Value of --device: a file, or the name of an example profile."""
+
+    name = "PROFILE.toml"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem[str]]:
+        """Returns the examples and the files that complete a name."""
+        names = [CompletionItem(name) for name in example_profiles() if name.startswith(incomplete)]
+        return names or files_with((".toml",), incomplete)
+
+
 class _PlanVerb(Verb):
     """Command `palpate plan`; with --examples it needs neither a model nor a device."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        if "--examples" in args:
+        if "--examples" in args and not ctx.resilient_parsing:
             _list_examples(as_json="--json" in args)
             ctx.exit()
         return super().parse_args(ctx, args)
@@ -89,7 +104,7 @@ def _list_examples(*, as_json: bool) -> None:
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.option(
     "--device",
-    metavar="PROFILE.toml",
+    type=Profile(),
     required=True,
     help="Profile of the device, or the name of an example.",
 )

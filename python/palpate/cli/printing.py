@@ -43,6 +43,13 @@ _NARROWEST_HELP = 30
 """Least width to which a help text is wrapped [columns]."""
 
 
+_COLOURS = {"good": "green", "usable": "yellow", "no": "red"}
+"""Colour of each level of a verdict."""
+
+_QUIET = "palpate.quiet"
+"""Key in the context of a verb whose value is True if only the verdict is printed."""
+
+
 class OutputError(Exception):
     """Standard output cannot be written; the message is one sentence with the reason."""
 
@@ -86,10 +93,27 @@ def terminal_width(*, err: bool = False) -> int | None:
     return min(shutil.get_terminal_size().columns, WIDEST) if on_terminal else None
 
 
+def is_quiet() -> bool:
+    """Returns True if the running verb prints only its verdict and errors (--quiet)."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(_QUIET))
+
+
+def set_quiet(ctx: click.Context, quiet: bool) -> None:
+    """States for the running verb if only its verdict and errors are printed."""
+    ctx.meta[_QUIET] = quiet
+
+
+def prints_unicode() -> bool:
+    """Returns True if the encoding of standard output is UTF-8."""
+    return (getattr(sys.stdout, "encoding", None) or "").lower().replace("-", "") == "utf8"
+
+
 def print_line(text: str = "", *, err: bool = False, hanging: int = 2, elsewhere: int | None = None) -> None:
     """Prints one item: a line, wrapped on a terminal with an additional hanging indent.
 
-    `elsewhere` is the width without a terminal; None does not wrap.
+    `elsewhere` is the width without a terminal; None does not wrap. With --quiet nothing is printed on
+    standard output.
 
     Raises
     ------
@@ -98,6 +122,8 @@ def print_line(text: str = "", *, err: bool = False, hanging: int = 2, elsewhere
     BrokenPipeError
         The reader of standard output has ended.
     """
+    if is_quiet() and not err:
+        return
     shown = visible(text)
     width = terminal_width(err=err) or elsewhere
     if width is not None and len(shown) > width:
@@ -152,8 +178,9 @@ def drop_what_cannot_be_written() -> None:
 
 
 def talk(sentence: str) -> None:
-    """Prints a sentence for the user on standard error."""
-    print_line(sentence, err=True)
+    """Prints a sentence for the user on standard error, unless the verb is quiet."""
+    if not is_quiet():
+        print_line(sentence, err=True)
 
 
 def print_json(result: Mapping[str, Any]) -> None:
@@ -185,9 +212,19 @@ def print_numbers(rows: Mapping[str, str]) -> None:
 
 def print_verdict(verdict: Verdict) -> None:
     """Prints the verdict on standard output, before any number: its level, then a line for each reason."""
-    print_line(f"verdict: {verdict.level}")
+    echo(f"verdict: {_coloured(verdict.level)}")
     for reason in verdict.reasons:
         print_paragraph(reason, indent="  ")
+
+
+def _coloured(level: str) -> str:
+    """Returns the level of a verdict in its colour if standard output is a terminal that shows colours.
+
+    No colours are used if the variable NO_COLOR is not empty (https://no-color.org) or TERM is dumb.
+    """
+    if terminal_width() is None or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return level
+    return click.style(level, fg=_COLOURS[level], bold=True)
 
 
 def print_details(details: Iterable[str]) -> None:
@@ -227,7 +264,7 @@ class OverwrittenLine:
     """Line on a terminal that each new text replaces. Without a terminal it prints nothing."""
 
     def __init__(self) -> None:
-        self.on_terminal = sys.stderr.isatty()
+        self.on_terminal = sys.stderr.isatty() and not is_quiet()
         self._used = False
 
     def show(self, text: str) -> None:
@@ -295,7 +332,7 @@ class _Formatter(click.HelpFormatter):
         super().__init__(indent_increment, max(_NARROWEST_HELP, min(terminal, WIDEST)))
 
     def write_dl(self, rows: Iterable[tuple[str, str]], col_max: int = 30, col_spacing: int = 2) -> None:
-        super().write_dl(list(rows), min(col_max, self.width // 3), col_spacing)
+        super().write_dl(list(rows), min(col_max, 3 * self.width // 8), col_spacing)
 
 
 class _Context(click.Context):

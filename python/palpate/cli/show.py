@@ -56,7 +56,8 @@ def show(model_file: Path, other_file: Path | None, plot: Path | None, as_json: 
         if as_json:
             print_json(_record(model, model_file))
         else:
-            for line in str(model).split("\n"):
+            print_verdict(model.verdict)
+            for line in str(model).split("\n")[1 + len(model.verdict.reasons) :]:
                 print_line(line, hanging=4)
             if (plan := _plan_record(model)) is not None:
                 print_line()

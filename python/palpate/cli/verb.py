@@ -13,17 +13,16 @@ from typing import Any, TypeVar, cast
 import click
 
 from .._core.rendering import Scheme, most_prediction_taps, structure_names
+from ..arguments import first_sentence, parameter_texts
 from ..errors import InputError
 from ..recording import Recording, read_recording
+from .completion import FIGURES, FileName
 from .exit_status import interrupted_at_once
-from .printing import TERMS, Option, Verb, talk
+from .printing import TERMS, Option, Verb, set_quiet, talk
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-PATH = click.Path(path_type=Path)
-
-_FIGURES = (".png", ".pdf", ".svg")
-"""Suffixes (formats) that the file name of a figure may have."""
+PATH = FileName(path_type=Path)
 
 _READ = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows", "zero",
          "force_late_s", "invalid")  # fmt: skip
@@ -35,7 +34,7 @@ _SCHEME = Scheme()
 def verb(
     example: str, *, cls: type[click.Command] = Verb, ends_at_once: bool = True, **settings: Any
 ) -> Callable[[Callable[..., Any]], click.Command]:
-    """Converts a function to a verb: a command whose help ends with an example.
+    """Converts a function to a verb: a command with --quiet whose help ends with an example.
 
     Parameters
     ----------
@@ -52,7 +51,10 @@ def verb(
     def command(function: Callable[..., Any]) -> click.Command:
         epilog = f"Example: {example}\n\n{TERMS}"
         given = {"no_args_is_help": True, "epilog": epilog, **settings}
-        return click.command(cls=cls, **given)(interrupted_at_once()(function) if ends_at_once else function)
+        made = click.command(cls=cls, **given)(interrupted_at_once()(function) if ends_at_once else function)
+        if not any("--quiet" in param.secondary_opts for param in made.params):
+            made.params.append(_quiet_option())
+        return made
 
     return command
 
@@ -113,6 +115,14 @@ class ReadingOptions:
         return recording
 
 
+_TEXTS = parameter_texts(read_recording)
+
+
+def _about(argument: str) -> str:
+    """Returns the help of an option that is an argument of `read_recording`: the start of its text there."""
+    return first_sentence(_TEXTS.get(argument, ""))
+
+
 expert_option = partial(click.option, cls=Option, group="Expert")
 """Option of a verb with many options; the help lists it under "Expert" unless `group` names a heading."""
 
@@ -120,45 +130,31 @@ _column = partial(expert_option, metavar="COLUMN", default=None)
 _rows = partial(expert_option, metavar="START:STOP", callback=_row_range, default=None)
 
 _READING = options(
-    _column("--position", group="Input", help="Column of the position; else chosen by unit."),
-    _column("--force", group="Input", help="Column of the force; else chosen by unit."),
+    _column("--position", group="Input", help=_about("position")),
+    _column("--force", group="Input", help=_about("force")),
     expert_option(
         "--units",
         group="Input",
         metavar="NAME=UNIT",
         callback=_names_and_units,
         multiple=True,
-        help="Unit of a column whose name has none.",
+        help=_about("units"),
     ),
-    expert_option(
-        "--force-late-s",
-        metavar="SECONDS",
-        type=float,
-        default=0.0,
-        help="Delay of the recorded force [s]; needs time.",
-    ),
-    _column("--time", help="Column of the time; else chosen by unit."),
-    _column("--direction", help="Column of the stroke's direction (press, release)."),
-    expert_option(
-        "--negate",
-        metavar="COLUMN",
-        multiple=True,
-        help="Invert the sign of position, force or a column; repeatable.",
-    ),
+    expert_option("--force-late-s", metavar="SECONDS", type=float, default=0.0, help=_about("force_late_s")),
+    _column("--time", help=_about("time")),
+    _column("--direction", help=_about("direction")),
+    expert_option("--negate", metavar="COLUMN", multiple=True, help=f"{_about('negate')} Repeatable."),
     expert_option(
         "--torque-constant-Nm-per-A",
         "torque_constant",
         type=float,
         default=None,
-        help="Converts a force column from A to N*m.",
+        help=_about("torque_constant"),
     ),
-    _rows("--rows", help="Use only these rows, counted from 0."),
-    _rows("--zero", help="Rows without contact; their mean force is subtracted."),
+    _rows("--rows", help=_about("rows")),
+    _rows("--zero", help=_about("zero")),
     expert_option(
-        "--invalid",
-        type=click.Choice(["refuse", "drop"]),
-        default="refuse",
-        help="Refuse the file, or drop rows without a number.",
+        "--invalid", type=click.Choice(["refuse", "drop"]), default="refuse", help=_about("invalid")
     ),
 )
 
@@ -228,13 +224,40 @@ scheme_options = options(
 """Options for the fields of `Scheme`. An option that is not given is None; the model or its plan decides."""
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-verbose_option = click.option("-v", "--verbose", is_flag=True, help="Print all details below the summary.")
+
+
+def _loudness(ctx: click.Context, param: click.Parameter, verbose: bool | None) -> bool:
+    """Returns True for --verbose, and makes the verb quiet for --quiet."""
+    set_quiet(ctx, verbose is False)
+    return verbose is True
+
+
+verbose_option = click.option(
+    "-v/-q",
+    "--verbose/--quiet",
+    "verbose",
+    default=None,
+    show_default=False,
+    callback=_loudness,
+    help="Print all details, or only the verdict.",
+)
+
+
+def _quiet_option() -> Option:
+    """Returns the option --quiet of a verb without the option --verbose."""
+    return Option(
+        ["-q", "--quiet"],
+        is_flag=True,
+        expose_value=False,
+        callback=lambda ctx, param, quiet: set_quiet(ctx, quiet),
+        help="Print only the verdict.",
+    )
 
 
 def _figure_name(ctx: click.Context, param: click.Parameter, value: Path | None) -> Path | None:
     """Refuses a file name whose suffix is not a figure format, before anything is computed."""
-    if value is not None and value.suffix.lower() not in _FIGURES:
-        raise InputError(f"{value} is not a figure file: its name must end in {', '.join(_FIGURES)}")
+    if value is not None and value.suffix.lower() not in FIGURES:
+        raise InputError(f"{value} is not a figure file: its name must end in {', '.join(FIGURES)}")
     return value
 
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
-import numpy as np
 
 from ..errors import InputError
 from ..model import load_model
@@ -23,7 +22,6 @@ from .figures import (
     print_closed_loops,
 )
 from .printing import (
-    number,
     print_details,
     print_json,
     print_line,
@@ -106,7 +104,7 @@ def verify(
             )  # fmt: skip
         else:
             print_verdict(verification.verdict)
-            print_numbers(_summary(recording, verification))
+            print_numbers(verification.summary())
             if loops:
                 print_line()
                 print_closed_loops(loops)
@@ -115,19 +113,6 @@ def verify(
             if verbose:
                 print_details([*_further_numbers(recording, verification), *verification.notes])
     end_with(verification.verdict)
-
-
-def _summary(recording: Recording, found: Verification) -> dict[str, str]:
-    """Returns the main numbers of a verification, in the units of the recording's file."""
-    worst = int(np.argmax(np.abs(found.residual)))
-    position = recording.file_unit("position").text(float(recording.position[found.rows][worst]))
-    return {
-        "error": f"RMS {recording.file_unit('force').text(found.rmse)}, NRMSE {number(found.nrmse)}",
-        "largest": f"{recording.file_unit('force').text(found.worst)} at position {position}",
-        "not felt": f"{100 * found.within_jnd:.3g} % of the rows have an error that a hand does not feel",
-        "rows": f"{found.n} of {len(recording)} compared, {found.extrapolated} outside the model's domain",
-        "recording": "fresh" if found.fresh else "not fresh: the model was identified on this recording",
-    }
 
 
 def _further_numbers(recording: Recording, found: Verification) -> list[str]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import inspect
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
@@ -13,9 +14,10 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from .._typing import Float1D, Float2D
+from ..arguments import parameter_texts
 from ..errors import InputError
 from ..model import Model
-from ..recording import Source
+from ..recording import Source, read_recording
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
@@ -69,6 +71,29 @@ def identify(
     palpate.InputError
         For an unknown option or a bad value, and for data without a force over position.
 
+    Notes
+    -----
+    A file is read by :func:`palpate.read_recording`. To give arguments to it, read the recording first:
+    ``identify(read_recording("press.csv", force_late_s=0.025))``. Its arguments are:
+
+    {reading}
+    The other options of ``palpate identify`` are these functions and attributes:
+
+    ``--output`` : :meth:`palpate.Model.save`
+        Model file to write.
+    ``--plot`` : :meth:`palpate.Verification.plot`
+        Draws force over position, and the residuals.
+    ``--hold-out-every`` : :meth:`palpate.Recording.split`
+        Holds out every K-th row (K >= 2), for :func:`palpate.verify`.
+    ``--baselines`` : :func:`palpate.baselines.compare`
+        Fits the usual methods to the same rows and compares them on the held-out rows.
+    ``--out-of-core``, ``--jobs``, ``--scheduler`` : :func:`palpate.identify_files`
+        Reads files larger than memory part by part, in several processes or by the workers of a Dask
+        scheduler.
+    ``--json``, ``--quiet``, ``--verbose``, ``--sketch`` : the returned model
+        The error is ``model.fit.nrmse``, the notes are ``model.notes["identification"]``, and a notebook
+        shows the model as a table with its force curve.
+
     Examples
     --------
     >>> import numpy as np, palpate
@@ -111,7 +136,22 @@ def _show_options() -> None:
         for each in fields(IdentifyOptions)
     ]
     identify.__signature__ = signature.replace(parameters=given + options)  # type: ignore[attr-defined]
-    identify.__doc__ = inspect.cleandoc(identify.__doc__ or "").replace("{options}", described_fields())
+    texts = {"{options}": described_fields(), "{reading}": _reading_arguments()}
+    documentation = inspect.cleandoc(identify.__doc__ or "")
+    for place, text in texts.items():
+        documentation = documentation.replace(place, text)
+    identify.__doc__ = documentation
+
+
+def _reading_arguments() -> str:
+    """Returns the arguments of `read_recording` as a list for a docstring, except the file and the inputs."""
+    texts = parameter_texts(read_recording)
+    return "".join(
+        f"{name} : {parameter.annotation}, default {parameter.default!r}\n"
+        + textwrap.indent(texts.get(name, "") + "\n", "    ")
+        for name, parameter in inspect.signature(read_recording).parameters.items()
+        if name not in ("path", "inputs")
+    )
 
 
 _show_options()

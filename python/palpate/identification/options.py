@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from .._core.rendering import compensated_share
-from ..arguments import shown
-from ..errors import InputError
+from ..arguments import first_sentence, shown
+from ..errors import InputError, did_you_mean
 
 RESERVED_INPUTS = ("auto", "position", "hysteresis", "velocity")
 """Values of the option `inputs` that do not name columns."""
@@ -116,34 +116,35 @@ class IdentifyOptions:
     """
 
     inputs: str | tuple[str, ...] = "auto"
-    """"auto": the model selection decides, with position and the further inputs of the recording. Or names,
-    as a tuple or separated by commas: position, then hysteresis, velocity (from time) or columns."""
+    """auto, or position,hysteresis,velocity,COLUMN. "auto": the model selection decides, with position and
+    the further inputs of the recording. Or names, as a tuple or separated by commas: position, then
+    hysteresis, velocity (from time) or columns."""
     max_wavelets: int = 64
-    """Largest network that is tried, as its number of wavelets [-]"""
+    """Largest number of wavelets [-]."""
     criterion: str = "bic"
-    """Criterion that compares models and ends growth. From the fitted rows: bic, aicc, gcv, fpe (Bayesian,
-    corrected Akaike, generalised cross-validation, final prediction error). From the error on held-out rows:
-    fresh (error as force) or perceptual (error in just noticeable differences)"""
+    """Criterion to stop adding wavelets. It also compares models. From the fitted rows: bic, aicc, gcv, fpe
+    (Bayesian, corrected Akaike, generalised cross-validation, final prediction error). From the error on
+    held-out rows: fresh (error as force) or perceptual (error in just noticeable differences)"""
     loss: str = "squares"
-    """Loss of the fit: squares (least squares), or huber (a row with a force far from the model's force gets
-    less weight)"""
+    """squares: least squares; huber: outliers weigh less. An outlier is a row with a force far from the
+    model's force."""
     hysteresis_nonnegative: bool = True
-    """Impose hysteresis h >= 0 over the domain, so that every loop of press and release loses energy"""
+    """Impose that every loop loses energy. The hysteresis is h >= 0 over the domain."""
     slope_bounds: tuple[float, float] | None = None
-    """(min, max) of the slope df/dx, imposed over the domain [force/position]"""
+    """Smallest and largest slope imposed [N/m or N*m/rad]. They bound df/dx over the domain."""
     monotone: bool = False
-    """Impose a slope df/dx >= 0 over the domain"""
+    """The force never falls with position. The slope is df/dx >= 0 over the domain."""
     fixed_force: tuple[float, float] | None = None
-    """(position, force) of a point of the force law; with hysteresis, of the mean force of both strokes
-    [position, force]"""
+    """Position and force that the model goes through [m or rad, N or N*m]. With hysteresis this is the mean
+    force of both strokes."""
     coupling_stiffness: float | None = None
-    """Stiffness K_c of the virtual coupling: slope df/dx <= 0.9 K_c (`compensated_share`) is imposed over the
-    domain [force/position]"""
+    """Impose a slope below 0.9 of this stiffness [N/m or N*m/rad]. It is the stiffness K_c of the virtual
+    coupling, and 0.9 is `compensated_share`."""
     period: float | None = None
-    """Period of a periodic force law: change of position after which the force repeats, such as one
-    revolution of a knob [position]"""
+    """Period of a repeating force [m or rad]. It is the change of position after which the force repeats,
+    such as one revolution of a knob."""
     search: SearchOptions = field(default_factory=SearchOptions)
-    """Further settings of the search, which few identifications need to change"""
+    """Settings of the search, which few identifications need to change."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.inputs, str):
@@ -247,7 +248,8 @@ def _parsed(name: str, text: str) -> Any:
     """
     known = {each.name: each.default for each in fields(SearchOptions)}
     if name not in known:
-        raise InputError(f"search has no setting {name!r}; its settings are {', '.join(known)}")
+        cure = did_you_mean(name, known) or f"; its settings are {', '.join(known)}"
+        raise InputError(f"search has no setting {name!r}{cure}")
     default = known[name]
     if isinstance(default, str):
         return text
@@ -272,17 +274,28 @@ def default_of(each: Field[Any]) -> Any:
     return each.default if each.default_factory is MISSING else each.default_factory()
 
 
+def field_texts(kind: type[IdentifyOptions | SearchOptions] = IdentifyOptions) -> dict[str, str]:
+    """Returns the docstring of each field of options, by name; empty if the source file is missing."""
+    try:
+        tree = ast.parse(inspect.getsource(kind)).body[0]
+    except (OSError, SyntaxError):
+        tree = ast.Pass()
+    return {
+        ast.unparse(each.target): inspect.cleandoc(ast.literal_eval(text.value))
+        for each, text in pairwise(tree.body if isinstance(tree, ast.ClassDef) else [])
+        if isinstance(each, ast.AnnAssign) and isinstance(text, ast.Expr)
+    }
+
+
+def summaries() -> dict[str, str]:
+    """Returns the first sentence of the docstring of each field of `IdentifyOptions`, by name."""
+    return {name: first_sentence(text) for name, text in field_texts().items()}
+
+
 def described_fields(kind: type[IdentifyOptions | SearchOptions] = IdentifyOptions) -> str:
     """Returns the fields of options as a parameter list for a docstring, from the docstrings of the
     fields."""
-    try:
-        tree = ast.parse(inspect.getsource(kind)).body[0]
-    except (OSError, SyntaxError):  # the source file with the docstrings is missing
-        tree = ast.Pass()
-    texts: dict[str, str] = {}
-    for each, text in pairwise(tree.body if isinstance(tree, ast.ClassDef) else []):
-        if isinstance(each, ast.AnnAssign) and isinstance(text, ast.Expr):
-            texts[ast.unparse(each.target)] = inspect.cleandoc(ast.literal_eval(text.value))
+    texts = field_texts(kind)
     return "".join(
         f"{each.name} : {kind_of(each)}, default {default_of(each)!r}\n"
         + textwrap.indent(texts.get(each.name, "") + "\n", "    ")

@@ -7,10 +7,11 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
 from .._core import __version__
 from .._core.io import check_model, read_json
@@ -21,7 +22,11 @@ from ..errors import InputError
 from ..recording import Source
 from ..recording.files import require_file
 from ..verdict import Verdict
+from .model_display import frame_of, html_of
 from .model_file import Fit, PathStep, describe, write_json
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _HELD_OUT_KEY = "held_out_every"
 """Key in the notes of a model file whose value is k if every k-th row of the recordings was held out."""
@@ -337,6 +342,36 @@ class Model(ForceModel):
         content = self.to_dict()
         check_model(content)
         return write_json(target, content)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Returns a table of the wavelets, one row each.
+
+        The names of the columns end in the unit: dilation alpha_per_m, translation beta_m, weight_N, and with
+        hysteresis weight_hysteresis_N. With several inputs they also contain the name of the input.
+        """
+        return frame_of(self)
+
+    def plot(self, ax: Axes | None = None, *, label: str = "model", color: str = "black") -> Axes:
+        """Draws the force over the domain and returns the axes.
+
+        A model with hysteresis has one curve for press and one for release. A model with further inputs has
+        one curve for their least, middle and largest values.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw on; by default those of a new figure.
+        label, color : str
+            Name and colour of the curves, to draw several models on the same axes.
+        """
+        from ..plotting import axes_or_new, draw_model
+
+        axes = axes_or_new(ax)
+        draw_model(axes, self, label=label, color=color)
+        return axes
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Model.from_dict, (self.to_dict(),)

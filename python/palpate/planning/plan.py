@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,9 +19,13 @@ from .._core.stability import Certificate, certify, device_difference, slope_beh
 from .._typing import Float1D, Float2D
 from ..arguments import instance_of
 from ..errors import InputError
+from ..html_table import Curve, html_table
 from ..model import Model
 from ..model.model_file import certificate_record
 from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _CERTIFICATE = {
     "certified": "certified",
@@ -230,6 +234,40 @@ class Plan:
             rows["play radius"] = f"{scheme.play_radius:.4g}"
         return rows
 
+    def forces_at_rest(self) -> tuple[Float1D, Float2D, Float2D]:
+        """Returns positions (n,) over the domain, and identified and felt force (k, n) of a handle at rest.
+
+        The k strokes are press and release for a model with hysteresis.
+        """
+        x = np.linspace(self.model.lower[0], self.model.upper[0], SAMPLES)
+        if self.model.of_velocity:  # this model is always rendered without a coupling
+            force = self.model.predict(np.column_stack([x, np.zeros_like(x)]))[None, :]
+            return x, force, force
+        return x, strokes(self.model, x), _at_rest(self.rendered, self.scheme, x)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the identified force and the force that a hand at rest feels, and returns the axes.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw on; by default those of a new figure.
+        """
+        from ..plotting import axes_or_new, draw_plan
+
+        axes = axes_or_new(ax)
+        draw_plan(axes, self)
+        return axes
+
+    def _repr_html_(self) -> str:
+        rows = {"structure": self.description} if self.certificate is None else self.summary()
+        if self.certificate is not None:
+            rows["device"] = self.certificate.device.id
+        rows["model"] = repr(self.model)[1:-1]
+        x, identified, rendered = self.forces_at_rest()
+        curves = [Curve(x, force) for force in identified] + [Curve(x, force, "dashed") for force in rendered]
+        return html_table("Plan", self.verdict, rows | self.settings(), curves)
+
     def certified_for(self, device: DeviceProfile) -> Plan:
         """Returns the plan with its certificate on a device; the certificate can be refused."""
         return replace(self, certificate=certify(self.rendered, self.scheme, device))
@@ -346,13 +384,11 @@ def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Sch
         Structure and coupling. With coupling stiffness K_c the felt slope is K_c f' / (K_c + f'), where f' is
         the slope of the model.
     """
-    exact = scheme.compensated or not scheme.has_coupling
-    if exact and rendered is identified:
+    if _is_exact(scheme) and rendered is identified:
         return StaticForceError(0.0, 0.0, 0.0, 0.0)
     x = np.linspace(identified.lower[0], identified.upper[0], SAMPLES)
     wanted = strokes(identified, x)
-    rendered_force = strokes(rendered, x) if exact else _behind_coupling(rendered, scheme, x)
-    error = rendered_force - wanted
+    error = _at_rest(rendered, scheme, x) - wanted
     largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))
     return StaticForceError(
         largest, rms, _share(largest, float(np.ptp(wanted)), wanted), _share(rms, float(wanted.std()), wanted)
@@ -380,6 +416,16 @@ def _share(error: float, size: float, force: Float2D) -> float:
     value of the force."""
     size = size or float(np.abs(force).max())
     return 0.0 if error == 0.0 else error / size if size else math.inf
+
+
+def _is_exact(scheme: Scheme) -> bool:
+    """Returns True if a hand at rest feels the rendered model itself."""
+    return scheme.compensated or not scheme.has_coupling
+
+
+def _at_rest(rendered: ForceModel, scheme: Scheme, x: Float1D) -> Float2D:
+    """Returns the felt force (k, n) of each stroke for a handle at rest."""
+    return strokes(rendered, x) if _is_exact(scheme) else _behind_coupling(rendered, scheme, x)
 
 
 def _behind_coupling(model: ForceModel, scheme: Scheme, x: Float1D) -> Float2D:

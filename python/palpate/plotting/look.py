@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+from weakref import WeakKeyDictionary
 
+import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
@@ -14,12 +16,28 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from .._typing import Float1D
+from ..arguments import instance_of
+from ..errors import InputError
 
 MOST_POINTS = 6000
 """Largest number of drawn points; more are indistinguishable at the width of a column."""
 
 _UNIT_TEXT = {"count": "counts"}
 """Units whose name in a figure differs from their symbol."""
+
+
+def axes_or_new(ax: Axes | None) -> Axes:
+    """Returns the given axes, or those of a new figure of pyplot.
+
+    Raises
+    ------
+    InputError
+        The argument is not Axes of matplotlib.
+    """
+    if ax is None:
+        _, ax = plt.subplots(layout="constrained")
+    instance_of("ax", ax, Axes, "leave it out to draw in a new figure")
+    return ax
 
 
 def label(name: str, unit: str) -> str:
@@ -71,6 +89,24 @@ def _least(size: float) -> float:
     return size if size > 1.0 else 0.1 * size
 
 
+_SCALES: WeakKeyDictionary[Axis, tuple[str, Scale]] = WeakKeyDictionary()
+"""SI unit and scale of the curves on each axis on which something was drawn."""
+
+
+def scale_on(axis: Axis, unit: str, *values: npt.ArrayLike) -> Scale:
+    """Returns the scale of the curves that are already on an axis; for an empty axis as `scale_for` does.
+
+    Raises
+    ------
+    InputError
+        The curves that are already on the axis have another unit.
+    """
+    drawn, scale = _SCALES.setdefault(axis, (unit, scale_for(unit, *values)))
+    if unit and drawn and unit != drawn:
+        raise InputError(f"ax already shows values in {drawn}, and these are in {unit}: use other axes")
+    return scale
+
+
 def legend_above(axes: Axes) -> None:
     """Places a legend above the axes, so that it hides no data."""
     axes.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, borderaxespad=0.2)
@@ -104,3 +140,14 @@ def strokes(direction: NDArray[np.int8] | None, n: int) -> list[tuple[str, NDArr
     if direction is not None and (direction > 0).any() and (direction < 0).any():
         return [("press", direction > 0), ("release", direction < 0)]
     return [("", np.ones(n, dtype=np.bool_))]
+
+
+def dots_of(stroke: str) -> dict[str, Any]:
+    """Returns the look of the dots of a stroke: filled, or hollow for release."""
+    dots: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0}
+    return dots | ({"markerfacecolor": "none", "markeredgewidth": 0.4} if stroke == "release" else {})
+
+
+def of_stroke(name: str, stroke: str) -> str:
+    """Returns the name of a curve with its stroke, if it has one."""
+    return f"{name}, {stroke}" if stroke else name

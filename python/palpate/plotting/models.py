@@ -12,12 +12,26 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from .._typing import Float1D
+from ..model import Model
+from ..model.model_display import force_curves
 from ..recording import Recording
 from ..verification import Stroke
-from .look import grid, legend_above, plain_decades, scale_for, strokes, thinned
+from .look import dots_of, grid, legend_above, of_stroke, plain_decades, scale_for, scale_on, strokes, thinned
 
 _LINES = {"press": "solid", "release": (0, (4, 2)), "": "solid"}
 """Line style of each stroke."""
+
+_CURVE: dict[str, Any] = {"color": "black", "linewidth": 1.1}
+"""Look of a model's curve, except the line style of its stroke."""
+
+_INPUT_LINES = ("dotted", "solid", "dashed")
+"""Line style of each curve of a model with further inputs."""
+
+_SHARES = (0.0, 0.5, 1.0)
+"""Values of the further inputs at which the force of a model is drawn [share of their range]"""
+
+_POSITIONS = 1001
+"""Number of positions at which a curve of a model is drawn [-]"""
 
 
 def draw_measured_and_modelled(
@@ -49,50 +63,74 @@ def draw_measured_and_modelled(
         Standard error of the model's force at each row, drawn as a 95 % band about zero residual, in front of
         the dots.
     """
-    residual = recording.force - modelled
+    draw_forces(force_axes, recording, modelled, one_curve=one_curve, seen=seen)
+    draw_residual(residual_axes, recording, modelled, standard_error=standard_error)
+    force_axes.set_xlabel("")
+
+
+def draw_forces(
+    axes: Axes, recording: Recording, modelled: Float1D, *, one_curve: bool = True, seen: str = "measured"
+) -> None:
+    """Draws measured force as dots and modelled force as curves over position, one of each for a stroke.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Target axes.
+    recording, modelled, one_curve, seen
+        As in :func:`draw_measured_and_modelled`.
+    """
     by_stroke = strokes(recording.direction, len(recording))
-    x = scale_for(recording.units["position"], recording.position)
-    y = scale_for(recording.units["force"], recording.force, modelled)
-    z = scale_for(recording.units["force"], residual)
+    x = scale_on(axes.xaxis, recording.units["position"], recording.position)
+    y = scale_on(axes.yaxis, recording.units["force"], recording.force, modelled)
     for name, rows in by_stroke:
-        suffix = f", {name}" if name else ""
-        position, force, rest = thinned(recording.position[rows], recording.force[rows], residual[rows])
-        dots: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0}
-        if name == "release":
-            dots |= {"marker": "o", "markerfacecolor": "none", "markeredgewidth": 0.4}
-        force_axes.plot(
-            position * x.factor,
-            force * y.factor,
-            **dots,
-            color="0.65",
-            markersize=2.2,
-            label=f"{seen}{suffix}",
-        )
-        shade = "0.45" if name != "release" else "0.7"
-        residual_axes.plot(position * x.factor, rest * z.factor, **dots, color=shade, markersize=2.0)
+        position, force = thinned(recording.position[rows] * x.factor, recording.force[rows] * y.factor)
+        axes.plot(position, force, **dots_of(name), color="0.65", markersize=2.2, label=of_stroke(seen, name))
     for name, rows in by_stroke:
-        suffix = f", {name}" if name else ""
         position, curve = recording.position[rows], modelled[rows]
         if one_curve:
             order = np.argsort(position, kind="stable")
             position, curve = position[order], curve[order]
-        force_axes.plot(
+        axes.plot(
             *thinned(position * x.factor, curve * y.factor),
-            color="black",
-            linewidth=1.1,
+            **_CURVE,
             linestyle=_LINES[name],
-            label=f"model{suffix}",
+            label=of_stroke("model", name),
         )
+    axes.set_xlabel(x.label("position"))
+    axes.set_ylabel(y.label("force"))
+    legend_above(axes)
+
+
+def draw_residual(
+    axes: Axes, recording: Recording, modelled: Float1D, *, standard_error: Float1D | None = None
+) -> None:
+    """Draws measured minus modelled force over position, press and release with different dots.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Target axes.
+    recording, modelled, standard_error
+        As in :func:`draw_measured_and_modelled`.
+    """
+    residual = recording.force - modelled
+    by_stroke = strokes(recording.direction, len(recording))
+    x = scale_on(axes.xaxis, recording.units["position"], recording.position)
+    z = scale_on(axes.yaxis, recording.units["force"], residual)
+    for name, rows in by_stroke:
+        position, rest = thinned(recording.position[rows] * x.factor, residual[rows] * z.factor)
+        shade = "0.45" if name != "release" else "0.7"
+        axes.plot(position, rest, **dots_of(name), color=shade, markersize=2.0)
+    for name, rows in by_stroke:
         if standard_error is not None:
             half = 2.0 * z.factor * standard_error[rows]
-            _draw_band(residual_axes, recording.position[rows] * x.factor, half, _LINES[name])
-    force_axes.set_ylabel(y.label("force"))
-    legend_above(force_axes)
-    residual_axes.axhline(0.0, color="black", linewidth=0.6)
-    residual_axes.set_xlabel(x.label("position"))
-    residual_axes.set_ylabel(z.label("residual"))
+            _draw_band(axes, recording.position[rows] * x.factor, half, _LINES[name])
+    axes.axhline(0.0, color="black", linewidth=0.6)
+    axes.set_xlabel(x.label("position"))
+    axes.set_ylabel(z.label("residual"))
     if standard_error is not None:
-        residual_axes.set_title("lines: 95 % band of the model", loc="right", color="0.3")
+        axes.set_title("lines: 95 % band of the model", loc="right", color="0.3")
 
 
 def _draw_band(axes: Axes, position: Float1D, half: Float1D, line: Any) -> None:
@@ -102,6 +140,43 @@ def _draw_band(axes: Axes, position: Float1D, half: Float1D, line: Any) -> None:
     at, width = thinned(position[order], half[order])
     for edge in (width, -width):
         axes.plot(at, edge, color="black", linewidth=0.7, linestyle=line)
+
+
+def draw_model(axes: Axes, model: Model, *, label: str = "model", color: str = "black") -> None:
+    """Draws the force of a model over its domain, one curve for each stroke.
+
+    A model with further inputs has a curve for their least, middle and largest values.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Target axes.
+    model : Model
+        The model.
+    label, color : str
+        Name and colour of the curves.
+    """
+    curves: dict[str, tuple[Float1D, Any]] = {}
+    position = np.linspace(model.lower[0], model.upper[0], _POSITIONS)
+    if model.dimension == 1:
+        _, forces = force_curves(model, _POSITIONS)
+        curves = {of_stroke(label, name): (force, _LINES[name]) for name, force in forces.items()}
+    else:
+        for share, line in zip(_SHARES, _INPUT_LINES, strict=True):
+            further = model.lower[1:] + share * (model.upper[1:] - model.lower[1:])
+            inputs = np.column_stack([position, np.broadcast_to(further, (_POSITIONS, len(further)))])
+            names = zip(model.inputs[1:], further, strict=True)
+            name = ", ".join([label, *(f"{name} {value:.4g}" for name, value in names)])
+            curves[name] = (model.predict(inputs), line)
+    x = scale_on(axes.xaxis, model.units["position"], position)
+    y = scale_on(axes.yaxis, model.units["force"], *(force for force, _ in curves.values()))
+    for name, (force, line) in curves.items():
+        look = _CURVE | {"color": color, "linestyle": line}
+        axes.plot(position * x.factor, force * y.factor, **look, label=name)
+    axes.set_xlabel(x.label(model.inputs[0]))
+    axes.set_ylabel(y.label("force"))
+    if len(axes.lines) > 1:
+        legend_above(axes)
 
 
 def draw_two_models(

@@ -15,7 +15,7 @@ from .._core.rendering import Scheme, compensated_share, default_play_radius
 from .._core.stability import explicit_scheme, force_bounds
 from .._typing import Float1D
 from ..planning import Plan
-from .look import grid, plain_decades, scale_for, thinned
+from .look import grid, legend_above, of_stroke, plain_decades, scale_for, scale_on, thinned
 
 _LINES = ("-", "--", ":", "-.")
 """Line styles of the object slopes in a figure of the root locus, in order."""
@@ -115,6 +115,39 @@ def draw_structures(
     grid(axes, "x")
     axes.set_xlabel(x.label("force error, RMS"))
     axes.figure.legend(frameon=False, loc="outside lower center", ncols=2)
+
+
+def draw_plan(axes: Axes, plan: Plan) -> None:
+    """Draws the identified force, and the force that a hand at rest feels, over the model's domain.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Target axes.
+    plan : Plan
+        The plan; its coupling and its limited network change the felt force.
+    """
+    position, identified, rendered = plan.forces_at_rest()
+    x = scale_on(axes.xaxis, plan.model.units["position"], position)
+    y = scale_on(axes.yaxis, plan.model.units["force"], identified, rendered)
+    names = ("press", "release") if len(identified) > 1 else ("",)
+    # The line of the identified force is wider, so that both are visible if they agree.
+    for curves, name, color, width in (
+        (identified, "identified", "0.7", 3.0),
+        (rendered, f"felt at rest: {plan.description}", "black", 1.0),
+    ):
+        for stroke, force, line in zip(names, curves, _LINES, strict=False):
+            axes.plot(
+                position * x.factor,
+                force * y.factor,
+                color=color,
+                linewidth=width,
+                linestyle=line,
+                label=of_stroke(name, stroke),
+            )
+    axes.set_xlabel(x.label("position"))
+    axes.set_ylabel(y.label("force"))
+    legend_above(axes)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..errors import InputError, listed, shortened
+from ..errors import InputError, did_you_mean, listed, nearest_name, shortened
 from .units import (
     FORCE_UNITS,
     POSITION_UNITS,
@@ -173,7 +173,8 @@ def _attempt(
     ]
     for option, name in (*options, *(("inputs", name) for name in request.inputs)):
         if name is not None and name not in names:
-            problems[option.strip("-")] = f"there is no column {shortened(name)!r} for {option}"
+            wrong = f"there is no column {shortened(name)!r} for {option}"
+            problems[option.strip("-")] = wrong + did_you_mean(name, names)
     columns = _with_units(names, request, problems)
     notes: list[str] = []
     chosen: dict[str, Column | None] = {}
@@ -330,7 +331,10 @@ def _cure(
             suggestion: Column | None = next(column for column in columns if column.name == named_column)
         else:
             left_out = {*others, *text, *DIRECTION_NAMES}
-            suggestion = _suggested(role, [each for each in columns if each.name not in left_out], steady)
+            candidates = [each for each in columns if each.name not in left_out]
+            misspelt = None if named_column is None else nearest_name(named_column, names)
+            suggestion = next((each for each in candidates if each.name == misspelt), None)
+            suggestion = suggestion or _suggested(role, candidates, steady)
         if suggestion is None:
             return no_cure
         if suggestion.name != named_column:

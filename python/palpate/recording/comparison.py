@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 from .._core.model import play
 from .._typing import Float1D, Float2D
 from ..verdict import Finding, no, usable
-from .recording import Recording
 from .units import GRAVITY
+
+if TYPE_CHECKING:
+    from .recording import Recording
 
 MOST_COMPARED_ROWS = 100_000
 """Largest number of rows used to compare forces; of a longer recording every k-th moving row is used."""

@@ -178,6 +178,10 @@ class Layout:
     roles: dict[str, str] = field(default_factory=dict)
     inputs: tuple[str, ...] = ()
 
+    def record(self) -> dict[str, str]:
+        """Returns the metadata, one key and one line of text, that state the layout in a file or a frame."""
+        return {_LAYOUT_KEY: json.dumps({**self.roles, "inputs": list(self.inputs)})}
+
     @staticmethod
     def pop_from(file: str, metadata: dict[str, str]) -> Layout:
         """Removes the layout from the metadata of a file and returns it."""
@@ -213,12 +217,11 @@ def write_csv(
         The folder does not exist or cannot be written, the file exists and `replace` is False, or the
         metadata does not fit on one line.
     """
-    stated = json.dumps({**layout.roles, "inputs": list(layout.inputs)})
     with (
         replacing(path, replace=replace) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as stream,
     ):
-        for key, value in (*metadata.items(), (_LAYOUT_KEY, stated)):
+        for key, value in {**metadata, **layout.record()}.items():
             line = f"# {key}: {value}"
             if len(line.splitlines()) != 1 or ":" in key:
                 raise InputError(

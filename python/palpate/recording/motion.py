@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,9 @@ from numpy.typing import NDArray
 from .._core.dynamics import TransferFunction
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
-from .recording import Recording
+
+if TYPE_CHECKING:
+    from .recording import Recording
 
 TURN_SHARE = 0.02
 """Least motion against the stroke that reverses the stroke, as a share of the position range [-]."""

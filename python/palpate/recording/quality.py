@@ -8,6 +8,7 @@ gaps, and (in `comparison`) files that hold two objects or recordings that do no
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,9 @@ from ..verdict import Finding, usable
 from .comparison import CellRows, Travel, cell_rows, merged_findings, scale_findings, sides
 from .conversion import MIN_ROWS, mirror_notes
 from .motion import GAP_RATIO
-from .recording import Recording
+
+if TYPE_CHECKING:
+    from .recording import Recording
 
 PLAUSIBLE_TRAVEL = {"m": (1e-7, 0.5), "rad": (1e-3, 100.0 * np.pi)}
 """Least and largest plausible position range by unit: from microscope tip to arm; up to 50 revolutions."""

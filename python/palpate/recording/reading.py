@@ -58,33 +58,35 @@ def read_recording(
         CSV (separated by commas, semicolons or tabs); an incomplete ``.part`` file, whose torn last line is
         ignored and counted; ``.parquet`` (needs pyarrow), ``.xlsx`` (openpyxl), ``.npz``, ``.mat``, or
         ``.mcap`` with JSON messages (mcap).
-    position, force, time : str, optional
-        Column names. By default columns are chosen by name and unit; if that is ambiguous, the error names
-        the candidates.
+    position : str, optional
+        Column of the position; else chosen by unit. If several columns are possible, the error names them.
+    force : str, optional
+        Column of the force; else chosen by unit.
+    time : str, optional
+        Column of the time; else chosen by unit.
     direction : str, optional
-        Column with the direction of the stroke, in words (press, approach, load, loading, forward, +1;
-        release, retract, unload, unloading, back, -1; pause, hold, extra, 0). By default a column
-        ``direction``, or a column ``segment`` with words, is used.
+        Column of the stroke's direction (press, release). It contains words (press, approach, load, loading,
+        forward, +1; release, retract, unload, unloading, back, -1; pause, hold, extra, 0). By default a
+        column ``direction``, or a column ``segment`` with words, is used.
     inputs : sequence of str
         Further columns that the force depends on.
     units : mapping of str to str, optional
-        Unit of a column, in place of the one in its name. The key is the column's name, or "position",
-        "force" or "time" if that column is also named.
+        Unit of a column whose name has none. It replaces the unit in the name. The key is the column's name,
+        or "position", "force" or "time" if that column is also named.
     torque_constant : float, optional
-        Torque per current [N*m/A]: converts a force column from A to N*m. By default current remains in A.
+        Torque per current [N*m/A]; converts a force column from A to N*m. By default a current remains in A.
     negate : sequence of str
-        "position", "force" or names of used columns whose sign is inverted.
+        Invert the sign of position, force or a column. A column is given by its name and must be used.
     rows : (start, stop), optional
-        Half-open range of data rows to use, counted from 0; None leaves an end open.
+        Use only these rows, counted from 0. The range excludes stop; None leaves an end open.
     zero : (start, stop), optional
-        Half-open range of data rows, counted as `rows`, without contact. Their mean force is subtracted from
-        all forces.
+        Rows without contact; their mean force is subtracted. The range is counted as `rows`.
     force_late_s : float
-        Delay of the recorded force after its position [s], for example if the converter of a load cell
-        averages. Every force is moved to its position. Needs time.
+        Delay of the recorded force [s]; needs time. Every force is moved to its position, for example if the
+        converter of a load cell averages.
     invalid : {"refuse", "drop"}
-        Treatment of a row with a missing or infinite number, without a direction, or with a time that does
-        not increase: refuse the file and name the row, or drop the row and count it.
+        Refuse the file, or drop rows without a number. An infinite number, a missing direction, or a time
+        that does not increase is treated in the same way. The error names the row; dropped rows are counted.
 
     Returns
     -------

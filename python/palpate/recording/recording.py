@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -16,10 +16,16 @@ import pandas as pd
 from .._typing import Float1D, Float2D, Int8Vector
 from ..arguments import number_of, path_of, real_of, shown, vector_of
 from ..errors import InputError
+from ..verdict import Verdict
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
-from .files import Layout, free_name, write_csv
+from .display import columns_of, html_of
+from .files import write_csv
+from .quality import quality_findings
 from .table import FRAME, Cells, FrameTable, python_arguments
-from .units import COLUMN_SUFFIX, FORCE_UNITS, POSITION_UNITS, Unit
+from .units import FORCE_UNITS, POSITION_UNITS, Unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 T = TypeVar("T")
 
@@ -222,6 +228,11 @@ class Recording:
         return self.file_units.get(role, Unit.of_si(self.units.get(role, "")))
 
     @property
+    def verdict(self) -> Verdict:
+        """Verdict on the quality of the recording: clipped or stuck sensors, gaps, wrong signs or units."""
+        return Verdict(tuple(quality_findings(self)))
+
+    @property
     def motion(self) -> Motion:
         """Positions and times of all rows of the motion, including the rows that were held out."""
         if self.part_of is not None and len(self.part_of.rows) == len(self):
@@ -334,21 +345,37 @@ class Recording:
             The folder does not exist or cannot be written, or the metadata does not fit on one line.
         """
         file = path_of("path", path)
-        used_names = {*self.columns, *self.input_names}
-        suffixes = {"time": "_s", "direction": ""}
-        for role in ("position", "force"):
-            unit = self.units[role]
-            suffixes[role] = f"_{COLUMN_SUFFIX[unit]}" if unit else ""
-        roles = {
-            role: free_name(role, suffixes[role], used_names)
-            for role in ("time", "position", "force", "direction")
-            if getattr(self, role) is not None
-        }
-        cells = {name: getattr(self, role) for role, name in roles.items()}
-        cells |= {name: self.inputs[:, index] for index, name in enumerate(self.input_names)}
-        cells |= self.columns
-        write_csv(file, Layout(roles, self.input_names), cells, self.metadata, replace=replace)
+        write_csv(file, *columns_of(self), self.metadata, replace=replace)
         return file
+
+    def to_frame(self) -> pd.DataFrame:
+        """Returns the recording as a DataFrame that :meth:`from_frame` reads back exactly.
+
+        The names of the columns end in the SI unit: time_s, position_m, force_N, direction, then the further
+        inputs and all other columns. ``attrs`` holds the metadata and the role of each column.
+        """
+        layout, cells = columns_of(self)
+        frame = pd.DataFrame({name: column.copy() for name, column in cells.items()})
+        frame.attrs.update(self.metadata)
+        frame.attrs.update(layout.record())
+        return frame
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws force over position, press and release with different dots, and returns the axes.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw on; by default those of a new figure.
+        """
+        from ..plotting import axes_or_new, draw_recording
+
+        axes = axes_or_new(ax)
+        draw_recording(axes, self)
+        return axes
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
 
 def _mapping(name: str, value: Mapping[str, T] | None) -> dict[str, T]:

@@ -26,14 +26,15 @@ class Unit:
 
     def text(self, value: float) -> str:
         """Returns a value given in SI as text in this unit, with four significant digits and the symbol."""
-        return f"{value / self.factor:.4g} {self._shown}".rstrip()
+        return f"{value / self.factor:.4g} {self.shown}".rstrip()
 
     def interval(self, low: float, high: float) -> str:
         """Returns the interval of two values given in SI as text in this unit: "0.1 to 0.3 mm"."""
         return f"{low / self.factor:.4g} to {self.text(high)}"
 
     @property
-    def _shown(self) -> str:
+    def shown(self) -> str:
+        """Symbol in texts: the SI symbol if the factor is 1."""
         return self.si if self.factor == 1.0 else self.symbol
 
     @staticmethod

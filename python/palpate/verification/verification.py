@@ -5,19 +5,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 from numpy.typing import NDArray
 
 from .._typing import Float1D
 from ..arguments import instance_of
 from ..errors import InputError
+from ..html_table import Curve, html_table
 from ..identification.classes.findings import USABLE_NRMSE, error_findings
 from ..identification.data.rows import require_in_range
 from ..model import Model
 from ..recording import Recording, Source
+from ..recording.files import free_name
 from ..recording.reading import RecordingLike, recording_from
+from ..recording.units import COLUMN_SUFFIX
 from ..verdict import FORCE_JND, GOOD, Finding, Verdict, no, usable
 from .explanation import explanation
 from .metrics import (
@@ -30,6 +35,9 @@ from .metrics import (
     share_within_stiffness_jnd,
 )
 from .prediction import Prediction, flight_of, predict
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FEW_OUTSIDE = 0.01
 """Share of rows outside the model's domain above which the result is usable with a reservation [-]."""
@@ -85,6 +93,8 @@ class Verification:
     """Force of the model at the evaluated rows"""
     residual: Float1D = field(repr=False, compare=False, kw_only=True)
     """(n,) force of the model minus the recorded one"""
+    recording: Recording = field(repr=False, compare=False, kw_only=True)
+    """The recording with which the model was compared, with all its rows"""
 
     @property
     def rows(self) -> NDArray[np.bool_]:
@@ -95,6 +105,66 @@ class Verification:
     def force(self) -> Float1D:
         """(n,) force of the model at the evaluated rows"""
         return self.prediction.force
+
+    @property
+    def compared(self) -> Recording:
+        """The evaluated rows of the recording."""
+        return self.recording.without(~self.rows)
+
+    def summary(self) -> dict[str, str]:
+        """Returns the main numbers in the units of the recording's file for display, by name."""
+        recording = self.recording
+        position_unit, force_unit = (recording.file_unit(role) for role in ("position", "force"))
+        worst = int(np.argmax(np.abs(self.residual)))
+        position = position_unit.text(float(recording.position[self.rows][worst]))
+        return {
+            "error": f"RMS {force_unit.text(self.rmse)}, NRMSE {self.nrmse:.4g}",
+            "largest": f"{force_unit.text(self.worst)} at position {position}",
+            "not felt": f"{100 * self.within_jnd:.3g} % of the rows have an error that a hand does not feel",
+            "rows": f"{self.n} of {len(recording)} compared, {self.extrapolated} outside the model's domain",
+            "recording": "fresh" if self.fresh else "not fresh: the model was identified on this recording",
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Returns the evaluated rows with the model's force, as a DataFrame.
+
+        The columns are those of :meth:`palpate.Recording.to_frame`, then ``modelled_force_N`` and
+        ``residual_N`` (modelled minus recorded force) in the recording's unit of force.
+        :meth:`palpate.Recording.from_frame` reads the recording back exactly, with both as further columns.
+        """
+        frame = self.compared.to_frame()
+        suffix = COLUMN_SUFFIX.get(self.units["force"], "")
+        for stem, values in (("modelled_force", self.force), ("residual", self.residual)):
+            frame[free_name(stem, f"_{suffix}" if suffix else "", frame.columns)] = values
+        return frame
+
+    def plot(self, ax: Axes | None = None, *, residual: bool = False) -> Axes:
+        """Draws recorded and modelled force over position, or their difference, and returns the axes.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw on; by default those of a new figure.
+        residual : bool
+            True draws the residual, recorded minus modelled force.
+        """
+        from ..plotting import axes_or_new, draw_forces, draw_residual
+
+        axes, recording = axes_or_new(ax), self.compared
+        if residual:
+            draw_residual(axes, recording, self.force)
+        else:
+            one_curve = self.prediction.side is None or recording.direction is not None
+            draw_forces(axes, recording, self.force, one_curve=one_curve)
+        return axes
+
+    def _repr_html_(self) -> str:
+        recording = self.compared
+        curves = [
+            Curve(recording.position, recording.force, "dots"),
+            Curve(recording.position, self.force, "dots"),
+        ]
+        return html_table("Verification", self.verdict, self.summary(), curves)
 
 
 def verify(
@@ -168,6 +238,7 @@ def verify(
         notes=notes,
         prediction=prediction,
         residual=residual,
+        recording=recording,
     )
     return replace(found, verdict=Verdict(findings_of(model, recording, found)))
 

@@ -3,12 +3,9 @@
 
 import ast
 import json
-import os
-import pty
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -25,36 +22,6 @@ from test_cli_identify import spring
 CLI = Path(__file__).parents[3] / "python" / "palpate" / "cli"
 
 Terminal = Callable[..., str]
-
-
-@pytest.fixture
-def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    """Runs a function whose standard output and error are a terminal of this width; returns its output."""
-
-    def run(work: Callable[[], object], columns: int = 80) -> str:
-        reading_end, terminal_end = pty.openpty()
-        output = bytearray()
-
-        def read_output() -> None:
-            while True:
-                try:
-                    received = os.read(reading_end, 65536)
-                except OSError:  # reading fails when the program has closed the terminal
-                    return
-                output.extend(received)
-
-        reader = threading.Thread(target=read_output)
-        reader.start()
-        with os.fdopen(terminal_end, "w") as stream, monkeypatch.context() as context:
-            context.setenv("COLUMNS", str(columns))
-            context.setattr(sys, "stdout", stream)
-            context.setattr(sys, "stderr", stream)
-            work()
-        reader.join()
-        os.close(reading_end)
-        return output.decode().replace("\r\n", "\n")
-
-    return run
 
 
 @pytest.fixture

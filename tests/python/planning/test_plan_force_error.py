@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import (
@@ -303,3 +304,23 @@ def test_a_plan_by_hand_that_is_soft_can_be_stored_when_its_error_is_accepted() 
     with pytest.raises(InputError, match="a plan with verdict no is not stored"):
         soft.stored()
     assert replace(soft, accept_force_error=1.0).stored().plan is not None
+
+
+def test_plot_of_a_plan_draws_identified_and_rendered_force_at_rest() -> None:
+    model = model_by_hand()
+    soft = Plan(model, Scheme(structure="massless", coupling_stiffness=20.0))
+    axes = Figure().subplots()
+    assert soft.plot(axes) is axes
+    identified, rendered = (np.asarray(line.get_ydata()) for line in axes.lines)
+    assert np.abs(rendered - identified).max() == pytest.approx(soft.force_error.largest, rel=1e-12)
+    assert axes.get_ylabel() == "force [N·m]"
+    strokes = Figure().subplots()
+    Plan(keyswitch_by_hand(), Scheme(structure="direct", play_radius=1e-5)).plot(strokes)
+    names = [str(line.get_label()) for line in strokes.lines]
+    assert names == [
+        "identified, press",
+        "identified, release",
+        "felt at rest: direct, press",
+        "felt at rest: direct, release",
+    ]
+    np.testing.assert_array_equal(strokes.lines[0].get_ydata(), strokes.lines[2].get_ydata())

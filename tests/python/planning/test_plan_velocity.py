@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from control_program import control, needs_program
 from models_by_hand import model_by_hand
@@ -148,3 +149,14 @@ def test_control_program_renders_a_force_of_velocity_certified_and_uncertified(t
         )
         assert answer.returncode == 0, answer.stderr
         assert expected in record.read_text(encoding="utf-8")
+
+
+def test_a_plan_of_a_force_of_velocity_is_shown_and_drawn_at_rest() -> None:
+    model = fluid_by_hand()
+    chosen = plan(model, KNOB)
+    position, identified, rendered = chosen.forces_at_rest()
+    np.testing.assert_array_equal(identified, rendered)
+    assert identified[0, 500] == model.predict([[position[500], 0.0]])[0]
+    assert "<svg" in chosen._repr_html_()
+    axes = Figure().subplots()
+    assert chosen.plot(axes) is axes

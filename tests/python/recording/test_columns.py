@@ -169,7 +169,8 @@ def test_a_column_with_an_unknown_unit_is_read_in_the_stated_unit() -> None:
     [
         (
             {"position": "deep_mm"},
-            "there is no column 'deep_mm' for --position; no column name has a unit of force",
+            "there is no column 'deep_mm' for --position (did you mean 'depth_mm'?); "
+            "no column name has a unit of force",
         ),
         (
             {"position": "deep_mm"},

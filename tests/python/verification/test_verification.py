@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
-from palpate import InputError, Model, Recording, load_model, read_recording, verify
+from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate.model import Fit
-from palpate.recording import Source
+from palpate.recording import Source, sample_recording
 
 RAD = {"position": "rad", "force": "N*m"}
 NOISE = 0.01
@@ -341,3 +343,31 @@ def test_a_copied_file_is_not_fresh(tmp_path: Path) -> None:
     copy = tmp_path / "other_name.csv"
     copy.write_bytes(path.read_bytes())
     assert not verify(model_of(read_recording(path).source), read_recording(copy)).fresh
+
+
+def test_a_frame_of_a_verification_is_read_back_as_its_compared_rows() -> None:
+    recording = sample_recording(2, 2.0)
+    found = verify(identify(sample_recording(1, 5.0)), recording)
+    frame = found.to_frame()
+    assert list(frame.columns) == ["time_s", "position_rad", "force_Nm", "modelled_force_Nm", "residual_Nm"]
+    for table in (frame, pd.DataFrame(dict(frame))):  # with and without the roles in attrs
+        read = Recording.from_frame(table)
+        np.testing.assert_array_equal(read.position, recording.position[found.rows])
+        np.testing.assert_array_equal(read.force, recording.force[found.rows])
+        np.testing.assert_array_equal(read.columns["modelled_force_Nm"], found.force)
+        np.testing.assert_array_equal(read.columns["residual_Nm"], found.residual)
+    assert found.recording is recording
+    again = identify(found.compared)
+    assert again.units == recording.units
+
+
+def test_plot_of_a_verification_draws_forces_or_residuals() -> None:
+    recording = sample_recording(2, 2.0)
+    found = verify(identify(sample_recording(1, 5.0)), recording)
+    forces, residuals = Figure().subplots(2)
+    assert found.plot(forces) is forces
+    found.plot(residuals, residual=True)
+    assert forces.get_xlabel() == residuals.get_xlabel() == "position [rad]"
+    assert (forces.get_ylabel(), residuals.get_ylabel()) == ("force [N·m]", "residual [mN·m]")
+    drawn = 1e-3 * np.asarray(residuals.lines[0].get_ydata())
+    np.testing.assert_allclose(drawn, -found.residual, rtol=1e-12)
