@@ -51,6 +51,17 @@ _LINES |= {
 }
 
 
+_MANTISSAS = ((0.7, (1, 2, 3, 5, 7)), (1.5, (1, 2, 5)), (2.5, (1, 3)), (np.inf, (1,)))
+"""First digits of the ticks of a logarithmic axis, by the largest number of decades of its values"""
+
+
+def _logarithmic_ticks(values: Float1D) -> list[float]:
+    """Returns ticks that do not overlap; those of Bokeh do if the values cover less than two decades."""
+    decades = float(np.log10(values.max() / values.min()))
+    digits = next(digits for most, digits in _MANTISSAS if decades <= most)
+    return [float(f"{digit}e{power}") for power in range(-15, 16) for digit in digits]
+
+
 def _coloured(**uses: str | None) -> dict[str, Any]:
     """Returns the colours of a glyph, and the tags by which the page changes them in the dark."""
     given = {part: use for part, use in uses.items() if use is not None}
@@ -69,16 +80,22 @@ class Panel:
         Labels of the axes, with units.
     height : int
         Height [px].
-    log : bool
-        Logarithmic vertical axis.
+    log : (n,) array, optional
+        Positive values of a logarithmic vertical axis; None: the axis is linear.
     above : Panel, optional
         Panel whose horizontal range this panel shares.
     """
 
-    def __init__(self, x: str, y: str, height: int, *, log: bool = False, above: Panel | None = None) -> None:
+    def __init__(
+        self, x: str, y: str, height: int, *, log: Float1D | None = None, above: Panel | None = None
+    ) -> None:
         self.height = height
         self.legend: list[tuple[str, str]] = []
-        shared = {} if above is None else {"x_range": above.plot.x_range}
+        self._names = x.partition(" [")[0], y.partition(" [")[0]
+        shared = {}
+        if above is not None:
+            shared = {"x_range": above.plot.x_range}
+            above.plot.xaxis.axis_label = None
         self.plot = bokeh("plotting").figure(
             height=height,
             sizing_mode="stretch_width",
@@ -86,14 +103,13 @@ class Panel:
             min_border_right=12,
             x_axis_label=x,
             y_axis_label=y,
-            y_axis_type="log" if log else "linear",
+            y_axis_type="linear" if log is None else "log",
             background_fill_alpha=0.0,
             border_fill_alpha=0.0,
             outline_line_color=None,
             tools="pan,box_zoom,wheel_zoom,reset,save",
             active_drag=None,
             toolbar_location="above",
-            output_backend="canvas",
             **shared,
         )
         self.plot.toolbar.logo = None
@@ -102,6 +118,10 @@ class Panel:
         self.plot.axis.major_label_text_font_size = "12px"
         self.plot.axis.minor_tick_line_color = None
         self.plot.xaxis.ticker.desired_num_ticks = 5
+        if log is not None:
+            models = bokeh("models")
+            self.plot.yaxis.ticker = models.FixedTicker(ticks=_logarithmic_ticks(log))
+            self.plot.yaxis.formatter = models.PrintfTickFormatter(format="%g")
 
     def dots(self, x: Float1D, y: Float1D, mark: str, text: str = "", *, hover: bool = False) -> None:
         """Draws at most MOST_DOTS of the points (x, y)."""
@@ -135,8 +155,9 @@ class Panel:
         self._add(drawn, mark, text, "")
 
     def steps(self, x: Float1D, y: Float1D, mark: str, text: str) -> None:
-        """Draws a line through the points (x, y), with a circle at each."""
-        self.line(x, y, mark, text, hover=False)
+        """Draws circles at the points (x, y) and a line through them that ends where x decreases."""
+        ends = np.flatnonzero(np.diff(x) <= 0.0) + 1
+        self.line(np.insert(x, ends, np.nan), np.insert(y, ends, np.nan), mark, text, hover=False)
         drawn = self.plot.scatter(
             "x", "y", source=self._source(x=x, y=y), size=6, fill_color=None, tags=[],
             **{name: value for name, value in _coloured(line=_LINES[mark]["line"]).items() if name != "tags"},
@@ -178,8 +199,7 @@ class Panel:
         if text:
             self.legend.append((mark, text))
         if hover:
-            names = [(axis.axis_label.partition(" [")[0], f"@{key}{{%0.4g}}") for axis, key in
-                     ((self.plot.xaxis[0], "x"), (self.plot.yaxis[0], "y"))]  # fmt: skip
+            names = [(name, f"@{key}{{%0.4g}}") for name, key in zip(self._names, "xy", strict=True)]
             self.plot.add_tools(
                 bokeh("models").HoverTool(
                     renderers=[drawn],
@@ -223,4 +243,11 @@ class Chart:
 
     def layout(self) -> Any:
         """Returns the Bokeh layout of the panels."""
-        return bokeh("layouts").column(*(panel.plot for panel in self.panels), sizing_mode="stretch_width")
+        layout = bokeh("layouts").gridplot(
+            [[panel.plot] for panel in self.panels],
+            sizing_mode="stretch_width",
+            toolbar_location="above",
+            toolbar_options={"logo": None},
+        )
+        layout.toolbar.stylesheets = ["@media print { :host { display: none; } }"]
+        return layout

@@ -75,8 +75,8 @@ MEANINGS = {
 """Kind of quantity on both sides of an inequality, and its meaning in words, by the id of the inequality"""
 
 BASES = {
-    "proved": "proved for every motion",
-    "linear": "proved for the linearised system only",
+    "proved": "for every motion",
+    "linear": "for small motion near an equilibrium only",
     "none": "no bound is known",
 }
 """Basis of an inequality in words"""

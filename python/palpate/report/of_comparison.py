@@ -43,7 +43,8 @@ deviation 1 / sqrt(n)"""
 NO_RECORDING = "no recording was given: palpate report MODEL.json RECORDING -o REPORT.html"
 
 _DOT_MARKS = {"press": "dots", "release": "open-dots", "": "dots"}
-_LINE_MARKS = {"press": "line", "release": "dashed", "": "line"}
+LINE_MARKS = {"press": "line", "release": "dashed", "": "line"}
+"""Marks of the model's curves by stroke"""
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,19 @@ def force_curve(subject: Subject) -> Section:
         )
     else:
         sentences.append(f"Without band: {subject.uncertainty}.")
-    return Section(key, title, explanation, sentences, [Chart(f"{description}.", *panels)])
+    charts = [Chart(f"{description}.", *panels)]
+    if compared is not None and not curves:
+        charts.append(_modelled_over_recorded(compared))
+    return Section(key, title, explanation, sentences, charts)
+
+
+def _modelled_over_recorded(compared: Compared) -> Chart:
+    y = compared.y
+    panel = Panel(y.label("recorded force"), y.label("modelled force"), 340)
+    panel.dots(y.factor * compared.force, y.factor * compared.found.force, "dots", "row of the recording")
+    ends = y.factor * np.array([compared.force.min(), compared.force.max()])
+    panel.line(ends, ends, "line", "equal forces", hover=False)
+    return Chart("Modelled force over recorded force; in a good model the dots lie on the line.", panel)
 
 
 def _force_panel(subject: Subject, curves: list[Curve], compared: Compared | None) -> Panel:
@@ -193,7 +206,7 @@ def _force_panel(subject: Subject, curves: list[Curve], compared: Compared | Non
                 panel.dots(at, modelled, "soft-dots", "model")
     for curve in curves:
         line = x.factor * curve.position, y.factor * curve.force
-        panel.line(*line, _LINE_MARKS[curve.stroke], f"model{curve.suffix}")
+        panel.line(*line, LINE_MARKS[curve.stroke], f"model{curve.suffix}")
     return panel
 
 
@@ -304,7 +317,7 @@ def just_noticeable(subject: Subject) -> Section:
         panel.dots(at, force, mark, f"recorded, {text}")
     for curve in curves:
         line = x.factor * curve.position, y.factor * curve.force
-        panel.line(*line, _LINE_MARKS[curve.stroke], f"model{curve.suffix}")
+        panel.line(*line, LINE_MARKS[curve.stroke], f"model{curve.suffix}")
     sentence = (
         f"{percent(found.within_jnd)} of {found.n} rows are inside. The smallest noticeable difference is "
         f"{compared.amount(found.jnd_floor)}, also where the force is near zero."

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Mapping, Sequence
-from datetime import datetime, timezone
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,10 @@ from ..model import Model
 from ..plotting.look import scale_for
 from ..recording.files import sha256_of_file
 from .charts import CLASS_MARKS, Chart, Panel
-from .of_comparison import curves_of
+from .of_comparison import LINE_MARKS, curves_of
 from .page import Section
 from .subject import Subject
-from .words import amount, percent
+from .words import amount, date_text, interval, percent
 
 WAVELET_POINTS = 61
 """Number of points at which one wavelet is drawn"""
@@ -52,10 +52,9 @@ def wavelets(subject: Subject) -> Section:
     z = scale_for(model.units["force"], *parts)
     above = Panel(x.label("position"), y.label("force"), 220)
     for curve in curves:
-        mark = "dashed" if curve.stroke == "release" else "line"
         inside = (curve.position >= lower) & (curve.position <= upper)
         line = x.factor * curve.position[inside], y.factor * curve.force[inside]
-        above.line(*line, mark, f"model{curve.suffix}")
+        above.line(*line, LINE_MARKS[curve.stroke], f"model{curve.suffix}")
     above.line(x.factor * ends, y.factor * straight, "second", "straight line c x + b", hover=False)
     below = Panel(x.label("position"), z.label("wavelets"), 220, above=above)
     below.lines(
@@ -98,39 +97,35 @@ def selection_path(subject: Subject) -> Section:
         return Section(key, title, explanation, left_out=reason)
     rmse = np.array([step["rmse"] for step in model.path])
     y = scale_for(model.units["force"], rmse)
-    least = min((step["criterion"] for step in model.path if step["criterion"] is not None), default=0.0)
-    above = Panel("wavelets", y.label("RMS error"), 220, log=bool((rmse > 0.0).all()))
-    below = Panel("wavelets", "criterion above its least", 200, above=above)
-    for k, name in enumerate(dict.fromkeys(step["model_class"] for step in model.path)):
-        steps = [step for step in model.path if step["model_class"] == name]
-        judged = [(step["n_wavelets"], step["criterion"]) for step in steps if step["criterion"] is not None]
-        sizes = np.array([float(step["n_wavelets"]) for step in steps])
-        mark = f"class-{k % CLASS_MARKS}"
-        above.steps(sizes, y.factor * np.array([step["rmse"] for step in steps]), mark, name)
-        if judged:
-            count, criterion = np.array(judged, dtype=np.float64).T
-            below.steps(count, criterion - least, mark, "")
+    criteria = [step["criterion"] for step in model.path]
+    least = min((each for each in criteria if each is not None), default=0.0)
+    criterion = np.array([np.nan if c is None else c - least + 1.0 for c in criteria])
+    above = Panel("wavelets", y.label("RMS error"), 220, log=y.factor * rmse if (rmse > 0.0).all() else None)
+    below = Panel("wavelets", "criterion − least + 1", 200, log=criterion[np.isfinite(criterion)], above=above)
+    size = np.array([float(step["n_wavelets"]) for step in model.path])
+    classes = np.array([step["model_class"] for step in model.path])
+    for k, name in enumerate(dict.fromkeys(classes)):
+        mark, rows = f"class-{k % CLASS_MARKS}", classes == name
+        above.steps(size[rows], y.factor * rmse[rows], mark, str(name))
+        judged = rows & np.isfinite(criterion)
+        below.steps(size[judged], criterion[judged], mark, "")
     sentence = (
         f"The model class is {model.fit.model_class} with {model.n_wavelets} wavelets and "
         f"{model.n_parameters} parameters; the search was stopped by {model.stop_reason}."
     )
-    description = "RMS error, and below the criterion above its least value, over the number of wavelets."
+    description = "RMS error, and below the criterion minus its least value, over the number of wavelets."
     return Section(key, title, explanation, [sentence], [Chart(description, above, below)])
 
 
 def provenance(subject: Subject) -> Section:
     """Files with fingerprints, rows, columns, versions, options and dates."""
     model, data, recording = subject.model, subject.model.data, subject.recording
-    now = datetime.now(timezone.utc)
-    facts: dict[str, Sequence[str]] = {
-        "report": [f"{now:%Y-%m-%d %H:%M} UTC, palpate {_core.__version__}"],
-    }
+    facts: dict[str, Sequence[str]] = {"report": [f"palpate {_core.__version__}, {date_text(time.time())}"]}
     if subject.file is not None:
-        changed = datetime.fromtimestamp(subject.file.stat().st_mtime, timezone.utc)
         facts["model file"] = [
             str(subject.file),
             f"SHA-256 {sha256_of_file(subject.file)}",
-            f"written {changed:%Y-%m-%d %H:%M} UTC by {model.created_by}",
+            f"written by {model.created_by}, {date_text(subject.file.stat().st_mtime)}",
         ]
     facts["identified on"] = [
         *_files(data.files, data.sha256),
@@ -151,8 +146,7 @@ def provenance(subject: Subject) -> Section:
         facts["compared with"] = [
             *_files(source.files, source.sha256),
             f"{source.rows} rows read{of_file}{held_out}; {subject.verification.n} compared",
-            *_columns(source.columns),
-            *recording.notes,
+            *(recording.notes or _columns(source.columns)),
             *subject.verification.notes,
             *(f"{name}: {value}" for name, value in recording.metadata.items()),
         ]
@@ -180,7 +174,7 @@ def _domain(model: Model) -> list[str]:
     lines = []
     for name, low, high in zip(model.inputs, model.lower, model.upper, strict=True):
         unit = model.units["position"] if name == "position" else ""
-        lines.append(f"domain of {name}: {amount(float(low), unit)} to {amount(float(high), unit)}")
+        lines.append(f"domain of {name}: {interval(float(low), float(high), unit)}")
     if model.period is not None:
         lines.append(f"repeats every {amount(model.period, model.units['position'])}")
     else:

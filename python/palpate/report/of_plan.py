@@ -10,7 +10,7 @@ from ..planning import force_at, mechanical_units
 from ..plotting.look import scale_for
 from .charts import Chart, Panel
 from .inequalities import BASES, MEANINGS, VERDICTS
-from .of_comparison import Compared, curves_of
+from .of_comparison import LINE_MARKS, Compared, curves_of
 from .page import Section, Table
 from .subject import RENDERED_S, Rendering, Subject
 from .words import amount
@@ -34,14 +34,14 @@ def rendered(subject: Subject) -> Section:
     panel = Panel(x.label("position"), y.label("force"), 320)
     if compared is not None:
         panel.dots(x.factor * compared.position, y.factor * compared.force, "soft-dots", "recorded")
-    if curves := curves_of(subject):
-        for curve in curves:
-            line = x.factor * curve.position, y.factor * curve.force
-            panel.line(*line, "dashed" if curve.stroke == "release" else "line", f"model{curve.suffix}")
-    else:
+    curves = curves_of(subject)
+    if not curves:
         modelled = force_at(plan, recording.position, recording.sample_period)
-        panel.dots(x.factor * at, y.factor * modelled, "soft-dots", "model")
-    panel.dots(x.factor * at, y.factor * recording.force, "open-dots", "rendered", hover=True)
+        panel.dots(x.factor * at, y.factor * modelled, "dots", "model")
+    panel.dots(x.factor * at, y.factor * recording.force, "open-dots", "rendered", hover=not curves)
+    for curve in curves:
+        line = x.factor * curve.position, y.factor * curve.force
+        panel.line(*line, LINE_MARKS[curve.stroke], f"model{curve.suffix}")
     unit = recording.units["force"]
     certificate = plan.certificate
     assert certificate is not None

@@ -8,6 +8,7 @@
   // Gives every part of the charts the colour of its use; tags such as "line:ink" name the use.
   function paint(scheme) {
     const colour = colours[scheme];
+    document.documentElement.dataset.scheme = scheme;  // on paper, page.css inverts charts of the dark scheme
     for (const model of models()) {
       for (const tag of model.tags ?? []) {
         const [part, use] = tag.split(":");
@@ -32,6 +33,4 @@
     document.documentElement.dataset.charts = "drawn";
   });
   dark.addEventListener("change", () => paint(scheme()));
-  window.addEventListener("beforeprint", () => paint("light"));
-  window.addEventListener("afterprint", () => paint(scheme()));
 })();

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from .. import _core
 from ..arguments import path_of
 from ..identification.classes.findings import USABLE_NRMSE
 from ..model import Model
@@ -19,7 +21,7 @@ from .of_model import provenance, selection_path, wavelets
 from .of_plan import certificate_table, rendered
 from .page import KeyNumber, Section, Table, bokeh, html_of
 from .subject import Subject
-from .words import amount, percent
+from .words import amount, date_text, percent
 
 LEVEL_WORDS = {
     "good": "This result can be used: no finding speaks against it.",
@@ -69,7 +71,7 @@ def report_of(subject: Subject) -> Report:
     bokeh("plotting")
     sections = sections_of(subject)
     return Report(
-        html=html_of(f"Force model of {_source(subject.model)}", "Report of palpate", sections),
+        html=html_of(f"Force model of {_source(subject.model)}", f"Report of palpate {_core.__version__}, {date_text(time.time())}", sections),
         verdict=subject.verdict,
         sections=tuple(section.key for section in sections if not section.left_out),
         left_out={section.key: section.left_out for section in sections if section.left_out},
@@ -183,15 +185,16 @@ def _key_numbers(subject: Subject) -> Section:
                 f"rows of the identification. A good model has at most {percent(USABLE_NRMSE)}.",
             )
         )
-    if plan is not None and plan.certificate is not None:
-        error = plan.force_error
+    if subject.refusal or (plan is not None and plan.certificate is not None and plan.certificate.refused):
+        meaning = "The rendering has no proof of stability: do not render this plan."
+        numbers.append(KeyNumber("refused", "certificate", meaning))
+    elif plan is not None and plan.certificate is not None:
         numbers.append(
             KeyNumber(
                 f"{1e3 * plan.certificate.longest_period_s:.3g} ms",
                 "longest time between samples",
                 f"Up to this time the rendering is stable; the device samples every "
-                f"{1e3 * plan.certificate.device.period_s:.3g} ms. The plan changes the force by up to "
-                f"{amount(error.largest, model.units['force'])}.",
+                f"{1e3 * plan.certificate.device.period_s:.3g} ms. {_force_change(subject)}",
             )
         )
     else:
@@ -204,3 +207,12 @@ def _key_numbers(subject: Subject) -> Section:
         )
     explanation = "These numbers show how close the model is to the recording and how safely it can be rendered."
     return Section("numbers", "Key numbers", explanation, numbers=numbers)
+
+
+def _force_change(subject: Subject) -> str:
+    """Returns a sentence on the difference between planned and identified force."""
+    assert subject.plan is not None
+    largest = subject.plan.force_error.largest
+    if largest == 0.0:
+        return "The plan does not change the force."
+    return f"The plan changes the force by up to {amount(largest, subject.model.units['force'])}."

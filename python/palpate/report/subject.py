@@ -177,7 +177,7 @@ def _without_plan(file: Path, refused: InputError) -> Subject:
     except InputError:
         raise refused from None
     reason = str(refused).removeprefix(f"{file}: ")
-    refusal = f"the plan in the model file is refused: {reason}. Make a new plan with palpate plan"
+    refusal = f"the plan in the model file is refused: {reason}"
     try:
         plan = Plan.of(Model.from_dict({**content, "certificate": None}))
         device = DeviceProfile(**content["certificate"]["device"])
