@@ -53,11 +53,12 @@ def report(
     if recording_file is not None and recording_file.suffix == ".json" != model_file.suffix:
         raise InputError(f"the model comes first: palpate report {recording_file} {model_file}")
     require_writable(output, inputs=(model_file, recording_file, *identified_on))
-    columns = columns_of(Subject.of(model_file).model)
+    subject = Subject.of(model_file)
+    columns = columns_of(subject.model)
     recording = None if recording_file is None else reading.read(recording_file, columns)
     others = [reading.read(each, columns) for each in identified_on]
     talk("writing the report ...")
-    page = report_of(Subject.of(model_file, recording, others))
+    page = report_of(subject.compared_with(recording, others))
     with finishing():
         page.write(output)
         size = output.stat().st_size

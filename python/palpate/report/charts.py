@@ -96,7 +96,7 @@ class Panel:
         if above is not None:
             shared = {"x_range": above.plot.x_range}
             above.plot.xaxis.axis_label = None
-        self.plot = bokeh("plotting").figure(
+        self.plot: Any = bokeh("plotting").figure(
             height=height,
             sizing_mode="stretch_width",
             min_border_left=_BORDER_PX,
@@ -177,9 +177,8 @@ class Panel:
     def bars(self, left: Float1D, right: Float1D, top: Float1D, text: str = "") -> None:
         """Draws bars from zero to `top`."""
         source = self._source(left=left, right=right, y=top, x=0.5 * (left + right), zero=np.zeros(len(top)))
-        drawn = self.plot.quad(
-            "left", "right", "y", "zero", source=source, fill_alpha=0.75, **_coloured(fill="first", line="paper")
-        )  # fmt: skip
+        colours = _coloured(fill="first", line="paper")
+        drawn = self.plot.quad("left", "right", "y", "zero", source=source, fill_alpha=0.75, **colours)
         self._add(drawn, "bars", text, "mouse")
 
     def level(self, value: float, mark: str, text: str = "") -> None:
@@ -222,7 +221,9 @@ class Panel:
 
     @staticmethod
     def _source(**columns: Any) -> Any:
-        data = {name: _small(each) if isinstance(each, np.ndarray) else each for name, each in columns.items()}
+        data = {
+            name: _small(each) if isinstance(each, np.ndarray) else each for name, each in columns.items()
+        }
         return bokeh("models").ColumnDataSource(data)
 
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 MEANINGS = {
     "damping-hold": (
         "damping",
-        "The force is held between two samples, which feeds energy into the handle; the viscous damping of the "
-        "device must absorb it.",
+        "The force is held between two samples, which feeds energy into the handle; the viscous damping of "
+        "the device must absorb it.",
     ),
     "damping-coupling": (
         "damping",
@@ -16,8 +16,8 @@ MEANINGS = {
     ),
     "friction-steps": (
         "force",
-        "Steps of encoder and force feed energy into the handle; the Coulomb friction of the device must absorb "
-        "it.",
+        "Steps of encoder and force feed energy into the handle; the Coulomb friction of the device must "
+        "absorb it.",
     ),
     "friction-force-step": (
         "force",
@@ -30,8 +30,8 @@ MEANINGS = {
     ),
     "unique-solution": (
         "stiffness",
-        "The position of the virtual object must have one solution at every sample, so the force must not fall "
-        "too steeply.",
+        "The position of the virtual object must have one solution at every sample, so the force must not "
+        "fall too steeply.",
     ),
     "solution-exists": (
         "stiffness",
@@ -52,7 +52,8 @@ MEANINGS = {
     ),
     "explicit-damping": (
         "mass",
-        "Object and coupling must not have more damping than the mass can follow from one sample to the next.",
+        "Object and coupling must not have more damping than the mass can follow from one sample to the "
+        "next.",
     ),
     "explicit-damping-positive": ("damping", "Object or coupling must have damping, so that motion decays."),
     "explicit-falling-slope": (
@@ -83,7 +84,8 @@ BASES = {
 
 VERDICTS = {
     "certified": "The certificate holds: a hand cannot take more energy out of the device than it put in.",
-    "stable-locally": "The linearised system is stable near each equilibrium; nothing is proved about energy.",
+    "stable-locally": "The linearised system is stable near each equilibrium; nothing is proved about its "
+    "energy.",
     "refused": "The certificate is refused: an inequality does not hold, or no bound is known.",
 }
 """Verdict of a certificate in words"""

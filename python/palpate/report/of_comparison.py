@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._typing import Float1D
-from ..plotting.look import Scale, scale_for, strokes
+from ..plotting.look import Scale, scale_for, strokes, thinned
 from ..recording import Recording
 from ..verdict import FORCE_JND
 from ..verification import Uncertainty, Verification
-from ..verification.metrics import autocorrelation, force_jnd_band, root_mean_square, within_force_jnd
-from .charts import Chart, Panel
+from ..verification.metrics import autocorrelation, force_jnd_band, within_force_jnd
+from .charts import MOST_DOTS, Chart, Panel
 from .page import Section
 from .subject import Subject
 from .words import amount, percent
@@ -298,8 +298,8 @@ def just_noticeable(subject: Subject) -> Section:
     """Curve with the band of forces that a hand does not distinguish, and the rows outside of it."""
     key, title = "just-noticeable", "Differences that a hand feels"
     explanation = (
-        f"A hand does not feel a difference of less than about {FORCE_JND:.0%} of the force; dots in the grey "
-        "band feel like the model."
+        f"A hand does not feel a difference of less than about {FORCE_JND:.0%} of the force; dots in the "
+        "grey band feel like the model."
     )
     compared = Compared.of(subject)
     if compared is None:
@@ -312,9 +312,13 @@ def just_noticeable(subject: Subject) -> Section:
         name = f"not noticeable{curve.suffix}"
         panel.band(x.factor * curve.position, y.factor * low, y.factor * high, name)
     inside = within_force_jnd(compared.force, found.residual)
-    for rows, mark, text in ((inside, "soft-dots", "not noticeable"), (~inside, "outside", "noticeable")):
-        at, force = x.factor * compared.position[rows], y.factor * compared.force[rows]
-        panel.dots(at, force, mark, f"recorded, {text}")
+    # Both series are thinned together, so that the picture shows the share of each.
+    at, force, within = thinned(compared.position, compared.force, inside.astype(float), most=MOST_DOTS)
+    for rows, mark, text in (
+        (within > 0, "soft-dots", "not noticeable"),
+        (within == 0, "outside", "noticeable"),
+    ):
+        panel.dots(x.factor * at[rows], y.factor * force[rows], mark, f"recorded, {text}")
     for curve in curves:
         line = x.factor * curve.position, y.factor * curve.force
         panel.line(*line, LINE_MARKS[curve.stroke], f"model{curve.suffix}")
@@ -324,8 +328,3 @@ def just_noticeable(subject: Subject) -> Section:
     )
     description = "Recorded force over position; rows with a noticeable difference to the model are marked."
     return Section(key, title, explanation, [sentence], [Chart(description, panel)])
-
-
-def error_text(compared: Compared) -> str:
-    """Returns the RMS error as text."""
-    return compared.amount(root_mean_square(compared.found.residual))

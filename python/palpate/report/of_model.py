@@ -64,8 +64,8 @@ def wavelets(subject: Subject) -> Section:
     sentences = []
     if model.hysteretic:
         sentences.append(
-            "Wavelets and line give the mean force of press and release; the hysteresis uses the same wavelets "
-            "with other weights."
+            "Wavelets and line give the mean force of press and release; the hysteresis uses the same "
+            "wavelets with other weights."
         )
     description = f"Force of the model with its straight line; below, its {model.n_wavelets} wavelets."
     return Section(key, title, explanation, sentences, [Chart(description, above, below)])
@@ -88,8 +88,8 @@ def selection_path(subject: Subject) -> Section:
     """Error and criterion over the number of wavelets, one line for each model class."""
     key, title = "selection", "How the size was chosen"
     explanation = (
-        "More wavelets reduce the error; the criterion adds the cost of their parameters, and its least value "
-        "decides."
+        "More wavelets reduce the error; the criterion adds the cost of their parameters, and its least "
+        "value decides."
     )
     model = subject.model
     if not model.path:
@@ -101,7 +101,9 @@ def selection_path(subject: Subject) -> Section:
     least = min((each for each in criteria if each is not None), default=0.0)
     criterion = np.array([np.nan if c is None else c - least + 1.0 for c in criteria])
     above = Panel("wavelets", y.label("RMS error"), 220, log=y.factor * rmse if (rmse > 0.0).all() else None)
-    below = Panel("wavelets", "criterion − least + 1", 200, log=criterion[np.isfinite(criterion)], above=above)
+    below = Panel(
+        "wavelets", "criterion − least + 1", 200, log=criterion[np.isfinite(criterion)], above=above
+    )
     size = np.array([float(step["n_wavelets"]) for step in model.path])
     classes = np.array([step["model_class"] for step in model.path])
     for k, name in enumerate(dict.fromkeys(classes)):
@@ -154,8 +156,8 @@ def provenance(subject: Subject) -> Section:
         if name != _VERDICT_NOTE and (lines := _lines(note)):
             facts[name.replace("_", " ")] = lines
     explanation = (
-        "With these files, columns and versions the result can be repeated; a file is the same if its SHA-256 "
-        "is the same."
+        "With these files, columns and versions the result can be repeated; a file is the same if its "
+        "SHA-256 is the same."
     )
     return Section("provenance", "Origin of the data", explanation, facts=facts)
 

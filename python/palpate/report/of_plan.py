@@ -12,7 +12,7 @@ from .charts import Chart, Panel
 from .inequalities import BASES, MEANINGS, VERDICTS
 from .of_comparison import LINE_MARKS, Compared, curves_of
 from .page import Section, Table
-from .subject import RENDERED_S, Rendering, Subject
+from .subject import RENDERED_S, Subject
 from .words import amount
 
 

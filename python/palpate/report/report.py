@@ -11,24 +11,17 @@ from pathlib import Path
 
 from .. import _core
 from ..arguments import path_of
-from ..identification.classes.findings import USABLE_NRMSE
 from ..model import Model
 from ..recording import Recording
 from ..recording.files import replacing
 from ..verdict import Verdict
-from .of_comparison import Compared, error_over_position, error_text, force_curve, just_noticeable, whiteness
+from .of_comparison import error_over_position, force_curve, just_noticeable, whiteness
 from .of_model import provenance, selection_path, wavelets
 from .of_plan import certificate_table, rendered
-from .page import KeyNumber, Section, Table, bokeh, html_of
+from .page import Section, bokeh, html_of
 from .subject import Subject
-from .words import amount, date_text, percent
-
-LEVEL_WORDS = {
-    "good": "This result can be used: no finding speaks against it.",
-    "usable": "This result can be used within the limits below.",
-    "no": "Do not use this result; the likely cause and the cure are below.",
-}
-"""Level of a verdict in words"""
+from .summary import key_numbers, verdict
+from .words import date_text
 
 _MOST_NAMES = 2
 """Largest number of recordings that the title names"""
@@ -71,7 +64,11 @@ def report_of(subject: Subject) -> Report:
     bokeh("plotting")
     sections = sections_of(subject)
     return Report(
-        html=html_of(f"Force model of {_source(subject.model)}", f"Report of palpate {_core.__version__}, {date_text(time.time())}", sections),
+        html=html_of(
+            f"Force model of {_source(subject.model)}",
+            f"Report of palpate {_core.__version__}, {date_text(time.time())}",
+            sections,
+        ),
         verdict=subject.verdict,
         sections=tuple(section.key for section in sections if not section.left_out),
         left_out={section.key: section.left_out for section in sections if section.left_out},
@@ -110,7 +107,7 @@ def write_report(
     InputError
         Bokeh is not installed, the model or the recording cannot be used, or the page cannot be written.
     """
-    report = report_of(Subject.of(model, recording, identified_on))
+    report = report_of(Subject.of(model).compared_with(recording, identified_on))
     report.write(to)
     return report
 
@@ -126,8 +123,8 @@ def _source(model: Model) -> str:
 def sections_of(subject: Subject) -> list[Section]:
     """Returns the sections of a report in order."""
     return [
-        _verdict(subject),
-        _key_numbers(subject),
+        verdict(subject),
+        key_numbers(subject),
         force_curve(subject),
         wavelets(subject),
         selection_path(subject),
@@ -138,81 +135,3 @@ def sections_of(subject: Subject) -> list[Section]:
         certificate_table(subject),
         provenance(subject),
     ]
-
-
-def _verdict(subject: Subject) -> Section:
-    verdict = subject.verdict
-    rows = [(part, found.level) for part, found in subject.verdicts.items()]
-    explanation = (
-        "The verdict is that of the weakest part: good, usable within limits, or no. Each finding names its "
-        "likely cause and the cure."
-    )
-    return Section(
-        "verdict",
-        "Verdict",
-        explanation,
-        [LEVEL_WORDS[verdict.level]],
-        verdict=verdict,
-        tables=[Table(("part", "verdict"), rows)],
-    )
-
-
-def _key_numbers(subject: Subject) -> Section:
-    compared, model, plan = Compared.of(subject), subject.model, subject.plan
-    numbers = []
-    if compared is not None:
-        found = compared.found
-        fresh = "rows that the model has not seen" if found.fresh else "rows of the identification"
-        numbers += [
-            KeyNumber(
-                percent(found.nrmse),
-                "error (NRMSE)",
-                f"The force differs by {error_text(compared)} RMS, this share of the spread of the recorded "
-                f"force, on {found.n} {fresh}. A good model has at most {percent(USABLE_NRMSE)}.",
-            ),
-            KeyNumber(
-                percent(found.within_jnd),
-                "not noticeable",
-                "Share of the rows in which a hand does not feel the difference to the model.",
-            ),
-        ]
-    else:
-        numbers.append(
-            KeyNumber(
-                percent(model.fit.nrmse),
-                "error (NRMSE) of the fit",
-                f"The RMS force error as a share of the spread of the recorded force, on {model.data.rows} "
-                f"rows of the identification. A good model has at most {percent(USABLE_NRMSE)}.",
-            )
-        )
-    if subject.refusal or (plan is not None and plan.certificate is not None and plan.certificate.refused):
-        meaning = "The rendering has no proof of stability: do not render this plan."
-        numbers.append(KeyNumber("refused", "certificate", meaning))
-    elif plan is not None and plan.certificate is not None:
-        numbers.append(
-            KeyNumber(
-                f"{1e3 * plan.certificate.longest_period_s:.3g} ms",
-                "longest time between samples",
-                f"Up to this time the rendering is stable; the device samples every "
-                f"{1e3 * plan.certificate.device.period_s:.3g} ms. {_force_change(subject)}",
-            )
-        )
-    else:
-        numbers.append(
-            KeyNumber(
-                str(model.n_wavelets),
-                "wavelets",
-                f"Size of the model: {model.n_parameters} fitted numbers describe the force.",
-            )
-        )
-    explanation = "These numbers show how close the model is to the recording and how safely it can be rendered."
-    return Section("numbers", "Key numbers", explanation, numbers=numbers)
-
-
-def _force_change(subject: Subject) -> str:
-    """Returns a sentence on the difference between planned and identified force."""
-    assert subject.plan is not None
-    largest = subject.plan.force_error.largest
-    if largest == 0.0:
-        return "The plan does not change the force."
-    return f"The plan changes the force by up to {amount(largest, subject.model.units['force'])}."

@@ -51,32 +51,44 @@ class Subject:
     """Rows from which the model was identified, as far as their recordings were given"""
 
     @classmethod
-    def of(
-        cls,
-        model: Model | str | os.PathLike[str],
-        recording: Recording | None = None,
-        identified_on: Sequence[Recording] = (),
-    ) -> Subject:
-        """Returns the subject for a model or a model file. A refused plan does not refuse the model.
+    def of(cls, model: Model | str | os.PathLike[str]) -> Subject:
+        """Returns the subject for a model or a model file. A refused plan does not refuse the model file.
 
         Raises
         ------
         InputError
             The model file cannot be read, also without its plan.
         """
-        subject = (
-            cls(model, plan=None if model.plan is None else Plan.of(model))
-            if isinstance(model, Model)
-            else _of_file(path_of("model", model))
-        )
-        for each in (*identified_on, *(() if recording is None else (recording,))):
-            instance_of("recording", each, Recording, "read one with palpate.read_recording")
-        model = subject.model
+        if isinstance(model, Model):
+            return cls(model, plan=_plan_of(model))
+        return _of_file(path_of("model", model))
+
+    def compared_with(self, recording: Recording | None, identified_on: Sequence[Recording] = ()) -> Subject:
+        """Returns the subject with a recording to compare, and recordings of the identification.
+
+        If rows of the recording were held out from the identification, only these are compared.
+
+        Raises
+        ------
+        InputError
+            The model was not identified on a recording of `identified_on`.
+        """
+        data = self.model.data
         given = [*identified_on, *([] if recording is None else [recording])]
-        fitted = {each.source.sha256: _fitted_rows(model, each) for each in given if _is_of(model, each)}
-        if recording is not None and _is_of(model, recording) and model.data.held_out_every:
-            recording = recording.split(model.data.held_out_every)[1]
-        return replace(subject, recording=recording, identified_on=tuple(fitted.values()))
+        for each in given:
+            instance_of("recording", each, Recording, "read one with palpate.read_recording")
+        for each in identified_on:
+            if is_fresh(data, each.source):
+                name = " and ".join(each.source.files) or "a recording"
+                raise InputError(f"{name} did not identify the model: its SHA-256 is not in the model file")
+        fitted: dict[str, Recording] = {}
+        for each in given:
+            if not is_fresh(data, each.source):
+                part = each.split(data.held_out_every)[0] if data.held_out_every else each
+                fitted.setdefault(each.source.sha256, part)
+        if recording is not None and data.held_out_every and not is_fresh(data, recording.source):
+            recording = recording.split(data.held_out_every)[1]
+        return replace(self, recording=recording, identified_on=tuple(fitted.values()))
 
     @cached_property
     def verification(self) -> Verification | None:
@@ -108,9 +120,7 @@ class Subject:
         if self.plan.certificate is None:
             return "the plan has no certificate, so its device is not known: make a plan with palpate plan"
         try:
-            rendered = simulate(
-                self.plan, self.plan.certificate.device, rig_for(self.model).hand, RENDERED_S
-            )
+            rendered = simulate(self.plan, self.plan.certificate.device, rig_for(self.model).hand, RENDERED_S)
         except InputError as error:
             return str(error)
         error_of = force_error(self.plan, rendered)
@@ -150,37 +160,27 @@ class Subject:
         return np.asarray(lower + np.mod(position - lower, self.model.period))
 
 
-def _is_of(model: Model, recording: Recording) -> bool:
-    """Returns True if the model was identified on the recording or, with held-out rows, on a part of it."""
-    return not is_fresh(model.data, recording.source)
-
-
-def _fitted_rows(model: Model, recording: Recording) -> Recording:
-    every = model.data.held_out_every
-    return recording.split(every)[0] if every else recording
+def _plan_of(model: Model) -> Plan | None:
+    return None if model.plan is None else Plan.of(model)
 
 
 def _of_file(file: Path) -> Subject:
     """Reads a model file. If its plan or certificate is refused, returns the model with the reason."""
     try:
         model = load_model(file)
+        return Subject(model, file, _plan_of(model))
     except InputError as error:
-        return _without_plan(file, error)
-    return Subject(model, file, None if model.plan is None else Plan.of(model))
-
-
-def _without_plan(file: Path, refused: InputError) -> Subject:
-    """Returns the model of a file whose plan is refused, with the plan's certificate computed again."""
+        refused = error
     try:
         model = load_model(file, with_plan=False)
         content = read_json(str(file))
     except InputError:
         raise refused from None
     reason = str(refused).removeprefix(f"{file}: ")
-    refusal = f"the plan in the model file is refused: {reason}"
+    subject = Subject(model, file, refusal=f"the plan in the model file is refused: {reason}")
     try:
+        # The certificate is computed again for the model in the file.
         plan = Plan.of(Model.from_dict({**content, "certificate": None}))
-        device = DeviceProfile(**content["certificate"]["device"])
-        return Subject(model, file, plan.certified_for(device), refusal)
+        return replace(subject, plan=plan.certified_for(DeviceProfile(**content["certificate"]["device"])))
     except (ValueError, TypeError, KeyError):
-        return Subject(model, file, None, refusal)
+        return subject
