@@ -94,12 +94,15 @@ test-cpp: setup
 test-full: test-full-native
 	$(MAKE) --no-print-directory test-python
 
-# Tests that `make test` never runs: sanitizers, the installed package, a USB device below a kernel.
+# Tests that `make test` does not run: sanitizers, the installed package, a USB device below a kernel, and reports in
+# a browser if Chromium was not installed.
 test-full-native: setup control
 	tools/cpp_tests.sh release
 	for preset in asan tsan; do tools/cpp_tests.sh $$preset; done
 	tools/install_tests.sh
 	$(python) -m pytest tests/usb
+	tools/system_packages.sh "$(PYTHON)" browser
+	$(python) -m pytest tests/browser
 
 bench: setup
 	tools/bench.sh

@@ -59,10 +59,37 @@ class Page:
         found = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         return found["result"].get("value")
 
-    def media(self, *, dark: bool) -> None:
-        """Sets the colour scheme that the reader prefers."""
-        value = "dark" if dark else "light"
-        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": value}])
+    def wait(self, condition: str) -> None:
+        """Waits until an expression in the page is true."""
+        deadline = time.monotonic() + START_S
+        while self.run(condition) is not True:
+            assert time.monotonic() < deadline, f"not true: {condition}; {self.problems}"
+            time.sleep(0.05)
+
+    def box(self, element: str) -> list[float]:
+        """Returns left, top, right and bottom of the element with this id in the window [px]."""
+        found: list[float] = self.run(
+            "(b => [b.left, b.top, b.right, b.bottom])"
+            f"(document.getElementById({element!r}).getBoundingClientRect())"
+        )
+        return found
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Moves the mouse with its left button pressed, from one place in the window to another [px]."""
+        self._mouse("mouseMoved", start, buttons=0)
+        self._mouse("mousePressed", start, button="left", clickCount=1)
+        for share in (0.3, 0.6, 1.0):
+            x, y = (a + share * (b - a) for a, b in zip(start, end, strict=True))
+            self._mouse("mouseMoved", (x, y), button="left", buttons=1)
+        self._mouse("mouseReleased", end, button="left", clickCount=1)
+
+    def _mouse(self, kind: str, at: tuple[float, float], **button: Any) -> None:
+        self.call("Input.dispatchMouseEvent", type=kind, x=at[0], y=at[1], **button)
+
+    def media(self, *, dark: bool, paper: bool = False) -> None:
+        """Sets the colour scheme that the reader prefers, and the screen or paper."""
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.call("Emulation.setEmulatedMedia", media="print" if paper else "", features=[scheme])
 
     def size(self, width: int, height: int, *, phone: bool = False) -> None:
         """Sets the size of the window [px]; a phone has a finger in place of a mouse."""
@@ -77,10 +104,7 @@ class Page:
     def open(self, file: Path) -> None:
         """Opens a file and waits until its charts are drawn."""
         self.call("Page.navigate", url=file.resolve().as_uri())
-        deadline = time.monotonic() + START_S
-        while self.run("document.documentElement.dataset.charts") != "drawn":
-            assert time.monotonic() < deadline, f"the charts are not drawn: {self.problems}"
-            time.sleep(0.05)
+        self.wait("document.documentElement.dataset.charts === 'drawn'")
         time.sleep(0.5)  # the charts are laid out again when their size is known
 
     def screenshot(self, to: Path, *, whole: bool = False) -> bytes:

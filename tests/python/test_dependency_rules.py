@@ -19,7 +19,10 @@ COMMON = {"errors", "arguments", "verdict", "_typing", "_core"}
 MODULE_ORDER = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
 
 # Modules of the package that may import any module except cli; only the module cli imports them.
-SIDE_MODULES = {"plotting", "baselines"}
+SIDE_MODULES = {"plotting", "baselines", "report"}
+
+# A report uses the units, labels and strokes of plotting.
+SIDE_IMPORTS = {"report": {"plotting"}}
 
 # Folder of C++ headers -> folders whose headers it may include, besides its own, status.hpp and fields.
 INCLUDES = {
@@ -116,7 +119,7 @@ def may_import(module: str) -> set[str]:
     if module in ("__init__", "__main__"):
         return {*COMMON, *MODULE_ORDER} if module == "__main__" else {*COMMON, *MODULE_ORDER} - {"cli"}
     if module in SIDE_MODULES:
-        return {*COMMON, module, *MODULE_ORDER} - {"cli"}
+        return {*COMMON, module, *MODULE_ORDER, *SIDE_IMPORTS.get(module, ())} - {"cli"}
     if module == "cli":
         return {*COMMON, *MODULE_ORDER, *SIDE_MODULES, "."}
     if module in MODULE_ORDER:

@@ -2,14 +2,14 @@
 (() => {
   const { colours, charts } = JSON.parse(document.getElementById("report-data").textContent);
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
-  const precise = window.matchMedia("(pointer: fine)").matches;
-  const models = () => Bokeh.documents.flatMap((each) => each.roots().flatMap((root) => [...root.references()]));
+  const finger = window.matchMedia("(pointer: coarse)").matches;
+  const roots = () => Bokeh.documents.flatMap((each) => each.roots());
 
   // Gives every part of the charts the colour of its use; tags such as "line:ink" name the use.
   function paint(scheme) {
     const colour = colours[scheme];
     document.documentElement.dataset.scheme = scheme;  // on paper, page.css inverts charts of the dark scheme
-    for (const model of models()) {
+    for (const model of roots().flatMap((root) => [...root.references()])) {
       for (const tag of model.tags ?? []) {
         const [part, use] = tag.split(":");
         model[`${part}_color`] = model.type === "Span" ? colour[use] : { value: colour[use] };
@@ -29,7 +29,9 @@
   Promise.all(charts.map((item) => Bokeh.embed.embed_item(item))).then(() => {
     paint(scheme());
     // A finger scrolls the page; a mouse zooms without a click on the tool first.
-    for (const model of models()) if (precise && model.type === "BoxZoomTool") model.active = true;
+    for (const tool of finger ? [] : roots().flatMap((root) => root.toolbar.tools)) {
+      if ((tool.tools?.[0] ?? tool).type === "BoxZoomTool") tool.active = true;
+    }
     document.documentElement.dataset.charts = "drawn";
   });
   dark.addEventListener("change", () => paint(scheme()));

@@ -24,7 +24,7 @@ COLOURS = {
         "rule": "#d5d9df",
         "band": "#8d97a6",
         "first": "#1f6fb4",
-        "second": "#c05a10",
+        "second": "#b3530d",
         "alarm": "#b3261e",
         "good": "#1b6e3c",
     },

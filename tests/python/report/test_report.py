@@ -132,8 +132,13 @@ def test_texts_of_files_cannot_become_elements(tmp_path: Path) -> None:
 def test_names_of_inputs_cannot_become_elements() -> None:
     names = ("position", "<script>alert(1)</script>")
     model = model_by_hand(
-        **{"inputs": names, "kind": "general", "alpha": [[9.0, 9.0]], "beta": [[0.2, 0.2]]},
-        **{"linear": [1.0, 1.0], "lower": [0.0, 0.0], "upper": [1.0, 1.0]},
+        inputs=names,
+        kind="general",
+        alpha=[[9.0, 9.0]],
+        beta=[[0.2, 0.2]],
+        linear=[1.0, 1.0],
+        lower=[0.0, 0.0],
+        upper=[1.0, 1.0],
     )
     page = parsed(model)
     assert len(page.all("script")) == 3
@@ -186,8 +191,13 @@ def test_a_model_of_several_inputs_is_compared_without_curve() -> None:
 
 def test_a_model_of_velocity_is_rendered_and_drawn_without_curve() -> None:
     model = model_by_hand(
-        **{"inputs": ("position", "velocity"), "kind": "position_velocity", "alpha": [[3.0, 0.5]]},
-        **{"beta": [[0.3, 0.0]], "linear": [1.0, 0.02], "lower": [0.0, -3.0], "upper": [0.5, 3.0]},
+        inputs=("position", "velocity"),
+        kind="position_velocity",
+        alpha=[[3.0, 0.5]],
+        beta=[[0.3, 0.0]],
+        linear=[1.0, 0.02],
+        lower=[0.0, -3.0],
+        upper=[0.5, 3.0],
     )
     x = 0.25 + 0.2 * np.sin(np.arange(2000) * 5e-3)
     time = np.arange(2000) * 1e-3
@@ -250,7 +260,16 @@ def test_the_certificate_table_states_each_inequality_in_words(planned: Model, p
         assert f"{line.name[:1].upper()}{line.name[1:]}" in text
         assert f"{line.right:.4g}" in text
         assert f"{line.margin:.4g}" in text
-    for word in ("condition", "needed", "there is", "reserve", "basis", "result", "holds", certificate.device.id):
+    for word in (
+        "condition",
+        "needed",
+        "there is",
+        "reserve",
+        "basis",
+        "result",
+        "holds",
+        certificate.device.id,
+    ):
         assert word in text
 
 
@@ -292,7 +311,9 @@ def test_without_bokeh_the_message_names_the_command(
     assert not list(tmp_path.iterdir())
 
 
-def test_an_existing_page_keeps_its_mode_and_a_missing_folder_is_named(planned: Model, tmp_path: Path) -> None:
+def test_an_existing_page_keeps_its_mode_and_a_missing_folder_is_named(
+    planned: Model, tmp_path: Path
+) -> None:
     target = tmp_path / "report.html"
     target.write_text("old", encoding="utf-8")
     target.chmod(0o640)
