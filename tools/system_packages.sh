@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the missing Debian or Ubuntu packages, or prints one line with the packages to install.
 #
-#   tools/system_packages.sh PYTHON build|control|test-cpp|guest
+#   tools/system_packages.sh PYTHON build|control|test-cpp|guest|browser
 set -euo pipefail
 
 python=$1
@@ -40,6 +40,11 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         command -v qemu-system-x86_64 >/dev/null || echo qemu-system-x86
         command -v busybox >/dev/null || echo busybox-static
         command -v cpio >/dev/null || echo cpio
+    fi
+    if [ "$purpose" = browser ]; then
+        # for the tests that open a report
+        command -v chromium >/dev/null || command -v chromium-browser >/dev/null ||
+            command -v google-chrome >/dev/null || echo chromium
     fi
 }
 

@@ -20,7 +20,10 @@ MODULE_ORDER = ["recording", "model", "identification", "verification", "plannin
 
 # Modules of the package that may import any module except cli; only the module cli imports them. A method
 # `plot` may also import `plotting`, which draws its object.
-SIDE_MODULES = {"plotting", "baselines"}
+SIDE_MODULES = {"plotting", "baselines", "report"}
+
+# A report uses the units, labels and strokes of plotting.
+SIDE_IMPORTS = {"report": {"plotting"}}
 
 # Folder of C++ headers -> folders whose headers it may include, besides its own, status.hpp and fields.
 INCLUDES = {
@@ -128,7 +131,7 @@ def may_import(module: str) -> set[str]:
     if module in ("__init__", "__main__"):
         return {*COMMON, *MODULE_ORDER} if module == "__main__" else {*COMMON, *MODULE_ORDER} - {"cli"}
     if module in SIDE_MODULES:
-        return {*COMMON, module, *MODULE_ORDER} - {"cli"}
+        return {*COMMON, module, *MODULE_ORDER, *SIDE_IMPORTS.get(module, ())} - {"cli"}
     if module == "cli":
         return {*COMMON, *MODULE_ORDER, *SIDE_MODULES, "."}
     if module in MODULE_ORDER:

@@ -20,6 +20,8 @@ IMPORTED_LATE = {
     "pyarrow",
     "openpyxl",
     "mcap",
+    "bokeh",
+    "jinja2",
 }
 IMPORTED_LATE |= {"scipy.io", "usb"}
 

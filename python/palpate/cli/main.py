@@ -26,6 +26,7 @@ _VERBS = {
     "devices": "List haptic devices.",
     "check-device": "Measure a device and judge if it can render force.",
     "show": "Print a model.",
+    "report": "Write one HTML page about a model.",
     "demo": "Identify, verify and render a simulated sample.",
 }
 """Verbs with their lines in the help. The file of a verb is imported only when the verb is used."""

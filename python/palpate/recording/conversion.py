@@ -54,6 +54,8 @@ class Source:
     """k if the rows i with i mod k = k - 1 were held out; 0: no rows were held out."""
     held_out: bool = False
     """True if the recording contains only held-out rows, False if it contains none of them."""
+    file_rows: int = 0
+    """Number of rows of the files, including rows that are not used; 0: not known."""
 
     @staticmethod
     def merged(sources: Iterable[Source]) -> Source:
@@ -65,6 +67,7 @@ class Source:
             files=tuple(file for part in parts for file in part.files),
             sha256=" ".join(part.sha256 for part in parts),
             rows=sum(part.rows for part in parts),
+            file_rows=sum(part.file_rows for part in parts) if all(part.file_rows for part in parts) else 0,
         )
 
 
@@ -316,6 +319,7 @@ def converted(
             sha256=digest_of(x, f, time, *inputs, directions) if file is None else sha256_of_file(file),
             rows=len(x),
             columns=conversion.names,
+            file_rows=total,
         ),
         "notes": (conversion.note(torque_constant, table.notes), *notes, *_sign_notes(x, f, directions)),
         "file_units": file_units,

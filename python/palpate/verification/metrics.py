@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._typing import Float1D
 from ..errors import InputError
@@ -39,10 +40,17 @@ def normalised(rmse: float, reference: Float1D) -> float:
     return rmse / spread
 
 
+def autocorrelation(residual: Float1D, lags: int) -> Float1D:
+    """Returns sum e_k e_{k+j} / sum e_k^2 for the lags j = 1 to `lags`: (lags,), 0 for white residuals."""
+    power = float(residual @ residual)
+    if power == 0:
+        return np.zeros(lags)
+    return np.array([float(residual[:-lag] @ residual[lag:]) / power for lag in range(1, lags + 1)])
+
+
 def lag_one_autocorrelation(residual: Float1D) -> float:
     """Returns sum e_k e_{k+1} / sum e_k^2: 0 for white residuals, near 1 if adjacent errors are similar."""
-    power = float(residual @ residual)
-    return 0.0 if power == 0 else float(residual[:-1] @ residual[1:]) / power
+    return float(autocorrelation(residual, 1)[0])
 
 
 def durbin_watson(residual: Float1D) -> float:
@@ -60,11 +68,26 @@ def force_floor(force: Float1D) -> float:
     return FORCE_FLOOR * float(np.abs(force).max())
 
 
-def share_within_force_jnd(reference: Float1D, error: Float1D) -> float:
-    """Returns the share of samples with an error of at most 7 % of the local force, or at most the smallest
-    just noticeable difference."""
+def within_force_jnd(reference: Float1D, error: Float1D) -> NDArray[np.bool_]:
+    """Returns True for samples with an error of at most 7 % of the local force, or at most the
+    smallest just noticeable difference."""
     allowed = np.maximum(FORCE_JND * np.abs(reference), force_floor(reference))
-    return float(np.mean(np.abs(error) <= allowed))
+    return np.asarray(np.abs(error) <= allowed)
+
+
+def share_within_force_jnd(reference: Float1D, error: Float1D) -> float:
+    """Returns the share of the samples of `within_force_jnd`."""
+    return float(np.mean(within_force_jnd(reference, error)))
+
+
+def force_jnd_band(force: Float1D, floor: float) -> tuple[Float1D, Float1D]:
+    """Returns the lowest and the highest recorded force that a hand does not distinguish from a force.
+
+    A recorded force F is in the band of the force f if |f - F| is at most 7 % of |F|, or at most `floor`, the
+    smallest just noticeable difference.
+    """
+    ends = force / (1.0 + FORCE_JND), force / (1.0 - FORCE_JND), force - floor, force + floor
+    return np.min(ends, axis=0), np.max(ends, axis=0)
 
 
 def share_within_stiffness_jnd(position: Float1D, reference: Float1D, error: Float1D) -> float | None:

@@ -22,6 +22,7 @@ VERBS = {
     "devices": "devices",
     "check-device": "check-device --object m.json --duration-s 2 --rate-hz 100",
     "show": "show m.json",
+    "report": "report m.json a.csv -o report.html",
     "demo": "demo -o demo",
 }
 """Command lines for the tests, one for each verb; each command ends quickly."""

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from palpate import InputError, read_recording
+from palpate.recording import Source
 from small_files import HEADER, Write, refusal, rows, timed_rows
 
 
@@ -26,6 +27,14 @@ def test_the_first_note_names_the_chosen_columns(csv_file: Write) -> None:
     assert recording.notes == (
         "position is depth_mm, force is force_gf, there is no time, direction is direction",
     )
+
+
+def test_the_source_counts_the_rows_of_the_file(csv_file: Write) -> None:
+    file = csv_file(HEADER, [*rows(20), "x,1,press"])
+    recording = read_recording(file, invalid="drop", rows=(5, None))
+    assert (recording.source.rows, recording.source.file_rows) == (15, 21)
+    both = Source.merged([recording.source, recording.source])
+    assert (both.rows, both.file_rows) == (30, 42)
 
 
 def test_other_columns_are_kept_unconverted(csv_file: Write) -> None:

@@ -10,13 +10,16 @@ from palpate import InputError, Model, Recording, identify
 from palpate.cli.main import main
 from palpate.verification import compare
 from palpate.verification.metrics import (
+    autocorrelation,
     durbin_watson,
     force_floor,
+    force_jnd_band,
     lag_one_autocorrelation,
     normalised,
     root_mean_square,
     share_within_force_jnd,
     share_within_stiffness_jnd,
+    within_force_jnd,
 )
 
 
@@ -45,6 +48,22 @@ def test_white_residuals_are_white() -> None:
     white = np.random.default_rng(2).normal(size=100_000)
     assert lag_one_autocorrelation(white) == pytest.approx(0.0, abs=0.02)
     assert durbin_watson(white) == pytest.approx(2.0, abs=0.04)
+
+
+def test_the_autocorrelation_repeats_with_the_period_of_the_residuals() -> None:
+    repeated = np.resize([1.0, 0.0, -1.0, 0.0], 4000)
+    assert autocorrelation(repeated, 4) == pytest.approx([0.0, -1.0, 0.0, 1.0], abs=2e-3)
+    assert autocorrelation(np.zeros(10), 3).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_the_noticeable_band_contains_exactly_the_forces_that_a_hand_does_not_distinguish() -> None:
+    random = np.random.default_rng(3)
+    recorded = random.uniform(-2.0, 2.0, 10_000)
+    modelled = recorded + random.normal(0.0, 0.1, len(recorded))
+    low, high = force_jnd_band(modelled, force_floor(recorded))
+    inside = (low <= recorded) & (recorded <= high)
+    assert inside.tolist() == within_force_jnd(recorded, modelled - recorded).tolist()
+    assert 0.1 < inside.mean() < 0.9
 
 
 def test_slow_residuals_are_not_white() -> None:

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate report: written page, printed result, exit codes, and refused input."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from models_by_hand import model_by_hand
+from palpate.cli.main import main
+from palpate.verdict import Verdict, no
+from test_cli_identify import spring
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    spring(tmp_path / "a.csv")
+    spring(tmp_path / "b.csv", seed=1)
+    assert main(["identify", "a.csv", "-o", "m.json"]) == 0
+    return tmp_path
+
+
+def test_the_page_is_written_and_left_out_sections_are_printed(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    assert main(["report", "m.json", "b.csv", "--identified-on", "a.csv", "-o", "report.html"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.startswith("verdict: good\nwritten ")
+    assert "left out, certificate  the model has no plan: make one with palpate plan" in captured.out
+    assert "read b.csv: 400 rows" in captured.err
+    page = Path("report.html").read_text(encoding="utf-8")
+    assert page.startswith("<!DOCTYPE html>")
+    assert "Without band" not in page
+
+
+def test_json_names_page_verdict_and_sections(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert main(["report", "m.json", "-o", "report.html", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["report"] == "report.html"
+    assert found["verdict"] == "good"
+    assert found["sections"][:3] == ["verdict", "numbers", "force-curve"]
+    assert found["left_out"]["whiteness"].startswith("no recording was given")
+    assert found["bytes"] == Path("report.html").stat().st_size
+
+
+def test_a_verdict_of_no_exits_with_1_and_writes_the_page(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = model_by_hand()
+    model.notes["verdict"] = Verdict((no("the sensor is stuck"),)).record()
+    model.save("bad.json")
+    capsys.readouterr()
+    assert main(["report", "bad.json", "-o", "report.html"]) == 1
+    assert capsys.readouterr().out.startswith("verdict: no\n  the sensor is stuck\n")
+    assert "The sensor is stuck." in Path("report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["m.json"], "Missing option '-o'"),
+        (["a.csv", "m.json", "-o", "report.html"], "the model comes first: palpate report m.json a.csv"),
+        (["m.json", "a.csv", "-o", "missing/report.html"], "there is no folder missing"),
+        (["m.json", "a.csv", "-o", "a.csv"], "a.csv is also an input; the result would overwrite it"),
+        (["m.json", "-o", "m.json"], "m.json is also an input; the result would overwrite it"),
+        (["m.json", "c.csv", "-o", "report.html"], "c.csv"),
+        (["m.json", "--identified-on", "b.csv", "-o", "report.html"], "b.csv did not identify the model"),
+    ],
+    ids=["no output", "order", "no folder", "over the recording", "over the model", "no file", "other"],
+)
+def test_wrong_input_is_refused_with_one_sentence_and_writes_nothing(
+    arguments: list[str], message: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    capsys.readouterr()
+    assert main(["report", *arguments]) == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before

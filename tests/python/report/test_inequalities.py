@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every inequality, basis and verdict of the core has a meaning in words."""
+
+import re
+from typing import get_args
+
+from conftest import ROOT
+from palpate.report.inequalities import BASES, MEANINGS, VERDICTS
+from palpate.report.of_plan import _unit
+from palpate.report.summary import LEVEL_WORDS
+from palpate.verdict import Level
+
+STABILITY = ROOT / "cpp" / "include" / "palpate" / "stability"
+
+
+def words_in(file: str, of: str) -> set[str]:
+    text = (STABILITY / file).read_text(encoding="utf-8")
+    found = re.search(rf"words_of<{of}> =[^{{]*\{{([^}}]*)\}}", text)
+    assert found
+    return set(re.findall(r'"([\w-]+)"', found[1]))
+
+
+def test_every_inequality_of_the_core_has_a_meaning_and_a_unit() -> None:
+    text = "".join(file.read_text(encoding="utf-8") for file in STABILITY.glob("*_inequalities.hpp"))
+    text += (STABILITY / "certificate.hpp").read_text(encoding="utf-8")
+    ids = set(re.findall(r'"([a-z]+(?:-[a-z]+)+)"', text)) - words_in("certificate.hpp", "Verdict")
+    assert ids == set(MEANINGS)
+    assert all(_unit(kind, "rad") for kind, _ in MEANINGS.values())
+
+
+def test_every_basis_and_verdict_has_words() -> None:
+    assert set(BASES) == words_in("inequality.hpp", "Basis")
+    assert set(VERDICTS) == words_in("certificate.hpp", "Verdict")
+    assert set(LEVEL_WORDS) == set(get_args(Level))
+
+
+def test_units_are_those_of_a_rotary_or_linear_device() -> None:
+    assert _unit("stiffness", "rad") == "N·m/rad"
+    assert _unit("damping", "m") == "N·s/m"
