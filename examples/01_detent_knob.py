@@ -58,6 +58,6 @@ axes.legend()
 # Result
 # ------
 # Direct rendering has the smallest error. It fails on a device with too little damping for the steepest slope
-# of the detent, see :ref:`sphx_glr_auto_examples_09_certificate_and_device.py`.
+# of the detent, see :doc:`09_certificate_and_device`.
 print(f"the error of explicit is {error['explicit'] / error['direct']:.0f} times that of direct")
 plt.show()

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import pandas as pd
 
 # %%
-# .. literalinclude:: ../../examples/11_own_device.cpp
+# .. literalinclude:: /../examples/11_own_device.cpp
 #    :language: c++
 #
 # The headers need no library besides the standard one.
@@ -47,5 +47,5 @@ axes.legend(loc="upper right")
 # ------
 # The printed frequencies agree with the theory of small swings. Without damping this device fails to be
 # passive: the held force is half a sample late, so the swing grows slowly. See
-# :ref:`sphx_glr_auto_examples_09_certificate_and_device.py`.
+# :doc:`09_certificate_and_device`.
 plt.show()

@@ -58,8 +58,8 @@ axes.legend()
 # %%
 # Result
 # ------
-# The coupling of the massless structure flattens the detent. Direct rendering returns the model. The comparison
-# fails to show that each force acts half a sample late: a row holds the force of its measured position.
+# The coupling of the massless structure flattens the detent. Direct rendering returns the model. The
+# comparison fails to show that each force acts half a sample late: a row holds the force of its position.
 share = difference / np.ptp(both.first)
 print(f"direct rendering returns the model within {100 * share:.1f} % of its force range")
 plt.show()
