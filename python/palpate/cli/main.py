@@ -22,7 +22,7 @@ _VERBS = {
     "record": "Record a real object.",
     "devices": "List haptic devices.",
     "check-device": "Measure a device and judge if it can render force.",
-    "show": "Print a model.",
+    "show": "Print a model or a recording.",
     "demo": "Identify, verify and render a simulated sample.",
 }
 """Verbs with their lines in the help. The file of a verb is imported only when the verb is used."""
