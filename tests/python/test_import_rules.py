@@ -20,6 +20,7 @@ IMPORTED_LATE = {
     "pyarrow",
     "openpyxl",
     "mcap",
+    "pywt",
 }
 IMPORTED_LATE |= {"scipy.io", "usb"}
 
