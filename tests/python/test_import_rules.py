@@ -22,6 +22,7 @@ IMPORTED_LATE = {
     "mcap",
     "bokeh",
     "jinja2",
+    "pywt",
 }
 IMPORTED_LATE |= {"scipy.io", "usb"}
 

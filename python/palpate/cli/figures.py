@@ -23,9 +23,13 @@ from .printing import number, print_table, visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _COLUMN_INCHES = 3.5
 """Width of a figure: one column of a journal page [inch]."""
+
+_PAGE_INCHES = 7.2
+"""Width of a figure of several columns: both columns of a journal page [inch]."""
 
 _DOTS_PER_INCH = 200
 
@@ -63,7 +67,22 @@ def figure_file(
     """Yields axes one below the other, with the given shares of the height, and writes the figure at the end.
 
     Several axes share their position axis. In several columns, filled row by row, each has a separate one.
-    The title is above them, wrapped to the width of the figure.
+    """
+    with _written(path, (_COLUMN_INCHES, height_inches), title=title) as figure:
+        axes = figure.subplots(
+            len(rows), columns, squeeze=False, sharex=columns == 1, gridspec_kw={"height_ratios": rows}
+        ).ravel()
+        yield list(axes)
+        if columns == 1:
+            for each in axes:
+                each.label_outer()
+
+
+@contextmanager
+def _written(path: Path, inches: tuple[float, float], *, title: str = "") -> Iterator[Figure]:
+    """Yields an empty figure of this width and height, and writes it at the end.
+
+    The title is above the axes, wrapped to the width of the figure.
     """
     import matplotlib
 
@@ -71,19 +90,12 @@ def figure_file(
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(_COLUMN_INCHES, height_inches), dpi=_DOTS_PER_INCH, layout="constrained")
-        axes = figure.subplots(
-            len(rows), columns, squeeze=False, sharex=columns == 1, gridspec_kw={"height_ratios": rows}
-        ).ravel()
+        figure = Figure(figsize=inches, dpi=_DOTS_PER_INCH, layout="constrained")
         if title:
-            lines = [
-                part for line in title.split("\n") for part in textwrap.wrap(visible(line), _TITLE_COLUMNS)
-            ]
+            columns = int(_TITLE_COLUMNS * inches[0] / _COLUMN_INCHES)
+            lines = [part for line in title.split("\n") for part in textwrap.wrap(visible(line), columns)]
             figure.suptitle("\n".join(lines).replace("$", r"\$"), fontsize=_STYLE["axes.titlesize"])
-        yield list(axes)
-        if columns == 1:
-            for each in axes:
-                each.label_outer()
+        yield figure
         with replacing(path) as temporary:
             figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
 
@@ -186,6 +198,32 @@ def _standard_error(
         return None
     stroke = None if drawn.direction is None else drawn.direction.astype(np.float64)
     return known.force(drawn.position, stroke)
+
+
+def picture_recording(path: Path, recording: Recording) -> tuple[str, ...]:
+    """Draws the views of a recording side by side; returns notes on the axis of the transforms."""
+    from ..plotting import draw_views, history_of
+
+    history = history_of(recording)
+    title = f"{source_name(recording.source.files)}: {len(recording)} rows"
+    with _written(path, (_PAGE_INCHES, 5.2), title=title) as figure:
+        axes = figure.subplot_mosaic(
+            [["history", "history", "position"], ["spectrum", "short-time", "wavelet"]],
+            height_ratios=(1.0, 1.6),
+        )
+        draw_views(axes, recording, history)
+    return history.notes
+
+
+def picture_frame(path: Path, domain: tuple[float, float], position_unit: str, *, of: str) -> None:
+    """Draws the bounds of the frame of candidate wavelets, and its grid over a domain."""
+    from ..plotting import draw_frame_bounds, draw_frame_grid
+
+    title = f"frame of candidate wavelets over the positions of {of}"
+    with _written(path, (_PAGE_INCHES, 5.2), title=title) as figure:
+        axes = figure.subplot_mosaic([["bounds", "voices", "scales"], ["grid", "grid", "grid"]])
+        draw_frame_bounds(axes["bounds"], axes["voices"], axes["scales"])
+        draw_frame_grid(axes["grid"], domain, position_unit)
 
 
 def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:

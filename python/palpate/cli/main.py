@@ -25,7 +25,7 @@ _VERBS = {
     "record": "Record a real object.",
     "devices": "List haptic devices.",
     "check-device": "Measure a device and judge if it can render force.",
-    "show": "Print a model.",
+    "show": "Print a model or a recording.",
     "report": "Write one HTML page about a model.",
     "demo": "Identify, verify and render a simulated sample.",
 }

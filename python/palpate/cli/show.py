@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate show: prints a model, or compares it with another one."""
+"""palpate show: prints a model or a recording, or compares two models."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
+from ..errors import InputError
 from ..model import Model, load_model
 from ..planning import Plan
 from ..verdict import GOOD, Verdict, usable
 from ..verification import Stroke, compare
 from .exit_status import end_with, finishing
-from .figures import figure_file, picture_path
+from .figures import figure_file, picture_frame, picture_path
 from .printing import (
     number,
     print_json,
@@ -22,7 +24,8 @@ from .printing import (
     print_table,
     print_verdict,
 )
-from .verb import PATH, json_option, plot_option, require_writable, verb
+from .show_recording import is_recording, show_recording
+from .verb import PATH, ReadingOptions, json_option, plot_option, reading_options, require_writable, verb
 
 _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping", "domain", "continuation",
           "slope_bounds", "data")  # fmt: skip
@@ -30,7 +33,7 @@ _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping"
 
 
 @verb("palpate show press.json")
-@click.argument("model_file", metavar="MODEL.json", type=PATH)
+@click.argument("file", metavar="MODEL.json|RECORDING", type=PATH)
 @click.option(
     "--beside",
     "other_file",
@@ -38,21 +41,42 @@ _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping"
     type=PATH,
     help="Another model; prints the largest difference of both forces, over the just noticeable difference.",
 )
-@plot_option("error of every compared network; with --beside the forces of both models and their difference")
+@plot_option(
+    "error of every compared network; with --beside the forces of both models and their difference; of a "
+    "recording force, power spectrum, short-time and wavelet transform"
+)
+@plot_option("bounds of the frame of candidate wavelets, and its grid over the positions", "--plot-frame")
 @json_option
-def show(model_file: Path, other_file: Path | None, plot: Path | None, as_json: bool) -> None:
+@reading_options
+def show(
+    file: Path,
+    other_file: Path | None,
+    plot: Path | None,
+    plot_frame: Path | None,
+    as_json: bool,
+    reading: ReadingOptions,
+) -> None:
     """Print a model: its verdict, terms, domain and units, how it was identified, and its plan.
 
-    Exit code 1: the verdict of the model is "no".
+    Of a recording, print verdict, columns, ranges, rate and strokes. Exit code 1: the verdict is "no".
     """
-    require_writable(plot, inputs=(model_file, other_file))
-    model = load_model(model_file)
+    require_writable(plot, plot_frame, inputs=(file, other_file))
+    if is_recording(file):
+        if other_file is not None:
+            raise InputError(f"--beside compares two models, but {file} is a recording: identify it first")
+        show_recording(file, reading, plot=plot, plot_frame=plot_frame, as_json=as_json)
+        return
+    _refuse_reading_options(file)
+    model_file, model = file, load_model(file)
     if other_file is not None:
         _compare(model, model_file, load_model(other_file), other_file, plot=plot, as_json=as_json)
         return
     with finishing():
         if plot is not None:
             picture_path(plot, model)
+        if plot_frame is not None:
+            domain = float(model.lower[0]), float(model.upper[0])
+            picture_frame(plot_frame, domain, model.units["position"], of=file.name)
         if as_json:
             print_json(_record(model, model_file))
         else:
@@ -63,6 +87,16 @@ def show(model_file: Path, other_file: Path | None, plot: Path | None, as_json: 
                 print_line()
                 print_numbers({f"plan, {name}": str(value) for name, value in plan.items()})
         end_with(model.verdict)
+
+
+def _refuse_reading_options(file: Path) -> None:
+    """Refuses options of the reading of recordings if the file is a model."""
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if given and name not in ("file", "other_file", "plot", "plot_frame", "as_json"):
+            raise InputError(f"{parameter.opts[0]} is an option for recordings, but {file} is a model")
 
 
 def _record(model: Model, file: Path) -> dict[str, Any]:

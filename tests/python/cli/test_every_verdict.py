@@ -91,7 +91,8 @@ def test_a_difference_that_a_hand_notices_is_reported(
     ("arguments", "cure"),
     [
         (["verify", "a.csv", "m.json"], "the model comes first: palpate verify m.json a.csv"),
-        (["show", "a.csv"], "a model is a .json file that palpate identify writes"),
+        (["show", "a.csv", "--beside", "m.json"], "a.csv is a recording: identify it first"),
+        (["show", "m.json", "--rows", "0:9"], "--rows is an option for recordings, but m.json is a model"),
         (["simulate", "a.csv"], "a model is a .json file that palpate identify writes"),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",

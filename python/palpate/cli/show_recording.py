@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The part of `palpate show` that prints a recording: its findings, columns, ranges, rate and strokes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..recording import Recording
+from ..recording.motion import GAP_RATIO, ordered_strokes
+from ..recording.quality import quality_findings
+from ..verdict import Verdict
+from .exit_status import end_with, finishing
+from .figures import picture_frame, picture_recording
+from .printing import number, print_json, print_numbers, print_paragraph, print_verdict
+from .verb import ReadingOptions
+
+_MODEL_START = b"{"
+"""First character of a model file, which is JSON; no recording format begins with it."""
+
+_MODEL_HEAD = 64
+"""Number of bytes at the start of a file in which the first character is searched."""
+
+
+def is_recording(file: Path) -> bool:
+    """Returns True if a file is a recording: its name does not end in .json, and its content is not JSON."""
+    if file.suffix.lower() == ".json" or not file.is_file():
+        return False
+    with file.open("rb") as stream:
+        return not stream.read(_MODEL_HEAD).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(_MODEL_START)
+
+
+def show_recording(
+    file: Path, reading: ReadingOptions, *, plot: Path | None, plot_frame: Path | None, as_json: bool
+) -> None:
+    """Prints a recording, its verdict first, and draws its views."""
+    recording = reading.read(file)
+    verdict = Verdict(tuple(quality_findings(recording)))
+    strokes = _strokes(recording)
+    with finishing():
+        notes = () if plot is None else picture_recording(plot, recording)
+        if plot_frame is not None:
+            domain = float(recording.position.min()), float(recording.position.max())
+            picture_frame(plot_frame, domain, recording.units["position"], of=file.name)
+        if as_json:
+            print_json(_record(file, recording, strokes) | {"verdict": str(verdict)})
+        else:
+            print_verdict(verdict)
+            print_numbers(_summary(recording, strokes))
+            for note in notes:
+                print_paragraph(note, indent="  ")
+        end_with(verdict)
+
+
+def _strokes(recording: Recording) -> dict[str, int] | None:
+    """Returns the numbers of press and release strokes; None if neither direction nor order shows strokes."""
+    direction = ordered_strokes(recording) if recording.direction is None else recording.direction
+    if direction is None or not direction.any():
+        return None
+    moving = direction[direction != 0]
+    first = moving[np.flatnonzero(np.diff(moving, prepend=0))]
+    return {"press": int(np.sum(first > 0)), "release": int(np.sum(first < 0))}
+
+
+def _summary(recording: Recording, strokes: dict[str, int] | None) -> dict[str, str]:
+    """Returns the properties of a recording for display, by name, in the units of the file."""
+    position, force = recording.file_unit("position"), recording.file_unit("force")
+    others = [*recording.input_names, *recording.columns]
+    rows = {
+        "rows": str(len(recording)),
+        "columns": ", ".join(f"{role} {name!r}" for role, name in recording.source.columns.items()),
+        "others": ", ".join(others),
+        "position": position.interval(recording.position.min(), recording.position.max()),
+        "force": force.interval(recording.force.min(), recording.force.max()),
+        "time": _time_text(recording),
+    }
+    if strokes is None:
+        rows["strokes"] = "not known: neither a direction column nor the order of the rows shows them"
+    else:
+        source = "the order of the rows" if recording.direction is None else "the direction column"
+        rows["strokes"] = f"{strokes['press']} press, {strokes['release']} release, from {source}"
+    return {name: value for name, value in rows.items() if value}
+
+
+def _time_text(recording: Recording) -> str:
+    """Returns duration, rate and gaps of a recording in words."""
+    time, period = recording.time, recording.sample_period
+    if time is None or period is None:
+        return "no column of time: no rate, no velocity"
+    steps = np.diff(time)
+    gaps = int(np.sum(steps > GAP_RATIO * period))
+    text = f"{number(time[-1] - time[0])} s at {number(1.0 / period)} Hz, {gaps} gap{'s' * (gaps != 1)}"
+    return f"{text}, steps from {number(steps.min())} s to {number(steps.max())} s"
+
+
+def _record(file: Path, recording: Recording, strokes: dict[str, int] | None) -> dict[str, Any]:
+    """Returns the values that `palpate show --json` prints for a recording; ranges are in SI units."""
+    time, period = recording.time, recording.sample_period
+    return {
+        "recording": str(file),
+        "rows": len(recording),
+        "columns": dict(recording.source.columns),
+        "units": dict(recording.units),
+        "position": [float(recording.position.min()), float(recording.position.max())],
+        "force": [float(recording.force.min()), float(recording.force.max())],
+        "duration_s": None if time is None else float(time[-1] - time[0]),
+        "rate_hz": None if period is None else 1.0 / period,
+        "strokes": strokes,
+    }

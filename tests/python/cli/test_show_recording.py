@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of `palpate show` for a recording: recognition, printed properties, views."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models_by_hand import model_by_hand
+from palpate import Recording
+from palpate.cli.main import main
+from palpate.recording.sample import sample_recording
+
+
+@pytest.fixture
+def timed(tmp_path: Path) -> Path:
+    return sample_recording(seed=1, duration_s=5.0).write(tmp_path / "timed.csv")
+
+
+@pytest.fixture
+def strokes(tmp_path: Path) -> Path:
+    """Writes two presses and one release of a spring without time, in mm and gf."""
+    x = np.concatenate([np.linspace(0.0, 4.0, 60), np.linspace(4.0, 0.0, 60), np.linspace(0.0, 3.0, 50)])
+    rows = (f"{each:.4f},{50.0 * each:.4f}" for each in x)
+    path = tmp_path / "strokes.csv"
+    path.write_text("\n".join(["depth_mm,load_gf", *rows, ""]), encoding="utf-8")
+    return path
+
+
+def printed(capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
+    lines = capsys.readouterr().out.splitlines()
+    return {line.split("  ")[0]: line.split("  ", 1)[1].strip() for line in lines if "  " in line.strip()}
+
+
+def test_a_recording_with_time_prints_verdict_rows_ranges_and_rate(
+    timed: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["show", str(timed)]) == 0
+    output = capsys.readouterr().out
+    assert output.startswith("verdict: good\n")
+    for text in ("rows      5000\n", "position 'position_rad'", "time      4.999 s at 1000 Hz, 0 gaps"):
+        assert text in output
+    assert " N*m\n" in output
+
+
+def test_a_recording_without_time_prints_strokes_in_the_units_of_the_file(
+    strokes: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["show", str(strokes)]) == 0
+    shown = printed(capsys)
+    assert shown["position"] == "0 to 4 mm"
+    assert shown["force"] == "0 to 200 gf"
+    assert shown["time"] == "no column of time: no rate, no velocity"
+    assert shown["strokes"] == "2 press, 1 release, from the order of the rows"
+
+
+def test_json_has_the_same_properties(strokes: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", str(strokes), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"].partition(":")[0] in ("good", "usable")
+    assert found["rows"] == 170
+    assert found["units"] == {"position": "m", "force": "N"}
+    assert found["position"] == pytest.approx([0.0, 4e-3])
+    assert found["strokes"] == {"press": 2, "release": 1}
+    assert found["rate_hz"] is None
+
+
+@pytest.mark.parametrize("name", ["timed", "strokes"])
+def test_the_views_are_drawn(
+    name: str, timed: Path, strokes: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture, frame = tmp_path / "views.png", tmp_path / "frame.svg"
+    file = {"timed": timed, "strokes": strokes}[name]
+    assert main(["show", str(file), "--plot", str(picture), "--plot-frame", str(frame)]) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert b"<svg" in frame.read_bytes()
+    missing = "the recording has no time, so no frequency is known in Hz"
+    assert (missing in " ".join(capsys.readouterr().out.split())) == (name == "strokes")
+
+
+def test_the_frame_of_a_model_is_drawn(tmp_path: Path) -> None:
+    model, frame = model_by_hand().save(tmp_path / "m.json"), tmp_path / "frame.png"
+    assert main(["show", str(model), "--plot-frame", str(frame)]) == 0
+    assert frame.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("rows", [9, 10, 11])
+def test_a_recording_of_few_rows_is_refused_or_drawn(
+    rows: int, tmp_path: Path, csv_file: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = csv_file("depth_mm,load_N", [f"{k},{k * k}" for k in range(rows)])
+    code = main(["show", str(file), "--plot", str(tmp_path / "views.png")])
+    assert code == (2 if rows < 10 else 0), capsys.readouterr().err
+    assert (tmp_path / "views.png").exists() == (rows >= 10)
+
+
+def test_a_model_without_the_usual_suffix_is_not_read_as_a_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "model.txt"
+    copy.write_text(model_by_hand().save(tmp_path / "m.json").read_text(encoding="utf-8"), encoding="utf-8")
+    main(["show", str(copy)])
+    assert "a recording is" not in capsys.readouterr().err
+
+
+def test_a_finding_sets_the_verdict_of_a_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    x = np.concatenate([np.linspace(0.0, 1e-3, 200), np.linspace(3e-3, 4e-3, 200)])
+    recording = Recording.from_arrays(x, 500.0 * x, units={"position": "m", "force": "N"})
+    assert main(["show", str(recording.write(tmp_path / "gap.csv"))]) == 0
+    assert capsys.readouterr().out.startswith("verdict: usable\n  the recording has no rows from")
+
+
+def test_measured_recordings_of_all_kinds_are_drawn(data: Path, tmp_path: Path) -> None:
+    for number, name in enumerate(
+        [
+            "keyswitches/clicky__cherry_mx_blue.csv",
+            "rubber_domes/topre_r1_55g__run1.csv",
+            "motor_cogging/map_b_16.csv",
+            "organ_probing/meat0904_region4.csv",
+            "afm_indentation/cellhesion_force_distance.csv",
+            "silicone_compression/EF30_0T_A3.csv",
+        ]
+    ):
+        picture = tmp_path / f"{number}.png"
+        assert main(["show", str(data / name), "--plot", str(picture)]) == 0
+        assert picture.stat().st_size > 50_000
