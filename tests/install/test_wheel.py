@@ -125,7 +125,7 @@ def test_the_repaired_wheel_has_the_tag_of_a_c_library(repaired: Path) -> None:
 
 
 @needs_tools
-def test_the_repaired_wheel_works_with_its_own_libusb(repaired: Path, tmp_path: Path) -> None:
+def test_the_repaired_wheel_works_with_the_libusb_that_it_contains(repaired: Path, tmp_path: Path) -> None:
     python = clean_environment(tmp_path)
     install(python, repaired)
     try_package(python, "--repaired")
