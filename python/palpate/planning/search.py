@@ -233,8 +233,6 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
         if need := least(*short):
             other = least(*otherwise)
             return f"needs {need}" + (f", or {other}" if other else "")
-    if task.coupling_stiffness is not None:
-        return f"needs a coupling stiffness other than {task.coupling_stiffness:.4g}"
     return ""
 
 

@@ -416,7 +416,7 @@ def _gaps(recording: Recording, travel: Travel, name: str, gaps: list[tuple[floa
     more = f" ({len(gaps) - len(longest)} shorter gaps are not listed)" if len(gaps) > len(longest) else ""
     return usable(
         f"the {name} has no rows from {named}{more}, {share:.0%} of the travel: the model is interpolated "
-        "there; record these positions too"
+        "or extrapolated there; record these positions too"
     )
 
 

@@ -28,6 +28,7 @@ RecordingLike: TypeAlias = Recording | str | os.PathLike[str] | pd.DataFrame
 """A recording, or data that can be read as one."""
 
 RECORDING_TYPES = "give a Recording, the name of a file, a DataFrame, or arrays of position and force"
+ELEMENT_TYPES = "a list holds Recordings, names of files or DataFrames; Recording.from_arrays takes arrays"
 
 
 def read_recording(
@@ -164,7 +165,8 @@ def recording_from(
         return Recording.from_frame(recording, inputs=inputs)
     if isinstance(recording, (str, os.PathLike)):
         return read_recording(path_of(name, recording), inputs=inputs)
-    raise InputError(f"{name} is {shown(recording)}; {RECORDING_TYPES}")
+    types = RECORDING_TYPES if name == "recording" else ELEMENT_TYPES
+    raise InputError(f"{name} is {shown(recording)}; {types}")
 
 
 def recordings_from(

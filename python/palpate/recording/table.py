@@ -139,9 +139,7 @@ class FrameTable(Table):
             frame = frame.reset_index()
         for name in frame.columns:
             if not isinstance(name, str):
-                raise InputError(
-                    f"{FRAME} has a column called {name!r}; names must be text that ends in a unit"
-                )
+                raise InputError(f"{FRAME} has a column called {name!r}; every column name must be text")
         if not frame.columns.is_unique:
             repeated = frame.columns[frame.columns.duplicated()][0]
             raise InputError(f"{FRAME} has several columns called {repeated}; give each one name")

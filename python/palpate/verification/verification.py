@@ -302,7 +302,8 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
                 "this range"
             )
         )
-    if flight_of(recording).object_position is not None:
+    flight = flight_of(recording)
+    if flight.object_position is not None and not flight.predicted:
         handle = predict(model, replace(recording, columns={}))
         reference = recording.force[handle.rows]
         handle_nrmse = normalised(root_mean_square(handle.force - reference), reference)
@@ -310,8 +311,8 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
             findings.append(
                 usable(
                     f"at the position of the handle the NRMSE is {handle_nrmse:.3g}, above {USABLE_NRMSE:g}: "
-                    "the virtual coupling is softer than the object. Plan the model with palpate plan, or "
-                    "render with --structure direct"
+                    "the virtual coupling yields, so that the object feels softer. Plan the model with "
+                    "palpate plan, or render with --structure direct"
                 )
             )
     if found.n < LEAST_COMPARED_SHARE * len(recording):

@@ -364,9 +364,10 @@ def excess_findings(
     return [
         judge(
             f"between the rows the force of the model is {force_unit.text(value)} at position "
-            f"{position_unit.text(place)}{stroke}, but the recorded forces are "
-            f"{force_unit.interval(force.min(), force.max())}. Likely cause: few rows of that stroke near "
-            "this position. Cure: record more strokes there, or give a smaller --max-wavelets"
+            f"{position_unit.text(place)}{stroke}, but all recorded forces are "
+            f"{force_unit.interval(force.min(), force.max())}. Likely cause: few rows near this position. "
+            "Cure: record more strokes there, remove single rows far from the others, or give a smaller "
+            "--max-wavelets"
         )
     ]
 
@@ -401,11 +402,10 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
         return []
     period = "" if options.period or best.problem.dimension > 1 else ", or --period if the force repeats"
-    spread = float(np.std(best.data.force)) or 1.0
     return [
         usable(
             f"the network has {limit} wavelets, the largest number allowed, and the error (NRMSE "
-            f"{best.rmse / spread:.3g}) is not yet noise; give --max-wavelets {4 * limit}{period}"
+            f"{best.error.nrmse:.3g}) is not yet noise; give --max-wavelets {4 * limit}{period}"
         )
     ]
 
