@@ -72,8 +72,8 @@ def certificate_table(subject: Subject) -> Section:
     sentences = [VERDICTS[certificate.verdict]]
     if subject.refusal:
         sentences = [
-            "The certificate in the file does not belong to this model. The table was computed again for the "
-            "model in the file.",
+            "The plan in the file is refused. This table was computed again for the model in the file and is "
+            "not stored.",
             *sentences,
         ]
     if certificate.reason:

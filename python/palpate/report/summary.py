@@ -76,17 +76,19 @@ def _plan_number(subject: Subject) -> KeyNumber | None:
     plan = subject.plan
     certificate = None if plan is None else plan.certificate
     if subject.refusal or (certificate is not None and certificate.refused):
-        meaning = "The rendering has no proof of stability: do not render this plan."
+        reason = "The plan in the file is refused" if subject.refusal else "There is no proof of stability"
+        meaning = f"{reason}: do not render this plan."
         return KeyNumber("refused", "certificate", meaning)
     if plan is None or certificate is None:
         return None
     largest = plan.force_error.largest
-    change = f"by up to {amount(largest, subject.model.units['force'])}" if largest else "by nothing"
+    change = f"changes the force by up to {amount(largest, subject.model.units['force'])}"
     return KeyNumber(
         f"{1e3 * certificate.longest_period_s:.3g} ms",
         "longest time between samples",
         "Up to this time every condition of stability holds; the device samples every "
-        f"{1e3 * certificate.device.period_s:.3g} ms. The plan changes the force {change}.",
+        f"{1e3 * certificate.device.period_s:.3g} ms. "
+        f"The plan {change if largest else 'does not change the force'}.",
     )
 
 
