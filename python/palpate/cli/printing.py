@@ -332,7 +332,7 @@ class _Formatter(click.HelpFormatter):
         super().__init__(indent_increment, max(_NARROWEST_HELP, min(terminal, WIDEST)))
 
     def write_dl(self, rows: Iterable[tuple[str, str]], col_max: int = 30, col_spacing: int = 2) -> None:
-        super().write_dl(list(rows), min(col_max, 3 * self.width // 8), col_spacing)
+        super().write_dl(list(rows), min(col_max, self.width // 3 + 1), col_spacing)
 
 
 class _Context(click.Context):

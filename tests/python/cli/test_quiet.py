@@ -38,7 +38,7 @@ def test_quiet_prints_only_the_verdict_and_keeps_the_exit_code(
     code = main([*VERBS[verb].split(), "--quiet"])
     captured = capsys.readouterr()
     level = captured.out.removeprefix("verdict: ").rstrip("\n")
-    assert captured.out == f"verdict: {level}\n"
+    assert level in ("good", "usable", "no"), captured.out
     assert code == (1 if level == "no" else 0)
     assert captured.err == "" or captured.err.startswith("error: ")
 
