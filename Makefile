@@ -148,9 +148,10 @@ format: setup
 stubs: setup
 	$(python) tools/stubs.py
 
-# The example output in README.md and docs/.
+# The example output in README.md and docs/, and the figure of README.md.
 output: setup
 	$(python) tools/example_output.py
+	$(python) tools/readme_figure.py
 
 clean:
 	rm -rf build dist demo .venv .pytest_cache .mypy_cache .ruff_cache

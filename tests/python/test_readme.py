@@ -3,6 +3,7 @@
 
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -38,6 +39,35 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("snippet", blocks("python"), ids=lambda snippet: snippet.splitlines()[0])
 def test_snippet_runs(snippet: str, folder: Path) -> None:
     subprocess.run([sys.executable, "-W", "error", "-c", snippet], cwd=folder, check=True, timeout=300)
+
+
+def test_the_cpp_snippet_prints_the_numbers_of_the_python_snippet(folder: Path) -> None:
+    (python,), (cpp,) = blocks("python"), blocks("cpp")
+    compiler = shutil.which("c++")
+    assert compiler is not None, "the package cannot have been built without a compiler"
+    (folder / "snippet.cpp").write_text(cpp, encoding="utf-8")
+    include = ROOT / "cpp" / "include"
+    subprocess.run(
+        [
+            compiler,
+            "-std=c++20",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-I",
+            include,
+            "snippet.cpp",
+            "-o",
+            "snippet",
+        ],
+        cwd=folder,
+        check=True,
+    )
+    last_lines = [
+        subprocess.run(words, cwd=folder, check=True, capture_output=True, text=True).stdout.splitlines()[-1]
+        for words in ([sys.executable, "-c", python], [folder / "snippet"])
+    ]
+    assert last_lines[0] == last_lines[1]
 
 
 PROGRAMS = {
