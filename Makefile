@@ -7,6 +7,7 @@
 #   make test-full    the same tests with long counts, with sanitizers, and of the installed package  (an hour)
 #   make bench        all studies, JSON and figures in build/bench/
 #   make figures      the same studies, figures and generated pages in docs/
+#   make docs         the documentation site: build/docs/html/index.html; every example and command of it is run
 #   make lint | format | stubs | output | clean
 #
 # Paths are relative on purpose: the folder may have a space in its name.
@@ -42,7 +43,7 @@ core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree contain absolute paths: they are created again after the folder was moved.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python test-packages bench figures lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python test-packages bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved
 
 help:
@@ -73,6 +74,12 @@ $(stamps)/control $(stamps)/test-cpp: $(stamps)/build
 # Tools by their group in pyproject.toml: tests, linters, tests of the packages.
 $(stamps)/test $(stamps)/lint $(stamps)/package: $(stamps)/build
 	$(pip) install --quiet --group "$(@F)"
+	touch $@
+
+# The programs that build the documentation site.
+$(stamps)/docs: $(stamps)/build
+	tools/system_packages.sh "$(PYTHON)" docs
+	$(pip) install --quiet --group docs
 	touch $@
 
 setup: $(stamps)/core $(stamps)/control $(stamps)/test-cpp $(stamps)/test $(stamps)/lint
@@ -121,6 +128,11 @@ bench: setup
 figures: setup
 	tools/bench.sh docs
 
+# The documentation site. A warning is an error, and so is a broken link between pages.
+docs: $(stamps)/core control $(stamps)/test $(stamps)/docs
+	$(python) -m sphinx --nitpicky --fail-on-warning --keep-going --quiet --jobs auto docs build/docs/html
+	$(python) -m pytest --quiet tests/docs/test_site.py
+
 # ------------------------------------------------------------------------------------------------------------ lint
 
 lint: lint-python lint-cpp lint-stubs lint-language
@@ -154,4 +166,4 @@ output: setup
 	$(python) tools/readme_figure.py
 
 clean:
-	rm -rf build dist demo .venv .pytest_cache .mypy_cache .ruff_cache
+	rm -rf build dist demo docs/gallery docs/generated .venv .pytest_cache .mypy_cache .ruff_cache

@@ -2,7 +2,7 @@
 """Draws docs/figures/key-switch.png, the figure of the README: a key switch, recorded and rendered.
 
 The recording is simulated from the model of examples/02_key_switch_click.json, with a noise of 1 % of the
-force range. It is identified, planned for direct rendering and rendered on the simulated knob of its test rig.
+force range. It is identified, and rendered directly on the simulated knob of its test rig.
 """
 
 from pathlib import Path

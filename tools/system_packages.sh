@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the missing Debian or Ubuntu packages, or prints one line with the packages to install.
 #
-#   tools/system_packages.sh PYTHON build|control|test-cpp|guest|browser
+#   tools/system_packages.sh PYTHON build|control|test-cpp|docs|guest|browser
 set -euo pipefail
 
 python=$1
@@ -34,6 +34,9 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         # for the emulated USB device of the tests
         [ -e /usr/include/umockdev-1.0/umockdev.h ] || echo libumockdev-dev
         command -v umockdev-run >/dev/null || echo umockdev
+    fi
+    if [ "$purpose" = docs ]; then
+        command -v doxygen >/dev/null || echo doxygen
     fi
     if [ "$purpose" = guest ]; then
         # for the small Linux that runs palpate-control with the USB drivers of a real kernel

@@ -9,12 +9,10 @@ import sys
 import sysconfig
 from pathlib import Path
 
-import click
 import pytest
 
-from control_program import PROGRAM, control, needs_program
+from control_program import PROGRAM, needs_program
 from palpate import _core
-from palpate.cli.main import palpate
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -110,31 +108,6 @@ def test_every_target_of_make_exists() -> None:
     assert used_targets <= targets
 
 
-def commands_not_run() -> list[str]:
-    """Returns the README's commands that no test runs: they need hardware or are part of a sentence."""
-    lines = [line for block in blocks("text", RENDERING) for line in block.splitlines()]
-    return [line for line in lines if line.startswith("palpate")] + re.findall(
-        r"`(palpate [a-z-]+ [^`]+)`", README + RENDERING
-    )
-
-
-@pytest.mark.parametrize("line", [line for line in commands_not_run() if line.startswith("palpate ")])
-def test_every_option_of_a_command_that_needs_hardware_exists(line: str) -> None:
-    verb, *arguments = shlex.split(line, comments=True)[1:]
-    command = palpate.get_command(click.Context(palpate), verb)
-    assert command is not None
-    options = {name for parameter in command.params for name in parameter.opts}
-    assert {word for word in arguments if word.startswith("-")} <= options
-
-
-@needs_program
-@pytest.mark.parametrize("line", [line for line in commands_not_run() if line.startswith("palpate-control ")])
-def test_every_option_of_palpate_control_exists(line: str) -> None:
-    help_text = control("--help").stdout
-    for word in shlex.split(line, comments=True):
-        assert not word.startswith("--") or word in help_text
-
-
 def test_the_first_screen_shows_both_commands() -> None:
     first_screen = "\n".join(README.splitlines()[:40])
     assert "make demo" in first_screen
@@ -147,8 +120,7 @@ def test_the_table_of_statuses_equals_the_statuses_of_the_core() -> None:
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "docs/rendering.md"],
+    "name", ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"]
 )
 def test_linked_files_exist(name: str) -> None:
     text = (ROOT / name).read_text(encoding="utf-8")

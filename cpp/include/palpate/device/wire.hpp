@@ -26,14 +26,14 @@ namespace palpate::wire {
 inline constexpr std::uint16_t vendor_id = 0x1209;  ///< USB vendor number (idVendor)
 inline constexpr std::uint16_t product_id =
     0x0001;  ///< USB product number (idProduct): test number of pid.codes, only for development
-inline constexpr std::uint8_t interface_number = 0;
+inline constexpr std::uint8_t interface_number = 0;  ///< number of the USB interface with both endpoints
 inline constexpr std::array<std::uint8_t, 3> interface_kind{0xFF, 0x01, 0x01};  ///< class, subclass, protocol
-inline constexpr std::uint8_t in_endpoint = 0x81;   ///< interrupt IN endpoint: packets from the device
-inline constexpr std::uint8_t out_endpoint = 0x01;  ///< interrupt OUT endpoint: commands to the device
-inline constexpr std::uint8_t protocol_version = 1;
+inline constexpr std::uint8_t in_endpoint = 0x81;    ///< interrupt IN endpoint: packets from the device
+inline constexpr std::uint8_t out_endpoint = 0x01;   ///< interrupt OUT endpoint: commands to the device
+inline constexpr std::uint8_t protocol_version = 1;  ///< first field of every packet
 
-inline constexpr std::uint8_t request_to_host = 0xC1;  ///< bmRequestType: vendor, interface
-inline constexpr std::uint8_t request_to_device = 0x41;
+inline constexpr std::uint8_t request_to_host = 0xC1;    ///< bmRequestType: vendor, interface
+inline constexpr std::uint8_t request_to_device = 0x41;  ///< bmRequestType: vendor, interface
 
 /// Numbers of the control requests to the device (the field bRequest of a control transfer).
 enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
@@ -63,30 +63,32 @@ enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog 
     }
 }
 
-/// Bits of the status in a packet of the device (InPacket::status).
-inline constexpr unsigned enabled = 1;
-inline constexpr unsigned watchdog_tripped = 2;
-inline constexpr unsigned torque_saturated = 4;
-inline constexpr unsigned bad_packet = 8;
-inline constexpr unsigned encoder_fault = 16;
-inline constexpr unsigned over_temperature = 32;
-inline constexpr unsigned emergency_stop = 64;
+// Bits of the status in a packet of the device (InPacket::status)
+inline constexpr unsigned enabled = 1;  ///< status bit: the motor is enabled
+inline constexpr unsigned watchdog_tripped =
+    2;  ///< status bit: no command arrived in time, the torque is zero
+inline constexpr unsigned torque_saturated =
+    4;                                         ///< status bit: the torque was limited to the device's maximum
+inline constexpr unsigned bad_packet = 8;      ///< status bit: the device refused a command packet
+inline constexpr unsigned encoder_fault = 16;  ///< status bit: the encoder reported an error
+inline constexpr unsigned over_temperature = 32;  ///< status bit: the motor or its driver is too hot
+inline constexpr unsigned emergency_stop = 64;    ///< status bit: the emergency stop was pressed
 /// Status bits that report a fault; after one of them the device and its packets are not reliable.
 inline constexpr unsigned fault_bits = encoder_fault | over_temperature | emergency_stop;
 
-/// Bits that state which sensors the device has (Info::capabilities).
-inline constexpr std::uint32_t has_transducer = 1;
-inline constexpr std::uint32_t measures_velocity = 2;
+// Bits that state which sensors the device has (Info::capabilities)
+inline constexpr std::uint32_t has_transducer = 1;     ///< capability bit: the device measures torque
+inline constexpr std::uint32_t measures_velocity = 2;  ///< capability bit: the device measures velocity
 
-/// Least and largest setting of the watchdog: the time for which the device makes force without a new command [ms].
-inline constexpr int shortest_watchdog_ms = 2;
-inline constexpr int longest_watchdog_ms = 1000;
+// The watchdog is the time for which the device makes force without a new command.
+inline constexpr int shortest_watchdog_ms = 2;    ///< least setting of the watchdog [ms]
+inline constexpr int longest_watchdog_ms = 1000;  ///< largest setting of the watchdog [ms]
 
 /// Largest packet that USB full speed allows for an interrupt endpoint [bytes]
 inline constexpr std::size_t largest_packet = 64;
-inline constexpr std::size_t in_size = 32;
-inline constexpr std::size_t out_size = 16;
-inline constexpr std::size_t info_size = 32;
+inline constexpr std::size_t in_size = 32;    ///< size of an `InPacket` [bytes]
+inline constexpr std::size_t out_size = 16;   ///< size of an `OutPacket` [bytes]
+inline constexpr std::size_t info_size = 32;  ///< size of an `Info` [bytes]
 
 /// Packet that the device sends `Info::rate_hz` times a second.
 struct InPacket {

@@ -88,20 +88,24 @@ inline void validate(const GuardSettings& settings) {
 /// Smallest number of consecutive ticks with equal position after which an encoder can count as frozen.
 inline constexpr std::uint64_t fewest_frozen_samples = 5;
 
+/// Returns the force limit of these settings.
 [[nodiscard]] inline ForceLimit force_limit(const GuardSettings& settings) noexcept {
     return {settings.force_limit};
 }
 
+/// Returns the slew limit: the force limit over `slew_s`, or no limit if `slew_s` is 0.
 [[nodiscard]] inline SlewLimit slew_limit(const GuardSettings& settings, double period_s) noexcept {
     const double step = settings.slew_s > 0.0 ? settings.force_limit * period_s / settings.slew_s
                                               : std::numeric_limits<double>::infinity();
     return {step, 0.0};
 }
 
+/// Returns the start ramp of these settings.
 [[nodiscard]] inline ForceRamp force_ramp(const GuardSettings& settings, double period_s) noexcept {
     return {static_cast<std::uint64_t>(std::llround(settings.ramp_s / period_s)), 0};
 }
 
+/// Returns the guard of the readings, with the limits of these settings in one period.
 [[nodiscard]] inline ReadingGuard reading_guard(const GuardSettings& settings, double period_s) noexcept {
     const auto samples = static_cast<std::uint64_t>(std::llround(settings.frozen_s / period_s));
     return ReadingGuard{{settings.largest_speed * period_s, settings.frozen_speed * period_s,

@@ -29,9 +29,10 @@ struct HysteresisParameters {
     return std::min(position + radius, std::max(position - radius, previous));
 }
 
-/// The usual play radius is 1 % of the length of the domain, and at least 4 encoder steps, so that a motion of the hand
-/// changes the direction state and encoder noise does not.
+/// Usual play radius over the length of the domain [-].
 inline constexpr double play_share_of_travel = 0.01;
+/// Least play radius over the encoder step [-]. A motion of the hand then changes the direction state, and encoder
+/// noise does not.
 inline constexpr double fewest_encoder_steps_in_play = 4.0;
 
 /// Returns the play radius for a model without its own play radius [m], from the length of its domain and the encoder

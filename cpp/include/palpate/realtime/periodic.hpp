@@ -12,6 +12,7 @@ namespace palpate {
 /// Time or duration [ns].
 using Nanoseconds = std::int64_t;
 
+/// Nanoseconds in a second.
 inline constexpr Nanoseconds nanoseconds_a_second = 1'000'000'000;
 
 /// Returns the time of the monotonic system clock, which never jumps [ns]. All deadlines are times of this clock.

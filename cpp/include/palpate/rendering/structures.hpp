@@ -19,6 +19,7 @@ namespace palpate {
 /// One enumerator for each structure, in the order of the type list `Structures`.
 enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit, EnergyConsistent };
 
+/// Types of all structures, in the order of `StructureKind`.
 using Structures = std::tuple<DirectStructure, MasslessStructure, ImplicitStructure, ExplicitStructure,
                               EnergyConsistentStructure>;
 
@@ -37,9 +38,11 @@ inline constexpr auto words_of<StructureKind> = structure_names;
 [[nodiscard]] constexpr const StructureTraits& traits_of(StructureKind kind) noexcept {
     return structure_traits[static_cast<std::size_t>(kind)];
 }
+/// Returns true if the structure has a virtual coupling between device and object.
 [[nodiscard]] constexpr bool has_coupling(StructureKind kind) noexcept {
     return traits_of(kind).coupling;
 }
+/// Returns true if the virtual object of the structure has mass and damping.
 [[nodiscard]] constexpr bool has_mass(StructureKind kind) noexcept {
     return traits_of(kind).mass;
 }

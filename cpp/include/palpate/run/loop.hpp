@@ -29,8 +29,8 @@ struct LoopSettings {
     double longest_period_s = std::numeric_limits<double>::infinity();
 };
 
-inline constexpr double lowest_rate_hz = 100.0;
-inline constexpr double highest_rate_hz = 10'000.0;
+inline constexpr double lowest_rate_hz = 100.0;      ///< lowest rate of the control loop [Hz]
+inline constexpr double highest_rate_hz = 10'000.0;  ///< highest rate of the control loop [Hz]
 /// The rate is reported as too low if the measured rate divided by the chosen rate is below this limit [-]
 inline constexpr double held_rate_share = 0.99;
 

@@ -29,6 +29,7 @@ enum class FaultKind : std::uint8_t {
     Gone,        ///< the device reports Fault and makes no force for the rest of the run
 };
 
+/// Names of the faults in a text, in the order of `FaultKind`.
 inline constexpr std::array<std::string_view, 8> fault_names{"late",   "lost", "repeated",  "nan",
                                                              "frozen", "jump", "saturated", "gone"};
 
@@ -132,8 +133,8 @@ class Faulty {
     Reading last_;
 };
 
-/// Reads a simulated fault from a text KIND@SECONDS or KIND@SECONDSxSAMPLES: kind, start time and number of samples,
-/// such as late@1.5 or frozen@2x200. Throws std::invalid_argument with the valid form.
+/// Reads a simulated fault from a text `KIND@SECONDS` or `KIND@SECONDSxSAMPLES`: kind, start time and number of
+/// samples, such as `late@1.5` or `frozen@2x200`. Throws std::invalid_argument with the valid form.
 [[nodiscard]] inline Fault parse_fault(const std::string& text, double period_s) {
     const auto refuse = [&] {
         std::string names;

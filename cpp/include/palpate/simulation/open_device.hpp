@@ -62,7 +62,7 @@ namespace palpate {
     return live;
 }
 
-/// Opens a device for rendering by its name: simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]. Throws
+/// Opens a device for rendering by its name: `simulated`, `usb[:SERIAL]` or `inverse3[:AXIS[@PORT]]`. Throws
 /// std::invalid_argument with the reason if the device cannot be opened or does not fit the model.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_device(const RenderOptions& options,
                                                              const PlannedModel& model) {

@@ -138,6 +138,7 @@ namespace detail {
                                         "L_x Delta / 2 + B_v Delta / T")};
 }
 
+/// Returns the inequalities of the direct structure for the kind of the force: of velocity, with hysteresis, or static.
 [[nodiscard]] inline std::vector<Inequality> inequalities(DirectStructure, const ForceBounds& bounds,
                                                           const Scheme& scheme, const DeviceProfile& device) {
     if (bounds.drag > 0.0) {
