@@ -100,6 +100,12 @@ Json to_json(const py::handle& value, int depth = 0) {
 }
 
 }  // namespace
+/// Returns a part of a model file; throws std::invalid_argument if the part is null.
+detail::JsonField given(const detail::JsonField& part) {
+    part.require_object();
+    return part;
+}
+
 
 void bind_io(py::module_& module) {
     module.def(
@@ -122,15 +128,21 @@ void bind_io(py::module_& module) {
         "Returns the device profile in the content of a file. Raises ValueError with the first wrong\n"
         "field, its value and the correct values.");
     module.def(
-        "scheme_of", [](const py::object& plan) { return *detail::read_plan({to_json(plan), "plan"}); },
-        "plan"_a, "Returns the scheme (structure and its numbers) in the plan of a model file.");
+        "scheme_of",
+        [](const py::object& plan) {
+            const Json stored = to_json(plan);
+            return *detail::read_plan(given({stored, "plan"}));
+        },
+        "plan"_a,
+        "Returns the scheme (structure and its numbers) in the plan of a model file. Raises ValueError\n"
+        "with the first wrong field, its value and the correct values.");
     module.def(
         "checked_certificate",
         [](const ForceModel& model, const py::object& plan, const py::object& certificate) {
             const Json scheme = to_json(plan);
             const Json stored = to_json(certificate);
-            return *detail::read_certificate({stored, "certificate"}, detail::read_plan({scheme, "plan"}),
-                                             model, "");
+            return *detail::read_certificate(given({stored, "certificate"}),
+                                             detail::read_plan(given({scheme, "plan"})), model, "");
         },
         "model"_a, "plan"_a, "certificate"_a,
         "Computes the certificate of a model file again from the rendered model and returns it. Raises\n"
