@@ -52,9 +52,10 @@ py::object to_python(const Json& value) {
 /// Converts a Python value to a JSON value. An integer of more than 64 bits becomes a double, as when a JSON file is
 /// read, or infinity if the integer is too large for a double.
 Json to_json(const py::handle& value, int depth = 0) {
-    if (depth > deepest_json) {
-        throw std::invalid_argument("the file is nested more than " + std::to_string(deepest_json) +
-                                    " levels deep");
+    const bool is_object = py::isinstance<py::dict>(value);
+    const bool is_list = py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value);
+    if ((is_object || is_list) && depth >= deepest_json) {
+        throw std::invalid_argument(too_deep());
     }
     if (value.is_none()) {
         return nullptr;
@@ -80,14 +81,14 @@ Json to_json(const py::handle& value, int depth = 0) {
     if (py::isinstance<py::str>(value)) {
         return value.cast<std::string>();
     }
-    if (py::isinstance<py::dict>(value)) {
+    if (is_object) {
         Json items = Json::object();
         for (const auto& [key, item] : py::reinterpret_borrow<py::dict>(value)) {
             items[py::str(key).cast<std::string>()] = to_json(item, depth + 1);
         }
         return items;
     }
-    if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
+    if (is_list) {
         Json items = Json::array();
         for (const py::handle& item : py::reinterpret_borrow<py::sequence>(value)) {
             items.push_back(to_json(item, depth + 1));
@@ -99,13 +100,13 @@ Json to_json(const py::handle& value, int depth = 0) {
                                 ": must be a number, text, list, dict, true, false or null");
 }
 
-}  // namespace
 /// Returns a part of a model file; throws std::invalid_argument if the part is null.
 detail::JsonField given(const detail::JsonField& part) {
     part.require_object();
     return part;
 }
 
+}  // namespace
 
 void bind_io(py::module_& module) {
     module.def(
