@@ -313,8 +313,8 @@ void bind_model(py::module_& module) {
         "array for an array of positions.\n\n"
         "A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius,\n"
         "`play`, the state of the play operator. Arguments that the model does not use do not change the\n"
-        "force. Raises ValueError with the name of a missing argument. A position that is not finite\n"
-        "gives NaN.");
+        "force, but direction and play must have one value for each position or one for all. Raises\n"
+        "ValueError with the name of a missing argument. A position that is not finite gives NaN.");
     bind_quantity<&EnvironmentSample::slope>(
         type, "slope",
         "Returns the slope df/dx of the force [N/m or N*m/rad]; the arguments are "

@@ -45,8 +45,10 @@ class ForceModel:
         array for an array of positions.
         
         A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius,
-        `play`, the state of the play operator. Arguments that the model does not use are ignored.
-        Raises ValueError with the name of a missing argument. A position that is not finite gives NaN.
+        `play`, the state of the play operator. Arguments that the model does not use do not change the
+        force, but direction and play must have one value for each position or one for all. Raises
+        ValueError with the name of a missing argument. A position that is not finite
+        gives NaN.
         """
     @typing.overload
     def force(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
@@ -76,9 +78,9 @@ class ForceModel:
     def slope_range(self, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None) -> tuple[float, float]:
         """
         Returns proved bounds (smallest, largest) of the slope of the force inside the domain, in press
-        and in release. They are wider than the true range by at most 1 % of the steepest slope. With a
-        play radius r they include the slope h / r (hysteresis h), with which the force of a hysteresis
-        model changes after a reversal.
+        and in release. Without hysteresis they are wider than the true range by at most 1 % of the
+        steepest slope. With a play radius r they include the slope h / r (hysteresis h), with which
+        the force of a hysteresis model changes after a reversal.
         """
     @property
     def above(self) -> str:
