@@ -27,8 +27,9 @@ class VelocityNetwork {
   public:
     VelocityNetwork(NetworkParameters network, Domain domain)
         : network_{checked(std::move(network)), std::move(domain)} {
-        const RadialBounds rest = resting_bounds(0.01);
-        const CurveExtent extent{travel(), rest.value.largest(), std::max(0.0, rest.gradient[0].upper)};
+        const double margin = uncertain_end * travel();
+        const Interval slopes = resting_bounds(lower() + margin, upper() - margin, 0.01).gradient[0];
+        const CurveExtent extent{travel(), resting_bounds(0.01).value.largest(), std::max(0.0, slopes.upper)};
         below_ = continue_force(lower(), resting(lower()), -1.0, Continuation::Linear, extent);
         above_ = continue_force(upper(), resting(upper()), +1.0, Continuation::Linear, extent);
     }
@@ -73,12 +74,15 @@ class VelocityNetwork {
 
     /// Returns proved bounds of the force and its gradient over the domain of positions, at velocity zero.
     [[nodiscard]] RadialBounds resting_bounds(double relative) const {
-        const double rest = clipped(0.0);
-        return radial_bounds(network_.parameters(), std::array{lower(), rest}, std::array{upper(), rest},
-                             relative);
+        return resting_bounds(lower(), upper(), relative);
     }
 
   private:
+    [[nodiscard]] RadialBounds resting_bounds(double from, double to, double relative) const {
+        const double rest = clipped(0.0);
+        return radial_bounds(network_.parameters(), std::array{from, rest}, std::array{to, rest}, relative);
+    }
+
     static NetworkParameters checked(NetworkParameters network) {
         detail::require(network.dimension == 2, "the network has " + std::to_string(network.dimension) +
                                                     " inputs, must have 2: position and velocity");
