@@ -109,12 +109,9 @@ class ForceModel {
                         sentence("max", stored.upper, "at least", slopes.upper));
     }
 
-    /// Returns the smallest width of the wavelets, 1 / dilation [m]; the length of the domain if the network has no
-    /// wavelets or only wider ones. For networks of one input.
+    /// Returns the smallest width of a wavelet along the position [m], at most the length of the domain.
     [[nodiscard]] double finest_width() const noexcept {
-        const auto& alpha = parameters().alpha;
-        const double travel = domain().upper[0] - domain().lower[0];
-        return alpha.empty() ? travel : std::min(travel, 1.0 / *std::max_element(alpha.begin(), alpha.end()));
+        return palpate::finest_width(parameters(), domain().upper[0] - domain().lower[0]);
     }
 
     /// Returns a copy of the model with this play radius [m]. A model without hysteresis is copied unchanged.

@@ -54,15 +54,9 @@ class VelocityNetwork {
         return network_.extrapolated(std::array{position, velocity});
     }
 
-    /// Returns the smallest width of a wavelet along the position, 1 / dilation [m]; the length of the domain of
-    /// positions if the network has no wavelets or only wider ones.
+    /// Returns the smallest width of a wavelet along the position [m], at most the length of the domain.
     [[nodiscard]] double finest_width() const noexcept {
-        const std::vector<double>& alpha = network_.parameters().alpha;
-        double finest = travel();
-        for (std::size_t i = 0; i < alpha.size(); i += 2) {
-            finest = std::min(finest, 1.0 / alpha[i]);
-        }
-        return finest;
+        return palpate::finest_width(network_.parameters(), travel());
     }
 
     /// Returns proved bounds of the force and its gradient over the domain of positions and velocities, wider than the
@@ -78,15 +72,15 @@ class VelocityNetwork {
     }
 
   private:
-    [[nodiscard]] RadialBounds resting_bounds(double from, double to, double relative) const {
-        const double rest = clipped(0.0);
-        return radial_bounds(network_.parameters(), std::array{from, rest}, std::array{to, rest}, relative);
-    }
-
     static NetworkParameters checked(NetworkParameters network) {
         detail::require(network.dimension == 2, "the network has " + std::to_string(network.dimension) +
                                                     " inputs, must have 2: position and velocity");
         return network;
+    }
+
+    [[nodiscard]] RadialBounds resting_bounds(double from, double to, double relative) const {
+        const double rest = clipped(0.0);
+        return radial_bounds(network_.parameters(), std::array{from, rest}, std::array{to, rest}, relative);
     }
 
     [[nodiscard]] double clipped(double velocity) const noexcept {
