@@ -69,7 +69,6 @@ class Controller {
             return paces_host<D>;
         }
     }
-    [[nodiscard]] S& structure() noexcept { return structure_; }
     [[nodiscard]] const ReadingGuard& reading_guard() const noexcept { return guards_.reading; }
     [[nodiscard]] const Guards& guards() const noexcept { return guards_; }
 
