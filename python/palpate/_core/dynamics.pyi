@@ -58,6 +58,6 @@ class EnvironmentFilters:
 def environment_filters(pair: str, design: str = 'paper') -> EnvironmentFilters:
     """
     Returns the paper's integrators and differentiators for the period T = 1 ms (section 4.3): as published,
-    or with unit gain at low frequency.
+    or such that integrator times differentiator is 1 at low frequency.
     """
 paper_sample_time_s: float = 0.001

@@ -29,8 +29,8 @@ def measure(*, object: palpate._core.model.ForceModel | None = None, position_un
     Measures a real object in real time; on the simulated device the model `object` is mounted.
     
     A hand moves the handle. With `probe` the device moves it slowly between `lower` and `upper`. With
-    `push` the device gives short pushes of this force to either side. Options are keywords, None for
-    the default:
+    `push` the device gives short pushes of up to this force to either side. Options are keywords,
+    None for the default:
     
     - device (simulated or usb[:SERIAL]), wait_s.
     - rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.

@@ -115,8 +115,9 @@ def motion_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.r
 def rig_for(model: palpate._core.model.ForceModel, is_angle: bool, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> TestRig:
     """
     Returns the test rig for a model of position, or of position and velocity. With is_angle
-    (positions in rad) it is the default knob. For any other unit, lengths and forces of the knob
-    and its hand are scaled to the travel and the largest force of the model.
+    (positions in rad) the device is the default knob. For any other unit, its lengths and forces
+    are scaled to the travel and the largest force of the model. The hand moves the handle through
+    the domain of the model.
     """
 def simulate(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile, hand: Hand, duration_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 20, start_position: typing.SupportsFloat | typing.SupportsIndex = 0.0, progress: collections.abc.Callable | None = None) -> dict:
     """

@@ -149,7 +149,7 @@ class Inequality:
         """
 class Certificate:
     """
-    Proved inequalities and verdict for a model that a scheme renders on a device.
+    Inequalities and verdict for a model that a scheme renders on a device.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
@@ -239,7 +239,7 @@ def explicit_scheme(bounds: ForceBounds, device: palpate._core.device.DeviceProf
     Searches the explicit structure with the stiffest coupling, then the least object damping, for
     which the structure is stable, and returns its scheme. If none is stable, returns the last
     scheme that was tried. Keywords: mass, object_damping, coupling_stiffness, coupling_damping and
-    play_radius; None: the search chooses the value.
+    play_radius; None: a default, or the result of the search.
     """
 def force_bounds(model: palpate._core.model.ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> ForceBounds:
     """
@@ -274,8 +274,8 @@ def slope_behind_coupling(slope: typing.SupportsFloat | typing.SupportsIndex, co
     """
 def steepest_stick(device: palpate._core.device.DeviceProfile) -> float:
     """
-    Returns the largest slope h / r (hysteresis by play radius) for which half of the
-    largest slope that the device can render remains for the model's strokes.
+    Returns the largest slope h / r (hysteresis by play radius) that is certified for a model
+    whose strokes have slopes as large as h / r.
     """
 def stiffest_coupling(*, coupling_damping: typing.SupportsFloat | typing.SupportsIndex, falling: typing.SupportsFloat | typing.SupportsIndex, device: palpate._core.device.DeviceProfile, share: typing.SupportsFloat | typing.SupportsIndex = 0.95) -> float:
     """
