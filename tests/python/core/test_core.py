@@ -155,7 +155,7 @@ def test_an_array_of_objects_must_contain_numbers() -> None:
     for text in ("0.5", b"0.5", np.str_("0.5"), np.bytes_(b"0.5"), bytearray(b"0.5"), None):
         array = np.empty(1, dtype=object)
         array[0] = text
-        with pytest.raises(ValueError, match="^position contains .*must be a number or an array of numbers"):
+        with pytest.raises(ValueError, match=r"^position contains .*must be a number or an array of numbers"):
             model.force(array)
 
 

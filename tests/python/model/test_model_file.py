@@ -279,11 +279,11 @@ def test_keys_with_a_nul_character_are_checked_by_their_whole_name() -> None:
 
 def test_a_plan_or_certificate_that_is_null_is_refused() -> None:
     model = load_model(CORPUS / "good" / "plan_and_certificate.json")
-    with pytest.raises(ValueError, match="^plan is null: must be an object$"):
+    with pytest.raises(ValueError, match=r"^plan is null: must be an object$"):
         scheme_of(None)
-    with pytest.raises(ValueError, match="^plan is null: must be an object$"):
+    with pytest.raises(ValueError, match=r"^plan is null: must be an object$"):
         checked_certificate(model, None, model.certificate)
-    with pytest.raises(ValueError, match="^certificate is null: must be an object$"):
+    with pytest.raises(ValueError, match=r"^certificate is null: must be an object$"):
         checked_certificate(model, model.plan, None)
 
 

@@ -125,9 +125,9 @@ template <class At>
 }  // namespace detail
 
 /// Returns the smallest and largest stored energy of a force of position and velocity, at velocity zero and with a
-/// force limit [N]. Uses Simpson's rule, because this force does not have an elementary antiderivative. For a force with
-/// slopes up to L, the error of the rule is at most 5/36 L w^2 in a cell of width w: its three points are at most w/6,
-/// w/3 and w/6 away from the positions that they stand for.
+/// force limit [N]. Uses Simpson's rule, because this force does not have an elementary antiderivative. For slopes up to
+/// L, the error of the rule is at most 5/36 L w^2 in a cell of width w. Its three values represent the positions at most
+/// w/6, w/3 and w/6 away from them.
 [[nodiscard]] inline EnergyRange energy_range(const VelocityNetwork& force, double force_limit) {
     const auto at = [&](double x) noexcept {
         return Curve{std::clamp(force.force(x, 0.0), -force_limit, force_limit), 0.0, 0.0, 0.0};

@@ -170,8 +170,8 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
 }
 
 /// Returns the method that solves the load line of a scheme: "table" if a table of solutions is used for at least a
-/// part of the positions, else "newton"; nothing if the structure has no load line. The energy-consistent structure uses
-/// its table only in steps in which the model's force does not generate energy, and Newton's method in the others.
+/// part of the positions, else "newton"; nothing if the structure has no load line. The energy-consistent structure
+/// uses its table only in steps in which the model's force does not generate energy, and Newton's method in the others.
 [[nodiscard]] inline std::optional<std::string_view> solver_name(const ForceModel& model,
                                                                  const Scheme& scheme, double period_s) {
     return with_structure(model, scheme, period_s, std::numeric_limits<double>::infinity(),

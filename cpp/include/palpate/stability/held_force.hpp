@@ -212,8 +212,8 @@ template <class Gain = FilterGain, class Cost>
 ///
 ///     min over l, gamma of a + max over theta of l Re Q + gamma |Q|^2     and     R(sum of |taps|).
 ///
-/// a is computed by `step_coefficient`, R by `held_need`. For n samples of delay the filter has n taps of 1. For a force
-/// with hysteresis the result is proved only for delays, not for other filters (docs/certificate.md).
+/// a is computed by `step_coefficient`, R by `held_need`. For n samples of delay the filter has n taps of 1. For a
+/// force with hysteresis the result is proved only for delays, not for other filters (docs/certificate.md).
 [[nodiscard]] inline double filtered_need(std::span<const double> taps, SlopeRange slopes) {
     const double size = detail::size_of(taps);
     const double simple = held_need(size, slopes);
@@ -256,8 +256,8 @@ namespace detail {
 ///     Z = a + max over theta of (l Re Q + gamma |Q|^2) + gamma tau (1 - tau)
 ///     b / T >= (Z + sqrt(Z^2 - 4 tau (1 - tau) (a gamma - l^2 / 4))) / 2,
 ///
-/// the largest eigenvalue of a quadratic form in the handle's step d and alpha; a is computed by `step_coefficient`. The
-/// bound is continuous in the delay. A falling force can need slightly less damping with n + tau samples of delay than
+/// the largest eigenvalue of a quadratic form in the handle's step d and alpha; a is computed by `step_coefficient`.
+/// The bound is continuous in the delay. A falling force can need slightly less damping with n + tau samples of delay than
 /// with n samples. The result is the larger of both, because the true delay may be shorter than n + tau samples.
 [[nodiscard]] inline double delayed_need(int whole, double fraction, SlopeRange slopes) {
     const std::vector<double> taps(static_cast<std::size_t>(whole), 1.0);
