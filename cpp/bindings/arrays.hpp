@@ -85,8 +85,10 @@ inline void require_vector(const Array& array, const char* name) {
     const char kind = given.dtype().kind();
     if (kind == 'O') {
         for (const py::handle each : given.attr("ravel")()) {
-            if (each.is_none()) {
-                refuse("contains None");
+            // NumPy would convert a text such as "0.5"
+            if (each.is_none() || py::isinstance<py::str>(each) || py::isinstance<py::bytes>(each) ||
+                py::isinstance<py::bytearray>(each)) {
+                refuse("contains " + py::repr(each).cast<std::string>().substr(0, 60));
             }
         }
     } else if (kind != 'f' && kind != 'i' && kind != 'u' && kind != 'b') {

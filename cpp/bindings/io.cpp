@@ -52,9 +52,10 @@ py::object to_python(const Json& value) {
 /// Converts a Python value to a JSON value. An integer of more than 64 bits becomes a double, as when a JSON file is
 /// read, or infinity if the integer is too large for a double.
 Json to_json(const py::handle& value, int depth = 0) {
-    if (depth > deepest_json) {
-        throw std::invalid_argument("the file is nested more than " + std::to_string(deepest_json) +
-                                    " levels deep");
+    const bool is_object = py::isinstance<py::dict>(value);
+    const bool is_list = py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value);
+    if ((is_object || is_list) && depth >= deepest_json) {
+        throw std::invalid_argument(too_deep());
     }
     if (value.is_none()) {
         return nullptr;
@@ -80,14 +81,14 @@ Json to_json(const py::handle& value, int depth = 0) {
     if (py::isinstance<py::str>(value)) {
         return value.cast<std::string>();
     }
-    if (py::isinstance<py::dict>(value)) {
+    if (is_object) {
         Json items = Json::object();
         for (const auto& [key, item] : py::reinterpret_borrow<py::dict>(value)) {
             items[py::str(key).cast<std::string>()] = to_json(item, depth + 1);
         }
         return items;
     }
-    if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
+    if (is_list) {
         Json items = Json::array();
         for (const py::handle& item : py::reinterpret_borrow<py::sequence>(value)) {
             items.push_back(to_json(item, depth + 1));
@@ -97,6 +98,12 @@ Json to_json(const py::handle& value, int depth = 0) {
     throw std::invalid_argument("the content has a value of type " +
                                 py::str(py::type::of(value).attr("__name__")).cast<std::string>() +
                                 ": must be a number, text, list, dict, true, false or null");
+}
+
+/// Returns a part of a model file; throws std::invalid_argument if the part is null.
+detail::JsonField given(const detail::JsonField& part) {
+    part.require_object();
+    return part;
 }
 
 }  // namespace
@@ -122,15 +129,21 @@ void bind_io(py::module_& module) {
         "Returns the device profile in the content of a file. Raises ValueError with the first wrong\n"
         "field, its value and the correct values.");
     module.def(
-        "scheme_of", [](const py::object& plan) { return *detail::read_plan({to_json(plan), "plan"}); },
-        "plan"_a, "Returns the scheme (structure and its numbers) in the plan of a model file.");
+        "scheme_of",
+        [](const py::object& plan) {
+            const Json stored = to_json(plan);
+            return *detail::read_plan(given({stored, "plan"}));
+        },
+        "plan"_a,
+        "Returns the scheme (structure and its numbers) in the plan of a model file. Raises ValueError\n"
+        "with the first wrong field, its value and the correct values.");
     module.def(
         "checked_certificate",
         [](const ForceModel& model, const py::object& plan, const py::object& certificate) {
             const Json scheme = to_json(plan);
             const Json stored = to_json(certificate);
-            return *detail::read_certificate({stored, "certificate"}, detail::read_plan({scheme, "plan"}),
-                                             model, "");
+            return *detail::read_certificate(given({stored, "certificate"}),
+                                             detail::read_plan(given({scheme, "plan"})), model, "");
         },
         "model"_a, "plan"_a, "certificate"_a,
         "Computes the certificate of a model file again from the rendered model and returns it. Raises\n"

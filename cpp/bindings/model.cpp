@@ -44,18 +44,23 @@ class Broadcast {
     py::ssize_t stride_ = 0;
 };
 
-/// Returns force, slope and energy of a model at the position x. A hysteresis model needs the direction (+1 press, -1
+using Member = double EnvironmentSample::*;
+
+/// Returns force, slope or energy of a model at the position x. A hysteresis model needs the direction (+1 press, -1
 /// release) or the state of the play operator.
-EnvironmentSample sample(const ForceModel& model, double x, std::optional<double> direction,
-                         std::optional<double> play) {
+template <Member member>
+double sample(const ForceModel& model, double x, std::optional<double> direction,
+              std::optional<double> play) {
     if (const WaveletNetwork* network = model.network()) {
-        return network->at(x, {});
+        return network->at(x, {}).*member;
     }
     const HysteresisNetwork& both = *model.hysteresis();
-    if (direction) {
-        return both.sliding(x, *direction);
+    if constexpr (member == &EnvironmentSample::energy) {
+        if (direction && model.play_radius()) {  // the direction gives the position of the play operator
+            return both.at(x, {x - *direction * *model.play_radius()}).energy;
+        }
     }
-    return both.at(x, {*play});
+    return (direction ? both.sliding(x, *direction) : both.at(x, {*play})).*member;
 }
 
 /// Throws if the model has several inputs, or if a hysteresis model is called without a direction or play state.
@@ -73,8 +78,6 @@ void require_inputs(const ForceModel& model, bool direction, bool play) {
         "play= is given, but the model has no play radius: give direction= (+1 pressing, -1 releasing)");
 }
 
-using Member = double EnvironmentSample::*;
-
 constexpr HatQuantity quantity_of(Member member) {
     return member == &EnvironmentSample::force   ? HatQuantity::Value
            : member == &EnvironmentSample::slope ? HatQuantity::Slope
@@ -87,7 +90,7 @@ double scalar(const ForceModel& model, double position, const py::object& /*velo
               const py::object& /*acceleration*/, std::optional<double> direction,
               std::optional<double> play) {
     require_inputs(model, direction.has_value(), play.has_value());
-    return sample(model, position, direction, play).*member;
+    return sample<member>(model, position, direction, play);
 }
 
 /// Returns the force, slope or energy of a model at many positions.
@@ -116,7 +119,7 @@ py::array_t<double> batch(const ForceModel& model, const ArrayLike& positions, c
         }
         for (std::size_t k = first; k < first + count; ++k) {
             const auto at = static_cast<py::ssize_t>(k);
-            out[k] = sample(model, in[k], directions[at], plays[at]).*member;
+            out[k] = sample<member>(model, in[k], directions[at], plays[at]);
         }
     });
     return result;
@@ -310,15 +313,17 @@ void bind_model(py::module_& module) {
         "array for an array of positions.\n\n"
         "A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius,\n"
         "`play`, the state of the play operator. Arguments that the model does not use do not change the\n"
-        "force. Raises ValueError with the name of a missing argument. A position that is not finite\n"
-        "gives NaN.");
+        "force, but direction and play must have one value for each position or one for all. Raises\n"
+        "ValueError with the name of a missing argument. A position that is not finite gives NaN.");
     bind_quantity<&EnvironmentSample::slope>(
         type, "slope",
         "Returns the slope df/dx of the force [N/m or N*m/rad]; the arguments are "
         "those of force().");
     bind_quantity<&EnvironmentSample::energy>(
         type, "energy",
-        "Returns the stored energy, up to a constant [J]; the arguments are those of force().");
+        "Returns the stored energy, up to a constant [J]; the arguments are those of force(). With\n"
+        "`direction` the play operator is at position - direction * play_radius. If the model has no play\n"
+        "radius, the result is the energy of the mean force of press and release.");
     type.def("predict", &predict, "X"_a,
              "Returns the force (n,) for the n rows of inputs X (n, d). A hysteresis model takes the\n"
              "direction as one more column. A row with a value that is not finite gives NaN.");

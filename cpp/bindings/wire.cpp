@@ -49,6 +49,7 @@ void bind_wire(py::module_& module) {
         .value("Clear", wire::Request::Clear);
     module.attr("usb_vendor") = wire::vendor_id;
     module.attr("usb_product") = wire::product_id;
+    module.attr("usb_timeout_ms") = wire::request_timeout_ms;
     module.attr("usb_interface") = wire::interface_number;
     module.attr("usb_interface_kind") =
         py::make_tuple(wire::interface_kind[0], wire::interface_kind[1], wire::interface_kind[2]);

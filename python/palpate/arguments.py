@@ -86,6 +86,14 @@ def number_of(name: str, value: object) -> float:
     return number
 
 
+def holds_numbers(array: np.ndarray[Any, Any]) -> bool:
+    """Returns True if an array contains real numbers. Text in an array of objects is not a number, although
+    NumPy would convert it."""
+    if array.dtype.kind == "O":
+        return not any(isinstance(each, (str, bytes, bytearray)) for each in array.flat)
+    return array.dtype.kind in "biuf"
+
+
 def vector_of(name: str, values: object) -> Float1D:
     """Returns a copy of the finite numbers (n,) of an array, a list or a column of a frame.
 
@@ -98,7 +106,7 @@ def vector_of(name: str, values: object) -> Float1D:
         raise InputError(f"{name} is a masked array; leave the masked rows out of all arrays")
     try:
         given = np.asarray(values)
-        if given.dtype.kind not in "biufO" or isinstance(values, (str, dict)):
+        if not holds_numbers(given) or isinstance(values, (str, dict)):
             raise TypeError
         array = np.array(given, dtype=np.float64)
     except (TypeError, ValueError):

@@ -54,6 +54,7 @@ WRONG_VALUES: dict[str, Any] = {
     "empty_array": np.array([]),
     "two_dimensional": np.zeros((2, 2)),
     "text_array": np.array(["a", "b"]),
+    "object_text_array": X.astype(str).astype(object),
     "complex_array": X * 1j,
     "masked_array": np.ma.masked_array(X, X > 0.2),
     "frame": pd.DataFrame({"a": [1, 2]}),
@@ -161,7 +162,7 @@ CALLS: dict[str, tuple[Call, str, set[str]]] = {
     "regressor y": (
         lambda v: WaveletNetworkRegressor().fit(X[:, None], v),
         "y",
-        {"object", "function", "frame"},
+        {"object", "function", "frame", "object_text_array"},  # scikit-learn converts text
     ),
     "regressor weight": (
         lambda v: WaveletNetworkRegressor().fit(X[:, None], X, sample_weight=v),

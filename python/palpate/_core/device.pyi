@@ -4,7 +4,7 @@ Profiles of devices, and the packets of USB devices.
 """
 from __future__ import annotations
 import typing
-__all__: list[str] = ['DeviceProfile', 'UsbRequest', 'decode_info', 'longest_watchdog_ms', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_to_device', 'usb_to_host', 'usb_vendor']
+__all__: list[str] = ['DeviceProfile', 'UsbRequest', 'decode_info', 'longest_watchdog_ms', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_timeout_ms', 'usb_to_device', 'usb_to_host', 'usb_vendor']
 class DeviceProfile:
     """
     Properties of a haptic device of one degree of freedom, in SI units; a knob (rad) or a straight handle (m).
@@ -162,6 +162,7 @@ usb_interface: int = 0
 usb_interface_kind: tuple = (255, 1, 1)
 usb_largest_packet: int = 64
 usb_product: int = 1
+usb_timeout_ms: int = 500
 usb_to_device: int = 65
 usb_to_host: int = 193
 usb_vendor: int = 4617

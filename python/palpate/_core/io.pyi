@@ -31,5 +31,6 @@ def read_json(path: str) -> typing.Any:
     """
 def scheme_of(plan: typing.Any) -> palpate._core.rendering.Scheme:
     """
-    Returns the scheme (structure and its numbers) in the plan of a model file.
+    Returns the scheme (structure and its numbers) in the plan of a model file. Raises ValueError
+    with the first wrong field, its value and the correct values.
     """

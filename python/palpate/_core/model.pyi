@@ -25,7 +25,9 @@ class ForceModel:
     @typing.overload
     def energy(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
         """
-        Returns the stored energy, up to a constant [J]; the arguments are those of force().
+        Returns the stored energy, up to a constant [J]; the arguments are those of force(). With
+        `direction` the play operator is at position - direction * play_radius. If the model has no play
+        radius, the result is the energy of the mean force of press and release.
         """
     @typing.overload
     def energy(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
@@ -44,7 +46,8 @@ class ForceModel:
         
         A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius,
         `play`, the state of the play operator. Arguments that the model does not use do not change the
-        force. Raises ValueError with the name of a missing argument. A position that is not finite
+        force, but direction and play must have one value for each position or one for all. Raises
+        ValueError with the name of a missing argument. A position that is not finite
         gives NaN.
         """
     @typing.overload

@@ -22,9 +22,6 @@ from .._core.device import UsbRequest
 from ..errors import InputError
 from ..recording.files import replacing
 
-_TIMEOUT_MS = 500
-"""Longest time that a request to the device waits for the answer [ms]"""
-
 
 class DeviceError(Exception):
     """Failure of a device: one sentence with the device's name, the reason and the likely cure."""
@@ -137,7 +134,7 @@ class UsbSetup:
                 value,
                 core.usb_interface,
                 size or None,
-                timeout=_TIMEOUT_MS,
+                timeout=core.usb_timeout_ms,
             )
         except (pyusb.USBError, NotImplementedError) as error:
             raise device_error(self.name, action, error) from None

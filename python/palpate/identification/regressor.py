@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from .._typing import Float1D, Float2D
-from ..arguments import shown
+from ..arguments import holds_numbers, shown
 from ..errors import InputError
 from ..model import Model
 from ..recording import Source
@@ -286,7 +286,7 @@ def _plain(value: Any) -> Any:
 def _weights(sample_weight: npt.ArrayLike, n: int) -> Float1D:
     try:
         given = np.asarray(sample_weight)
-        if given.dtype.kind == "c" or (hasattr(sample_weight, "mask") and np.ma.is_masked(sample_weight)):
+        if not holds_numbers(given) or np.ma.is_masked(sample_weight):
             raise TypeError
         weight = given.astype(np.float64)
     except (TypeError, ValueError):

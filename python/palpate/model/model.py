@@ -17,7 +17,7 @@ from .._core import __version__
 from .._core.io import check_model, read_json
 from .._core.model import ForceModel
 from .._typing import Float1D
-from ..arguments import instance_of, path_of, shown
+from ..arguments import holds_numbers, instance_of, path_of, shown
 from ..errors import InputError
 from ..recording import Source
 from ..recording.files import require_file
@@ -399,7 +399,7 @@ def _require_numbers(name: str, value: object) -> None:
         return
     try:
         given = np.asarray(value)
-        if given.dtype.kind not in "biufO" or value is None or np.ma.is_masked(value):
+        if not holds_numbers(given) or value is None or np.ma.is_masked(value):
             raise TypeError
         given.astype(np.float64)
     except (TypeError, ValueError):

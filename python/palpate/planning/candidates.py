@@ -146,7 +146,8 @@ class Task:
         if not self.predict:
             return None
         return Refusal(
-            f"predict is {self.predict}: only direct rendering of the identified model has a prediction"
+            f"predict is {self.predict}: a required prediction is possible only in direct rendering of the "
+            "identified model"
         )
 
 

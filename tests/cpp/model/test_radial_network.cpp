@@ -56,6 +56,35 @@ TEST(RadialNetwork, ContinuesOutsideTheBoxWithAClampedGradient) {
     }
 }
 
+// Every region: each input below, inside or above the domain, with slopes that are limited and slopes that are not.
+TEST(RadialNetwork, GradientOutsideAgreesWithDifferencesOfTheValue) {
+    Random random{12};
+    constexpr double h = 1e-6;
+    for (std::size_t d = 1; d <= 3; ++d) {
+        const Domain domain{std::vector<double>(d, 0.0), std::vector<double>(d, 1.0), {}, {}, std::nullopt};
+        for (int k = 0; k < cases(300); ++k) {
+            const RadialNetwork network{random_network(random, 7, d), domain};
+            std::vector<double> x(d);
+            for (double& one : x) {
+                const double along = uniform(random, 0.01, 0.99);
+                const auto region = random() % 3;
+                one = region == 0 ? along - 1.0 : region == 1 ? along : along + 1.0;
+            }
+            std::vector<double> gradient(d);
+            (void)network.at(x, gradient);
+            for (std::size_t j = 0; j < d; ++j) {
+                std::vector<double> up = x;
+                std::vector<double> down = x;
+                up[j] += h;
+                down[j] -= h;
+                const double slope = (network.value(up) - network.value(down)) / (2.0 * h);
+                EXPECT_NEAR(gradient[j], slope, 2e-4 * (1.0 + std::abs(slope)))
+                    << d << " inputs, input " << j;
+            }
+        }
+    }
+}
+
 TEST(RadialNetwork, OfOneInputIsTheWaveletNetwork) {
     Random random{7};
     for (int k = 0; k < cases(100); ++k) {

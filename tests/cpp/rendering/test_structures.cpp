@@ -4,6 +4,7 @@
 #include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -457,6 +458,97 @@ TEST(Structure, NanGivesZeroForceAndTheNextStepContinues) {
     expect_zero_force_without_a_trace(Explicit{object, Inertia{}, coupling, period}, "explicit");
 }
 
+ForceModel spring_model(double stiffness) {
+    return {NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0}, test::unit_domain()};
+}
+
+/// Returns a model with the force f = 5 x + 0.2 v, for position x and velocity v.
+ForceModel dashpot_model() {
+    return ForceModel::of_velocity({2, {}, {}, {}, {5.0, 0.2}, 0.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}});
+}
+
+/// Returns positions of every magnitude, with numbers that are not finite.
+std::vector<double> extreme_positions(test::Random& random) {
+    using Limits = std::numeric_limits<double>;
+    std::vector<double> positions{Limits::quiet_NaN(), Limits::infinity(),   Limits::max(), 1e308, 1e300,
+                                  Limits::min(),       Limits::denorm_min(), 0.0,           -0.0};
+    for (int k = 0; k < test::cases(200); ++k) {
+        positions.push_back(std::pow(10.0, test::uniform(random, -320.0, 308.0)));
+    }
+    for (std::size_t k = positions.size(); k-- > 0;) {
+        positions.push_back(-positions[k]);
+    }
+    std::shuffle(positions.begin(), positions.end(), random);
+    return positions;
+}
+
+/// Checks that a step to an extreme position gives a finite force, or is refused and leaves no trace in the state.
+template <class S>
+void expect_finite_or_refused(const S& resting, const std::string& name) {
+    test::Random random{7};
+    S wandering = resting;
+    for (const double position : extreme_positions(random)) {
+        const Rendered visited = wandering.step(position);
+        EXPECT_TRUE(std::isfinite(visited.force)) << name << " after other positions, at " << position;
+        EXPECT_TRUE(visited.status != Status::NonFinite || visited.force == 0.0)
+            << name << " at " << position;
+        S structure = resting;
+        const Rendered far = structure.step(position);
+        if (far.status == Status::NonFinite) {
+            S reference = resting;
+            EXPECT_EQ(far.force, 0.0) << name << " at " << position;
+            for (const double next : {0.2, 0.21, 0.19}) {
+                const Rendered expected = reference.step(next);
+                const Rendered now = structure.step(next);
+                EXPECT_EQ(now.force, expected.force) << name << " after " << position;
+                EXPECT_EQ(now.environment_position, expected.environment_position)
+                    << name << " after " << position;
+            }
+        } else {
+            EXPECT_TRUE(std::isfinite(position)) << name << " at " << position;
+            EXPECT_TRUE(std::isfinite(far.force)) << name << " at " << position;
+            EXPECT_TRUE(std::isfinite(far.environment_position)) << name << " at " << position;
+        }
+    }
+}
+
+TEST(Structure, ExtremePositionsGiveAFiniteForceOrAreRefused) {
+    test::Random random{3};
+    const NetworkParameters network = test::random_network(random, 6);
+    NetworkParameters gentle{1, {4.0}, {0.5}, {0.2}, {5.0}, 0.0};
+    const ForceModel plain{network, test::unit_domain()};
+    const ForceModel bounded{gentle, test::unit_domain(Continuation::Free, Continuation::Free)};
+    const ForceModel both{gentle, {{0.1}, 0.0, 0.4}, test::unit_domain(), 0.01};
+    const auto check = [](const ForceModel& model, const Scheme& scheme, const std::string& name) {
+        for (const double limit : {5.0, std::numeric_limits<double>::infinity()}) {
+            with_structure(model, scheme, period, limit, [&](auto structure) {
+                structure.reset(0.2);
+                (void)structure.step(0.2);
+                (void)structure.step(0.205);
+                expect_finite_or_refused(structure, name);
+            });
+        }
+    };
+    for (const std::string_view word : structure_names) {
+        const std::string name{word};
+        Scheme scheme;
+        scheme.structure = named<StructureKind>(word, "structure");
+        check(plain, scheme, name);
+        check(bounded, scheme, name + ", free outside");
+        check(both, scheme, name + ", hysteresis");
+        if (has_coupling(scheme.structure)) {
+            scheme.compensated = true;
+            check(bounded, scheme, name + ", compensated");
+        } else {
+            scheme.predict = 4;
+            check(bounded, scheme, name + ", predicted");
+            check(both, scheme, name + ", predicted, hysteresis");
+            scheme.predict = 0;
+            check(dashpot_model(), scheme, name + ", velocity");
+        }
+    }
+}
+
 TEST(Structure, StartsAtRestAtTheDevicePosition) {
     const ClickAndWall object;
     const auto expect_at_rest = [&](auto structure, const char* name) {
@@ -469,15 +561,6 @@ TEST(Structure, StartsAtRestAtTheDevicePosition) {
     expect_at_rest(Massless{object, coupling, period}, "massless");
     expect_at_rest(Implicit{object, Inertia{}, coupling, period}, "implicit");
     expect_at_rest(Explicit{object, Inertia{}, coupling, period}, "explicit");
-}
-
-ForceModel spring_model(double stiffness) {
-    return {NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0}, test::unit_domain()};
-}
-
-/// Returns a model with the force f = 5 x + 0.2 v, for position x and velocity v.
-ForceModel dashpot_model() {
-    return ForceModel::of_velocity({2, {}, {}, {}, {5.0, 0.2}, 0.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}});
 }
 
 TEST(DirectVelocity, ComputesTheVelocityFromTheLastTwoPositions) {

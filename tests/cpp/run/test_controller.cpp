@@ -91,5 +91,42 @@ TEST(Controller, ClipsToTheForceLimitAndReportsIt) {
     EXPECT_EQ(tick.status, Status::Limited);
 }
 
+/// A spring whose force is not a number beyond `broken_from`.
+struct BrokenSpring {
+    using State = Stateless;
+    double stiffness;
+    double broken_from;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
+        return x < broken_from ? test::Spring{stiffness}.at(x, state)
+                               : EnvironmentSample{std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+TEST(Controller, SendsZeroForceAtOnceAfterAFailedStep) {
+    for (const ForceRamp ramp : {ForceRamp{}, ForceRamp{1000, 900}}) {
+        ScriptedDevice device;
+        device.next.position = 0.3;
+        Controller<ScriptedDevice, Direct<BrokenSpring>> controller{
+            device, Direct{BrokenSpring{10.0, 0.5}},
+            Guards{.limit = {5.0}, .ramp = ramp, .slew = {1.0, 0.0}}};
+        ASSERT_EQ(controller.start(), Status::Ok);
+        for (int k = 0; k < 4; ++k) {
+            (void)controller.tick();
+        }
+        ASSERT_GT(device.sent, 2.0);
+        device.next.position = 0.6;
+        (void)controller.tick();
+        EXPECT_EQ(controller.tick().status, Status::NonFinite);
+        EXPECT_EQ(device.sent, 0.0) << "the slew limit must not delay the zero force";
+        device.next.position = 0.3;
+        (void)controller.tick();
+        (void)controller.tick();
+        EXPECT_NEAR(device.sent, 1.0, 1e-12) << "after the failed step the force rises from zero";
+    }
+}
+
 }  // namespace
 }  // namespace palpate

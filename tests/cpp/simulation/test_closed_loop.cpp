@@ -61,6 +61,20 @@ TEST(EnergyAccount, BalancesToRoundingForEveryHand) {
     EXPECT_LT(worst, 1e-12);
 }
 
+TEST(ClosedLoop, LimitsTheForceByDefaultToTheLimitOfTheDevice) {
+    for (const double limit : {2.0, 8.5}) {
+        DeviceProfile device;
+        device.force_limit = limit;
+        double largest = 0.0;
+        (void)closed_loop(Direct{Spring{40.0}}, device, PassiveHand{}, 3, {20, 0.5, 0.0, {}},
+                          [&](const Tick& tick, const Motion& /*handle*/, const EnergyAccount& /*account*/) {
+                              largest = std::max(largest, tick.command.force);
+                              return true;
+                          });
+        EXPECT_EQ(largest, limit);
+    }
+}
+
 TEST(EnergyAccount, BalancesForAMassMuchLargerThanTheDevice) {
     DeviceProfile device;
     device.viscous_damping = 0.02;

@@ -274,6 +274,9 @@ TEST(Scheme, TablesRenderTheSameForceAsTheNetwork) {
         compare(Massless{plain, scheme.coupling, 1e-3}, "table");
         scheme.structure = StructureKind::Implicit;
         compare(Implicit{plain, scheme.inertia, scheme.coupling, 1e-3}, "table");
+        scheme.structure = StructureKind::EnergyConsistent;
+        compare(EnergyConsistent{plain, scheme.inertia, scheme.coupling, 1e-3, 1e-2 * model.finest_width()},
+                "table");
     }
 }
 

@@ -565,7 +565,9 @@ TEST(Certificate, RefusesNumbersThatAreNotFinite) {
             bounds.slope.upper = wrong;
             bounds.steepest = wrong;
             Scheme scheme = scheme_of(structure, {100.0, structure == StructureKind::Massless ? 0.0 : 0.02});
-            EXPECT_EQ(certify(bounds, scheme, smooth(10.0)).verdict, Verdict::Refused);
+            const Certificate refused = certify(bounds, scheme, smooth(10.0));
+            EXPECT_EQ(refused.verdict, Verdict::Refused);
+            EXPECT_EQ(refused.fingerprint, fingerprint_of(refused));
         }
     }
 }

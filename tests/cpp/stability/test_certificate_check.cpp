@@ -127,6 +127,18 @@ TEST(CertificateCheck, RefusesABoundTooWideForACertificate) {
     EXPECT_EQ(wrong.rfind("certificate.verdict is ", 0), 0U) << wrong;
 }
 
+TEST(CertificateCheck, RefusesAStoredRefusalWithTheVerdictsThatAreAllowed) {
+    const ForceModel model = hysteretic();
+    DeviceProfile loose = strong();
+    loose.viscous_damping = 1e-9;
+    const Certificate refused = certify(model, direct(), loose);
+    ASSERT_EQ(refused.verdict, Verdict::Refused);
+    const std::string wrong = disagreement(refused, model);
+    const std::string expected =
+        "certificate.verdict is \"refused\": must be \"certified\" or \"stable-locally\", ";
+    EXPECT_EQ(wrong.rfind(expected, 0), 0U) << wrong;
+}
+
 TEST(CertificateCheck, RefusesAnEditedDeviceEvenIfNoLineUsesTheField) {
     const ForceModel model = hysteretic();
     const Certificate certificate = certify(model, direct(), strong());

@@ -48,7 +48,7 @@ TEST(HeldForce, ClosedFormIsTheMinimumOverGamma) {
             const SlopeRange slopes{1.0, falling};
             double least = std::numeric_limits<double>::infinity();
             for (double gamma = 1e-3; gamma < 1e3; gamma *= 1.001) {
-                least = std::min(least, detail::step_energy(slopes, 0.0, gamma) + gamma * lag * lag);
+                least = std::min(least, detail::step_coefficient(slopes, 0.0, gamma) + gamma * lag * lag);
             }
             EXPECT_NEAR(held_need(lag, slopes), least, 3e-4 * least) << lag << " " << falling;
             EXPECT_LE(held_need(lag, slopes), least * (1.0 + 1e-12)) << lag << " " << falling;
@@ -69,7 +69,7 @@ TEST(HeldForce, StepEnergyIsTheLargestOverAllRatios) {
                                            : s * (-rho - 0.5);
             most = std::max(most, h - l * rho - gamma * rho * rho);
         }
-        EXPECT_NEAR(detail::step_energy({M, s}, l, gamma), most, 1e-6);
+        EXPECT_NEAR(detail::step_coefficient({M, s}, l, gamma), most, 1e-6);
     }
 }
 
@@ -142,8 +142,8 @@ TEST(HeldForce, AFilterWithAFractionOfASampleIsContinuousInTheDelay) {
             // Filter weights of the same prediction with a delay of one more sample: 1, then `taps`.
             std::vector<double> late = taps;
             late.insert(late.begin(), 1.0);
-            EXPECT_NEAR(filtered_need(taps, 1e-9, slopes), filtered_need(taps, slopes), 1e-3);
-            EXPECT_NEAR(filtered_need(taps, 1.0 - 1e-9, slopes), filtered_need(late, slopes), 1e-3);
+            EXPECT_NEAR(filtered_need(taps, 1e-9, slopes, 1.0 - 1e-9), filtered_need(taps, slopes), 1e-3);
+            EXPECT_NEAR(filtered_need(taps, 1.0 - 1e-9, slopes, 1e-9), filtered_need(late, slopes), 1e-3);
         }
     }
 }
@@ -153,7 +153,7 @@ TEST(HeldForce, WithoutAFilterBothLinesOfAFractionAreClose) {
         for (int n = 0; n <= 2; ++n) {
             const std::vector<double> taps(static_cast<std::size_t>(n), 1.0);
             const double delayed = delayed_need(n, tau, {1.0, 1.0});
-            const double filtered = filtered_need(taps, tau, {1.0, 1.0});
+            const double filtered = filtered_need(taps, tau, {1.0, 1.0}, 1.0 - tau);
             EXPECT_GE(filtered, delayed * (1.0 - 1e-5));
             EXPECT_LE(filtered, 1.04 * delayed);
         }
@@ -347,7 +347,7 @@ TEST(HeldForce, NoMotionTakesEnergyOutOfAPredictedForce) {
         timing.taps = prediction(1 + k % 4);
         std::vector<double> taps(static_cast<std::size_t>(whole), 1.0);
         taps.insert(taps.end(), timing.taps.begin(), timing.taps.end());
-        return filtered_need(taps, tau, slopes);
+        return filtered_need(taps, tau, slopes, 1.0 - tau);
     };
     EXPECT_EQ(violated(1.0, 40, need), 0);
     EXPECT_GE(violated(0.4, 40, need), 8);

@@ -33,6 +33,7 @@ def test_a_live_rendering_writes_a_recording_and_reports_its_timing(tmp_path: Pa
     assert len(every_row(out)) == summary["recorded"] == summary["ticks"]
     assert summary["ended"] == "the duration ended"
     assert summary["lost_records"] == 0
+    assert summary["limit_cycles"] == 0
     assert summary["lateness"]["p50_us"] <= summary["lateness"]["p999_us"] <= summary["lateness"]["max_us"]
 
 

@@ -149,6 +149,48 @@ def test_a_model_with_hysteresis_requires_a_direction() -> None:
         model.force(x, direction=[1, 1, -1])
 
 
+def test_an_array_of_objects_must_contain_numbers() -> None:
+    model = ForceModel(**random_network(np.random.default_rng(6), 3))
+    assert model.force(np.array([0.5, 1], dtype=object)) == pytest.approx(model.force(np.array([0.5, 1.0])))
+    for text in ("0.5", b"0.5", np.str_("0.5"), np.bytes_(b"0.5"), bytearray(b"0.5"), None):
+        array = np.empty(1, dtype=object)
+        array[0] = text
+        with pytest.raises(ValueError, match=r"^position contains .*must be a number or an array of numbers"):
+            model.force(array)
+
+
+def test_the_shape_of_an_argument_without_effect_is_checked() -> None:
+    model = ForceModel(**random_network(np.random.default_rng(7), 3))
+    x = np.linspace(0, 1, 5)
+    assert model.force(x, direction=[1, 1, 1, -1, -1], play=0.0) == pytest.approx(model.force(x), abs=0)
+    for name in ("direction", "play"):
+        with pytest.raises(ValueError, match=rf"{name} has shape \(3,\), must have 1 or 5 values"):
+            model.force(x, **{name: [1, 1, -1]})
+
+
+def test_energy_of_a_direction_is_that_of_its_play_state() -> None:
+    arguments = random_network(np.random.default_rng(8), 3)
+    hysteresis = {"weight_hysteresis": [0.1, 0.0, 0.1], "linear_hysteresis": [0.2], "bias_hysteresis": 0.25}
+    x = np.linspace(0, 1, 5)
+    played = ForceModel(**arguments, **hysteresis, play_radius=0.02)
+    for direction in (1.0, -1.0, 0.5):
+        expected = played.energy(x, play=x - direction * 0.02)
+        assert played.energy(x, direction=direction) == pytest.approx(expected, abs=1e-14)
+        assert played.energy(0.3, direction=direction) == pytest.approx(
+            played.energy(0.3, play=0.3 - direction * 0.02), abs=1e-14
+        )
+    without_radius = ForceModel(**arguments, **hysteresis)
+    mean = ForceModel(**arguments)
+    assert without_radius.energy(x, direction=1) == pytest.approx(mean.energy(x), abs=1e-14)
+
+
+def test_only_an_object_with_mass_is_driven_by_a_force() -> None:
+    model = ForceModel(**random_network(np.random.default_rng(9), 3))
+    with pytest.raises(ValueError, match="must be implicit or explicit or energy-consistent: "):
+        force_driven(model, Scheme(structure="massless"), np.zeros(3), 1e-3)
+    force_driven(model, Scheme(structure="energy-consistent"), np.zeros(3), 1e-3)
+
+
 def test_play_state_follows_the_motion() -> None:
     hysteresis = {
         "weight_hysteresis": [],

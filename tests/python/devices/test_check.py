@@ -305,7 +305,7 @@ def test_a_negative_friction_is_refused_by_name() -> None:
     ("changed", "wrong"),
     [
         ({"period_s": 0.5e-3}, "longest period "),
-        ({"encoder_step": 1e-5}, "encoder step "),
+        ({"encoder_step": 1e-5}, "expected at most 1e-05"),
         ({"force_limit": 9.0}, "largest force 5, expected at least 9"),
         ({"coulomb_friction": 0.02}, "friction 0.00994, expected at least 0.02"),
     ],
@@ -315,6 +315,12 @@ def test_a_profile_better_than_the_device_is_reported_as_wrong(changed: dict[str
     found = check_device(profile=DeviceProfile(**changed), push=True)
     assert observed(found, "profile").right is False
     assert wrong in observed(found, "profile").text
+
+
+@pytest.mark.usefixtures("faultless")
+def test_an_encoder_finer_than_that_of_the_profile_is_right() -> None:
+    found = check_device(profile=DeviceProfile(encoder_step=1e-2, delay_s=2e-3))
+    assert observed(found, "profile").right is True
 
 
 def test_a_model_without_a_certificate_is_refused() -> None:

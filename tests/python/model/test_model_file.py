@@ -17,7 +17,7 @@ import pytest
 import palpate.model
 from conftest import ROOT
 from palpate import InputError, load_model
-from palpate._core.io import check_model
+from palpate._core.io import check_model, checked_certificate, scheme_of
 
 CORPUS = ROOT / "tests" / "models"
 GOOD: list[dict[str, str]] = json.loads((CORPUS / "good.json").read_text(encoding="utf-8"))
@@ -251,6 +251,40 @@ def test_ambiguous_json_is_refused(content: bytes, sentence: str, tmp_path: Path
         load_model(tmp_path / "a.json")
     assert str(tmp_path / "a.json") in str(refused.value)
     assert str(refused.value).isprintable()
+
+
+def test_notes_nest_as_deep_when_checked_as_when_read(tmp_path: Path) -> None:
+    content = json.loads(TEXT)
+    deepest: Any = []
+    for _ in range(97):
+        deepest = [deepest]  # the file and its notes are two more levels
+    content["notes"] = {"a": deepest}
+    (tmp_path / "a.json").write_text(json.dumps(content), encoding="utf-8")
+    check_model(content)
+    load_model(tmp_path / "a.json")
+    content["notes"] = {"a": [deepest]}
+    with pytest.raises(ValueError, match="nested more than 100 levels deep"):
+        check_model(content)
+
+
+def test_keys_with_a_nul_character_are_checked_by_their_whole_name() -> None:
+    content = json.loads(TEXT)
+    content["notes"] = {"a\0b": 1.0}
+    content["data"]["columns"] = {"force\0": "force_N"}
+    check_model(content)
+    content["notes"] = {"a": 1.0, "a\0b": float("inf")}
+    with pytest.raises(ValueError, match=r"^notes\.a\\u0000b is inf: must be a finite number$"):
+        check_model(content)
+
+
+def test_a_plan_or_certificate_that_is_null_is_refused() -> None:
+    model = load_model(CORPUS / "good" / "plan_and_certificate.json")
+    with pytest.raises(ValueError, match=r"^plan is null: must be an object$"):
+        scheme_of(None)
+    with pytest.raises(ValueError, match=r"^plan is null: must be an object$"):
+        checked_certificate(model, None, model.certificate)
+    with pytest.raises(ValueError, match=r"^certificate is null: must be an object$"):
+        checked_certificate(model, model.plan, None)
 
 
 def test_a_pipe_is_refused_without_waiting_for_a_writer(tmp_path: Path) -> None:

@@ -125,7 +125,6 @@ class Inverse3Device {
     }
 
     [[nodiscard]] const Inverse3Info& info() const noexcept { return info_; }
-    [[nodiscard]] const Inverse3Settings& settings() const noexcept { return settings_; }
 
   private:
     using Json = nlohmann::json;

@@ -34,6 +34,8 @@ inline constexpr std::uint8_t protocol_version = 1;  ///< first field of every p
 
 inline constexpr std::uint8_t request_to_host = 0xC1;    ///< bmRequestType: vendor, interface
 inline constexpr std::uint8_t request_to_device = 0x41;  ///< bmRequestType: vendor, interface
+inline constexpr unsigned request_timeout_ms =
+    500;  ///< longest time that a request waits for its answer [ms]
 
 /// Numbers of the control requests to the device (the field bRequest of a control transfer).
 enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };

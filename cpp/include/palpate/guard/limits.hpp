@@ -29,7 +29,8 @@ struct ForceLimit {
     }
 };
 
-/// Limits the change of the force between two ticks. The zero force after a fault does not pass through this limit.
+/// Limits the change of the force between two ticks. The zero force after a fault or a failed step does not pass
+/// through this limit.
 struct SlewLimit {
     double largest_step =
         std::numeric_limits<double>::infinity();  ///< largest change of force in a tick [N or N*m], > 0

@@ -51,8 +51,8 @@ class JsonField {
     [[nodiscard]] bool is_null() const { return value_.is_null(); }
 
     /// Returns the value of a key of this object. Throws if the key is missing.
-    [[nodiscard]] JsonField operator[](const char* key) const {
-        const std::string path = path_.empty() ? key : path_ + "." + key;
+    [[nodiscard]] JsonField operator[](const std::string& key) const {
+        const std::string path = (path_.empty() ? "" : path_ + ".") + readable_key(key);
         require(value_.is_object(), "an object");
         const auto found = value_.find(key);
         if (found == value_.end()) {
@@ -65,10 +65,8 @@ class JsonField {
         require(value_.is_object(), "an object");
         for (const auto& item : value_.items()) {
             if (std::find(keys.begin(), keys.end(), item.key()) == keys.end()) {
-                const std::string key = Json(item.key()).dump();  // without control characters
-                throw std::invalid_argument((path_.empty() ? "" : path_ + ".") +
-                                            key.substr(1, key.size() - 2) + " is not a key of this format" +
-                                            cure);
+                throw std::invalid_argument((path_.empty() ? "" : path_ + ".") + readable_key(item.key()) +
+                                            " is not a key of this format" + cure);
             }
         }
     }
@@ -143,7 +141,7 @@ class JsonField {
     void require_finite() const {
         if (value_.is_object()) {
             for (const auto& item : value_.items()) {
-                (*this)[item.key().c_str()].require_finite();
+                (*this)[item.key()].require_finite();
             }
         } else if (value_.is_array()) {
             for (const JsonField& item : items()) {
@@ -189,6 +187,12 @@ class JsonField {
     }
 
   private:
+    /// Returns a key without control characters, for a message.
+    [[nodiscard]] static std::string readable_key(const std::string& key) {
+        const std::string quoted = Json(key).dump();
+        return quoted.substr(1, quoted.size() - 2);
+    }
+
     const Json& value_;
     std::string path_;
 };

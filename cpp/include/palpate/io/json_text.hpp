@@ -21,6 +21,11 @@ using Json = nlohmann::ordered_json;
 
 inline constexpr int deepest_json = 100;  ///< largest allowed depth of nested lists and objects
 
+/// Returns the error message for content that is nested too deeply.
+[[nodiscard]] inline std::string too_deep() {
+    return "the file is nested more than " + std::to_string(deepest_json) + " levels deep";
+}
+
 /// Parses JSON by RFC 8259, and refuses content that other readers interpret differently: a byte order mark, NUL bytes,
 /// repeated keys, unpaired surrogates, numbers too large for a double, more than `deepest_json` levels. Throws
 /// std::invalid_argument with the reason in one sentence.
@@ -36,8 +41,7 @@ inline constexpr int deepest_json = 100;  ///< largest allowed depth of nested l
         const bool starts =
             event == Json::parse_event_t::object_start || event == Json::parse_event_t::array_start;
         if (starts && depth >= deepest_json) {
-            throw std::invalid_argument("the file is nested more than " + std::to_string(deepest_json) +
-                                        " levels deep");
+            throw std::invalid_argument(too_deep());
         }
         if (event == Json::parse_event_t::object_start) {
             keys.emplace_back();

@@ -72,7 +72,7 @@ inline void check_data(const JsonField& data) {
     }
     data["columns"].require_object();
     for (const auto& column : data["columns"].value().items()) {
-        (void)data["columns"][column.key().c_str()].string();
+        (void)data["columns"][column.key()].string();
     }
 }
 

@@ -57,12 +57,16 @@ struct EdgeLine {
     }
 };
 
+/// Part of the domain at each end in which the slope of a fitted force is least certain [-]. The largest slope of a
+/// continuation is computed without these parts.
+inline constexpr double uncertain_end = 0.02;
+
 /// Properties of a force inside its domain, from which the straight lines outside the domain are computed.
 struct CurveExtent {
     double travel = 0.0;         ///< length of the domain, upper - lower [m]
     double largest_force = 0.0;  ///< max |f| over the domain [N]
-    /// Largest slope that a line may have: bound of max f' over the domain, at least 0; for a force of position alone
-    /// without the 2 % at the ends of the domain [N/m]
+    /// Largest slope that a line may have: bound of max f' over the domain without both `uncertain_end`, at least 0
+    /// [N/m]
     double slope_cap = 0.0;
 };
 

@@ -16,8 +16,7 @@ struct EnergyRange {
     /// Smallest stored energy over all positions, continuation included; -infinity if the energy has no lower bound [J]
     double least = 0.0;
     double largest = 0.0;  ///< largest stored energy over the domain, hysteresis included [J]
-    /// Upper bound of the error of `least` and `largest`, which are computed at finitely many positions [J]; not
-    /// computed (0) for a force of position and velocity
+    /// Upper bound of the error of `least` and `largest`, which are computed at finitely many positions [J]
     double missed = 0.0;
 
     /// Returns the energy that the object can give from any position in its domain, plus the error `missed` [J].
@@ -126,7 +125,9 @@ template <class At>
 }  // namespace detail
 
 /// Returns the smallest and largest stored energy of a force of position and velocity, at velocity zero and with a
-/// force limit [N]. Uses Simpson's rule, because this force does not have an elementary antiderivative.
+/// force limit [N]. Uses Simpson's rule, because this force does not have an elementary antiderivative. For slopes up to
+/// L, the error of the rule is at most 5/36 L w^2 in a cell of width w. Its three values represent the positions at most
+/// w/6, w/3 and w/6 away from them.
 [[nodiscard]] inline EnergyRange energy_range(const VelocityNetwork& force, double force_limit) {
     const auto at = [&](double x) noexcept {
         return Curve{std::clamp(force.force(x, 0.0), -force_limit, force_limit), 0.0, 0.0, 0.0};
@@ -153,6 +154,10 @@ template <class At>
         from = to;
         at_from = at_to;
     }
+    const double steepest = force.resting_bounds(0.01).gradient[0].largest();
+    const double width = force.travel() / static_cast<double>(cells);
+    // As in `limited_energy`, the energy between two samples lies outside the sampled values by at most L w^2 / 4.
+    range.missed = (5.0 / 36.0 * static_cast<double>(cells) + 0.25) * steepest * width * width;
     range.least = std::min({range.least, -detail::decrease_beyond(force.below(), -1.0, force_limit),
                             energy - detail::decrease_beyond(force.above(), +1.0, force_limit)});
     return range;

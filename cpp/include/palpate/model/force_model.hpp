@@ -73,8 +73,8 @@ class ForceModel {
 
     /// Returns proved bounds of the slope of the force inside the domain [N/m], for press and release, and at velocity
     /// zero. With a play radius r and h >= 0, the bounds also hold during the motion after a reversal that changes
-    /// press force to release force, which adds h / r (hysteresis / play radius) to the slope. Only for models that can
-    /// be rendered (`require_renderable`).
+    /// press force to release force, which adds h / r (hysteresis / play radius) to the slope. Throws
+    /// std::invalid_argument for models that cannot be rendered (`require_renderable`).
     [[nodiscard]] Interval slope_bounds(std::optional<double> radius = std::nullopt) const {
         if (const WaveletNetwork* single = network()) {
             return single->curve().slope_bounds();
@@ -82,6 +82,7 @@ class ForceModel {
         if (velocity() != nullptr) {
             return velocity()->resting_bounds(0.01).gradient[0];
         }
+        require_one_input(parameters());
         const Interval common = hysteresis()->force().slope_bounds();
         const double hysteresis_slope = hysteresis()->hysteresis_force().slope_bounds().largest();
         const double sticking_slope =
@@ -108,12 +109,9 @@ class ForceModel {
                         sentence("max", stored.upper, "at least", slopes.upper));
     }
 
-    /// Returns the smallest width of the wavelets, 1 / dilation [m]; the length of the domain if the network has no
-    /// wavelets or only wider ones. For networks of one input.
+    /// Returns the smallest width of a wavelet along the position [m], at most the length of the domain.
     [[nodiscard]] double finest_width() const noexcept {
-        const auto& alpha = parameters().alpha;
-        const double travel = domain().upper[0] - domain().lower[0];
-        return alpha.empty() ? travel : std::min(travel, 1.0 / *std::max_element(alpha.begin(), alpha.end()));
+        return palpate::finest_width(parameters(), domain().upper[0] - domain().lower[0]);
     }
 
     /// Returns a copy of the model with this play radius [m]. A model without hysteresis is copied unchanged.

@@ -107,9 +107,7 @@ class NetworkCurve {
     /// computed.
     [[nodiscard]] CurveExtent extent() const {
         const double travel = upper_ - lower_;
-        // The largest slope is computed without the outer 2 % of the domain, because the slope of a fitted network is
-        // least certain at the ends of the recorded positions.
-        const double margin = 0.02 * travel;
+        const double margin = uncertain_end * travel;
         const double steepest = palpate::slope_bounds(network_, lower_ + margin, upper_ - margin).upper;
         return {travel, value_bounds().largest(), std::max(0.0, steepest)};
     }

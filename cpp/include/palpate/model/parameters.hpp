@@ -58,6 +58,16 @@ inline void require_size(const std::vector<double>& values, std::size_t size, co
 
 }  // namespace detail
 
+/// Returns the smallest width of a wavelet along the first input, 1 / dilation, and at most `travel`, the length of the
+/// domain along this input [m].
+[[nodiscard]] inline double finest_width(const NetworkParameters& network, double travel) noexcept {
+    double finest = travel;
+    for (std::size_t k = 0; k < network.alpha.size(); k += network.dimension) {
+        finest = std::min(finest, 1.0 / network.alpha[k]);
+    }
+    return finest;
+}
+
 /// Throws std::invalid_argument if a parameter of the network or its domain is invalid. The message states the name of
 /// the parameter and the rule.
 inline void validate(const NetworkParameters& network, const Domain& domain) {

@@ -62,9 +62,9 @@ class RadialNetwork {
         return sum;
     }
 
-    /// Returns the value of the network at the input x (d values), continuation included. Writes to `gradient` the d
-    /// components of the gradient at the nearest point of the domain; components along which x lies outside are limited
-    /// as in the continuation.
+    /// Returns the value of the network at the input x (d values), continuation included, and writes its d partial
+    /// derivatives to `gradient`. Where x lies outside along one input, the slope of the continuation changes with the
+    /// other inputs, which adds d2f/dx_j dx_l times the distance from the domain.
     [[nodiscard]] double at(std::span<const double> x, std::span<double> gradient) const noexcept {
         double sum = network_.bias;
         for (std::size_t j = 0; j < dimension(); ++j) {
@@ -75,21 +75,15 @@ class RadialNetwork {
         for (std::size_t j = 0; j < dimension(); ++j) {
             const double beyond = x[j] - projected(x, j);
             if (beyond != 0.0) {
-                gradient[j] = std::clamp(gradient[j], 0.0, gradient_cap_[j]);
-                sum += gradient[j] * beyond;
+                const double slope = std::clamp(gradient[j], 0.0, gradient_cap_[j]);
+                if (slope == gradient[j]) {  // a limited slope does not change with the other inputs
+                    add_mixed(x, j, beyond, gradient);
+                }
+                gradient[j] = slope;
+                sum += slope * beyond;
             }
         }
         return sum;
-    }
-
-    /// Returns proved bounds of the value inside the domain, and of the gradient inside and outside the domain. Outside
-    /// the domain each component of the gradient is that at the nearest point of the domain, or is nearer to zero.
-    [[nodiscard]] RadialBounds bounds(double relative = 0.01) const {
-        RadialBounds bounds = radial_bounds(network_, domain_.lower, domain_.upper, relative);
-        for (Interval& component : bounds.gradient) {
-            component = component.with({0.0, 0.0});
-        }
-        return bounds;
     }
 
   private:
@@ -120,6 +114,26 @@ class RadialNetwork {
                    psi.gradient_over_u;
         }
         return sum;
+    }
+
+    /// Adds `beyond` times d2f/dx_j dx_l, at the point of the domain that is nearest to x, to `gradient[l]` for each
+    /// input l along which x lies inside the domain.
+    void add_mixed(std::span<const double> x, std::size_t j, double beyond,
+                   std::span<double> gradient) const noexcept {
+        const std::size_t d = dimension();
+        for (std::size_t i = 0; i < size(); ++i) {
+            double square = 0.0;
+            for (std::size_t l = 0; l < d; ++l) {
+                square += scaled(i, x, l) * scaled(i, x, l);
+            }
+            const RadialMexicanHat psi = radial_mexican_hat(square, static_cast<double>(d));
+            for (std::size_t l = 0; l < d; ++l) {
+                if (x[l] == projected(x, l)) {
+                    gradient[l] += beyond * network_.weight[i] * network_.alpha[i * d + j] *
+                                   network_.alpha[i * d + l] * psi.mixed(scaled(i, x, j), scaled(i, x, l));
+                }
+            }
+        }
     }
 
     [[nodiscard]] double clamped_partial(std::span<const double> x, std::size_t j) const noexcept {

@@ -27,8 +27,9 @@ class VelocityNetwork {
   public:
     VelocityNetwork(NetworkParameters network, Domain domain)
         : network_{checked(std::move(network)), std::move(domain)} {
-        const RadialBounds rest = resting_bounds(0.01);
-        const CurveExtent extent{travel(), rest.value.largest(), std::max(0.0, rest.gradient[0].upper)};
+        const double margin = uncertain_end * travel();
+        const Interval slopes = resting_bounds(lower() + margin, upper() - margin, 0.01).gradient[0];
+        const CurveExtent extent{travel(), resting_bounds(0.01).value.largest(), std::max(0.0, slopes.upper)};
         below_ = continue_force(lower(), resting(lower()), -1.0, Continuation::Linear, extent);
         above_ = continue_force(upper(), resting(upper()), +1.0, Continuation::Linear, extent);
     }
@@ -53,15 +54,9 @@ class VelocityNetwork {
         return network_.extrapolated(std::array{position, velocity});
     }
 
-    /// Returns the smallest width of a wavelet along the position, 1 / dilation [m]; the length of the domain of
-    /// positions if the network has no wavelets or only wider ones.
+    /// Returns the smallest width of a wavelet along the position [m], at most the length of the domain.
     [[nodiscard]] double finest_width() const noexcept {
-        const std::vector<double>& alpha = network_.parameters().alpha;
-        double finest = travel();
-        for (std::size_t i = 0; i < alpha.size(); i += 2) {
-            finest = std::min(finest, 1.0 / alpha[i]);
-        }
-        return finest;
+        return palpate::finest_width(network_.parameters(), travel());
     }
 
     /// Returns proved bounds of the force and its gradient over the domain of positions and velocities, wider than the
@@ -73,9 +68,7 @@ class VelocityNetwork {
 
     /// Returns proved bounds of the force and its gradient over the domain of positions, at velocity zero.
     [[nodiscard]] RadialBounds resting_bounds(double relative) const {
-        const double rest = clipped(0.0);
-        return radial_bounds(network_.parameters(), std::array{lower(), rest}, std::array{upper(), rest},
-                             relative);
+        return resting_bounds(lower(), upper(), relative);
     }
 
   private:
@@ -83,6 +76,11 @@ class VelocityNetwork {
         detail::require(network.dimension == 2, "the network has " + std::to_string(network.dimension) +
                                                     " inputs, must have 2: position and velocity");
         return network;
+    }
+
+    [[nodiscard]] RadialBounds resting_bounds(double from, double to, double relative) const {
+        const double rest = clipped(0.0);
+        return radial_bounds(network_.parameters(), std::array{from, rest}, std::array{to, rest}, relative);
     }
 
     [[nodiscard]] double clipped(double velocity) const noexcept {

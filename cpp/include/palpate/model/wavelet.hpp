@@ -48,8 +48,10 @@ struct RadialMexicanHat {
     double gradient_over_u;  ///< (d + 2 - r^2) E; this factor times the vector u is the gradient
 
     /// Returns the second derivative d^2 psi / du_j^2 for a component u_j = `u` (2 E is `value` + `gradient_over_u`).
-    [[nodiscard]] double curvature(double u) const noexcept {
-        return gradient_over_u - u * u * (2.0 * gradient_over_u + value);
+    [[nodiscard]] double curvature(double u) const noexcept { return gradient_over_u + mixed(u, u); }
+    /// Returns the second derivative d^2 psi / du_j du_l for two different components u_j = `u` and u_l = `v`.
+    [[nodiscard]] double mixed(double u, double v) const noexcept {
+        return -u * v * (2.0 * gradient_over_u + value);
     }
 };
 

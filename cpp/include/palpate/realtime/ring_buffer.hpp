@@ -48,7 +48,6 @@ class RingBuffer {
     [[nodiscard]] std::size_t size() const noexcept {
         return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_relaxed);
     }
-    [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
 
   private:
     /// Size of a cache line; data changed by different processor cores are at least this far apart [bytes]

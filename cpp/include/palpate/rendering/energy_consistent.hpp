@@ -58,6 +58,8 @@ class EnergyConsistent {
         return inertia.midpoint_slope(period) + coupling.load_line_slope(period);
     }
 
+    [[nodiscard]] const Solver& solver() const noexcept { return solver_; }
+
     /// Sets the virtual object at rest at a position.
     void reset(double position) noexcept {
         state_ = environment_.start(position);
@@ -243,11 +245,8 @@ class EnergyConsistent {
 
 /// Builds the energy-consistent structure.
 struct EnergyConsistentStructure {
-    static constexpr StructureTraits traits{.name = "energy-consistent",
-                                            .coupling = true,
-                                            .mass = true,
-                                            .solved = true,
-                                            .may_reduce_hysteresis = true};
+    static constexpr StructureTraits traits{
+        .name = "energy-consistent", .coupling = true, .mass = true, .may_reduce_hysteresis = true};
 
     template <Environment E, class SolverOf, class Visit>
     static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,

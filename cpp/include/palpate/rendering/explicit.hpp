@@ -54,35 +54,47 @@ class Explicit {
 
     /// Moves the object by one step and returns the coupling's force for the measured position of the device.
     [[nodiscard]] Rendered step(double device) noexcept {
-        if (!std::isfinite(device)) {
-            return detail::refused(position_);
+        const ObjectStep next = moved_by(force_);
+        const double force =
+            coupling_.force(device - next.position, (device - device_) / period_ - next.velocity);
+        const Rendered rendered = take(next, force);
+        if (rendered.status == Status::Ok) {
+            device_ = device;
+            force_ = force;
         }
-        Rendered rendered = drive(force_);
-        if (rendered.status == Status::NonFinite) {
-            return rendered;
-        }
-        rendered.force = coupling_.force(device - position_, (device - device_) / period_ - velocity_);
-        device_ = device;
-        force_ = rendered.force;
         return rendered;
     }
 
     /// Moves the virtual object by one step; the given force acts on it in place of the coupling's force.
-    [[nodiscard]] Rendered drive(double force) noexcept {
+    [[nodiscard]] Rendered drive(double force) noexcept { return take(moved_by(force), force); }
+
+  private:
+    /// Velocity and position of the object at the end of a step.
+    struct ObjectStep {
+        double velocity;
+        double position;
+        bool extrapolated;  ///< true if the step starts outside the model's domain
+    };
+
+    /// Returns the step of the object under a force, without changing the state.
+    [[nodiscard]] ObjectStep moved_by(double force) const noexcept {
         const EnvironmentSample sample = environment_.at(position_, state_);
         const double velocity =
             velocity_ + period_ / inertia_.mass * ((force - inertia_.damping * velocity_) - sample.force);
-        const double position = position_ + period_ * velocity;
-        if (!std::isfinite(position)) {
-            return detail::refused(position_);
-        }
-        velocity_ = velocity;
-        position_ = position;
-        environment_.advance(position_, state_);
-        return {force, position_, 1, Status::Ok, sample.extrapolated};
+        return {velocity, position_ + period_ * velocity, sample.extrapolated};
     }
 
-  private:
+    /// Moves the object to the end of a step and returns the force, if position and force are finite.
+    [[nodiscard]] Rendered take(const ObjectStep& next, double force) noexcept {
+        if (!std::isfinite(next.position) || !std::isfinite(force)) {
+            return detail::refused(position_);
+        }
+        velocity_ = next.velocity;
+        position_ = next.position;
+        environment_.advance(position_, state_);
+        return {force, position_, 1, Status::Ok, next.extrapolated};
+    }
+
     E environment_;
     Inertia inertia_;
     VirtualCoupling coupling_;

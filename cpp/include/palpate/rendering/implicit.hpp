@@ -142,8 +142,7 @@ class Implicit {
 
 /// Builds the implicit structure.
 struct ImplicitStructure {
-    static constexpr StructureTraits traits{
-        .name = "implicit", .coupling = true, .mass = true, .solved = true};
+    static constexpr StructureTraits traits{.name = "implicit", .coupling = true, .mass = true};
 
     template <Environment E, class SolverOf, class Visit>
     static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,

@@ -86,7 +86,7 @@ class Massless {
 
 /// Builds the massless structure.
 struct MasslessStructure {
-    static constexpr StructureTraits traits{.name = "massless", .coupling = true, .solved = true};
+    static constexpr StructureTraits traits{.name = "massless", .coupling = true};
 
     template <Environment E, class SolverOf, class Visit>
     static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,

@@ -170,8 +170,8 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
 }
 
 /// Returns the method that solves the load line of a scheme: "table" if a table of solutions is used for at least a
-/// part of the positions, else "newton"; nothing if the structure has no load line. For the energy-consistent structure
-/// always "newton", because it also solves by Newton's method when it has a table.
+/// part of the positions, else "newton"; nothing if the structure has no load line. The energy-consistent structure
+/// uses its table only in steps in which the model's force does not generate energy, and Newton's method in the others.
 [[nodiscard]] inline std::optional<std::string_view> solver_name(const ForceModel& model,
                                                                  const Scheme& scheme, double period_s) {
     return with_structure(model, scheme, period_s, std::numeric_limits<double>::infinity(),
@@ -179,9 +179,7 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
                               if constexpr (requires { structure.solver(); }) {
                                   return structure.solver().tabulated() ? "table" : "newton";
                               } else {
-                                  return traits_of(scheme.structure).solved
-                                             ? std::optional<std::string_view>{"newton"}
-                                             : std::nullopt;
+                                  return std::nullopt;
                               }
                           });
 }

@@ -34,7 +34,6 @@ struct StructureTraits {
     std::string_view name;               ///< name of the structure, as in --structure
     bool coupling = false;               ///< true: the structure has a virtual coupling
     bool mass = false;                   ///< true: the virtual object has mass and damping
-    bool solved = false;                 ///< true: every tick solves a load line
     bool velocity = false;               ///< true: the structure can render a force that depends on velocity
     bool predicts = false;               ///< true: the structure can use a predicted position
     bool may_reduce_hysteresis = false;  ///< true: may dissipate less energy than the model's hysteresis

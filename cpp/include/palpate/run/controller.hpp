@@ -69,7 +69,6 @@ class Controller {
             return paces_host<D>;
         }
     }
-    [[nodiscard]] S& structure() noexcept { return structure_; }
     [[nodiscard]] const ReadingGuard& reading_guard() const noexcept { return guards_.reading; }
     [[nodiscard]] const Guards& guards() const noexcept { return guards_; }
 
@@ -88,11 +87,17 @@ class Controller {
     /// Applies the guards to the force in this order: force limit, scaling after a limit cycle, start ramp, slew limit,
     /// energy tank. The force limit comes first: a force that is clipped and then scaled is passive, but a force of a
     /// periodic model that is scaled and then clipped can be active. The force limit also replaces numbers that are not
-    /// finite.
+    /// finite. A failed step sends zero force at once: the limits of its change do not apply.
     [[nodiscard]] Status limit_force(const Rendered& rendered, double& force,
                                      Status reading_status) noexcept {
         force = rendered.force;
         const Status limited = guards_.limit.apply(force);
+        for (const Status failed : {rendered.status, limited}) {
+            if (!sends_force(failed)) {
+                force = 0.0;
+                return failed;
+            }
+        }
         const Status cycle_scaled = guards_.limit_cycle.apply(force);
         const Status ramped = guards_.ramp.apply(force);
         const Status slewed = guards_.slew.apply(force);

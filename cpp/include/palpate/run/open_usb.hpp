@@ -42,6 +42,7 @@ namespace detail {
          {"malformed", stream.malformed},
          {"discarded", health.discarded},
          {"skipped_commands", health.skipped_commands},
+         {"lost_commands", health.lost_commands},
          {"refused_commands", stream.refused_commands},
          {"late_echoes", stream.late_echoes},
          {"late_commands", stream.late_commands},

@@ -122,7 +122,14 @@ struct RenderJob {
     return options.scheme.any() || options.force_limit || options.slew_s || options.tolerated;
 }
 
-/// Returns the reason why the certificate of a model does not hold for a simulated device; empty if it holds.
+/// Returns true if a simulated run uses the device and the rate for which the model was planned.
+[[nodiscard]] inline bool follows_certificate(const RenderOptions& options,
+                                              const PlannedModel& model) noexcept {
+    return model.certificate && !options.uncertified && !changes_plan(options);
+}
+
+/// Returns the reason why no proof holds for a run on a simulated device; empty if the certificate of the model holds
+/// and its verdict is `Certified`. A certificate with the verdict `StableLocally` proves nothing about the energy.
 [[nodiscard]] inline std::string uncertified_reason(const RenderOptions& options, const PlannedModel& model) {
     if (!model.certificate) {
         return "the model has no certificate";
@@ -130,7 +137,13 @@ struct RenderJob {
     if (options.uncertified) {
         return "uncertified was set";
     }
-    return changes_plan(options) ? "the options change the plan" : "";
+    if (changes_plan(options)) {
+        return "the options change the plan";
+    }
+    const Certificate& certificate = *model.certificate;
+    return certificate.certified() ? ""
+                                   : "the certificate is " + std::string(name_of(certificate.verdict)) +
+                                         ": " + certificate.reason;
 }
 
 namespace detail {

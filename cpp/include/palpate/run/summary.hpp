@@ -103,6 +103,7 @@ struct Summary {
         {"missed_deadlines", loop.timing.missed},
         {"longest_gap_us", 1e-3 * static_cast<double>(loop.timing.period.largest())},
         {"ticks_by_status", ticks_by_status(loop)},
+        {"limit_cycles", loop.limit_cycles},
         {"lost_samples", loop.lost_samples},
         {"repeated_samples", loop.repeated_samples},
         {"record", summary.record.empty() ? Value{} : Value{summary.record}},

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -56,7 +57,8 @@ struct ClosedLoopSettings {
     int substeps = usual_substeps;  ///< number of integration steps in each tick
     double start_position = 0.0;    ///< start position of the handle [m or rad]
     double start_velocity = 0.0;    ///< start velocity of handle and hand [m/s or rad/s]
-    Guards guards{};                ///< guards of the rendering; by default only a force limit of 5
+    /// Guards of the rendering; unset: only the force limit of the device
+    std::optional<Guards> guards{};
 };
 
 /// Result of a simulated run: energies, position and velocity of the handle at two times, and number of ticks.
@@ -76,13 +78,13 @@ template <Structure S, SimulatedHand H, class Watch>
                                         settings.start_velocity};
     const auto delay = static_cast<std::size_t>(profile.late_samples());
     ClosedLoopEnd end;
-    end.ticks =
-        closed_loop(device, std::move(structure), settings.guards, ticks, [&](const SimulatedTick& now) {
-            if (now.number == 0 || now.number == delay) {
-                end.at_first_force = now.start;
-            }
-            return watch(now.tick, now.end, device.plant().account());
-        });
+    const Guards guards = settings.guards.value_or(Guards{.limit = {profile.force_limit}});
+    end.ticks = closed_loop(device, std::move(structure), guards, ticks, [&](const SimulatedTick& now) {
+        if (now.number == 0 || now.number == delay) {
+            end.at_first_force = now.start;
+        }
+        return watch(now.tick, now.end, device.plant().account());
+    });
     end.energy = device.plant().account();
     end.handle = device.handle();
     return end;
@@ -214,9 +216,13 @@ template <class Each>
                 }
                 return rendered;
             } else {
-                throw std::invalid_argument(
-                    "structure is " + std::string(name_of(scheme.structure)) +
-                    ", must be implicit or explicit: a force can move only an object with mass");
+                std::string right;
+                for (const StructureTraits& traits : structure_traits) {
+                    right += traits.mass ? (right.empty() ? "" : " or ") + std::string(traits.name) : "";
+                }
+                throw std::invalid_argument("structure is " + std::string(name_of(scheme.structure)) +
+                                            ", must be " + right +
+                                            ": a force can move only an object with mass");
             }
         });
 }

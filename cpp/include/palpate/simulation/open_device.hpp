@@ -21,12 +21,12 @@
 
 namespace palpate {
 
-/// Opens the simulated device for rendering. Its profile is that of the model's certificate, if the certificate holds;
-/// otherwise the default knob, scaled to the model.
+/// Opens the simulated device for rendering. Its profile is that of the model's certificate if the run follows the
+/// plan, otherwise the default knob, scaled to the model.
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_simulated(const RenderOptions& options,
                                                                 const PlannedModel& model) {
-    const bool certified = uncertified_reason(options, model).empty();
-    const double rate_hz = certified ? 1.0 / model.certificate->device.period_s : options.loop.rate_hz;
+    const bool planned = follows_certificate(options, model);
+    const double rate_hz = planned ? 1.0 / model.certificate->device.period_s : options.loop.rate_hz;
     if (options.rate_given && std::abs(options.loop.rate_hz - rate_hz) > 1e-6 * rate_hz) {
         refuse("rate_hz is " + readable(options.loop.rate_hz) + ", but the certificate is for " +
                readable(rate_hz) +
@@ -37,7 +37,7 @@ namespace palpate {
     validate(loop);
     const double period_s = 1.0 / rate_hz;
     TestRig rig = rig_for(model.model, model.position_unit == "rad", period_s);
-    if (certified) {
+    if (planned) {
         rig.device = model.certificate->device;
     }
     const double largest_speed =

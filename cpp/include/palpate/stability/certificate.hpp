@@ -221,18 +221,15 @@ namespace detail {
     certificate.device = device;
     certificate.bounds = bounds;
     std::vector<Inequality> lines = inequalities_of(bounds, scheme, device);
-    if (!finite(bounds)) {
-        certificate.reason = "a bound of the model is not a finite number";
-        certificate.inequalities = std::move(lines);
-        return certificate;
-    }
-    if (all_hold(lines)) {
+    const bool is_finite = finite(bounds);
+    if (is_finite && all_hold(lines)) {
         const bool proved = std::all_of(lines.begin(), lines.end(),
                                         [](const Inequality& line) { return line.basis != Basis::Linear; });
         certificate.verdict = proved ? Verdict::Certified : Verdict::StableLocally;
         certificate.longest_period_s = detail::longest_period(lines, bounds, scheme, device);
     }
-    certificate.reason = detail::reason(lines, certificate.verdict);
+    certificate.reason = is_finite ? detail::reason(lines, certificate.verdict)
+                                   : "a bound of the model is not a finite number";
     certificate.inequalities = std::move(lines);
     certificate.fingerprint = fingerprint_of(certificate);
     return certificate;

@@ -42,11 +42,11 @@ namespace detail {
     std::string difference;
     for_each_field<ForceBounds>([&](const auto& field) {
         const auto bound = static_cast<double>(field.of(stored));
-        const auto true_bound = static_cast<double>(field.of(now));
+        const auto recomputed = static_cast<double>(field.of(now));
         const bool lower = std::string_view{field.name}.ends_with("_min");
-        if (difference.empty() && !(lower ? bound <= true_bound : bound >= true_bound) &&
-            !agree(bound, true_bound)) {
-            difference = disagrees(std::string("bounds.") + field.name, bound, true_bound,
+        if (difference.empty() && !(lower ? bound <= recomputed : bound >= recomputed) &&
+            !agree(bound, recomputed)) {
+            difference = disagrees(std::string("bounds.") + field.name, bound, recomputed,
                                    lower ? "at most " : "at least ");
         }
     });
@@ -121,7 +121,11 @@ namespace detail {
     }
     require(detail::narrower_bound(stored.bounds, bounds));
     Certificate now = certify_rendered(stored.bounds, stored.scheme, stored.device);
-    if (stored.verdict != now.verdict || now.verdict == Verdict::Refused) {
+    if (now.verdict == Verdict::Refused && stored.verdict == now.verdict) {
+        require("certificate.verdict is \"refused\": must be \"certified\" or \"stable-locally\", " +
+                now.reason);
+    }
+    if (stored.verdict != now.verdict) {
         require("certificate.verdict is \"" + std::string(name_of(stored.verdict)) + "\": must be \"" +
                 std::string(name_of(now.verdict)) + "\", " + now.reason);
     }

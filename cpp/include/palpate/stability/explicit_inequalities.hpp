@@ -46,13 +46,13 @@ namespace palpate {
                                           double period_s, int delay_samples) noexcept {
     constexpr int frequencies = 512;
     constexpr int slope_steps = 32;
-    // Number of refinements around the largest needed damping; after each one the distance between the tried
-    // frequencies, and between the tried slopes, is halved
+    // Number of refinements around the largest needed damping; each one halves the distance between the tried
+    // frequencies, and between the tried slopes
     constexpr int halvings = 20;
     constexpr double lowest = 1e-4;  // lowest tried frequency, as angular frequency times the period T [rad]
-    const double octaves = std::log(std::numbers::pi / lowest);
+    const double log_range = std::log(std::numbers::pi / lowest);
     const auto need = [&](double along, double slope) noexcept {
-        return explicit_need_at(lowest * std::exp(octaves * along), slope, inertia, coupling, period_s,
+        return explicit_need_at(lowest * std::exp(log_range * along), slope, inertia, coupling, period_s,
                                 delay_samples);
     };
     double best = -std::numeric_limits<double>::infinity();
@@ -74,7 +74,7 @@ namespace palpate {
         }
     }
     for (int halving = 0; halving < halvings; ++halving) {
-        const double share = std::ldexp(1.0, -halving);
+        const double share = std::ldexp(1.0, -1 - halving);
         const double along = best_along;
         const double slope = best_slope;
         for (const double i : {-1.0, 0.0, 1.0}) {

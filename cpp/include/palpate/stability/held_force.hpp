@@ -47,7 +47,7 @@ namespace detail {
 /// energy (a + l rho + gamma rho^2) d^2, where d is the handle's step and rho the position error divided by d. The
 /// function h(rho) is M (1/2 + rho) for rho > 0, M (1 + rho)^2 / 2 + s rho^2 / 2 for -1 <= rho <= 0, and s (-rho - 1/2)
 /// for rho < -1.
-[[nodiscard]] inline double step_energy(SlopeRange slopes, double l, double gamma) noexcept {
+[[nodiscard]] inline double step_coefficient(SlopeRange slopes, double l, double gamma) noexcept {
     const double M = slopes.rising;
     const double s = slopes.falling;
     const double rise = std::max(0.0, M - l);
@@ -212,8 +212,8 @@ template <class Gain = FilterGain, class Cost>
 ///
 ///     min over l, gamma of a + max over theta of l Re Q + gamma |Q|^2     and     R(sum of |taps|).
 ///
-/// a is computed by `step_energy`, R by `held_need`. For n samples of delay the filter has n taps of 1. For a force
-/// with hysteresis the result is proved only for delays, not for other filters (docs/certificate.md).
+/// a is computed by `step_coefficient`, R by `held_need`. For n samples of delay the filter has n taps of 1. For a
+/// force with hysteresis the result is proved only for delays, not for other filters (docs/certificate.md).
 [[nodiscard]] inline double filtered_need(std::span<const double> taps, SlopeRange slopes) {
     const double size = detail::size_of(taps);
     const double simple = held_need(size, slopes);
@@ -222,7 +222,7 @@ template <class Gain = FilterGain, class Cost>
     }
     const double sharp =
         detail::least_cost(taps, slopes, [&](const detail::FilterGain& gain, double l, double gamma) {
-            return detail::step_energy(slopes, l, gamma) + gain.most(l, gamma);
+            return detail::step_coefficient(slopes, l, gamma) + gain.most(l, gamma);
         });
     return std::min(simple, sharp);
 }
@@ -240,7 +240,7 @@ namespace detail {
     std::vector<double> taps(static_cast<std::size_t>(whole), 1.0);
     taps.push_back(fraction);
     const double sharp = least_cost(taps, slopes, [&](const FilterGain& gain, double l, double gamma) {
-        const double a = step_energy(slopes, l, gamma);
+        const double a = step_coefficient(slopes, l, gamma);
         const double Z = a + gain.most(l, gamma) + gamma * uneven;
         return 0.5 * (Z + std::sqrt(std::max(0.0, Z * Z - 4.0 * uneven * (a * gamma - 0.25 * l * l))));
     });
@@ -256,8 +256,8 @@ namespace detail {
 ///     Z = a + max over theta of (l Re Q + gamma |Q|^2) + gamma tau (1 - tau)
 ///     b / T >= (Z + sqrt(Z^2 - 4 tau (1 - tau) (a gamma - l^2 / 4))) / 2,
 ///
-/// the largest eigenvalue of a quadratic form in the handle's step d and alpha; a is computed by `step_energy`. The
-/// bound is continuous in the delay. A falling force can need slightly less damping with n + tau samples of delay than
+/// the largest eigenvalue of a quadratic form in the handle's step d and alpha; a is computed by `step_coefficient`.
+/// The bound is continuous in the delay. A falling force can need slightly less damping with n + tau samples of delay than
 /// with n samples. The result is the larger of both, because the true delay may be shorter than n + tau samples.
 [[nodiscard]] inline double delayed_need(int whole, double fraction, SlopeRange slopes) {
     const std::vector<double> taps(static_cast<std::size_t>(whole), 1.0);
@@ -288,8 +288,8 @@ class SplitGain {
     /// trigonometric polynomial, so `maximum_of` also holds for its largest eigenvalue.
     [[nodiscard]] double most(double fraction, double rest, SlopeRange slopes, double l, double gamma_first,
                               double gamma_second) const noexcept {
-        const double first = step_energy(slopes, l, gamma_first);
-        const double second = step_energy(slopes, l, gamma_second);
+        const double first = step_coefficient(slopes, l, gamma_first);
+        const double second = step_coefficient(slopes, l, gamma_second);
         const auto eigenvalue = [&](std::size_t k) {
             const std::complex<double> Q = now_[k];
             const std::complex<double> other = std::conj(1.0 + Q);
@@ -334,11 +334,6 @@ class SplitGain {
     };
     return std::min(least(fraction, rest), least(std::sqrt(fraction), std::sqrt(rest)));
 }
-/// Returns the device damping divided by the period for a force that acts with an additional delay of exactly a
-/// fraction tau of a sample (`rest` = 1 - tau).
-[[nodiscard]] inline double filtered_need(std::span<const double> taps, double fraction, SlopeRange slopes) {
-    return filtered_need(taps, fraction, slopes, 1.0 - fraction);
-}
 
 namespace detail {
 
@@ -350,7 +345,7 @@ namespace detail {
     const double off = gain * std::sqrt(nu);
     const double eta = off / size_of(taps);
     return least_cost(taps, slopes, [&](const FilterGain& filter, double l, double gamma) {
-        return step_energy(slopes, l, gamma) + filter.most(l, gamma * (1.0 + eta)) +
+        return step_coefficient(slopes, l, gamma) + filter.most(l, gamma * (1.0 + eta)) +
                gamma * (1.0 + 1.0 / eta) * off * off + std::abs(l) * off;
     });
 }

@@ -57,8 +57,6 @@ struct FreeList {
 /// Connection to one suitable USB device, whose interface is reserved for this program.
 class UsbConnection {
   public:
-    static constexpr unsigned request_timeout_ms = 500;
-
     /// Opens the device with this serial number, or the only device if `serial` is empty.
     [[nodiscard]] Opened open(const std::string& serial) {
         libusb_context* context = nullptr;
@@ -83,7 +81,7 @@ class UsbConnection {
     [[nodiscard]] int request(wire::Request request, std::uint16_t value) const noexcept {
         const int transferred = libusb_control_transfer(
             handle_.get(), wire::request_to_device, static_cast<std::uint8_t>(request), value,
-            wire::interface_number, nullptr, 0, request_timeout_ms);
+            wire::interface_number, nullptr, 0, wire::request_timeout_ms);
         return transferred < 0 ? transferred : 0;
     }
 
@@ -220,7 +218,7 @@ class UsbConnection {
         std::array<std::uint8_t, wire::largest_packet> bytes{};
         const int transferred = libusb_control_transfer(
             opened, wire::request_to_host, static_cast<std::uint8_t>(wire::Request::GetInfo), 0,
-            wire::interface_number, bytes.data(), bytes.size(), request_timeout_ms);
+            wire::interface_number, bytes.data(), bytes.size(), wire::request_timeout_ms);
         if (transferred < 0) {
             return refuse("does not report its properties (GET_INFO)", transferred);
         }

@@ -41,7 +41,7 @@ struct UsbArrival {
 class UsbTransfers {
   public:
     UsbTransfers(libusb_context* context, libusb_device_handle* handle)
-        : context_{context}, handle_{handle}, arrivals_{most_waiting_packets} {
+        : context_{context}, handle_{handle}, arrivals_{queued_packets} {
         for (Read& read : reads_) {
             read.owner = this;
             read.transfer.reset(libusb_alloc_transfer(0));
@@ -121,7 +121,7 @@ class UsbTransfers {
         libusb_fill_control_setup(setup_.data(), wire::request_to_device, static_cast<std::uint8_t>(request),
                                   value, wire::interface_number, 0);
         libusb_fill_control_transfer(request_.get(), handle_, setup_.data(), &UsbTransfers::request_callback,
-                                     this, request_timeout_ms);
+                                     this, wire::request_timeout_ms);
         requests_in_flight_.store(1, std::memory_order_relaxed);
         if (const int code = libusb_submit_transfer(request_.get()); code != 0) {
             requests_in_flight_.store(0, std::memory_order_relaxed);
@@ -177,10 +177,9 @@ class UsbTransfers {
     }
 
   private:
-    static constexpr std::size_t most_waiting_packets = 64;
+    static constexpr std::size_t queued_packets = 64;  ///< length of the queue of received packets
     static constexpr Nanoseconds longest_stop = 5 * nanoseconds_a_second;
     static constexpr Nanoseconds cancel_interval = nanoseconds_a_second / 10;
-    static constexpr unsigned request_timeout_ms = 500;
     /// The connection ends after this number of consecutive errors of the USB bus
     static constexpr int most_errors_in_a_row = 100;
 
@@ -224,10 +223,7 @@ class UsbTransfers {
         }
         if (reads_halted_) {
             if (reads_in_flight_.load(std::memory_order_acquire) > 0) {
-                for (Read& read : reads_) {
-                    // the result is ignored: canceling fails only if this transfer has already ended
-                    (void)libusb_cancel_transfer(read.transfer.get());
-                }
+                cancel_reads();
                 return;
             }
             store_error(libusb_clear_halt(handle_, wire::in_endpoint));
@@ -398,11 +394,15 @@ class UsbTransfers {
         changes_.notify();
     }
 
-    void cancel_all() noexcept {
+    void cancel_reads() noexcept {
         for (Read& read : reads_) {
             // the result is ignored: canceling fails only if this transfer has already ended
             (void)libusb_cancel_transfer(read.transfer.get());
         }
+    }
+
+    void cancel_all() noexcept {
+        cancel_reads();
         (void)libusb_cancel_transfer(write_.get());
         (void)libusb_cancel_transfer(request_.get());
     }
