@@ -47,8 +47,7 @@ class ForceModel:
         A hysteresis model needs `direction` (+1 pressing, -1 releasing) or, if it has a play radius,
         `play`, the state of the play operator. Arguments that the model does not use do not change the
         force, but direction and play must have one value for each position or one for all. Raises
-        ValueError with the name of a missing argument. A position that is not finite
-        gives NaN.
+        ValueError with the name of a missing argument. A position that is not finite gives NaN.
         """
     @typing.overload
     def force(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
