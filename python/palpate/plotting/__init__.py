@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures: each function draws on axes of the caller. The command line and the methods `plot` use them."""
 
-from .analysis import draw_force_history, draw_force_over_position, draw_spectrum, draw_transform, draw_views
+from .analysis import draw_force_history, draw_spectrum, draw_transform, draw_views
 from .frame import draw_frame_bounds, draw_frame_grid
 from .look import axes_or_new
 from .models import (
@@ -21,7 +21,6 @@ __all__ = [
     "Plane",
     "axes_or_new",
     "draw_force_history",
-    "draw_force_over_position",
     "draw_forces",
     "draw_frame_bounds",
     "draw_frame_grid",

@@ -13,7 +13,8 @@ from matplotlib.colors import LogNorm
 
 from .._typing import Float1D, Float2D
 from ..recording import Recording
-from .look import Scale, grid, legend_above, plain_decades, scale_for, strokes, thinned
+from .look import Scale, grid, plain_decades, scale_for, thinned
+from .recordings import draw_recording
 from .transforms import History, Plane, power_spectrum, short_time_transform, wavelet_transform
 
 MOST_COLUMNS = 700
@@ -48,34 +49,6 @@ def draw_force_history(axes: Axes, history: History, force_unit: str) -> None:
     _shade_gaps(axes, history, x)
     axes.set_xlim(history.at[0] * x.factor, history.at[-1] * x.factor)
     axes.set_xlabel(x.label(history.axis))
-    axes.set_ylabel(y.label("force"))
-
-
-def draw_force_over_position(axes: Axes, recording: Recording) -> None:
-    """Draws the recorded force over position; press and release have different markers.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        Target axes.
-    recording : Recording
-        Press and release are drawn separately if it states the direction.
-    """
-    x = scale_for(recording.units["position"], recording.position)
-    y = scale_for(recording.units["force"], recording.force)
-    for name, rows in strokes(recording.direction, len(recording)):
-        axes.plot(
-            *thinned(recording.position[rows] * x.factor, recording.force[rows] * y.factor),
-            linestyle="none",
-            marker="o",
-            markersize=1.6,
-            color="0.6" if name == "release" else "black",
-            markeredgewidth=0.0,
-            label=name,
-        )
-        if name == "release":
-            legend_above(axes)
-    axes.set_xlabel(x.label("position"))
     axes.set_ylabel(y.label("force"))
 
 
@@ -169,7 +142,7 @@ def draw_views(axes: Mapping[str, Axes], recording: Recording, history: History)
     """
     unit = recording.units["force"]
     draw_force_history(axes["history"], history, unit)
-    draw_force_over_position(axes["position"], recording)
+    draw_recording(axes["position"], recording)
     draw_spectrum(axes["spectrum"], history, unit)
     planes = {"short-time": short_time_transform(history), "wavelet": wavelet_transform(history)}
     for name, plane in planes.items():
