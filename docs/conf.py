@@ -96,6 +96,7 @@ sphinx_gallery_conf = {
     "examples_dirs": ["../examples"],
     "gallery_dirs": ["gallery"],
     "filename_pattern": r"/\d\d_",
+    "within_subsection_order": "FileNameSortKey",
     "ignore_pattern": r"__init__",
     "abort_on_example_error": True,
     "download_all_examples": False,
