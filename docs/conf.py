@@ -65,7 +65,6 @@ nitpick_ignore_regex = [
     (r"py:.*", r"palpate\.(_\w+|\w+\.\w+)\..*"),
     (r"cpp:.*", r"(?!palpate::).*|palpate::(wire|detail)\b.*"),
 ]
-autosummary_generate = True
 autosummary_ignore_module_all = False
 # Members of the base classes of scikit-learn and Python are described in their documentation.
 _FOREIGN = "BaseEstimator, RegressorMixin, MultiOutputMixin, Exception, ValueError, tuple, str, object"
@@ -97,6 +96,7 @@ sphinx_gallery_conf = {
     "examples_dirs": ["../examples"],
     "gallery_dirs": ["gallery"],
     "filename_pattern": r"/\d\d_",
+    "within_subsection_order": "FileNameSortKey",
     "ignore_pattern": r"__init__",
     "abort_on_example_error": True,
     "download_all_examples": False,
@@ -112,7 +112,8 @@ def setup(app: Any) -> None:
     """Makes the generated pages and pictures, and connects the changes of a page before it is read."""
     generated = DOCS / "generated"
     cpp_pages.write_pages(generated / "cpp")
-    python_pages.write_pages(generated / "python")
+    # A cached environment does not know new pages, so their files are listed.
+    app.config.autosummary_generate = python_pages.write_pages(generated / "python")
     command_pages.write_pages(generated)
     shutil.copy(DOCS.parent / "SECURITY.md", generated / "security.md")
     figures.write_figures(generated / "figures")

@@ -8,6 +8,7 @@ without a comment is an error. A member without a comment has the meaning in the
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
@@ -34,7 +35,8 @@ def write_pages(folder: Path) -> list[str]:
     (ROOT / "build" / "docs").mkdir(parents=True, exist_ok=True)
     subprocess.run(["doxygen", "docs/Doxyfile"], cwd=ROOT, check=True)
     reference = Reference()
-    folder.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     for name, headers in reference.headers().items():
         (folder / f"{name}.rst").write_text(reference.page(name, headers), encoding="utf-8")
     # One comment is enough for all overloads of a function.

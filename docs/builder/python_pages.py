@@ -11,6 +11,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +40,13 @@ def page_names() -> dict[str, list[str]]:
     return pages
 
 
-def write_pages(folder: Path) -> None:
-    """Writes the page of each package to `folder`; autosummary makes the pages of the names from it."""
-    folder.mkdir(parents=True, exist_ok=True)
+def write_pages(folder: Path) -> list[str]:
+    """Writes the page of each package to `folder`; returns the files.
+
+    From them autosummary makes the pages of the names.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     packages = public_packages()
     for package, names in page_names().items():
         module = importlib.import_module(package)
@@ -52,6 +57,7 @@ def write_pages(folder: Path) -> None:
         lines += [f".. currentmodule:: {package}", "", ".. autosummary::", "   :toctree: names", ""]
         lines += [f"   {name}" for name in names]
         (folder / f"{package}.rst").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return sorted(map(str, folder.glob("*.rst")))
 
 
 _SHORTER = (
@@ -71,7 +77,7 @@ def shorten_signature(
     return arguments, result
 
 
-def escape_formulas(_app: Any, _kind: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+def escape_formulas(_app: Any, kind: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
     """Escapes the signs | and * of formulas and units in a docstring, outside of code and literal blocks."""
     block: int | None = None
     """Indentation of the paragraph that announces a literal block"""
@@ -85,3 +91,6 @@ def escape_formulas(_app: Any, _kind: str, _name: str, _object: Any, _options: A
             lines[at] = re.sub(r"^(\s*)\\\* ", r"\1* ", "".join(parts))
         if block is None and line.rstrip().endswith("::"):
             block = indentation
+    if kind in ("attribute", "data", "property"):
+        # Napoleon takes the text before a colon in the first line for a type; this line is an empty comment.
+        lines[:0] = ["..", ""]
