@@ -98,7 +98,7 @@ def test_press_and_release_are_distinguished() -> None:
     axes = views(Recording.from_arrays(x, x + 0.1 * direction, direction=direction))
     legend = axes["position"].get_legend()
     assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["press", "release"]
+    assert [text.get_text() for text in legend.get_texts()] == ["recorded, press", "recorded, release"]
 
 
 def test_gaps_in_time_are_grey() -> None:
