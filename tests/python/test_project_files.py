@@ -48,11 +48,11 @@ def test_make_control_installs_neither_linters_nor_test_tools() -> None:
     assert set(re.findall(r"--group ([\w-]+)", commands)) == {"build"}
 
 
-def test_the_ci_of_a_change_runs_the_commands_of_the_workflow() -> None:
+def test_the_ci_of_a_change_runs_the_commands_of_the_workflows() -> None:
     commands = re.findall(r"^make .+$", (ROOT / ".ci" / "run").read_text(encoding="utf-8"), re.MULTILINE)
-    workflow = (GITHUB / "workflows" / "test.yml").read_text(encoding="utf-8")
+    workflows = "".join(path.read_text(encoding="utf-8") for path in (GITHUB / "workflows").glob("*.yml"))
     assert commands
-    assert all(f"- run: {command}\n" in workflow for command in commands)
+    assert all(f"- run: {command}\n" in workflows for command in commands)
 
 
 def test_the_bug_form_requests_the_output_of_the_programs() -> None:

@@ -66,7 +66,7 @@ def show(
             raise InputError(f"--beside compares two models, but {file} is a recording: identify it first")
         show_recording(file, reading, plot=plot, plot_frame=plot_frame, as_json=as_json)
         return
-    _refuse_reading_options(file)
+    _refuse_reading_options(file, reading)
     model_file, model = file, load_model(file)
     if other_file is not None:
         _compare(model, model_file, load_model(other_file), other_file, plot=plot, as_json=as_json)
@@ -89,13 +89,13 @@ def show(
         end_with(model.verdict)
 
 
-def _refuse_reading_options(file: Path) -> None:
+def _refuse_reading_options(file: Path, reading: ReadingOptions) -> None:
     """Refuses options of the reading of recordings if the file is a model."""
     context = click.get_current_context()
     for parameter in context.command.params:
         name = parameter.name or ""
         given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-        if given and name not in ("file", "other_file", "plot", "plot_frame", "as_json"):
+        if given and name in reading.options:
             raise InputError(f"{parameter.opts[0]} is an option for recordings, but {file} is a model")
 
 

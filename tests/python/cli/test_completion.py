@@ -55,7 +55,7 @@ def folder(tmp_path: Path) -> Path:
     ("words", "expected"),
     [
         (["i"], ["identify"]),
-        (["re"], ["render", "record"]),
+        (["re"], ["render", "record", "report"]),
         (["--c"], ["--completion"]),
         (["identify", "--hold"], ["--hold-out-every"]),
         (["identify", "a.csv", "--loss", ""], ["squares", "huber"]),
