@@ -39,7 +39,7 @@ extensions = [
 ]
 exclude_patterns = ["README.md", "builder"]
 source_suffix = {".rst": "restructuredtext", ".md": "markdown"}
-suppress_warnings = ["config.cache"]
+suppress_warnings = ["config.cache", "sphinx_gallery.space_in_filename"]
 
 html_theme = "furo"
 html_title = f"palpate {release}"

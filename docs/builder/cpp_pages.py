@@ -149,7 +149,7 @@ class Reference:
             return f"{name} = {declared}"
         if kind == "variable":
             initial = _text(element.find("initializer"))
-            short = len(initial) <= _LONGEST_INITIALIZER and not re.search(r"[\[\n]", initial)
+            short = len(initial) <= _LONGEST_INITIALIZER and not re.search(r"[\[\n{]", initial)
             return f"{declared} {name}{_text(element.find('argsstring'))}" + (f" {initial}" if short else "")
         explicit = "explicit " if element.get("explicit") == "yes" else ""
         static = "static " if element.get("static") == "yes" else ""
