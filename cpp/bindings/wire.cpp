@@ -29,6 +29,18 @@ py::dict decode_info(const py::bytes& data) {
         "measures_velocity"_a = (info.capabilities & wire::measures_velocity) != 0, "uid"_a = info.uid);
 }
 
+py::dict decode_model(const py::bytes& data) {
+    const auto text = data.cast<std::string>();
+    wire::DeviceModel model;
+    const std::string fault =
+        wire::decode({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, model);
+    if (!fault.empty()) {
+        throw std::invalid_argument(fault);
+    }
+    return py::dict("fingerprint"_a = wire::fingerprint_text(model.fingerprint), "rate_hz"_a = model.rate_hz,
+                    "is_rendered"_a = model.renderer == wire::Renderer::Device);
+}
+
 }  // namespace
 
 void bind_wire(py::module_& module) {
@@ -37,6 +49,10 @@ void bind_wire(py::module_& module) {
                "InputError with the wrong field.\n\n"
                "firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms,\n"
                "transducer, measures_velocity, uid.");
+    module.def("decode_model", &decode_model, "data"_a,
+               "Returns the model in a USB device's answer to the request GET_MODEL, by name. Raises\n"
+               "InputError with the wrong field.\n\n"
+               "fingerprint (16 hexadecimal digits), rate_hz (certified), is_rendered (now, by the device).");
     module.def("usb_cause", &wire::usb_cause, "code"_a,
                "Returns cause and cure for an error code of libusb; empty for a code without a text.");
     py::enum_<wire::Request>(
@@ -46,7 +62,9 @@ void bind_wire(py::module_& module) {
         .value("Enable", wire::Request::Enable)
         .value("Zero", wire::Request::Zero)
         .value("Watchdog", wire::Request::Watchdog)
-        .value("Clear", wire::Request::Clear);
+        .value("Clear", wire::Request::Clear)
+        .value("GetModel", wire::Request::GetModel)
+        .value("Renderer", wire::Request::Renderer);
     module.attr("usb_vendor") = wire::vendor_id;
     module.attr("usb_product") = wire::product_id;
     module.attr("usb_timeout_ms") = wire::request_timeout_ms;

@@ -6,12 +6,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "faults.hpp"
+#include "firmware.hpp"
 #include "identity.hpp"
 #include "little_endian.hpp"
 #include "motor.hpp"
@@ -23,15 +25,23 @@ namespace emulator {
 /// Answer of the emulated device to one packet on the USB bus: accepted, not ready (Nak), or refused.
 enum class Handshake : std::uint8_t { Ack, Nak, Stall };
 
-/// Emulates the device of protocol version 1: memory and mechanics, one frame for each millisecond. It is independent
-/// of the transport and shares no code with the tested library.
+/// Emulates the device of protocol version 1: a firmware with its mechanics, its USB endpoints and their faults, one
+/// frame for each millisecond. It is independent of the transport and shares no code with the tested library.
+///
+/// Deviations that the protocol permits are made here by changing the packets of the firmware, so that every firmware
+/// has them.
 class EmulatedDevice {
   public:
-    EmulatedDevice(Identity identity, Plant plant, std::vector<Fault> script)
-        : identity_{std::move(identity)}, plant_{plant}, motor_{identity_}, faults_{std::move(script)} {
-        zero_count_ = identity_.first_count;
-        sequence_ = identity_.first_sequence;
-        clock_us_ = identity_.first_us;
+    EmulatedDevice(Identity identity, std::unique_ptr<Firmware> firmware, Plant plant,
+                   std::vector<Fault> script)
+        : identity_{std::move(identity)},
+          firmware_{std::move(firmware)},
+          plant_{plant},
+          faults_{std::move(script)},
+          first_count_{identity_.first_count},
+          sequence_offset_{identity_.first_sequence},
+          clock_us_{identity_.first_us} {
+        last_sample_.clock_us = clock_us_;
     }
 
     [[nodiscard]] const Identity& identity() const { return identity_; }
@@ -41,19 +51,14 @@ class EmulatedDevice {
     /// Answers a control transfer; `bytes` are the 8 setup bytes, `data` the outgoing data.
     Answer control(const Bytes& bytes, const Bytes& data) {
         const Setup setup{bytes};
-        Answer answer = stalled();
-        if ((setup.type & 0x60U) == 0) {
-            if (setup.request == 9 || setup.request == 11) {  // requests SET_CONFIGURATION and SET_INTERFACE
-                disarm();
-                answer = {};
-            } else {
-                answer = standard_answer(setup, identity_, halts_);
-            }
-        } else if (setup.type == 0xC1 && setup.request == 1) {
-            answer = {0, info()};
-        } else if (setup.type == 0x41) {
-            answer = command(setup.request, setup.value, data);
+        if ((setup.type & 0x60U) != 0) {
+            return vendor_answer(setup, bytes, data);
         }
+        if (setup.request == 9 || setup.request == 11) {  // requests SET_CONFIGURATION and SET_INTERFACE
+            disarm();
+            return {};
+        }
+        Answer answer = standard_answer(setup, identity_, halts_);
         if (answer.data.size() > setup.length) {
             answer.data.resize(setup.length);
         }
@@ -62,15 +67,15 @@ class EmulatedDevice {
 
     /// Sets the torque to zero, as bus reset, suspend and SET_CONFIGURATION do.
     void disarm() {
-        motor_.disarm();
+        firmware_->disarm();
         halts_ = {};
     }
     void clear_halt(std::uint8_t endpoint) { halts_.clear(endpoint); }
 
     // ------------------------------------------------------------------------------------------------- frames
 
-    /// Advances the device by one millisecond: moves the mechanics, runs the watchdog, stores the encoder count of
-    /// this frame.
+    /// Advances the device by one millisecond: moves the mechanics, runs the ticks of the control loop, stores the
+    /// packet of this frame.
     void frame() {
         faults_.frame(out_seen_);
         unplugged_ = unplugged_ || faults_.used_last(FaultKind::Unplug);
@@ -80,22 +85,31 @@ class EmulatedDevice {
         if (faults_.used(FaultKind::Reset)) {
             restart();
         }
+        std::uint16_t present = 0;
         for (const auto& [kind, bit] : {std::pair{FaultKind::Encoder, encoder_fault},
                                         {FaultKind::OverTemperature, over_temperature},
                                         {FaultKind::EmergencyStop, emergency_stop}}) {
-            if (faults_.used(kind)) {
-                motor_.fail(bit);
-            }
+            present |= faults_.used(kind) ? bit : std::uint16_t{0};
         }
-        motor_.saturate(faults_.used(FaultKind::Saturate));
-        const std::uint32_t skipped = faults_.used_up(FaultKind::Skip);
-
-        plant_.advance(1e-6 * motor_.applied_uNm() * (identity_.reversed ? -1.0 : 1.0), 1e-3);
+        if (std::exchange(present_faults_, present) != present) {
+            was_enabled_ = firmware_->state().is_enabled();
+            firmware_->fault(present);
+        }
+        saturates_ = faults_.used(FaultKind::Saturate);
+        sequence_offset_ = static_cast<std::uint16_t>(sequence_offset_ + faults_.used_up(FaultKind::Skip));
         ++frames_;
-        clock_us_ += 1000;
-        sequence_ = static_cast<std::uint16_t>(sequence_ + 1 + skipped);
-        motor_.look(clock_us_);
-        latch();
+        // The 32-bit encoder count wraps around after its largest value.
+        const std::int64_t error =
+            first_count_ + (faults_.used(FaultKind::Jump) ? identity_.counts_per_rev / 4 : 0);
+        const bool frozen = faults_.used(FaultKind::FrozenEncoder);
+        const std::uint32_t ticks = std::max(1U, identity_.loop_hz / 1000U);
+        for (std::uint32_t k = 0; k < ticks; ++k) {
+            plant_.advance(1e-6 * applied_uNm() * (identity_.reversed ? -1.0 : 1.0), 1e-3 / ticks);
+            clock_us_ += 1000 / ticks;
+            last_sample_ = sample(error, frozen);
+            firmware_->tick(last_sample_);
+        }
+        store(deviating(firmware_->in()));
     }
 
     /// Returns true if an IN packet belongs to this version of the protocol.
@@ -143,7 +157,11 @@ class EmulatedDevice {
             return Handshake::Ack;
         }
         out_seen_ = true;
-        motor_.take(packet, clock_us_);
+        if (identity_.accepts_while_disabled || firmware_->state().is_enabled()) {
+            ++outs_;
+            firmware_->out(packet, clock_us_);
+            firmware_->tick(last_sample_);  // the command acts from the beginning of the next frame
+        }
         return Handshake::Ack;
     }
 
@@ -160,12 +178,20 @@ class EmulatedDevice {
     // ----------------------------------------------------------------------------- state that the tests read
 
     [[nodiscard]] std::uint64_t frames() const { return frames_; }
+    /// Sequence number of the last packet that the device has made.
     [[nodiscard]] std::uint16_t sequence() const { return sequence_; }
     /// Sequence number of the last packet that a host has read.
     [[nodiscard]] std::uint16_t last_read_sequence() const {
         return last_sent_.empty() ? 0 : get<std::uint16_t>(last_sent_, 2);
     }
-    [[nodiscard]] const Motor& motor() const { return motor_; }
+    [[nodiscard]] FirmwareState state() const { return firmware_->state(); }
+    /// Number of OUT packets that the firmware has received.
+    [[nodiscard]] std::uint64_t outs() const { return outs_; }
+    /// Torque that acts on the handle [uN*m].
+    [[nodiscard]] std::int32_t applied_uNm() const {
+        const std::int32_t step = identity_.torque_step_uNm;
+        return firmware_->state().torque_uNm / step * step / (saturates_ ? 2 : 1);
+    }
     [[nodiscard]] const Plant& plant() const { return plant_; }
 
     [[nodiscard]] static std::string trace_header() {
@@ -176,107 +202,120 @@ class EmulatedDevice {
         return std::to_string(frames_) + "," + std::to_string(faults_.started()) + "," +
                std::to_string(clock_us_) + "," + std::to_string(sequence_) + "," +
                std::to_string(plant_.position) + "," + std::to_string(plant_.velocity) + "," +
-               std::to_string(1e-6 * motor_.applied_uNm()) + "," + std::to_string(motor_.status()) + "," +
-               std::to_string(motor_.out_sequence()) + "," + (unplugged_ ? "1\n" : "0\n");
+               std::to_string(1e-6 * applied_uNm()) + "," + std::to_string(firmware_->state().status) + "," +
+               std::to_string(firmware_->state().out_sequence) + "," + (unplugged_ ? "1\n" : "0\n");
     }
 
   private:
     void restart() {
-        motor_.restart();
+        firmware_->restart();
         halts_ = {};
-        sequence_ = 0;
+        sequence_offset_ = 0;
         clock_us_ = 0;
-        zero_count_ = 0;
+        first_count_ = 0;
+        present_faults_ = 0;
+        restarted_ = true;
         packets_.clear();
     }
 
-    Answer command(std::uint8_t request, std::uint16_t value, const Bytes& data) {
-        switch (request) {
-            case 2:
-                return motor_.enable(value);
-            case 3:  // ZERO
-                zero_ = plant_.position;
-                zero_count_ = 0;
-                return {};
-            case 4:
-                return motor_.set_watchdog(value);
-            case 5:
-                return motor_.clear();
-            case 0x7F:  // FAULT
-                if (value < 1 || value > 6 || data.size() != 2) {
-                    return stalled();
-                }
-                inject(static_cast<FaultKind>(value - 1), get<std::uint16_t>(data, 0));
-                return {};
-            default:
+    Answer vendor_answer(const Setup& setup, const Bytes& bytes, const Bytes& data) {
+        constexpr std::uint8_t get_info = 1;
+        constexpr std::uint8_t enable = 2;
+        constexpr std::uint8_t fault = 0x7F;
+        if (setup.type == 0x41 && setup.request == fault) {
+            if (setup.value < 1 || setup.value > 6 || data.size() != 2) {
                 return stalled();
+            }
+            inject(static_cast<FaultKind>(setup.value - 1), get<std::uint16_t>(data, 0));
+            return {};
         }
+        Answer answer = firmware_->control(bytes);
+        if (setup.type == 0xC1 && setup.request == get_info && answer.data.size() == 32) {
+            answer.data[0] = identity_.magic;
+            if (!identity_.reports_current_watchdog) {
+                replace(answer.data, 14, identity_.watchdog_ms);
+            }
+            answer.data.resize(std::min<std::size_t>(identity_.info_size, setup.length));
+        }
+        const bool stopped = (firmware_->state().status & emergency_stop) != 0;
+        if (setup.type == 0x41 && setup.request == enable && stopped && !identity_.refuses_by_stall) {
+            return {};
+        }
+        return answer;
     }
 
-    [[nodiscard]] Bytes info() const {
-        Bytes bytes{identity_.magic, 1};
-        put(bytes, identity_.firmware);
-        put(bytes, identity_.counts_per_rev);
-        put(bytes, identity_.max_torque_uNm);
-        put(bytes, identity_.rate_hz);
-        put(bytes, identity_.reports_current_watchdog ? motor_.watchdog_ms() : identity_.watchdog_ms);
-        put(bytes, identity_.capabilities);
-        bytes.insert(bytes.end(), {32, 16, 1, 0});
-        put(bytes, identity_.uid);
-        bytes.resize(identity_.info_size);
-        return bytes;
-    }
-
-    void latch() {
+    [[nodiscard]] Sample sample(std::int64_t count_error, bool frozen) const {
         const double counts = identity_.counts_per_rev / (2.0 * std::numbers::pi);
-        const double moved = std::floor((plant_.position - zero_) * counts + 0.5);
-        // The 32-bit encoder count wraps around after its largest value.
-        const std::int64_t jump = faults_.used(FaultKind::Jump) ? identity_.counts_per_rev / 4 : 0;
-        const auto count = static_cast<std::int32_t>(zero_count_ + static_cast<std::int64_t>(moved) + jump);
-        const bool frozen = faults_.used(FaultKind::FrozenEncoder);
-        last_count_ = frozen ? last_count_ : count;
         const bool measures_speed = (identity_.capabilities & 2U) != 0;
         const bool has_transducer = (identity_.capabilities & 1U) != 0;
-        const double object = plant_.spring > 0.0 ? plant_.object_torque() : 1e-6 * motor_.applied_uNm();
-        Bytes packet{'H', 1};
-        put(packet, sequence_);
-        put(packet,
-            clock_us_ + (identity_.latch_jitter_us == 0 ? 0 : sequence_ * 7919U % identity_.latch_jitter_us));
-        put(packet, last_count_);
-        put(packet,
-            static_cast<std::int32_t>(measures_speed && !frozen ? std::lround(plant_.velocity * counts) : 0));
-        put(packet, motor_.applied_uNm());
-        put(packet, motor_.status());
-        put(packet,
-            static_cast<std::uint16_t>(motor_.out_sequence() - (faults_.used(FaultKind::OldEcho) ? 3 : 0)));
-        put(packet, motor_.out_age_us(clock_us_));
-        put(packet, identity_.temperature_dC);
-        put(packet, static_cast<std::int32_t>(has_transducer ? std::lround(1e6 * object) : 0));
+        const double object = plant_.spring > 0.0 ? plant_.object_torque() : 1e-6 * applied_uNm();
+        Sample sample;
+        sample.clock_us = clock_us_;
+        sample.count = last_sample_.count;
+        if (!frozen) {
+            sample.count = static_cast<std::int32_t>(
+                count_error + static_cast<std::int64_t>(std::floor(plant_.position * counts + 0.5)));
+        }
+        sample.velocity_cps =
+            static_cast<std::int32_t>(measures_speed && !frozen ? std::lround(plant_.velocity * counts) : 0);
+        sample.sensor_uNm = static_cast<std::int32_t>(has_transducer ? std::lround(1e6 * object) : 0);
+        sample.temperature_dC = identity_.temperature_dC;
+        return sample;
+    }
+
+    /// Returns a packet of the firmware with the deviations and faults of this device.
+    [[nodiscard]] Bytes deviating(Bytes packet) {
+        sequence_ = static_cast<std::uint16_t>(get<std::uint16_t>(packet, 2) + sequence_offset_);
+        replace(packet, 2, sequence_);
+        if (identity_.latch_jitter_us != 0) {
+            replace(packet, 4, clock_us_ + sequence_ * 7919U % identity_.latch_jitter_us);
+        }
+        replace(packet, 16, applied_uNm());
+        auto status = get<std::uint16_t>(packet, 20);
+        status |= identity_.spare_status;
+        status |= saturates_ ? saturated_bit : std::uint16_t{0};
+        const bool seems_enabled = !identity_.stop_disables && was_enabled_;
+        status |= (status & emergency_stop) != 0 && seems_enabled ? enabled_bit : std::uint16_t{0};
+        replace(packet, 20, status);
+        auto echo = get<std::uint16_t>(packet, 22);
+        if (outs_ == 0 && !restarted_) {
+            echo = identity_.first_out_sequence;
+            replace(packet, 24, identity_.first_out_age_us);
+        }
+        replace(packet, 22, static_cast<std::uint16_t>(echo - (faults_.used(FaultKind::OldEcho) ? 3 : 0)));
+        return packet;
+    }
+
+    void store(Bytes packet) {
         if (packets_.size() < std::max<std::size_t>(1, identity_.held_packets)) {
-            packets_.push_back(packet);
+            packets_.push_back(std::move(packet));
         } else if (identity_.held_packets == 0) {
-            packets_.back() = packet;
+            packets_.back() = std::move(packet);
         }
     }
 
     Identity identity_;
+    std::unique_ptr<Firmware> firmware_;
     Plant plant_;
-    Motor motor_;
     Faults faults_;
     Halts halts_;
 
-    double zero_ = 0.0;
-    std::int64_t zero_count_ = 0;
-
+    std::int64_t first_count_;       ///< encoder count at the position 0
+    std::uint16_t sequence_offset_;  ///< added to the sequence numbers of the firmware
+    std::uint32_t clock_us_;
     std::uint64_t frames_ = 0;
-    std::uint16_t sequence_ = 0;
-    std::uint32_t clock_us_ = 0;
+    std::uint64_t outs_ = 0;
+    std::uint16_t sequence_ = identity_.first_sequence;
+    std::uint16_t present_faults_ = 0;
+    bool was_enabled_ = false;  ///< the motor was enabled before the last change of the faults
+    bool saturates_ = false;    ///< the motor gives half the commanded torque
+    bool restarted_ = false;
     /// The host has sent an OUT packet, so the frames of the fault script are counted
     bool out_seen_ = false;
 
     std::deque<Bytes> packets_;  ///< IN packets that the host has not yet read
     Bytes last_sent_;
-    std::int32_t last_count_ = 0;
+    Sample last_sample_;
     bool naks_ = false;
     bool mute_ = false;
     bool slow_ = false;

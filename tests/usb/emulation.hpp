@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "choices.hpp"
+#include "firmwares.hpp"
 #include "port.hpp"
 
 namespace emulator {
@@ -20,6 +21,8 @@ struct Settings {
     Plant plant;
     std::vector<Fault> script;
     bool lock_step = false;
+    /// Firmware of the devices: see `make_firmware`
+    std::string firmware = default_firmware();
     double rate_hz = 1000.0;
     /// Option --lock-step: longest time that a frame waits for a transfer of the host
     std::chrono::milliseconds lock_step_timeout{3000};
@@ -33,6 +36,10 @@ struct Settings {
 inline constexpr const char* options_text =
     "  --lock-step            Frames begin when the host transfers, otherwise every 1/rate.\n"
     "  --rate-hz RATE         Frames a second [1000].\n"
+    "  --firmware cpp|c|FILE.elf  Firmware of the device: the second implementation, cpp/firmware, or\n"
+    "                         cpp/firmware as machine code of a Cortex-M4F in QEMU\n"
+    "                         [environment variable PALPATE_USB_FIRMWARE, otherwise cpp].\n"
+    "  --model UNM_PER_COUNT  The device has a model: a spring with this stiffness.\n"
     "  --lock-step-ms MS      Longest wait of lock-step for the host [3000].\n"
     "  --serial SERIAL        One device with this serial number; repeatable [EMU-1].\n"
     "  --no-device            No device is connected.\n"
@@ -53,6 +60,12 @@ inline constexpr const char* options_text =
     "  --trace FILE.csv       True state of the device, one row for each frame.\n"
     "  --denied               The device cannot be opened.\n"
     "  --preload-first FILE   Library of a sanitizer, which must be loaded before umockdev.\n";
+
+/// Returns an emulated device of these settings.
+[[nodiscard]] inline EmulatedDevice make_device(const Settings& settings, const Identity& identity,
+                                                const std::vector<Fault>& script) {
+    return {identity, make_firmware(settings.firmware, identity), settings.plant, script};
+}
 
 /// Reads the options of the command line. Throws std::invalid_argument if an option is unknown or its value is not a
 /// number, and std::out_of_range if the number is too large.
@@ -79,6 +92,10 @@ inline constexpr const char* options_text =
             settings.rate_hz = std::stod(value());
         } else if (word == "--lock-step-ms") {
             settings.lock_step_timeout = std::chrono::milliseconds{std::stoi(value())};
+        } else if (word == "--firmware") {
+            settings.firmware = value();
+        } else if (word == "--model") {
+            common.model_uNm_per_count = std::stoi(value());
         } else if (word == "--serial") {
             serials.push_back(value());
         } else if (word == "--seed") {
@@ -152,10 +169,9 @@ inline constexpr const char* options_text =
         return "{" + field("frames", std::to_string(device.frames())) + ", " +
                field("sequence", std::to_string(device.sequence())) + ", " +
                field("last_read", std::to_string(device.last_read_sequence())) + ", " +
-               field("outs", std::to_string(device.motor().outs())) + ", " +
-               field("bad_outs", std::to_string(device.motor().bad_outs())) + ", " +
-               field("enabled", device.motor().is_enabled() ? "true" : "false") + ", " +
-               field("torque_uNm", std::to_string(device.motor().applied_uNm())) + ", " +
+               field("outs", std::to_string(device.outs())) + ", " +
+               field("enabled", device.state().is_enabled() ? "true" : "false") + ", " +
+               field("torque_uNm", std::to_string(device.applied_uNm())) + ", " +
                field("position_rad", std::to_string(device.plant().position)) + ", " +
                field("waiting", std::to_string(port.waiting())) + "}";
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -22,6 +23,11 @@ struct Identity {
     std::uint16_t watchdog_ms = 20;
     std::uint32_t capabilities = 3;  ///< Bit 0: the device measures force, bit 1: it measures velocity.
     std::uint64_t uid = 0x5041'4C50'0001ULL;
+    std::uint32_t loop_hz = 10'000;  ///< rate of the control loop in the device
+    // Model on the device: a spring
+    std::int32_t model_uNm_per_count = 0;  ///< stiffness; 0: no model
+    std::uint64_t model_fingerprint = 0x0123'4567'89AB'CDEFULL;
+    std::uint16_t ramp_ms = 20;  ///< the force of the model grows for this time after its start
     std::size_t info_size = 32;  ///< Bytes of the answer to GET_INFO; another value means another protocol.
     /// False: GET_INFO reports the watchdog time at power-up, also after a change.
     bool reports_current_watchdog = true;
@@ -69,6 +75,12 @@ struct Identity {
     std::uint16_t temperature_dC = 253;
     std::int32_t torque_step_uNm = 1;  ///< Smallest change of the motor torque that the device can make.
     std::uint32_t latch_jitter_us = 0;
+
+    /// Returns the torque of the model on the device, limited to 32 bits.
+    [[nodiscard]] std::int32_t model_torque_uNm(std::int32_t count) const {
+        const std::int64_t torque = -std::int64_t{model_uNm_per_count} * count;
+        return static_cast<std::int32_t>(std::clamp<std::int64_t>(torque, INT32_MIN, INT32_MAX));
+    }
 
     [[nodiscard]] Bytes device_descriptor() const {
         Bytes bytes{18, 1};

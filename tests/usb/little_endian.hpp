@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
@@ -19,6 +20,14 @@ void put(Bytes& bytes, Integer value) {
         bytes.push_back(static_cast<std::uint8_t>(bits & 0xFFU));
         bits = static_cast<std::make_unsigned_t<Integer>>(static_cast<std::uint64_t>(bits) >> 8U);
     }
+}
+
+/// Replaces an integer, least significant byte first.
+template <class Integer>
+void replace(Bytes& bytes, std::size_t offset, Integer value) {
+    Bytes written;
+    put(written, value);
+    std::copy(written.begin(), written.end(), bytes.begin() + static_cast<std::ptrdiff_t>(offset));
 }
 
 /// Reads an integer, least significant byte first.

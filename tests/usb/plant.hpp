@@ -30,9 +30,10 @@ struct Plant {
 
     /// Moves the handle for the time `seconds` under a constant motor torque [N*m].
     void advance(double torque, double seconds) {
-        constexpr int substeps = 20;
-        const double step = seconds / substeps;
-        for (int k = 0; k < substeps; ++k) {
+        constexpr double longest_step = 50e-6;
+        const long substeps = std::max(1L, std::lround(seconds / longest_step));
+        const double step = seconds / static_cast<double>(substeps);
+        for (long k = 0; k < substeps; ++k) {
             const double phase = 2.0 * std::numbers::pi * hand_hz * time;
             const double target = hand_lower + 0.5 * (hand_upper - hand_lower) * (1.0 - std::cos(phase));
             const double hand =

@@ -21,6 +21,8 @@ ROOT = Path(__file__).resolve().parents[2]
 MISSING_PACKAGE_EXIT = 77
 BUILDS = ("dev", "release", "asan", "tsan", "control")
 SOURCES = ROOT / "tests" / "usb"
+FIRMWARE = ROOT / "cpp" / "firmware"
+C_FOLDERS = ["-I", str(FIRMWARE), "-I", str(ROOT / "tests" / "firmware")]
 
 
 def emulator() -> Path | str:
@@ -28,7 +30,8 @@ def emulator() -> Path | str:
     given = os.environ.get("PALPATE_USB_EMULATOR")
     if given:
         return Path(given)
-    newest = max(path.stat().st_mtime for path in SOURCES.glob("*.?pp"))
+    sources = [*SOURCES.glob("*.?pp"), *FIRMWARE.glob("*.[ch]")]
+    newest = max(path.stat().st_mtime for path in sources)
     programs = [ROOT / "build" / build / "tests" / "usb" / "umockdev_emulator" for build in BUILDS]
     programs.append(ROOT / "build" / "umockdev_emulator")
     for program in programs:
@@ -44,11 +47,22 @@ def emulator() -> Path | str:
     program = programs[-1]
     program.parent.mkdir(exist_ok=True)
     temporary = program.with_suffix(f".{os.getpid()}")
-    compiler = os.environ.get("CXX", "g++")
-    command = [compiler, "-std=c++20", "-O1", str(SOURCES / "umockdev_emulator.cpp"), "-o", str(temporary)]
-    subprocess.run([*command, *compiler_flags.stdout.split(), "-lpthread"], check=True)
+    build_emulator("umockdev_emulator.cpp", temporary, *compiler_flags.stdout.split())
     temporary.rename(program)
     return program
+
+
+def build_emulator(source: str, program: Path, *flags: str) -> None:
+    """Compiles a program of this folder with the device side in C."""
+    objects = [f"{program}.{name}.o" for name in ("device", "locks")]
+    files = [FIRMWARE / "palpate_device.c", SOURCES / "no_locks.c"]
+    for file, made in zip(files, objects, strict=True):
+        compiler = os.environ.get("CC", "cc")
+        subprocess.run([compiler, "-std=c99", "-O1", *C_FOLDERS, "-c", str(file), "-o", made], check=True)
+    command = [os.environ.get("CXX", "g++"), "-std=c++20", "-O1", *C_FOLDERS, str(SOURCES / source), *objects]
+    subprocess.run([*command, "-o", str(program), *flags, "-lpthread"], check=True)
+    for made in objects:
+        Path(made).unlink()
 
 
 if __name__ == "__main__":

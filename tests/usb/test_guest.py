@@ -11,7 +11,6 @@ import io
 import json
 import os
 import re
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ from palpate import load_model
 from palpate._core.rendering import Scheme
 from palpate._core.simulation import Hand
 from palpate.planning import DeviceProfile, Plan, force_at, simulate
+from run_emulated import build_emulator
 
 ROOT = Path(__file__).resolve().parents[2]
 CONTROL = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
@@ -84,9 +84,7 @@ class GuestRuns:
 
 def usbip_emulator() -> Path:
     program = guest.CACHE / "usbip_emulator"
-    compiler = [os.environ.get("CXX", "g++"), "-std=c++20", "-O2"]
-    source = ROOT / "tests" / "usb" / "usbip_emulator.cpp"
-    subprocess.run([*compiler, str(source), "-o", str(program), "-lpthread"], check=True)
+    build_emulator("usbip_emulator.cpp", program)
     return program
 
 

@@ -63,6 +63,19 @@ TEST(UsbDevice, ControlRequestsFollowTheProtocol) {
     }
 }
 
+TEST(UsbDevice, WithoutAModelItDoesNotRenderItself) {
+    UsbDevice device = patient();
+    ASSERT_EQ(device.open().reason, "");
+    EXPECT_FALSE(device.model());
+    device.close();
+    EXPECT_FALSE(device.model());
+    UsbOptions options;
+    options.device_renders = true;
+    const std::string reason = UsbDevice{options}.open().reason;
+    EXPECT_NE(reason.find("emulated knob EMU-1"), std::string::npos) << reason;
+    EXPECT_NE(reason.find("has no model to render"), std::string::npos) << reason;
+}
+
 TEST(UsbDevice, StreamsEverySampleOnceAndInOrder) {
     UsbDevice device = patient();
     ASSERT_TRUE(device.open());

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -69,6 +70,50 @@ TEST(UsbPlainDevice, MeasuredForceIsNanAndVelocityIsThePositionDifference) {
         EXPECT_NEAR(reading.velocity, (reading.position - last.position) / 1e-3, 1e-6);
         last = reading;
     }
+}
+
+// This device has a model: a spring of 10 uN*m for each count.
+
+TEST(UsbModelDevice, ReportsItsModelAndRendersForTheHost) {
+    UsbDevice device = patient();
+    ASSERT_EQ(device.open().reason, "");
+    const std::optional<wire::DeviceModel> model = device.model();
+    ASSERT_TRUE(model);
+    EXPECT_EQ(wire::fingerprint_text(model->fingerprint), "0123456789abcdef");
+    EXPECT_EQ(model->rate_hz, 10'000U);
+    EXPECT_EQ(model->renderer, wire::Renderer::Host);
+    settled(device, 0.2);
+    EXPECT_NEAR(settled(device, 0.2).applied, 0.2, 1e-9);
+}
+
+TEST(UsbModelDevice, RendersItsModelWhileTheHostSendsCommands) {
+    UsbOptions options;
+    options.wait = std::chrono::seconds{20};
+    options.device_renders = true;
+    UsbDevice device{options};
+    ASSERT_EQ(device.open().reason, "");
+    EXPECT_EQ(device.model()->renderer, wire::Renderer::Device);
+    settled(device);
+    for (int k = 0; k < 100; ++k) {
+        const Reading reading = device.exchange({1.0});  // this force has no effect
+        const double count =
+            std::round(reading.position / wire::position_of(1, device.info().counts_per_rev));
+        ASSERT_EQ(reading.status, Status::Ok) << k;
+        if (k > 20) {  // after the ramp of the device
+            ASSERT_NEAR(reading.applied, 10e-6 * count, 1e-9) << k;
+            ASSERT_GT(reading.applied, 0.0);
+        }
+    }
+    send_order("fault freeze 15");  // longer than a command is valid
+    EXPECT_EQ(device.exchange({0.0}).applied, 0.0);
+    EXPECT_NEAR(settled(device).applied, 0.0, 1e-2) << "the force grows from zero again";
+    device.close();
+    EXPECT_EQ(state("torque_uNm"), 0.0);
+    EXPECT_EQ(state("enabled"), 0.0);
+    UsbDevice next = patient();
+    ASSERT_EQ(next.open().reason, "");
+    settled(next, 0.2);
+    EXPECT_NEAR(settled(next, 0.2).applied, 0.2, 1e-9) << "the next host renders again";
 }
 
 // Each run of the tests below emulates a different device, whose firmware behaves randomly where the protocol allows

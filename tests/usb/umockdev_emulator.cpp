@@ -73,7 +73,7 @@ class Emulation {
     void plug(const Identity& identity, const std::vector<Fault>& script) {
         auto place = std::make_unique<Place>(
             Place{FrameClock{settings_.lock_step, settings_.rate_hz, settings_.lock_step_timeout}, nullptr});
-        place->node = std::make_unique<UsbfsNode>(testbed_, EmulatedDevice{identity, settings_.plant, script},
+        place->node = std::make_unique<UsbfsNode>(testbed_, make_device(settings_, identity, script),
                                                   next_address_++, mutex_, [this] {
                                                       if (begin_frames() < wakes_at_) {
                                                           changed_.notify_all();

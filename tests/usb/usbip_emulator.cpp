@@ -168,7 +168,7 @@ class UsbIp {
 int run(Settings settings) {
     using namespace std::chrono_literals;
     const Identity identity = settings.devices.empty() ? Identity{} : settings.devices.front();
-    Port port{EmulatedDevice{identity, settings.plant, settings.script}};
+    Port port{make_device(settings, identity, settings.script)};
     FrameClock clock{settings.lock_step, settings.rate_hz, settings.lock_step_timeout};
     std::ofstream trace;
     if (!settings.trace.empty()) {

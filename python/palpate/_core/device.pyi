@@ -4,7 +4,49 @@ Profiles of devices, and the packets of USB devices.
 """
 from __future__ import annotations
 import typing
-__all__: list[str] = ['DeviceProfile', 'UsbRequest', 'decode_info', 'longest_watchdog_ms', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_timeout_ms', 'usb_to_device', 'usb_to_host', 'usb_vendor']
+__all__: list[str] = ['DeviceProfile', 'OnDevice', 'UsbRequest', 'decode_info', 'decode_model', 'longest_watchdog_ms', 'on_device', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_timeout_ms', 'usb_to_device', 'usb_to_host', 'usb_vendor']
+class OnDevice:
+    """
+    Timing of a model that runs on the motor controller of a device, in SI units.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    @typing.overload
+    def __init__(self, *, delay_periods: typing.SupportsFloat | typing.SupportsIndex = 1.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 1e-06, highest_rate_hz: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    @typing.overload
+    def __init__(self, fields: dict) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
+        """
+    @property
+    def delay_periods(self) -> float:
+        """
+        Time from a sample to the force computed from it, in periods of the controller [-].
+        """
+    @property
+    def delay_s(self) -> float:
+        """
+        Delay in addition to delay_periods, for example of the current control and of a filter [s].
+        """
+    @property
+    def highest_rate_hz(self) -> float | None:
+        """
+        Highest rate of the controller [Hz]; absent: not known.
+        """
+    @property
+    def jitter_s(self) -> float:
+        """
+        Largest time between two samples, minus the period [s].
+        """
 class DeviceProfile:
     """
     Properties of a haptic device of one degree of freedom, in SI units; a knob (rad) or a straight handle (m).
@@ -13,7 +55,7 @@ class DeviceProfile:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, id: str = 'simulated-knob', position_unit: str = 'rad', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, *, id: str = 'simulated-knob', position_unit: str = 'rad', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, renderer: str | None = None, on_device: OnDevice | None = None) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -74,6 +116,11 @@ class DeviceProfile:
         period_s + jitter_s, the longest time between two samples [s].
         """
     @property
+    def on_device(self) -> OnDevice | None:
+        """
+        Timing of a model that runs on the motor controller; absent: the defaults of OnDevice.
+        """
+    @property
     def period_s(self) -> float:
         """
         T, time between two samples [s].
@@ -82,6 +129,11 @@ class DeviceProfile:
     def position_unit(self) -> str:
         """
         "rad", with forces in N*m, or "m", with forces in N.
+        """
+    @property
+    def renderer(self) -> str | None:
+        """
+        "device" if the model runs on the motor controller, with the period, delay and jitter above; absent if it runs on the host.
         """
     @property
     def viscous_damping(self) -> float:
@@ -103,10 +155,16 @@ class UsbRequest:
       Watchdog
     
       Clear
+    
+      GetModel
+    
+      Renderer
     """
     Clear: typing.ClassVar[UsbRequest]
     Enable: typing.ClassVar[UsbRequest]
     GetInfo: typing.ClassVar[UsbRequest]
+    GetModel: typing.ClassVar[UsbRequest]
+    Renderer: typing.ClassVar[UsbRequest]
     Watchdog: typing.ClassVar[UsbRequest]
     Zero: typing.ClassVar[UsbRequest]
     __members__: typing.ClassVar[dict[str, UsbRequest]]
@@ -151,6 +209,18 @@ def decode_info(data: bytes) -> dict:
     
     firmware, counts_per_rev, encoder_step [rad], max_torque [N*m], rate_hz, watchdog_ms,
     transducer, measures_velocity, uid.
+    """
+def decode_model(data: bytes) -> dict:
+    """
+    Returns the model in a USB device's answer to the request GET_MODEL, by name. Raises
+    InputError with the wrong field.
+    
+    fingerprint (16 hexadecimal digits), rate_hz (certified), is_rendered (now, by the device).
+    """
+def on_device(profile: DeviceProfile, rate_hz: typing.SupportsFloat | typing.SupportsIndex) -> DeviceProfile:
+    """
+    Returns the profile of a device whose motor controller runs the model rate_hz times a second. Raises ValueError
+    if the controller does not reach this rate, or if its delay is longer than 16 periods.
     """
 def usb_cause(code: typing.SupportsInt | typing.SupportsIndex) -> str:
     """

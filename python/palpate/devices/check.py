@@ -242,6 +242,8 @@ def judge(summary: Mapping[str, Any]) -> Check:
         **{f"period_{name}": value for name, value in summary["period"].items()},
     }
     observations = observe_at_rest(summary)
+    if summary.get("device_model"):
+        observations.append(Observation("model on the device", f"fingerprint {summary['device_model']}"))
     if "round_trip" in summary:
         delay_us = summary["delay"]
         delay_s = 1e-6 * delay_us["p999_us"] + _DELAY_MARGIN_PERIODS * base.period_s

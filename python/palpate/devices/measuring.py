@@ -61,6 +61,7 @@ def record(
     object: Model | None = None,
     force: bool = False,
     probe: bool = False,
+    device_renders: bool = False,
     duration_s: float = 10.0,
     rate_hz: float = 1000.0,
     transducer: bool = True,
@@ -71,8 +72,9 @@ def record(
 ) -> dict[str, Any]:
     """Records position and force of a real object.
 
-    Without `probe` the user moves the handle. With `probe` the device moves the handle slowly to and fro, and
-    reverses if the force reaches `force_limit`. The force is that of the device's transducer. Without a
+    Without `probe` the user moves the handle. With `device_renders` a USB device renders its own model, and
+    the recording contains the force of the motor. With `probe` the device moves the handle slowly to and fro,
+    and reverses if the force reaches `force_limit`. The force is that of the device's transducer. Without a
     transducer it is the force of the motor, which includes the friction of the device and needs the probe.
 
     Parameters
@@ -87,6 +89,8 @@ def record(
         The object mounted on the simulated device.
     probe : bool
         True: the device moves the handle.
+    device_renders : bool
+        True: the USB device renders the model of its firmware.
     duration_s, rate_hz : float
         Duration (inf: until Ctrl-C) [s] and sampling rate [Hz].
     transducer : bool
@@ -122,6 +126,7 @@ def record(
         record=str(path),
         force=force,
         probe=probe,
+        device_renders=device_renders,
         duration_s=duration_s,
         rate_hz=rate_hz,
         transducer=transducer,

@@ -97,6 +97,18 @@ class UsbSetup:
         self.serial = self._string(self._handle.iSerialNumber)
         return info
 
+    def model(self) -> dict[str, Any] | None:
+        """Reads the model that the device can render: see :func:`palpate._core.device.decode_model`.
+
+        Returns None if the device has no model, or a firmware without this request.
+        """
+        try:
+            return core.decode_model(
+                self._request(UsbRequest.GetModel, "reading its model", core.usb_largest_packet)
+            )
+        except DeviceError:
+            return None
+
     def zero(self) -> None:
         """Sets the zero of the device's position to the present position of the handle."""
         self._request(UsbRequest.Zero, "zeroing its encoder")
@@ -160,6 +172,8 @@ class Found:
     serial: str
     info: dict[str, Any] | None
     problem: str = ""
+    model: dict[str, Any] | None = None
+    """Model that the device can render itself: fingerprint, certified rate_hz, is_rendered"""
 
 
 def _candidates() -> Iterator[UsbSetup]:
@@ -197,13 +211,14 @@ def find_devices() -> list[Found]:
     """
     found = []
     for device in _candidates():
-        info, problem = None, ""
+        info, problem, model = None, "", None
         with device:
             try:
                 info = device.identify()
+                model = device.model()
             except (DeviceError, InputError) as error:
                 problem = str(error)
-        found.append(Found(device.place, device.product, device.serial, info, problem))
+        found.append(Found(device.place, device.product, device.serial, info, problem, model))
     return found
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from palpate import InputError
-from palpate._core.device import decode_info
+from palpate._core.device import decode_info, decode_model
 
 VALID_FIELDS: dict[str, Any] = {
     "magic": ord("I"),
@@ -65,3 +65,26 @@ def test_an_invalid_field_is_refused_by_name(changed: dict[str, int], sentence: 
     with pytest.raises(InputError, match="the answer to GET_INFO") as caught:
         decode_info(info(**changed))
     assert sentence in str(caught.value)
+
+
+def test_the_model_of_a_device_is_decoded() -> None:
+    answer = struct.pack("<QIBBBB", 0x0123456789ABCDEF, 40_000, 1, 0, 0, 0)
+    assert decode_model(answer) == {
+        "fingerprint": "0123456789abcdef",
+        "rate_hz": 40_000,
+        "is_rendered": True,
+    }
+
+
+@pytest.mark.parametrize(
+    ("answer", "sentence"),
+    [
+        (bytes(15), "the answer to GET_MODEL has 15 bytes, must have 16"),
+        (bytes(16), "rate_hz is 0, must be > 0"),
+        (struct.pack("<QIBBBB", 1, 1, 2, 0, 0, 0), "renderer is 2, must be 0 or 1"),
+        (struct.pack("<QIBBBB", 1, 1, 1, 1, 0, 0), "renderer is 257, must be 0 or 1"),
+    ],
+)
+def test_an_invalid_answer_to_get_model_is_refused(answer: bytes, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        decode_model(answer)

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -21,6 +23,33 @@ inline constexpr int longest_delay_samples = 16;
     return longest_delay_samples * period_s * (1.0 + 1e-9);
 }
 
+/// Timing of a model that runs on the motor controller of a device instead of on the host. A profile without these
+/// numbers gets the defaults: a controller applies a force one period after the sample, with an interrupt of a hardware
+/// timer.
+struct OnDevice {
+    double delay_periods = 1.0;
+    double delay_s = 0.0;
+    double jitter_s = 1e-6;
+    std::optional<double> highest_rate_hz = std::nullopt;
+
+    [[nodiscard]] bool operator==(const OnDevice&) const = default;
+};
+
+template <>
+inline constexpr auto fields_of<OnDevice> = std::tuple{
+    Field<&OnDevice::delay_periods>{
+        "delay_periods",
+        "Time from a sample to the force computed from it, in periods of the controller [-].",
+        Rule::NotNegative},
+    Field<&OnDevice::delay_s>{
+        "delay_s",
+        "Delay in addition to delay_periods, for example of the current control and of a filter [s].",
+        Rule::NotNegative},
+    Field<&OnDevice::jitter_s>{"jitter_s", "Largest time between two samples, minus the period [s].",
+                               Rule::NotNegative},
+    Field<&OnDevice::highest_rate_hz>{
+        "highest_rate_hz", "Highest rate of the controller [Hz]; absent: not known.", Rule::Positive}};
+
 /// Properties of a haptic device; `fields_of` states the meaning of each number. The default is a direct-drive knob
 /// with a 16-bit encoder.
 struct DeviceProfile {
@@ -35,6 +64,8 @@ struct DeviceProfile {
     double delay_s = 0.0;
     double force_limit = 5.0;
     double jitter_s = 0.0;
+    std::optional<std::string> renderer = std::nullopt;
+    std::optional<OnDevice> on_device = std::nullopt;
 
     /// Returns the longest time between two samples, T plus jitter [s]. A certificate must hold for this time.
     [[nodiscard]] double longest_period_s() const noexcept { return period_s + jitter_s; }
@@ -64,7 +95,8 @@ struct DeviceProfile {
 
 namespace detail {
 inline constexpr std::array<std::string_view, 2> position_units{"rad", "m"};
-}
+inline constexpr std::array<std::string_view, 1> renderers{"device"};
+}  // namespace detail
 
 template <>
 inline constexpr auto fields_of<DeviceProfile> = std::tuple{
@@ -97,11 +129,25 @@ inline constexpr auto fields_of<DeviceProfile> = std::tuple{
     Field<&DeviceProfile::force_limit>{"force_limit", "Largest force of the device [N or N*m].",
                                        Rule::Positive},
     Field<&DeviceProfile::jitter_s>{"jitter_s", "Largest time between two samples, minus the period T [s].",
-                                    Rule::NotNegative}};
+                                    Rule::NotNegative},
+    Field<&DeviceProfile::renderer>{"renderer",
+                                    "\"device\" if the model runs on the motor controller, with the period, "
+                                    "delay and jitter above; absent if "
+                                    "it runs on the host.",
+                                    Rule::Any, true, detail::renderers},
+    Field<&DeviceProfile::on_device>{
+        "on_device",
+        "Timing of a model that runs on the motor controller; absent: the defaults of OnDevice."}};
 
 /// Returns the profile with zero damping and friction. A certificate must not rely on values that were not measured.
 [[nodiscard]] inline DeviceProfile unmeasured(DeviceProfile profile) {
     profile.viscous_damping = profile.coulomb_friction = 0.0;
+    return profile;
+}
+
+/// Returns the part of the profile on which a certificate relies. The timing of another renderer is left out.
+[[nodiscard]] inline DeviceProfile certified_part(DeviceProfile profile) {
+    profile.on_device.reset();
     return profile;
 }
 
@@ -112,6 +158,29 @@ inline void validate(const DeviceProfile& profile) {
         throw std::invalid_argument("device profile: delay_s is " + readable(profile.delay_s) +
                                     ", must be 0 to 16 periods");
     }
+}
+
+/// Returns the profile of a device whose motor controller runs the model `rate_hz` times a second: period, delay and
+/// jitter are those of the controller. Throws std::invalid_argument if the controller does not reach this rate, or if
+/// its delay is longer than a certificate allows.
+[[nodiscard]] inline DeviceProfile on_device(DeviceProfile profile, double rate_hz) {
+    const OnDevice timing = profile.on_device.value_or(OnDevice{});
+    require_field(satisfies(rate_hz, Rule::Positive), "on_device", rate_hz, "a rate in Hz, > 0");
+    const double highest = timing.highest_rate_hz.value_or(rate_hz);
+    require_field(
+        rate_hz <= highest, "on_device", rate_hz,
+        "at most " + readable(highest) + " Hz, the highest rate of the controller of " + profile.id);
+    profile.period_s = 1.0 / rate_hz;
+    profile.delay_s = timing.delay_periods * profile.period_s + timing.delay_s;
+    profile.jitter_s = timing.jitter_s;
+    profile.renderer = "device";
+    if (const double most = longest_delay_samples - timing.delay_periods; timing.delay_s * rate_hz > most) {
+        require_field(false, "on_device", rate_hz,
+                      "at most " + readable(std::floor(std::max(most, 0.0) / timing.delay_s)) +
+                          " Hz, so that the delay of the controller is at most 16 periods");
+    }
+    validate(profile);
+    return profile;
 }
 
 }  // namespace palpate

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -25,6 +26,8 @@ struct UsbOptions {
     std::uint16_t time_to_live_ms = 10;  ///< the device ends its torque if no command arrives for this time
     double longest_delay_s = std::numeric_limits<double>::infinity();  ///< allowed delay [s]
     bool makes_force = true;  ///< false: the motor is never enabled; the device only sends samples
+    /// True: the device renders its own model. The commands only keep it active; their force has no effect.
+    bool device_renders = false;
 };
 
 /// Counters of the packets and USB transfers of a device.
@@ -157,6 +160,11 @@ class UsbDevice {
         return open_ == nullptr || open_->transfers == nullptr ? 0 : open_->transfers->in_flight();
     }
 
+    /// Returns the model that the open device can render itself; nothing without such a model.
+    [[nodiscard]] std::optional<wire::DeviceModel> model() const {
+        return open_ == nullptr ? std::nullopt : open_->connection.model();
+    }
+
     /// Returns a device profile from the properties that the device reports. Its inertia has the default value, and
     /// damping and friction are 0, because a device does not report them.
     [[nodiscard]] DeviceProfile profile() const {
@@ -205,6 +213,11 @@ class UsbDevice {
         if (const int code = connection.request(wire::Request::Enable, 0); code != 0) {
             return "cannot be disabled: " + detail::usb_reason(code);
         }
+        if (options_.device_renders) {
+            if (std::string reason = choose_device_renderer(); !reason.empty()) {
+                return reason;
+            }
+        }
         open_->transfers = std::make_unique<detail::UsbTransfers>(connection.context(), connection.handle());
         if (const int code = open_->transfers->start(); code != 0) {
             return "does not stream: " + detail::usb_reason(code);
@@ -234,6 +247,19 @@ class UsbDevice {
         }
         open_->stream.pause();
         return "";
+    }
+
+    /// Makes the device render its own model after it is enabled. Returns "", or a sentence with the reason.
+    [[nodiscard]] std::string choose_device_renderer() {
+        if (!open_->connection.model()) {
+            return "has no model to render: load a firmware with an exported model, or render on the host";
+        }
+        const int code = open_->connection.request(wire::Request::Renderer,
+                                                   static_cast<std::uint16_t>(wire::Renderer::Device));
+        return code == LIBUSB_ERROR_PIPE
+                   ? "refuses to render its model: the rate or the encoder differs from the certified one"
+               : code != 0 ? "cannot render its model: " + detail::usb_reason(code)
+                           : "";
     }
 
     [[nodiscard]] Nanoseconds longest_delay() const noexcept {

@@ -38,7 +38,21 @@ inline constexpr unsigned request_timeout_ms =
     500;  ///< longest time that a request waits for its answer [ms]
 
 /// Numbers of the control requests to the device (the field bRequest of a control transfer).
-enum class Request : std::uint8_t { GetInfo = 1, Enable = 2, Zero = 3, Watchdog = 4, Clear = 5 };
+enum class Request : std::uint8_t {
+    GetInfo = 1,
+    Enable = 2,
+    Zero = 3,
+    Watchdog = 4,
+    Clear = 5,
+    GetModel = 6,  ///< a device without a model, or with an older firmware, refuses this request
+    Renderer = 7
+};
+
+/// Source of the device's torque; the value of the request `Renderer`.
+enum class Renderer : std::uint8_t {
+    Host = 0,   ///< the torque of each command
+    Device = 1  ///< the model of the device; commands only keep it active
+};
 
 /// Returns a text with the cause and the cure of an error number of libusb; empty for an unknown number.
 [[nodiscard]] constexpr std::string_view usb_cause(int code) noexcept {
@@ -88,9 +102,10 @@ inline constexpr int longest_watchdog_ms = 1000;  ///< largest setting of the wa
 
 /// Largest packet that USB full speed allows for an interrupt endpoint [bytes]
 inline constexpr std::size_t largest_packet = 64;
-inline constexpr std::size_t in_size = 32;    ///< size of an `InPacket` [bytes]
-inline constexpr std::size_t out_size = 16;   ///< size of an `OutPacket` [bytes]
-inline constexpr std::size_t info_size = 32;  ///< size of an `Info` [bytes]
+inline constexpr std::size_t in_size = 32;     ///< size of an `InPacket` [bytes]
+inline constexpr std::size_t out_size = 16;    ///< size of an `OutPacket` [bytes]
+inline constexpr std::size_t info_size = 32;   ///< size of an `Info` [bytes]
+inline constexpr std::size_t model_size = 16;  ///< size of a `DeviceModel` [bytes]
 
 /// Packet that the device sends `Info::rate_hz` times a second.
 struct InPacket {
@@ -123,6 +138,13 @@ struct Info {
     std::uint16_t watchdog_ms = 0;
     std::uint32_t capabilities = 0;
     std::uint64_t uid = 0;
+};
+
+/// Model that a device can render itself.
+struct DeviceModel {
+    std::uint64_t fingerprint = 0;  ///< that of the exported model
+    std::uint32_t rate_hz = 0;      ///< certified rate of the device's control loop
+    Renderer renderer = Renderer::Host;
 };
 
 namespace detail {
@@ -235,6 +257,35 @@ class ByteWriter {
         }
     }
     return "";
+}
+
+/// Reads the answer to GET_MODEL. Returns "", or a sentence with the invalid field, its value and the required value.
+[[nodiscard]] inline std::string decode(std::span<const std::uint8_t> bytes, DeviceModel& model) {
+    const std::string answer = "the answer to GET_MODEL";
+    if (bytes.size() != model_size) {
+        return answer + " has " + std::to_string(bytes.size()) + " bytes, must have " +
+               std::to_string(model_size);
+    }
+    std::uint32_t renderer = 0;  // one byte, and three reserved bytes that must be 0
+    detail::ByteReader{bytes}(model.fingerprint, model.rate_hz, renderer);
+    if (model.rate_hz == 0) {
+        return answer + ": rate_hz is 0, must be > 0";
+    }
+    if (renderer > static_cast<std::uint32_t>(Renderer::Device)) {
+        return answer + ": renderer is " + std::to_string(renderer) + ", must be 0 or 1";
+    }
+    model.renderer = static_cast<Renderer>(renderer);
+    return "";
+}
+
+/// Returns a fingerprint as 16 hexadecimal digits.
+[[nodiscard]] inline std::string fingerprint_text(std::uint64_t fingerprint) {
+    constexpr const char* digits = "0123456789abcdef";
+    std::string text;
+    for (unsigned shift = 64; shift > 0; shift -= 4) {
+        text += digits[fingerprint >> (shift - 4) & 15U];
+    }
+    return text;
 }
 
 /// Returns the bytes of a command packet.

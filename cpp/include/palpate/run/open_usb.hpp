@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -127,18 +128,23 @@ namespace detail {
     const DeviceProfile profile = listener.profile();
     const wire::Info info = listener.info();
     const std::string name = listener.name().text();
+    const std::optional<wire::DeviceModel> own_model = listener.model();
     listener.close();
     detail::require(!options.probe || options.upper,
                     "a probe on a real device needs upper, the largest position of its target from the zero "
                     "of the encoder");
     options.force_limit =
         options.force_limit.value_or(std::min(ProbeSettings{}.force_limit, profile.force_limit));
-    usb.makes_force = options.moves();
+    usb.makes_force = options.moves() || options.device_renders;
+    usb.device_renders = options.device_renders;
     auto live = std::make_unique<LiveDeviceOf<UsbDevice>>(UsbDevice{std::move(usb)}, detail::usb_report);
     live->title = name;
     live->profile = profile;
     live->rate_hz = info.rate_hz;
     live->metadata = {{"device", profile.id}};
+    if (own_model) {
+        live->metadata.emplace_back("device_model", wire::fingerprint_text(own_model->fingerprint));
+    }
     live->transducer = (info.capabilities & wire::has_transducer) != 0;
     return live;
 }

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -85,6 +86,16 @@ class UsbConnection {
         return transferred < 0 ? transferred : 0;
     }
 
+    /// Reads the model that the device can render itself. Returns nothing if the device has none.
+    [[nodiscard]] std::optional<wire::DeviceModel> model() const {
+        std::array<std::uint8_t, wire::largest_packet> bytes{};
+        const int size = read(handle_.get(), wire::Request::GetModel, bytes);
+        wire::DeviceModel model;
+        const bool known =
+            size >= 0 && wire::decode(std::span{bytes}.first(static_cast<std::size_t>(size)), model).empty();
+        return known ? std::optional{model} : std::nullopt;
+    }
+
     [[nodiscard]] libusb_context* context() const noexcept { return context_.get(); }
     [[nodiscard]] libusb_device_handle* handle() const noexcept { return handle_.get(); }
     [[nodiscard]] const UsbName& name() const noexcept { return name_; }
@@ -99,6 +110,14 @@ class UsbConnection {
         UsbName name;
         wire::Info info;
     };
+
+    /// Reads the answer to a control request. Returns its size or an error code of libusb.
+    [[nodiscard]] static int read(libusb_device_handle* handle, wire::Request request,
+                                  std::span<std::uint8_t> bytes) noexcept {
+        return libusb_control_transfer(handle, wire::request_to_host, static_cast<std::uint8_t>(request), 0,
+                                       wire::interface_number, bytes.data(),
+                                       static_cast<std::uint16_t>(bytes.size()), wire::request_timeout_ms);
+    }
 
     /// Opens the only suitable USB device. Returns a reason if there is no suitable device or more than one.
     [[nodiscard]] Opened choose(const std::string& serial) {
@@ -216,9 +235,7 @@ class UsbConnection {
             return refuse("cannot be used", code);
         }
         std::array<std::uint8_t, wire::largest_packet> bytes{};
-        const int transferred = libusb_control_transfer(
-            opened, wire::request_to_host, static_cast<std::uint8_t>(wire::Request::GetInfo), 0,
-            wire::interface_number, bytes.data(), bytes.size(), wire::request_timeout_ms);
+        const int transferred = read(opened, wire::Request::GetInfo, bytes);
         if (transferred < 0) {
             return refuse("does not report its properties (GET_INFO)", transferred);
         }
