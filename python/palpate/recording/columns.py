@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import difflib
 import shlex
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..errors import InputError, did_you_mean, listed, nearest_name, shortened
@@ -187,6 +187,7 @@ def _attempt(
         problems.setdefault("force", both)
     if problems or position_column is None or force_column is None:
         return None, problems
+    notes += _unit_notes(each for each in chosen.values() if each is not None)
     direction = request.direction or next((name for name in DIRECTION_NAMES if name in names), None)
     return Choice(
         position=position_column,
@@ -223,6 +224,18 @@ def _with_units(names: Sequence[str], request: _Request, problems: dict[str, str
             stem, unit = name, None  # the ending "_in" means input, not inches
         columns.append(Column(name, stem, stated.get(name, unit)))
     return columns
+
+
+def _unit_notes(columns: Iterable[Column]) -> list[str]:
+    """Returns a sentence for each column that is read in another unit than that in its name."""
+    return [
+        f"{column.name} is read in {column.unit.symbol}, although its name states {named.symbol}"
+        for column in columns
+        if column.unit is not None
+        and (named := split_name(column.name)[1]) is not None
+        and named != column.unit
+        and column.stem != column.name
+    ]
 
 
 def _choose(

@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import json
 import struct
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +13,17 @@ import numpy as np
 
 from ..errors import InputError, escaped, listed, shortened
 from .csv_file import CsvFile
-from .dialect import decimal_mark, find_header, first_row_as_header, refuse_marks, with_checked_names
+from .dialect import decimal_mark, find_header, first_row_as_header, with_checked_names
 from .files import readable
-from .table import MISSING, Cells, LongTable, Table, parse_with, to_numbers
+from .mcap_file import read_mcap
+from .memory_table import MemoryTable, cells_of, import_library
+from .table import Cells, LongTable, Table, to_numbers
 
 _BUFFER_BYTES = 1 << 20
 """Number of bytes of each Parquet column that are read at once, before they are needed."""
 
 MOST_HEADER_ROWS = 200
 """Number of first rows of an Excel sheet among which the header is searched."""
-
-STEADY_ROWS = 1000
-"""A column that has only one or two distinct values in this number of first rows is steady."""
-
 
 _MATLAB_HEADER_BYTES = 128
 """Number of bytes before the first data element of a MATLAB file."""
@@ -64,90 +60,16 @@ def open_table(path: Path) -> Table:
         ".xlsm": _excel,
         ".npz": _numpy,
         ".mat": _matlab,
-        ".mcap": _mcap,
+        ".mcap": read_mcap,
     }
     return readers.get(path.suffix.lower(), CsvFile)(path)
-
-
-class MemoryTable(Table):
-    """Table in memory.
-
-    Parameters
-    ----------
-    path : Path
-    columns : mapping of str to (n,) array
-        float64, or objects of str.
-    metadata : mapping, optional
-    notes : sequence of str, optional
-        Statements on how the file was read, as parts of one sentence.
-    first : (str, int), optional
-        Word for a row and number of the first one, for the sentences.
-    decimal : str
-        Decimal mark of numbers that are stored as text.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        columns: Mapping[str, Cells],
-        metadata: Mapping[str, str] | None = None,
-        notes: Sequence[str] = (),
-        first: tuple[str, int] = ("row", 0),
-        decimal: str = ".",
-    ) -> None:
-        self._path, self._columns, self._first, self._decimal = path, dict(columns), first, decimal
-        self.names = tuple(self._columns)
-        self.metadata = dict(metadata or {})
-        self.notes = tuple(notes)
-        self.text_names = {name for name, cells in self._columns.items() if cells.dtype == object}
-        self.steady_names = {
-            name for name, cells in self._columns.items() if len(set(cells[:STEADY_ROWS].tolist())) < 3
-        }
-        if len(self.names) < 2:
-            raise InputError(
-                f"{path} has fewer than two columns ({listed(self.names)}); a recording needs a "
-                "position and a force"
-            )
-
-    def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
-        columns = {}
-        for name, cells in self._columns.items():
-            if name in text:
-                cells = np.array([_as_text(cell) for cell in cells], dtype=object)
-            elif name in numbers and cells.dtype == object:
-                found = to_numbers(cells, self._decimal)
-                refuse_marks(f"{self._path}: column {name}", cells[np.isnan(found)], self._decimal, ";")
-                cells = found
-            columns[name] = cells
-        return columns
-
-    def place(self, row: int) -> str:
-        word, number = self._first
-        return f"{word} {number + row}"
-
-    def cell(self, row: int, name: str) -> str:
-        return _as_text(self._columns[name][row])
-
-
-def _as_text(value: Any) -> str:
-    return "" if value is None or value != value else f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _import_library(name: str, path: Path, kind: str, extra: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError:
-        raise InputError(
-            f"{path} is {kind}, which needs {name.split('.')[0]}: "
-            f"install it with pip install 'palpate[{extra}]'"
-        ) from None
 
 
 class ParquetFile(LongTable):
     """A Parquet recording."""
 
     def __init__(self, path: Path) -> None:
-        parquet = _import_library("pyarrow.parquet", path, "Parquet", "parquet")
+        parquet = import_library("pyarrow.parquet", path, "Parquet", "parquet")
         self._path = path
         with readable(path, "Parquet"):
             # The file is read in small pieces: the file or one of its row groups may be larger than memory.
@@ -250,7 +172,7 @@ def _as_objects(values: Cells) -> Cells:
 
 def _excel(path: Path) -> Table:
     """Returns the first sheet of a workbook that is not empty."""
-    openpyxl = _import_library("openpyxl", path, "an Excel file", "excel")
+    openpyxl = import_library("openpyxl", path, "an Excel file", "excel")
     with readable(path, "Excel (.xlsx)"):
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         sheets = [(sheet.title, [*sheet.iter_rows(values_only=True)]) for sheet in book.worksheets]
@@ -274,7 +196,7 @@ def _excel(path: Path) -> Table:
     if header.units_row is not None:
         notes.append("units in a second header row")
     data = values[header.first :]
-    columns = {name: _cells([row[k] for row in data], decimal) for k, name in enumerate(header.names)}
+    columns = {name: cells_of([row[k] for row in data], decimal) for k, name in enumerate(header.names)}
     metadata = {}
     for row in rows[: header.row]:
         key, _, value = row[0].partition(":")
@@ -283,18 +205,6 @@ def _excel(path: Path) -> Table:
         notes.append("empty rows are left out")
     first = kept[header.first] + 1 if len(kept) > header.first else 0
     return MemoryTable(path, columns, metadata, [*notes, *header_notes], ("row", first), decimal)
-
-
-def _cells(values: Sequence[Any], decimal: str) -> Cells:
-    """Returns the cells of a column as numbers if every cell is a number or missing, else as text."""
-    if all(
-        value is None or (isinstance(value, (int, float)) and not isinstance(value, bool)) for value in values
-    ):
-        return np.array([np.nan if value is None else float(value) for value in values])
-    text = np.array(["" if value is None else str(value) for value in values], dtype=object)
-    if all(word.strip() in MISSING or parse_with(word, decimal) is not None for word in text):
-        return to_numbers(text, decimal)
-    return text
 
 
 def _numpy(path: Path) -> Table:
@@ -394,51 +304,3 @@ def _vector(array: Any) -> Cells:
     if array.dtype.kind in "iufb":
         return np.asarray(array, dtype=np.float64)
     return np.array([str(value) for value in array], dtype=object)
-
-
-def _mcap(path: Path) -> Table:
-    """Returns the JSON messages and log times of the only topic of an MCAP file with two values or more."""
-    reader = _import_library("mcap.reader", path, "MCAP", "mcap")
-    topics: dict[str, list[dict[str, Any]]] = {}
-    others: Counter[str] = Counter()
-    with readable(path, "MCAP"), path.open("rb") as stream:
-        for _, channel, message in reader.make_reader(stream).iter_messages():
-            if channel.message_encoding != "json":
-                others[channel.message_encoding] += 1
-                continue
-            row = {"log_time_s": message.log_time, **dict(_named_values(json.loads(message.data)))}
-            topics.setdefault(channel.topic, []).append(row)
-    if not topics:
-        content = f"only messages in {listed(others)}" if others else "no messages"
-        raise InputError(
-            f"{path} holds {content}; it must hold JSON messages. Convert the messages to JSON or export CSV"
-        )
-    sizes = {topic: len({name for row in rows for name in row}) for topic, rows in topics.items()}
-    wide = [topic for topic, size in sizes.items() if size > 2]
-    if len(wide) != 1:
-        raise InputError(
-            f"{path}: {len(wide)} topics hold two values or more ({listed(wide or sizes)}); one topic must "
-            "hold position and force. Write both to one topic or export them as CSV"
-        )
-    rows = topics[wide[0]]
-    names = dict.fromkeys(name for row in rows for name in row)
-    start = rows[0]["log_time_s"]
-    for row in rows:
-        row["log_time_s"] = (row["log_time_s"] - start) * 1e-9
-    columns = {escaped(name): _cells([row.get(name) for row in rows], ".") for name in names}
-    notes = [f"topic {shortened(wide[0])}"]
-    if len(topics) > 1 or others:
-        notes.append("other topics are left out")
-    return MemoryTable(path, columns, {}, notes, ("message", 0))
-
-
-def _named_values(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Yields the numbers and words of a JSON message; a nested field has a name like ``wrench.force_N``."""
-    if isinstance(value, dict):
-        for key, item in value.items():
-            yield from _named_values(item, f"{name}.{key}" if name else str(key))
-    elif isinstance(value, list):
-        for index, item in enumerate(value):
-            yield from _named_values(item, f"{name}.{index}")
-    elif isinstance(value, (int, float, str)) and not isinstance(value, bool):
-        yield name or "value", value

@@ -133,6 +133,7 @@ def recording_from(
     *,
     inputs: Sequence[str] = (),
     name: str = "recording",
+    types: str = RECORDING_TYPES,
 ) -> Recording:
     """Returns the given recording, or reads it or makes it from arrays.
 
@@ -146,6 +147,8 @@ def recording_from(
         Further columns of a file or a frame.
     name : str
         Name of the argument in messages.
+    types : str
+        The accepted types, as the end of a message.
 
     Raises
     ------
@@ -165,7 +168,6 @@ def recording_from(
         return Recording.from_frame(recording, inputs=inputs)
     if isinstance(recording, (str, os.PathLike)):
         return read_recording(path_of(name, recording), inputs=inputs)
-    types = RECORDING_TYPES if name == "recording" else ELEMENT_TYPES
     raise InputError(f"{name} is {shown(recording)}; {types}")
 
 
@@ -196,7 +198,8 @@ def recordings_from(
     if all(isinstance(each, (int, float, np.number)) for each in found):
         raise InputError(f"recording is a list of numbers, and force is not given; {RECORDING_TYPES}")
     return [
-        recording_from(each, inputs=inputs, name=f"recording[{number}]") for number, each in enumerate(found)
+        recording_from(each, inputs=inputs, name=f"recording[{number}]", types=ELEMENT_TYPES)
+        for number, each in enumerate(found)
     ]
 
 

@@ -20,6 +20,7 @@ from ..verdict import Verdict
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
 from .display import columns_of, html_of
 from .files import write_csv
+from .mcap_file import write_mcap
 from .quality import quality_findings
 from .table import FRAME, Cells, FrameTable, python_arguments
 from .units import FORCE_UNITS, POSITION_UNITS, Unit
@@ -328,10 +329,11 @@ class Recording:
         return shifted._rows(rows)
 
     def write(self, path: str | os.PathLike[str], *, replace: bool = True) -> Path:
-        """Writes the recording as CSV that :func:`palpate.read_recording` reads back exactly without options.
+        """Writes the recording as CSV, or as MCAP if the name ends in ``.mcap``.
 
-        The file gets its name only when it is complete. Numbers are exact to the last bit; positions and
-        forces are in SI units.
+        :func:`palpate.read_recording` reads both back exactly without options. The file gets its name only
+        when it is complete. Numbers are exact to the last bit; positions and forces are in SI units. MCAP
+        needs a time and the extra ``mcap``; it stores infinity in a further column as a missing number.
 
         Parameters
         ----------
@@ -342,10 +344,12 @@ class Recording:
         Raises
         ------
         InputError
-            The folder does not exist or cannot be written, or the metadata does not fit on one line.
+            The folder does not exist or cannot be written, the metadata does not fit on one line of CSV, or
+            the recording has no time for MCAP.
         """
         file = path_of("path", path)
-        write_csv(file, *columns_of(self), self.metadata, replace=replace)
+        write = write_mcap if file.suffix.lower() == ".mcap" else write_csv
+        write(file, *columns_of(self), self.metadata, replace=replace)
         return file
 
     def to_frame(self) -> pd.DataFrame:

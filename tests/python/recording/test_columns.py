@@ -240,3 +240,11 @@ def test_a_time_without_a_unit_is_reported_and_added_by_the_cure() -> None:
 def test_the_direction_is_found_by_its_name(name: str) -> None:
     assert choose(f"depth_mm,force_N,{name}").direction == name
     assert choose("depth_mm,force_N,stroke").direction is None
+
+
+def test_a_stated_unit_that_contradicts_the_name_is_noted() -> None:
+    names = ["displacement_mm", "force_gf"]
+    contradicted = choose_columns("a.csv", names, units={"force_gf": "N"})
+    assert contradicted.notes == ("force_gf is read in N, although its name states gf",)
+    assert choose_columns("a.csv", names, units={"force_gf": "gf"}).notes == ()
+    assert choose_columns("a.csv", names).notes == ()

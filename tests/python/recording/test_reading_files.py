@@ -88,7 +88,7 @@ def test_parquet_without_pyarrow_is_refused_with_the_install_command(
     def missing(name: str) -> object:
         raise ImportError(name)
 
-    reader = importlib.import_module("palpate.recording.formats")
+    reader = importlib.import_module("palpate.recording.memory_table")
     monkeypatch.setattr(reader, "import_module", missing)
     assert refusal(path) == (
         "a.parquet is Parquet, which needs pyarrow: install it with pip install 'palpate[parquet]'"

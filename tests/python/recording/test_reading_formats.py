@@ -228,7 +228,7 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(
             raise ImportError(name)
         return real(name)
 
-    monkeypatch.setattr(importlib.import_module("palpate.recording.formats"), "import_module", missing)
+    monkeypatch.setattr(importlib.import_module("palpate.recording.memory_table"), "import_module", missing)
     assert refusal(tmp_path / f"a.{kind}") == sentence
 
 

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate export: writes a model as a file for programs without palpate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..errors import InputError
+from ..export.request import Request, Written
+from .exit_status import end_with, finishing
+from .printing import print_json, print_numbers, print_verdict, talk
+from .verb import PATH, json_option, options, require_writable, verb
+
+FORMATS = {
+    "c": ("c_header", "A C header for a microcontroller: force law and structure with proved errors."),
+    "fmu": ("fmu", "An FMU (FMI 3.0, co-simulation) of the force law for simulators; needs a C compiler."),
+    "table": ("table", "A CSV table of the force over the position."),
+    "schema": ("schema", "The JSON schema of model files; needs no MODEL.json."),
+}
+"""Formats: option -> module of `palpate.export` with a function `write`, and the help."""
+
+format_options: Callable[[Any], Any] = options(
+    *(
+        click.option(
+            f"--{name}", "kind", flag_value=name, type=str, default=None, show_default=False, help=text
+        )
+        for name, (_, text) in FORMATS.items()
+    )
+)
+
+
+@verb("palpate export knob.json --c -o knob.h")
+@click.argument("model_file", metavar="[MODEL.json]", type=PATH, required=False)
+@format_options
+@click.option(
+    "-o",
+    "--output",
+    type=PATH,
+    metavar="OUT",
+    required=True,
+    help="File to write; an existing one is replaced.",
+)
+@click.option(
+    "--precision",
+    type=click.Choice(["single", "double"]),
+    default="single",
+    help="Number type of a program: float, or double for a processor with doubles.",
+)
+@click.option(
+    "--name",
+    default=None,
+    show_default="from OUT",
+    help="Name of the model in a program: an identifier of C.",
+)
+@click.option("--uncertified", is_flag=True, help="Export also a model without certificate.")
+@click.option(
+    "--encoder-step",
+    type=float,
+    default=None,
+    metavar="NUMBER",
+    show_default="of the certified device",
+    help="Position for each count of the encoder, without certificate.",
+)
+@json_option
+def export(
+    model_file: Path | None,
+    kind: str | None,
+    output: Path,
+    precision: str,
+    name: str | None,
+    uncertified: bool,
+    encoder_step: float | None,
+    as_json: bool,
+) -> None:
+    """Write a model as a file for programs without palpate.
+
+    The file is compared with the model before it is written. A model needs a certificate for its device
+    (palpate plan), because the file renders it without the guards of palpate. The exit code is 1 if the
+    comparison fails.
+    """
+    if kind is None:
+        raise InputError(f"no format is given: one of {', '.join(f'--{each}' for each in FORMATS)}")
+    require_writable(output, inputs=(model_file,))
+    talk(f"writing {output} ...")
+    module = import_module(f"palpate.export.{FORMATS[kind][0]}")
+    request = Request(output, model_file, precision, name, uncertified, encoder_step)
+    with finishing():
+        written: Written = module.write(request)
+        if as_json:
+            print_json(
+                {"output": str(output), "format": kind, "verdict": str(written.verdict)} | written.record
+            )
+        else:
+            print_verdict(written.verdict)
+            print_numbers(written.numbers)
+    end_with(written.verdict)

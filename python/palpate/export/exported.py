@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A model with its plan, ready to be written as a program: tables, certificate, and the check of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from .. import _core
+from .._core.device import DeviceProfile
+from .._core.model import fingerprint
+from .._core.portable import ExportCheck, ExportedModel, profile_checksum
+from .._core.rendering import Scheme
+from .._core.stability import Certificate
+from ..errors import InputError
+from ..model import Model
+from ..planning import Plan, describe, mechanical_units
+from ..planning.plan import require_force
+from ..recording.units import unit_of
+from ..verdict import Finding, Verdict, no, usable
+from .request import Request
+
+RANDOM_COUNTS = 20_000
+"""Random counts, and ticks of a random motion, at which the tables are compared with the core before they are
+written."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A model as tables, with the certificate of its plan."""
+
+    name: str
+    source: str
+    """Name of the model file"""
+    model: ExportedModel
+    check: ExportCheck
+    fingerprint: str
+    """Fingerprint of the rendered model, 16 hexadecimal digits"""
+    certificate: Certificate | None
+    units: tuple[str, str]
+    """Units of position and force"""
+
+    @classmethod
+    def of(cls, request: Request) -> Exported:
+        """Makes the tables of a model and compares them with the core.
+
+        Raises
+        ------
+        InputError
+            The model has no certificate, or the model or its structure cannot be exported. The message states
+            the cure.
+        """
+        name = request.identifier()
+        model = request.model()
+        require_force(model)
+        plan = None if model.plan is None else Plan.of(model)
+        certificate = None if plan is None else plan.certificate
+        _require_certificate(certificate, request)
+        device = None if certificate is None else certificate.device
+        rendered = model if plan is None else plan.rendered
+        scheme = Scheme(structure="direct") if plan is None else plan.scheme
+        tables = ExportedModel(
+            rendered,
+            scheme,
+            encoder_step=_encoder_step(device, request),
+            precision=request.precision,
+            **({} if device is None else {"period_s": device.period_s, "force_limit": device.force_limit}),
+        )
+        return cls(
+            name,
+            "" if request.model_file is None else request.model_file.name,
+            tables,
+            tables.check(RANDOM_COUNTS),
+            fingerprint(rendered),
+            certificate,
+            units_of(model),
+        )
+
+    @property
+    def device(self) -> DeviceProfile | None:
+        """Device of the certificate."""
+        return None if self.certificate is None else self.certificate.device
+
+    @property
+    def has_certificate(self) -> bool:
+        """True if the program states rate and profile, because its certificate holds for these only."""
+        return self.certificate is not None and self.certificate.certified
+
+    @property
+    def rate_hz(self) -> int:
+        """Certified rate [1/s]; 0 without certificate.
+
+        Raises
+        ------
+        InputError
+            The rate is not a whole number.
+        """
+        if not self.has_certificate or self.device is None:
+            return 0
+        rate = 1.0 / self.device.period_s
+        if abs(rate - round(rate)) > 1e-6 * rate:
+            raise InputError(
+                f"the period of {self.device.id} is {self.device.period_s:g} s: must give a whole number of "
+                f"ticks for each second, not {rate:.6g}; plan the model for such a period"
+            )
+        return round(rate)
+
+    @property
+    def profile(self) -> int:
+        """Checksum of the profile of the device; 0 without certificate."""
+        return profile_checksum(self.device) if self.has_certificate and self.device is not None else 0
+
+    @property
+    def structure(self) -> str:
+        """Structure of the plan in words."""
+        return describe(self.model.scheme)
+
+    @property
+    def position_unit(self) -> str:
+        return self.units[0]
+
+    @property
+    def force_unit(self) -> str:
+        return self.units[1]
+
+    @property
+    def slope_unit(self) -> str:
+        return f"{self.force_unit}/{self.position_unit}"
+
+    @property
+    def verdict(self) -> Verdict:
+        """ "no" if a difference to the core exceeds its bound, usable without a certificate, else good."""
+        findings: list[Finding] = []
+        if not self.check.passed:
+            worst = max(self.check.force, self.check.slope, self.check.energy, self.check.step)
+            findings.append(
+                no(
+                    f"the tables differ from the model by {worst:.3g} times the proved bound; nothing was "
+                    "written. Please report this with the model file"
+                )
+            )
+        if not self.has_certificate:
+            findings.append(
+                usable("the model has no certificate: nothing is proved about stability on a device")
+            )
+        return Verdict(tuple(findings))
+
+    @property
+    def certificate_text(self) -> str:
+        """Certificate in one or two sentences."""
+        if self.certificate is None or not self.has_certificate:
+            return "No certificate: nothing is proved about stability on a device."
+        device = self.certificate.device
+        return (
+            f"Certified: {self.structure} on {device.id} at {self.rate_hz} Hz, for up to "
+            f"{1e3 * self.certificate.longest_period_s:.4g} ms between samples; {self.certificate.reason}. "
+            f"Certificate {self.certificate.fingerprint}, model {self.certificate.model}."
+        )
+
+    def summary(self) -> dict[str, str]:
+        """Returns the proved bounds of the errors for display, by name."""
+        model = self.model
+        return {
+            "force error": self.error_text(model.force_error, model.largest_force, self.force_unit),
+            "slope error": self.error_text(model.slope_error, model.largest_slope, self.slope_unit),
+            "step error": self.step_error_text(),
+        }
+
+    def definitions(self) -> dict[str, str]:
+        """Returns the macros that a program defines before it includes the header, for display."""
+        if not self.has_certificate:
+            return {}
+        return {"define": f"PALPATE_RATE_HZ {self.rate_hz}, PALPATE_PROFILE {self.profile:#010x}"}
+
+    def record(self) -> dict[str, Any]:
+        """Returns the numbers of the export for --json."""
+        model = self.model
+        return {
+            "name": self.name,
+            "structure": self.model.scheme.structure,
+            "precision": "single" if model.single else "double",
+            "certified": self.has_certificate,
+            "rate_hz": self.rate_hz,
+            "profile": self.profile,
+            "fingerprint": self.fingerprint,
+            "force_error": model.force_error,
+            "force_error_share": _share(model.force_error, model.largest_force),
+            "slope_error": model.slope_error,
+            "slope_error_share": _share(model.slope_error, model.largest_slope),
+            "energy_error": model.energy_error,
+            "step_error": model.step_error,
+            "checked_places": self.check.places,
+            "largest_share_of_bounds": max(
+                self.check.force, self.check.slope, self.check.energy, self.check.step
+            ),
+        }
+
+    def error_text(self, error: float, largest: float, unit: str) -> str:
+        """Returns a bound of an error as text: absolute, and as a share of the largest value."""
+        share = _share(error, largest)
+        return f"up to {error:.2g} {unit}" + ("" if share is None else f", {share:.2g} of the largest value")
+
+    def step_error_text(self) -> str:
+        """Returns the bound of the error of a step as text."""
+        text = self.error_text(self.model.step_error, self.model.largest_force, self.force_unit)
+        return text if self.model.step_error_lasts else f"{text}, in one step from the same state"
+
+    def description(self) -> list[str]:
+        """Returns the opening comment of an exported program, in paragraphs."""
+        model = self.model
+        device = self.device
+        number = "single" if model.single else "double"
+        used = max(self.check.force, self.check.slope)
+        paragraphs = [
+            f"Force of the model {self.source}, exported by palpate {_core.__version__} in {number} "
+            "precision.\n"
+            "Generated file: change the model and export it again. Valid C99 and C++11; needs no library.",
+            f"Model: fingerprint {self.fingerprint}; position in {self.position_unit}, force in "
+            f"{self.force_unit}. The force is that of the object against the tool; the device applies its "
+            "negative.\n"
+            f"Structure: {self.structure}.\n"
+            f"Position for each count: {model.encoder_step:.9g} {self.position_unit}.",
+            self.certificate_text,
+            "Proved bounds of the difference to the model inside its domain. They hold with and without "
+            "contraction of products and sums (-ffp-contract).\n"
+            f"force  {self.error_text(model.force_error, model.largest_force, self.force_unit)}\n"
+            f"slope  {self.error_text(model.slope_error, model.largest_slope, self.slope_unit)}\n"
+            f"energy up to {model.energy_error:.2g} J\n"
+            f"step   {self.step_error_text()}\n"
+            f"Outside the domain, {model.outside_share:.2g} of the change of force since its end is added.\n"
+            f"Checked at {self.check.places} counts: at most {used:.2g} of a bound was used.",
+            "Functions:\n"
+            "NAME_start(&state, count)         object at rest at this position\n"
+            "NAME_step(&state, count)          force of one tick; changes the state\n"
+            "NAME_force, NAME_force_slope, NAME_energy, NAME_advance   the force law alone\n"
+            "NAME_torque_uNm, NAME_start_of    the members of palpate_model in palpate_device.h",
+        ]
+        if self.has_certificate and device is not None:
+            numbers = ", ".join(f"{key} {value}" for key, value in device.to_dict().items())
+            paragraphs.insert(3, f"Device profile (PALPATE_PROFILE {self.profile:#010x}): {numbers}.")
+        return paragraphs
+
+
+def _require_certificate(certificate: Certificate | None, request: Request) -> None:
+    if request.uncertified or (certificate is not None and certificate.certified):
+        return
+    found = "the model has no certificate" if certificate is None else f"the plan is {certificate.verdict}"
+    raise InputError(
+        f"{found}: certify it with palpate plan {request.model_file} --device PROFILE -o "
+        f"{request.model_file}, or export it without a certificate with --uncertified"
+    )
+
+
+def _encoder_step(device: DeviceProfile | None, request: Request) -> float:
+    known = 0.0 if device is None else device.encoder_step
+    if request.encoder_step is None:
+        return known
+    if known > 0.0:
+        raise InputError(
+            f"--encoder-step is given, but the encoder step of {device.id if device else ''} is {known:g}: "
+            "leave it out"
+        )
+    if device is not None and not request.uncertified:
+        raise InputError(
+            f"--encoder-step is given, but the certificate holds for {device.id} without encoder steps: "
+            "state the encoder step in the profile and plan the model again"
+        )
+    return request.encoder_step
+
+
+def units_of(model: Model) -> tuple[str, str]:
+    """Returns the SI units of position and force."""
+    unit = unit_of(model.units["position"] or "")
+    position = "rad" if unit is not None and unit.si == "rad" else "m"
+    return position, mechanical_units(position)[2]
+
+
+def _share(error: float, largest: float) -> float | None:
+    return error / largest if largest > 0.0 else None

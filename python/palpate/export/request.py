@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Request and result of an export, the same for all formats."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..model import Model, load_model
+from ..recording.files import replacing
+from ..verdict import Verdict
+
+_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+_RESERVED = frozenset(
+    word
+    for line in (
+        "auto break case char const continue default do double else enum extern float for goto if inline",
+        "int long register restrict return short signed sizeof static struct switch typedef union unsigned",
+        "void volatile while and bool class delete false new not operator or private protected public",
+        "template this true using virtual",
+    )
+    for word in line.split()
+)
+"""Words of C and C++ that cannot be the name of a model."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """Options of one export."""
+
+    output: Path
+    model_file: Path | None = None
+    precision: str = "single"
+    """"single" or "double": number type of the exported program"""
+    name: str | None = None
+    """Name of the model in the program; None: the name of the output file"""
+    uncertified: bool = False
+    """True if a model without certificate is exported too"""
+    encoder_step: float | None = None
+    """Position for each count, for a model without the profile of a device"""
+
+    def model(self) -> Model:
+        """Reads the model file."""
+        if self.model_file is None:
+            raise InputError("no model is given: palpate export MODEL.json -o OUT")
+        return load_model(self.model_file)
+
+    def identifier(self) -> str:
+        """Returns the name of the model, which is a C identifier.
+
+        Raises
+        ------
+        InputError
+            The name is not an identifier.
+        """
+        if self.name is not None:
+            if _IDENTIFIER.fullmatch(self.name) is None or self.name in _RESERVED:
+                raise InputError(f"the name is {self.name!r}: must be an identifier of C, such as knob")
+            return self.name
+        name = re.sub(r"\W+", "_", self.output.name.split(".")[0], flags=re.ASCII).strip("_")
+        if _IDENTIFIER.fullmatch(name) is None or name in _RESERVED:
+            raise InputError(f"{self.output.name} gives no identifier of C: state the name with --name")
+        return name
+
+    def write_text(self, text: str) -> None:
+        """Writes the output; the file gets its name only when it is completely written."""
+        with replacing(self.output) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Written:
+    """Result of one export."""
+
+    verdict: Verdict
+    numbers: dict[str, str]
+    """Main numbers for display, by name"""
+    record: dict[str, Any]
+    """The same numbers for --json"""

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests palpate export: formats, refusals, exit codes and outputs."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import palpate
+from models_by_hand import keyswitch_by_hand, model_by_hand
+from palpate.cli.main import main
+from palpate.export import exported
+from palpate.model import model_file
+
+
+@pytest.fixture
+def planned(tmp_path: Path) -> Path:
+    """Returns the file of a model that is certified for the bench knob."""
+    model = model_by_hand(alpha=[[5.0]], weight=[0.02], linear=[1.0])
+    plan = palpate.plan(model, "bench-knob")
+    assert plan.certificate.certified
+    return plan.stored().save(tmp_path / "knob.json")
+
+
+def exported_json(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, object]:
+    code = main([*map(str, arguments), "--json"])
+    result = json.loads(capsys.readouterr().out)
+    return result | {"code": code}
+
+
+def test_c_header_states_rate_profile_and_errors_of_a_certified_model(
+    planned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    header = tmp_path / "my-knob.h"
+    result = exported_json(capsys, "export", planned, "--c", "-o", header)
+    assert result["code"] == 0
+    assert result["verdict"] == "good"
+    assert result["certified"] is True
+    assert result["force_error_share"] <= 1e-6  # type: ignore[operator]
+    assert result["slope_error_share"] <= 3e-5  # type: ignore[operator]
+    text = header.read_text(encoding="utf-8")
+    assert f"PALPATE_PROFILE != {result['profile']:#010x}" in text
+    assert "PALPATE_RATE_HZ != 1000" in text
+    assert f"#define my_knob_FINGERPRINT UINT64_C(0x{result['fingerprint']})" in text
+    assert palpate.load_model(planned).certificate["fingerprint"] in text
+    assert "NAME" not in text
+    assert "//@" not in text
+
+
+def test_first_line_is_the_verdict(planned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(planned), "--c", "-o", str(tmp_path / "knob.h")]) == 0
+    assert capsys.readouterr().out.startswith("verdict: good\n")
+
+
+def test_model_without_certificate_is_refused_with_the_cure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = model_by_hand().save(tmp_path / "m.json")
+    assert main(["export", str(model), "--c", "-o", str(tmp_path / "m.h")]) == 2
+    sentence = capsys.readouterr().err
+    assert "palpate plan" in sentence
+    assert "--uncertified" in sentence
+    assert not (tmp_path / "m.h").exists()
+
+
+def test_uncertified_header_says_so_and_compares_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = model_by_hand().save(tmp_path / "m.json")
+    header = tmp_path / "m.h"
+    result = exported_json(
+        capsys, "export", model, "--c", "--uncertified", "--encoder-step", "1e-4", "-o", header
+    )
+    assert result["code"] == 0
+    assert str(result["verdict"]).startswith("usable: the model has no certificate")
+    text = header.read_text(encoding="utf-8")
+    assert "No certificate" in text
+    assert "PALPATE_RATE_HZ" not in text
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("--uncertified", "--encoder-step"),
+        ("--uncertified --encoder-step 0.2", "an eighth of the model's domain"),
+        ("--uncertified --encoder-step 1e-4 --name 2fast", "identifier of C"),
+        ("--uncertified --encoder-step 1e-4 --name for", "identifier of C"),
+    ],
+)
+def test_impossible_export_is_refused_in_one_sentence(
+    options: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = model_by_hand().save(tmp_path / "m.json")
+    assert main(["export", str(model), "--c", "-o", str(tmp_path / "m.h"), *options.split()]) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert words in error
+    assert not (tmp_path / "m.h").exists()
+
+
+def test_encoder_step_of_a_certified_device_cannot_be_changed(
+    planned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["export", str(planned), "--c", "--encoder-step", "1e-3", "-o", str(tmp_path / "m.h")]
+    assert main(command) == 2
+    assert "leave it out" in capsys.readouterr().err
+
+
+def test_format_is_required(planned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(planned), "-o", str(tmp_path / "m.h")]) == 2
+    assert "one of --c, --fmu, --table, --schema" in capsys.readouterr().err
+
+
+def test_failed_comparison_writes_nothing_and_exits_with_code_1(
+    planned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Failed:
+        passed = False
+        places, force, slope, energy, step = 10, 2.5, 0.0, 0.0, 0.0
+
+    made = exported.Exported.of
+    monkeypatch.setattr(exported.Exported, "of", lambda request: replace(made(request), check=Failed()))
+    header = tmp_path / "knob.h"
+    assert main(["export", str(planned), "--c", "-o", str(header)]) == 1
+    assert "2.5 times the proved bound; nothing was written" in " ".join(capsys.readouterr().out.split())
+    assert not header.exists()
+
+
+def test_table_has_the_forces_of_the_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = keyswitch_by_hand(play_radius=5e-5)
+    path = model.save(tmp_path / "key.json")
+    assert main(["export", str(path), "--table", "-o", str(tmp_path / "key.csv")]) == 0
+    table = pd.read_csv(tmp_path / "key.csv")
+    assert list(table.columns) == [
+        "position_m",
+        "press_force_N",
+        "press_slope_N/m",
+        "release_force_N",
+        "release_slope_N/m",
+        "energy_J",
+    ]
+    x = table["position_m"].to_numpy()
+    np.testing.assert_array_equal(table["press_force_N"], model.force(x, direction=1.0))
+    assert x[0] == model.lower[0]
+    assert x[-1] == model.upper[0]
+
+
+def test_schema_needs_no_model(tmp_path: Path) -> None:
+    assert main(["export", "--schema", "-o", str(tmp_path / "schema.json")]) == 0
+    stored = Path(model_file.__file__).with_name("model.schema.json").read_text(encoding="utf-8")
+    assert (tmp_path / "schema.json").read_text(encoding="utf-8") == stored
+
+
+def test_model_is_required_for_a_header(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "--c", "-o", str(tmp_path / "m.h")]) == 2
+    assert "no model is given" in capsys.readouterr().err
