@@ -83,6 +83,11 @@ def devices(
             f"velocity: {'measured' if info['measures_velocity'] else 'not measured'}; "
             f"firmware {info['firmware'] >> 8}.{info['firmware'] & 0xFF}, uid {info['uid']:016x}"
         )
+        if one.model is not None:
+            print_line(
+                f"  model on the device: fingerprint {one.model['fingerprint']}, certified for "
+                f"{one.model['rate_hz']} Hz{', rendered now' if one.model['is_rendered'] else ''}"
+            )
     end_with(verdict)
 
 

@@ -138,6 +138,8 @@ def exit_status_of(error: BaseException) -> ExitStatus:
 
 def _usage_sentence(error: click.ClickException) -> str:
     sentence = _one_line(error.format_message()).rstrip(".")
+    if isinstance(error, click.MissingParameter) and isinstance(error.param, click.Option) and error.ctx:
+        sentence += f"; add {error.param.opts[0]} {error.param.make_metavar(error.ctx)}"
     context = error.ctx if isinstance(error, click.UsageError) else None
     return f"{sentence} (see {context.command_path} --help)" if context else sentence
 

@@ -19,7 +19,7 @@ from ..planning import Comparison, Plan, describe, force_at
 from ..recording import Recording
 from ..recording.files import replacing
 from ..verification import ClosedLoop, Verification, force_driven, motion_driven, uncertainty
-from .printing import number, print_table, visible
+from .printing import number, print_table, talk, visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,6 +98,7 @@ def _written(path: Path, inches: tuple[float, float], *, title: str = "") -> Ite
         yield figure
         with replacing(path) as temporary:
             figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
+    talk(f"wrote {path}")
 
 
 def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
 
 import click
 from click.shell_completion import CompletionItem
@@ -27,9 +28,34 @@ _VERBS = {
     "check-device": "Measure a device and judge if it can render force.",
     "show": "Print a model or a recording.",
     "report": "Write one HTML page about a model.",
+    "export": "Write a model as a C header, table or schema.",
     "demo": "Identify, verify and render a simulated sample.",
 }
 """Verbs with their lines in the help. The file of a verb is imported only when the verb is used."""
+
+
+_USUAL_WORDS = {
+    "identify": ("fit", "train", "learn", "estimate", "model"),
+    "verify": ("validate", "test", "evaluate", "compare"),
+    "render --device": ("run", "play", "control"),
+    "show --plot FILE.png": ("plot", "draw", "info", "print"),
+    "plan --device": ("certify",),
+    "plan --examples": ("profiles", "profile"),
+    "check-device": ("check", "measure", "calibrate"),
+}
+"""Words that other programs use for the work of a verb, by the verb with the option that is needed."""
+
+
+def _hint(name: str) -> str:
+    """Returns the end of the message that there is no verb `name`: the verb that was probably meant."""
+    for verb, words in _USUAL_WORDS.items():
+        if name.lower() in words:
+            return f"; use palpate {verb}"
+    if Path(name).suffix == ".json":
+        return f"; to print a model, use palpate show {name}"
+    if Path(name).is_file():
+        return f"; to identify a model, use palpate identify {name} -o MODEL.json"
+    return did_you_mean(name, _VERBS) or f"; the verbs are {', '.join(_VERBS)}"
 
 
 class _LazyVerbs(Verbs):
@@ -51,8 +77,7 @@ class _LazyVerbs(Verbs):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
         if name not in _VERBS and not name.startswith("-") and not ctx.resilient_parsing:
-            suggestion = did_you_mean(name, _VERBS) or f"; the verbs are {', '.join(_VERBS)}"
-            raise click.UsageError(f"there is no verb {name!r}{suggestion}")
+            raise click.UsageError(f"there is no verb {name!r}{_hint(name)}")
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:

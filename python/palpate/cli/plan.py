@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from click.shell_completion import CompletionItem
 
 from .._core.stability import Certificate
 from ..model import load_model
@@ -16,7 +15,6 @@ from ..model.model_file import certificate_record
 from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, profile_file
 from ..planning.candidates import CANDIDATES
 from ..planning.search import plan as choose
-from .completion import files_with
 from .exit_status import end_with, finishing
 from .figures import figure_file, source_name
 from .printing import (
@@ -30,7 +28,16 @@ from .printing import (
     print_verdict,
     talk,
 )
-from .verb import PATH, json_option, plot_option, require_writable, verb, verbose_option
+from .profiles import ProfileName, device_for
+from .verb import (
+    PATH,
+    json_option,
+    plot_option,
+    require_writable,
+    sized,
+    verb,
+    verbose_option,
+)
 
 
 class Samples(click.ParamType[int | str]):
@@ -45,19 +52,6 @@ class Samples(click.ParamType[int | str]):
             return int(value)
         except ValueError:
             self.fail(f"'{value}' is not a number of samples: give 0 to 16, auto or off", param, ctx)
-
-
-class Profile(click.ParamType[str]):
-    """Value of --device: a file, or the name of an example profile."""
-
-    name = "PROFILE.toml"
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem[str]]:
-        """Returns the examples and the files that complete a name."""
-        names = [CompletionItem(name) for name in example_profiles() if name.startswith(incomplete)]
-        return names or files_with((".toml",), incomplete)
 
 
 class _PlanVerb(Verb):
@@ -104,11 +98,20 @@ def _list_examples(*, as_json: bool) -> None:
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @click.option(
     "--device",
-    type=Profile(),
+    type=ProfileName(),
+    metavar="PROFILE.toml",
     required=True,
     help="Profile of the device, or the name of an example.",
 )
 @click.option("-o", "--output", type=PATH, metavar="OUT.json", default=None, help="Write model and plan.")
+@click.option(
+    "--on-device",
+    type=float,
+    metavar="RATE",
+    default=None,
+    show_default="the host renders",
+    help="The motor controller of the device runs the model itself, at this rate [Hz].",
+)
 @click.option("--coupling", is_flag=True, help="Render through a virtual coupling.")
 @click.option(
     "--coupling-stiffness",
@@ -174,9 +177,9 @@ def plan(
     profile_path = profile_file(device)
     require_writable(plot, inputs=(model_file, profile_path))
     require_writable(output, plot, inputs=(profile_path,))  # the output may be the model file
-    profile = DeviceProfile.load(profile_path)
     model = load_model(model_file, with_plan=False)
-    talk(f"read {model_file}: {model!r}; for {profile.id}, {profile_path}")
+    profile = device_for(model, device)
+    talk(f"read {model_file}: {sized(model)}; for {profile.id}, {profile_path}")
     began = time.perf_counter()
     chosen = choose(model, profile, **{name: value for name, value in given.items() if value is not None})
     seconds = time.perf_counter() - began

@@ -25,6 +25,11 @@ from .verb import PATH, json_option, require_writable, verb
 @click.option("--rate-hz", type=float, default=1000.0, help="Sampling rate [Hz].")
 @click.option("--duration-s", type=float, default=10.0, help="Duration [s]; inf: until Ctrl-C.")
 @click.option("--probe", is_flag=True, help="The device moves the handle slowly forward and back.")
+@click.option(
+    "--device-renders",
+    is_flag=True,
+    help="The USB device renders the model of its firmware; the recorded force is that of the motor.",
+)
 @click.option("--lower", type=float, help="Least position of the probe's motion, in the device's unit.")
 @click.option("--upper", type=float, help="Largest position of the probe's motion.")
 @click.option(
@@ -62,6 +67,7 @@ def record(
     rate_hz: float,
     duration_s: float,
     probe: bool,
+    device_renders: bool,
     lowest_rate_share: float | None,
     as_json: bool,
     **sweep: Any,
@@ -75,6 +81,8 @@ def record(
     require_writable(recording, inputs=(object_file,))
     if not force:
         require_absent(recording)
+    if device == "simulated" and object_file is None:
+        raise InputError("the simulated device has no object; add --object MODEL.json, a model of one")
     given = [name for name, value in sweep.items() if value is not None]
     if given and not probe:
         raise InputError(f"--{given[0].replace('_', '-')} needs --probe")
@@ -90,6 +98,7 @@ def record(
             object=mounted,
             transducer=transducer,
             probe=probe,
+            device_renders=device_renders,
             duration_s=duration_s,
             rate_hz=rate_hz,
             wait_s=None if wait_ms is None else 1e-3 * wait_ms,

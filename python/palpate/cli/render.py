@@ -10,13 +10,14 @@ import click
 
 from .._core.run import LoopSettings, usual_telemetry_hz
 from .._core.run import render as render_live
+from ..errors import InputError
 from ..model import load_model
-from ..planning import Plan
+from ..planning import Plan, example_profiles
 from ..recording.files import require_absent
 from .exit_status import end_with
 from .live import live_line, session_verdict
 from .printing import print_json, print_numbers, print_verdict, talk
-from .verb import PATH, json_option, require_writable, scheme_options, verb
+from .verb import PATH, json_option, require_writable, scheme_options, sized, verb
 
 _LOOP = LoopSettings()
 
@@ -89,11 +90,16 @@ def render(
     require_writable(record, inputs=(model_file,))
     if record is not None and not force:
         require_absent(record)
+    if Path(device).suffix == ".toml" or device in example_profiles():
+        raise InputError(
+            f"--device {device} is a profile: give it to palpate plan, which writes it into the model file; "
+            "here --device names the connection, such as usb"
+        )
     model = load_model(model_file)
     plan = None if model.plan is None else Plan.of(model)
     units = (model.units["position"], model.units["force"])
     nothing_moves = ", which is simulated: nothing moves" if device == "simulated" else ""
-    talk(f"read {model_file}: {model!r}; rendering on {device}{nothing_moves}")
+    talk(f"read {model_file}: {sized(model)}; rendering on {device}{nothing_moves}")
     with live_line(options["rate_hz"] or _LOOP.rate_hz, units) as line:
         summary = render_live(
             model,

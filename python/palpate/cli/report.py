@@ -12,7 +12,11 @@ from ..report import Subject, report_of
 from ..verification import columns_of
 from .exit_status import end_with, finishing
 from .printing import print_json, print_numbers, print_verdict, talk
+from .profiles import ProfileName, device_for
 from .verb import PATH, ReadingOptions, expert_option, json_option, reading_options, require_writable, verb
+
+PAGES = (".html", ".htm")
+"""Endings of the name of a page"""
 
 
 @verb("palpate report press.json fresh.csv -o press.html")
@@ -21,6 +25,7 @@ from .verb import PATH, ReadingOptions, expert_option, json_option, reading_opti
 @expert_option(
     "-o",
     "--output",
+    group="Output",
     type=PATH,
     metavar="REPORT.html",
     required=True,
@@ -36,6 +41,14 @@ from .verb import PATH, ReadingOptions, expert_option, json_option, reading_opti
     multiple=True,
     help="Recording of the identification, for the 95 % band; repeatable.",
 )
+@expert_option(
+    "--device",
+    type=ProfileName(),
+    group="Input",
+    metavar="PROFILE.toml",
+    default=None,
+    help="Plan the model on this device; a refused plan is shown with the reason.",
+)
 @reading_options
 def report(
     model_file: Path,
@@ -43,6 +56,7 @@ def report(
     output: Path,
     as_json: bool,
     identified_on: tuple[Path, ...],
+    device: str | None,
     reading: ReadingOptions,
 ) -> None:
     """Write one HTML page about a model: verdict, curves, errors, certificate and origin.
@@ -53,7 +67,11 @@ def report(
     if recording_file is not None and recording_file.suffix == ".json" != model_file.suffix:
         raise InputError(f"the model comes first: palpate report {recording_file} {model_file}")
     require_writable(output, inputs=(model_file, recording_file, *identified_on))
+    if output.suffix.lower() not in PAGES:
+        raise InputError(f"{output} is not a page: its name must end in {' or '.join(PAGES)}")
     subject = Subject.of(model_file)
+    if device is not None:
+        subject = subject.planned_on(device_for(subject.model, device))
     columns = columns_of(subject.model)
     recording = None if recording_file is None else reading.read(recording_file, columns)
     others = [reading.read(each, columns) for each in identified_on]

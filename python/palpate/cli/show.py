@@ -42,8 +42,9 @@ _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping"
     help="Another model; prints the largest difference of both forces, over the just noticeable difference.",
 )
 @plot_option(
-    "error of every compared network; with --beside the forces of both models and their difference; of a "
-    "recording force, power spectrum, short-time and wavelet transform"
+    "error of every compared network (the force is drawn by palpate identify --plot); with --beside the "
+    "forces of both models and their difference; of a recording force, power spectrum, short-time and "
+    "wavelet transform"
 )
 @plot_option("bounds of the frame of candidate wavelets, and its grid over the positions", "--plot-frame")
 @json_option

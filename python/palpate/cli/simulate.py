@@ -25,7 +25,7 @@ from .printing import (
     progress,
     talk,
 )
-from .verb import PATH, json_option, plot_option, require_writable, scheme_options, verb
+from .verb import PATH, json_option, plot_option, require_writable, scheme_options, sized, verb
 
 
 @verb("palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv")
@@ -61,7 +61,7 @@ def simulate(
     rig = rig_for(model)
     plan = _chosen_plan(model, rig, scheme)
     device = rig.device if plan.certificate is None else plan.certificate.device
-    talk(f"read {model_file}: {model!r}; rendering on a {device.id}, which is simulated")
+    talk(f"read {model_file}: {sized(model)}; rendering on the simulated device {device.id}")
     ticks = max(duration_s / device.period_s, 1.0)
     with progress("simulating") as shown:
         rendered = render(
@@ -87,9 +87,10 @@ def simulate(
         "extrapolated": extrapolated,
         "status": dict(status_counts),
     }
+    written = None if status_counts["NonFinite"] else output
     with finishing():
-        if output is not None and not status_counts["NonFinite"]:
-            rendered.write(output, replace=force)
+        if written is not None:
+            rendered.write(written, replace=force)
         if plot is not None:
             picture_rendering(plot, plan, rendered)
         if as_json:
@@ -99,7 +100,7 @@ def simulate(
             unit = rendered.units["force"]
             print_numbers(
                 {
-                    "structure": plan.structure,
+                    "structure": plan.description,
                     "duration": f"{number(duration_s)} s",
                     "force error, end of tick": f"{number(error.end)} {unit} RMS"
                     + ("" if share is None else f", {100 * share:.3g} % of the object's force range"),
@@ -110,6 +111,7 @@ def simulate(
                     + ("" if error.work >= 0.0 else ", given to the hand"),
                     "extrapolated": f"{100 * extrapolated:.3g} %",
                     "ticks": ", ".join(f"{count} {word}" for word, count in status_counts.most_common()),
+                    **({} if written is None else {"written": f"{written}, {len(rendered)} rows"}),
                 }
             )
     end_with(verdict)

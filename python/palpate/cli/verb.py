@@ -15,6 +15,7 @@ import click
 from .._core.rendering import Scheme, most_prediction_taps, structure_names
 from ..arguments import first_sentence, parameter_texts
 from ..errors import InputError
+from ..model import Model
 from ..recording import Recording, read_recording
 from .completion import FIGURES, FileName
 from .exit_status import interrupted_at_once
@@ -121,6 +122,11 @@ _TEXTS = parameter_texts(read_recording)
 def _about(argument: str) -> str:
     """Returns the help of an option that is an argument of `read_recording`: the start of its text there."""
     return first_sentence(_TEXTS.get(argument, ""))
+
+
+def sized(model: Model) -> str:
+    """Returns kind and size of a model as text: "hysteresis, 28 wavelets, 116 parameters"."""
+    return f"{model.kind}, {model.n_wavelets} wavelets, {model.n_parameters} parameters"
 
 
 expert_option = partial(click.option, cls=Option, group="Expert")

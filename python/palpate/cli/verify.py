@@ -14,6 +14,7 @@ from ..verdict import FORCE_JND
 from ..verification import ClosedLoop, Verification, columns_of
 from ..verification import verify as verify_model
 from ..verification.metrics import STIFFNESS_JND
+from ..verification.verification import is_fresh
 from .exit_status import end_with, finishing
 from .figures import (
     close_loops,
@@ -28,6 +29,7 @@ from .printing import (
     print_numbers,
     print_paragraph,
     print_verdict,
+    talk,
 )
 from .verb import (
     PATH,
@@ -75,6 +77,8 @@ def verify(
 ) -> None:
     """Compare a model with a recording, best one that it has not seen.
 
+    Of the recording of the identification only the rows are compared that --hold-out-every held out.
+
     The closed loop is run both ways: the recorded motion moves the device and the rendered force is compared;
     the recorded force drives the object and the resulting position is compared. The exit code is 1 if the
     verdict is no.
@@ -84,15 +88,19 @@ def verify(
     require_writable(plot, plot_closed_loop, inputs=(model_file, recording_file))
     model = load_model(model_file)
     recording = reading.read(recording_file, columns_of(model))
+    whole, held_out = recording, model.data.held_out_every
+    if held_out and not is_fresh(model.data, recording.source):
+        recording = recording.split(held_out)[1]
+        talk(f"  the model was identified on the other rows: every {held_out}th row is compared")
     verification = verify_model(model, recording, play_radius=play_radius)
     loops: list[ClosedLoop] = []
     if plot_closed_loop is not None:
-        loops = close_loops(model, recording)
+        loops = close_loops(model, whole)
     with finishing():
         if plot is not None:
             picture_verification(plot, model, [(recording, verification)])
         if plot_closed_loop is not None:
-            picture_closed_loops(plot_closed_loop, recording, loops)
+            picture_closed_loops(plot_closed_loop, whole, loops)
         if as_json:
             print_json(
                 {

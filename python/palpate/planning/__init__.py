@@ -7,6 +7,7 @@ device property that must be better. `search` runs these steps. `simulation` ren
 """
 
 from .. import _core
+from .._core.device import OnDevice
 from .._core.rendering import Scheme, explicit_slope_limit
 from .._core.simulation import Hand, TestRig
 from .._core.stability import Certificate, Inequality
@@ -34,6 +35,7 @@ __all__ = [
     "ForceError",
     "Hand",
     "Inequality",
+    "OnDevice",
     "Plan",
     "Scheme",
     "StaticForceError",
@@ -52,5 +54,5 @@ __all__ = [
     "simulate",
 ]
 
-for _compiled in (Hand, Scheme, _core.device.DeviceProfile):
+for _compiled in (Hand, Scheme, OnDevice, _core.device.DeviceProfile):
     named_arguments(_compiled)

@@ -56,7 +56,8 @@ class DeviceProfile(_core.device.DeviceProfile):
     unknown damping or friction, and an upper bound for unknown delay, steps or jitter.
 
     The keyword arguments are the fields of the core's DeviceProfile, listed there with their units. The
-    defaults are those of a simulated knob.
+    defaults are those of a simulated knob. ``on_device`` is an :class:`palpate.planning.OnDevice`, a table in
+    the TOML file.
 
     Raises
     ------
@@ -83,7 +84,9 @@ class DeviceProfile(_core.device.DeviceProfile):
         except UnicodeDecodeError:
             raise InputError(f"{file} is not TOML: the file is not text") from None
         except RecursionError:
-            raise InputError(f"{file}: the file is nested too deeply; a profile has no tables") from None
+            raise InputError(
+                f"{file}: the file is nested too deeply; a profile has no table but on_device"
+            ) from None
         except ValueError as error:  # TOML with an integer of too many digits for Python, or an invalid date
             reason = str(error)
             if "integer string conversion" in reason:

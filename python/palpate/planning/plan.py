@@ -101,8 +101,10 @@ class Plan:
 
     @property
     def solver(self) -> str | None:
-        """Solver of the load line at 1 kHz: table or newton; None without load line."""
-        return solver_name(self.rendered, self.scheme, DeviceProfile().period_s)
+        """Solver of the load line: table or newton; None without load line. The period is that of the
+        certificate, or 1 ms without one."""
+        device = DeviceProfile() if self.certificate is None else self.certificate.device
+        return solver_name(self.rendered, self.scheme, device.period_s)
 
     @cached_property
     def force_error(self) -> StaticForceError:
@@ -217,6 +219,9 @@ class Plan:
         rows["certificate"] = _CERTIFICATE[certificate.verdict]
         if not certificate.refused:
             rows["certificate"] += f", for up to {1e3 * certificate.longest_period_s:.4g} ms between samples"
+        if certificate.device.renderer == "device":
+            rate_hz = 1.0 / certificate.device.period_s
+            rows["runs on"] = f"the motor controller of {certificate.device.id} at {rate_hz:.6g} Hz"
         return rows
 
     def settings(self) -> dict[str, str]:

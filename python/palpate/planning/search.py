@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from .._core.device import DeviceProfile
+from .._core.device import on_device as timed_on_device
 from .._core.model import ForceModel
 from .._core.rendering import most_prediction_taps
-from ..arguments import instance_of
+from ..arguments import instance_of, real_of
 from ..errors import InputError
 from ..model import Model
 from .candidates import CANDIDATES, Candidate, Refusal, Task
@@ -29,6 +30,7 @@ def plan(
     model: Model,
     device: DeviceProfile | str | os.PathLike[str],
     *,
+    on_device: float | None = None,
     coupling: bool = False,
     coupling_stiffness: float | None = None,
     coupling_damping: float | None = None,
@@ -49,6 +51,10 @@ def plan(
         A model of one position, or of position and velocity; a plan in it is ignored.
     device : DeviceProfile, str or path
         A profile in the model's unit, the name of an example profile, or the path of a TOML file.
+    on_device : float, optional
+        Rate at which the motor controller of the device runs the model itself [Hz]. Period, delay and jitter
+        are then those of the controller, from the table ``on_device`` of the profile. Default: the host
+        renders, with the period, delay and jitter of the profile.
     coupling : bool
         Renders through a virtual coupling even if none is needed.
     coupling_stiffness, coupling_damping : float, optional
@@ -81,6 +87,8 @@ def plan(
     """
     instance_of("model", model, Model, "make one with palpate.identify or palpate.load_model")
     device = find_profile(device)
+    if on_device is not None:
+        device = timed_on_device(device, real_of("on_device", on_device))
     for name, value in {
         "coupling_stiffness": coupling_stiffness,
         "coupling_damping": coupling_damping,
