@@ -109,14 +109,16 @@ test-cpp: setup
 test-full: test-full-native
 	$(MAKE) --no-print-directory test-python
 
-# Tests that `make test` does not run: sanitizers, the packages, a USB device below a kernel, and reports in a browser
-# if Chromium was not installed.
+# Tests that `make test` does not run: sanitizers, the packages, a USB device below a kernel; reports in a browser and
+# exported models on a microcontroller, if Chromium or QEMU was not installed.
 test-full-native: setup control test-packages
 	tools/cpp_tests.sh release
 	for preset in asan tsan; do tools/cpp_tests.sh $$preset; done
 	$(python) -m pytest tests/usb
 	tools/system_packages.sh "$(PYTHON)" browser
 	$(python) -m pytest tests/browser
+	tools/system_packages.sh "$(PYTHON)" portable
+	$(python) -m pytest tests/python/export
 
 # The packages as users install them.
 test-packages: $(stamps)/core $(stamps)/control $(stamps)/test $(stamps)/package

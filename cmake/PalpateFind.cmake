@@ -12,6 +12,7 @@ function(palpate_find_or_fetch name url sha256)
   find_package(${name} ${ARGN} QUIET)
   if(NOT ${name}_FOUND)
     include(FetchContent)
+    set(CMAKE_POLICY_VERSION_MINIMUM 3.5) # the releases below are older than CMake 4
     FetchContent_Declare(${name} URL "${url}" URL_HASH "SHA256=${sha256}")
     FetchContent_MakeAvailable(${name})
   endif()

@@ -52,6 +52,8 @@ study identification/figures build/bench --to "$to"
 study limits/certificate_table build/bench/certificate_search.txt --to "$to"
 study limits/failure_maps --to "$to" --points "$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 9 }')"
 study limits/prediction --to "$to"
+study plans/on_device_stiffness --to "$to"
+study portable/cost --to "$to" --json build/bench/portable_cost.json
 study plans/plan_against_trial --to "$to" --grid "$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 0 : 4 }')"
 echo "Results: build/bench/*.json; compare two runs with compare.py of Google Benchmark. Figures: $to/figures"
 

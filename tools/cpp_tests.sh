@@ -3,7 +3,7 @@
 # Builds and runs the C++ tests of one preset: tools/cpp_tests.sh dev|release|asan|tsan
 #
 # The sanitizers make a program ten times slower, so they run a tenth of the cases. Below a test scale of 10 the presets
-# asan, tsan and release run some tests only: threads and USB with the sanitizers, numerics with full optimization.
+# asan, tsan and release run some tests only: threads, USB and the device side with the sanitizers, numerics with full optimization.
 set -euo pipefail
 
 preset=$1
@@ -13,7 +13,7 @@ with=()
 
 case $preset in
 asan | tsan)
-    sample=(test_realtime test_usb_device)
+    sample=(test_realtime test_usb_device test_palpate_device)
     export PALPATE_TEST_SCALE=$(((scale + 9) / 10))
     ;;
 release) sample=(test_compiled_network) ;;

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the missing Debian or Ubuntu packages, or prints one line with the packages to install.
 #
-#   tools/system_packages.sh PYTHON build|control|test-cpp|docs|guest|browser
+#   tools/system_packages.sh PYTHON build|control|test-cpp|docs|guest|browser|portable
 set -euo pipefail
 
 python=$1
@@ -43,6 +43,13 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         command -v qemu-system-x86_64 >/dev/null || echo qemu-system-x86
         command -v busybox >/dev/null || echo busybox-static
         command -v cpio >/dev/null || echo cpio
+    fi
+    if [ "$purpose" = portable ]; then
+        # for the tests that run exported models as machine code of a microcontroller
+        command -v arm-none-eabi-gcc >/dev/null || echo gcc-arm-none-eabi
+        [ -e /usr/include/newlib ] || echo libnewlib-arm-none-eabi
+        command -v qemu-system-arm >/dev/null || echo qemu-system-arm
+        command -v clang >/dev/null || echo clang
     fi
     if [ "$purpose" = browser ]; then
         # for the tests that open a report

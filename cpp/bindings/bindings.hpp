@@ -15,6 +15,7 @@ void bind_device(pybind11::module_& module);
 void bind_wire(pybind11::module_& module);
 void bind_rendering(pybind11::module_& module);
 void bind_stability(pybind11::module_& module);
+void bind_portable(pybind11::module_& module);
 void bind_io(pybind11::module_& module);
 void bind_simulation(pybind11::module_& module);
 void bind_run(pybind11::module_& module);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <type_traits>
@@ -17,6 +18,12 @@ namespace palpate::bindings {
 /// Type in which a struct field is passed to Python: std::string for an enumeration, otherwise the field's own type.
 template <class V>
 using PythonType = std::conditional_t<HasWords<V>, std::string, V>;
+
+/// True for an optional struct with a table of fields. Its values in a dict are a dict.
+template <class V>
+inline constexpr bool is_optional_part = false;
+template <HasFields V>
+inline constexpr bool is_optional_part<std::optional<V>> = true;
 
 /// Converts the value of a struct field to its Python type.
 template <class V>
@@ -91,6 +98,8 @@ void bind_fields(
             for_each_field<T>([&](const auto& field) {
                 if (!field.stored || values[field.name].is_none()) {
                     values.attr("pop")(field.name);
+                } else if constexpr (is_optional_part<std::remove_cvref_t<decltype(field.of(object))>>) {
+                    values[field.name] = values[field.name].attr("to_dict")();
                 }
             });
             return values;

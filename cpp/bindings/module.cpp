@@ -38,6 +38,7 @@ PYBIND11_MODULE(_core, module) {
     submodule("device", "Profiles of devices, and the packets of USB devices.", bind_device, bind_wire);
     submodule("rendering", "Structures between a model and a device.", bind_rendering);
     submodule("stability", "Certificates and their inequalities.", bind_stability);
+    submodule("portable", "Models as tables for programs in C.", bind_portable);
     submodule("io", "Model files.", bind_io);
     submodule("simulation", "Rendering in virtual time on a simulated device.", bind_simulation);
     submodule("run", "Rendering and measuring in real time.", bind_run);

@@ -170,6 +170,12 @@ py::dict measure_in_python(const std::optional<ForceModel>& object, const std::s
     result["encoder_step"] = device->profile.encoder_step;
     result["force_limit"] = device->profile.force_limit;
     result["transducer"] = device->transducer;
+    result["device_model"] = py::none();
+    for (const auto& [key, value] : device->metadata) {
+        if (key == "device_model") {
+            result["device_model"] = value;
+        }
+    }
     if (result.contains("usb")) {
         result.attr("update")(result.attr("pop")("usb"));
     }
@@ -229,7 +235,8 @@ void bind_run(py::module_& module) {
         "- rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.\n"
         "- probe, lower, upper, speed, stiffness, force_limit, push.\n"
         "- record, force, keep.\n"
-        "- transducer, friction_share (Coulomb friction of the simulated device / its force limit).\n\n"
+        "- transducer, friction_share (Coulomb friction of the simulated device / its force limit).\n"
+        "- device_renders: a USB device renders its own model, and its force is recorded.\n\n"
         "Calls progress(ticks, position, force, lost) ten times a second.\n\n"
         "Returns the values of the summary by name; with `keep` the columns of all ticks are under `kept`.\n"
         "Raises InputError if the measurement is refused, before the device moves.");

@@ -9,8 +9,9 @@ from . import dynamics
 from . import device
 from . import rendering
 from . import stability
+from . import portable
 from . import io
 from . import simulation
 from . import run
-__all__: list[str] = ['device', 'dynamics', 'io', 'model', 'rendering', 'run', 'simulation', 'stability', 'status']
+__all__: list[str] = ['device', 'dynamics', 'io', 'model', 'portable', 'rendering', 'run', 'simulation', 'stability', 'status']
 __version__: str = '0.1.0'

@@ -37,6 +37,7 @@ def measure(*, object: palpate._core.model.ForceModel | None = None, position_un
     - probe, lower, upper, speed, stiffness, force_limit, push.
     - record, force, keep.
     - transducer, friction_share (Coulomb friction of the simulated device / its force limit).
+    - device_renders: a USB device renders its own model, and its force is recorded.
     
     Calls progress(ticks, position, force, lost) ten times a second.
     

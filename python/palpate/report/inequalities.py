@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+
 MEANINGS = {
     "damping-hold": (
         "damping",
@@ -89,3 +92,48 @@ VERDICTS = {
     "refused": "The certificate is refused: an inequality does not hold, or no bound is known.",
 }
 """Verdict of a certificate in words"""
+
+SYMBOLS = {
+    "b": "viscous damping of the device",
+    "f_c": "Coulomb friction of the device",
+    "T": "longest time between two samples",
+    "t_d": "delay from a sample to its force",
+    "Delta": "step of the encoder",
+    "Delta_F": "step of the force command",
+    "c": "force limit: c(f) is the force after the limit",
+    "B": "damping per sample period that a hold, a delay or a prediction needs",
+    "M": "steepest rising slope of the force",
+    "s_": "steepest falling slope of the force",
+    "L": "steepest slope of the force, rising or falling",
+    "M_h": "steepest rising slope with hysteresis: the largest value of g' + |h'| + h / r, at least 0",
+    "s_h": "steepest falling slope with hysteresis: the largest value of |h'| - g', at least 0",
+    "L_h": "the larger of M_h and s_h",
+    "L_x": "steepest slope of the force over position, at any velocity",
+    "B_v": "largest change of the force per velocity",
+    "period": "nominal time between two samples",
+    "K": "slope of the force of the object",
+    "p": "slope of the line whose crossing with the force is the next position",
+    "gamma": "largest change of the rendered force per error of the position",
+    "e": "increase of the slope of the hysteresis by a step of the encoder",
+    "f": "force of the model; f' is its slope",
+    "g": "mean force of press and release; g' is its slope",
+    "h": "half the difference between press and release force; h' is its slope",
+    "r": "play radius",
+    "m": "number of samples of the prediction, or mass of the virtual object",
+    "K_c": "stiffness of the virtual coupling",
+    "B_c": "damping of the virtual coupling",
+    "B_o": "damping of the virtual object",
+    "H": "response of the rendering to motion at one frequency",
+    "z": "shift by one sample",
+    "theta": "frequency in radians for each sample",
+}
+"""Meaning of the symbols in the formulas of inequalities"""
+
+
+_SYMBOL = r"[A-Za-z][A-Za-z_]*"
+
+
+def symbols_in(formulas: Iterable[str]) -> list[str]:
+    """Returns "symbol: meaning" for each symbol in the formulas, in the order of `SYMBOLS`."""
+    used = {word for formula in formulas for word in re.findall(_SYMBOL, formula)}
+    return [f"{symbol}: {meaning}" for symbol, meaning in SYMBOLS.items() if symbol in used]

@@ -288,7 +288,9 @@ def whiteness(subject: Subject) -> Section:
     outside = int(np.count_nonzero(np.abs(correlation) > bound))
     sentence = (
         f"{outside} of {len(lag)} bars are beyond the bound of {bound:.2g}; about {0.05 * len(lag):.2g} are "
-        f"expected for residuals without pattern. Neighbouring rows correlate with {correlation[0]:.2g}."
+        f"expected for residuals without pattern. Neighbouring rows correlate with {correlation[0]:.2g}. All "
+        f"residuals together are {percent(compared.found.nrmse)} of the spread of the recorded force "
+        "(NRMSE); the verdict judges this share."
     )
     description = f"Correlation of residuals at a distance of 1 to {len(lag)} rows, in the order of {order}."
     return Section(key, title, explanation, [sentence], [Chart(description, panel)])

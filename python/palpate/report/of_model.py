@@ -13,6 +13,7 @@ import numpy as np
 from .. import _core
 from .._core.model import wavelet_columns
 from .._typing import Float1D
+from ..identification.options import CHOICES
 from ..model import Model
 from ..plotting.look import scale_for
 from ..recording.files import sha256_of_file
@@ -27,6 +28,16 @@ WAVELET_POINTS = 61
 
 WAVELET_HALF_WIDTH = 5.0
 """Half the drawn width of a wavelet, in units of 1/alpha; beyond it the wavelet is below 1e-4 of its peak"""
+
+STOPS = {
+    "max_wavelets": "Growth ended at the largest number of wavelets allowed",
+    "data": "Growth ended because no further wavelet changes the force at the recorded positions",
+    **{
+        name: f"Growth ended because the criterion {name.upper()} no longer fell"
+        for name in CHOICES["criterion"]
+    },
+}
+"""Reason why the network was not grown further, in words, by its name in the model file"""
 
 _VERDICT_NOTE = "verdict"
 """Key of the notes of a model file that the first section shows"""
@@ -88,8 +99,8 @@ def selection_path(subject: Subject) -> Section:
     """Error and criterion over the number of wavelets, one line for each model class."""
     key, title = "selection", "How the size was chosen"
     explanation = (
-        "More wavelets reduce the error; the criterion adds the cost of their parameters, and its least "
-        "value decides."
+        "More wavelets reduce the error; the criterion adds the cost of their parameters, and growth ends "
+        "when it no longer falls."
     )
     model = subject.model
     if not model.path:
@@ -113,7 +124,8 @@ def selection_path(subject: Subject) -> Section:
         below.steps(size[judged], criterion[judged], mark, "")
     sentence = (
         f"The model class is {model.fit.model_class} with {model.n_wavelets} wavelets and "
-        f"{model.n_parameters} parameters; the search was stopped by {model.stop_reason}."
+        f"{model.n_parameters} parameters: the last point of its line, after wavelets that were not needed "
+        f"were removed. {STOPS.get(model.stop_reason, f'Growth was stopped by {model.stop_reason}')}."
     )
     description = "RMS error, and below the criterion minus its least value, over the number of wavelets."
     return Section(key, title, explanation, [sentence], [Chart(description, above, below)])

@@ -9,11 +9,11 @@ from .._core.stability import Certificate, Inequality
 from ..planning import force_at, mechanical_units
 from ..plotting.look import scale_for
 from .charts import Chart, Panel
-from .inequalities import BASES, MEANINGS, VERDICTS
+from .inequalities import BASES, MEANINGS, VERDICTS, symbols_in
 from .of_comparison import LINE_MARKS, Compared, curves_of
 from .page import Section, Table
 from .subject import RENDERED_S, Subject
-from .words import amount
+from .words import amount, interval
 
 
 def rendered(subject: Subject) -> Section:
@@ -45,11 +45,13 @@ def rendered(subject: Subject) -> Section:
     unit = recording.units["force"]
     certificate = plan.certificate
     assert certificate is not None
+    reached = interval(float(at.min()), float(at.max()), recording.units["position"])
     sentences = [
         f"The structure is {plan.description}, on the device {certificate.device.id}, for {RENDERED_S:g} s. "
         "Device and hand are simulated; nothing in this section was measured.",
-        f"Force error against the model, RMS: {amount(found.error.mean, unit)} (mean of a tick), "
-        f"{amount(found.error.band, unit)} below 50 Hz, which a hand can follow.",
+        f"The simulated hand reached {reached}; the domain of the model is {_domain(subject)}.",
+        f"Force error against the model at these positions, RMS: {amount(found.error.mean, unit)} (mean of a "
+        f"tick), {amount(found.error.band, unit)} below 50 Hz, which a hand can follow.",
     ]
     description = "Rendered, modelled and recorded force over position."
     return Section(key, title, explanation, sentences, [Chart(description, panel)])
@@ -79,7 +81,8 @@ def certificate_table(subject: Subject) -> Section:
     if certificate.reason:
         sentences.append(f"Reason: {certificate.reason}.")
     rows = [_row(line, certificate) for line in certificate.inequalities]
-    table = Table(("condition", "needed", "there is", "reserve", "basis", "result"), rows)
+    formulas = [line.formula for line in certificate.inequalities]
+    table = Table(("condition", "needed", "present", "reserve", "basis", "result"), rows)
     facts = {
         "device": [
             f"{certificate.device.id}, {1.0 / certificate.device.period_s:g} samples per second",
@@ -87,9 +90,16 @@ def certificate_table(subject: Subject) -> Section:
         **{name: [value] for name, value in (plan.summary() | plan.settings()).items()},
         "fingerprint": [certificate.fingerprint],
     }
+    if symbols := symbols_in([*formulas, *plan.refused]):
+        facts["symbols"] = symbols
     if plan.refused:
         facts["refused structures"] = list(plan.refused)
     return Section(key, title, explanation, sentences, tables=[table], facts=facts)
+
+
+def _domain(subject: Subject) -> str:
+    model = subject.model
+    return interval(float(model.lower[0]), float(model.upper[0]), model.units["position"])
 
 
 def _row(line: Inequality, certificate: Certificate) -> list[str]:

@@ -17,6 +17,7 @@ from ..arguments import instance_of, path_of
 from ..errors import InputError
 from ..model import Model, load_model
 from ..planning import DeviceProfile, ForceError, Plan, force_error, judge, rig_for, simulate
+from ..planning.search import plan as make_plan
 from ..recording import Recording
 from ..verdict import Verdict, no
 from ..verification import Uncertainty, Verification, uncertainty, verify
@@ -62,6 +63,18 @@ class Subject:
         if isinstance(model, Model):
             return cls(model, plan=_plan_of(model))
         return _of_file(path_of("model", model))
+
+    def planned_on(self, device: DeviceProfile) -> Subject:
+        """Returns the subject with the plan of its model on a device. The plan in a model file is not used.
+
+        Raises
+        ------
+        InputError
+            The model cannot be planned on this device.
+        """
+        file = self.file
+        model = self.model if file is None else load_model(file, with_plan=False)
+        return replace(self, plan=make_plan(model, device), refusal="")
 
     def compared_with(self, recording: Recording | None, identified_on: Sequence[Recording] = ()) -> Subject:
         """Returns the subject with a recording to compare, and recordings of the identification.
@@ -119,6 +132,8 @@ class Subject:
             return "the plan is refused"
         if self.plan.certificate is None:
             return "the plan has no certificate, so its device is not known: make a plan with palpate plan"
+        if self.plan.certificate.refused:
+            return "no structure can render the model on this device"
         try:
             rendered = simulate(self.plan, self.plan.certificate.device, rig_for(self.model).hand, RENDERED_S)
         except InputError as error:

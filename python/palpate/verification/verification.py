@@ -122,8 +122,14 @@ class Verification:
             "largest": f"{force_unit.text(self.worst)} at position {position}",
             "not felt": f"{100 * self.within_jnd:.3g} % of the rows have an error that a hand does not feel",
             "rows": f"{self.n} of {len(recording)} compared, {self.extrapolated} outside the model's domain",
-            "recording": "fresh" if self.fresh else "not fresh: the model was identified on this recording",
+            "recording": self._freshness,
         }
+
+    @property
+    def _freshness(self) -> str:
+        if not self.fresh:
+            return "not fresh: the model was identified on this recording"
+        return "held-out rows, new to the model" if self.recording.source.held_out else "fresh"
 
     def to_frame(self) -> pd.DataFrame:
         """Returns the evaluated rows with the model's force, as a DataFrame.
@@ -329,6 +335,9 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
     """Returns findings on the error: perceptible by a hand, and the likely cause of a large one."""
     findings = []
     if found.nrmse > USABLE_NRMSE:
+        known = {"velocity": model.of_velocity, "hysteresis": model.hysteretic}
+        missing = ", ".join(name for name, has in known.items() if not has)
+        missing = f"{missing} or another column" if missing else "another column"
         cause = explanation(model, recording, found.prediction)
         if cause is not None:
             findings.append(usable(f"{cause.sentence} (NRMSE {cause.nrmse:.3g})"))
@@ -336,8 +345,8 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
             findings.append(
                 usable(
                     f"the errors of neighbouring rows are correlated ({found.whiteness:.2g}, above "
-                    f"{STRUCTURED_CORRELATION:g}): the force depends on an input that the model does not "
-                    "have, such as velocity, hysteresis or another column"
+                    f"{STRUCTURED_CORRELATION:g}): the object is not the same, its zero position is not the "
+                    f"same, or the force depends on an input that the model does not have, such as {missing}"
                 )
             )
     if found.within_jnd < LEAST_SHARE_WITHIN_JND:

@@ -193,6 +193,22 @@ TEST(CertificateCheck, NamesTheFirstFieldInWhichADeviceDiffers) {
     EXPECT_TRUE(names(difference([](auto& d) { d.viscous_damping *= 1.001; }), "viscous_damping"));
     EXPECT_TRUE(names(difference([](auto& d) { d.delay_s = d.period_s; }), "delay_s"));
     EXPECT_TRUE(names(difference([](auto& d) { d.position_unit = "m"; }), "in rad"));
+    EXPECT_EQ(difference([](auto& d) { d.on_device = OnDevice{.delay_s = 1e-4}; }), "");
+    EXPECT_TRUE(names(difference([](auto& d) { d = on_device(d, 4e4); }),
+                      "with the model on the host at 1000 Hz, not on its motor controller at 40000 Hz"));
+}
+
+TEST(CertificateCheck, AnEditedRendererIsRefused) {
+    const ForceModel model = hysteretic();
+    DeviceProfile device = strong();
+    device.on_device = OnDevice{.delay_s = 1e-5};
+    const Certificate stored = certify(model, direct(), on_device(device, 4e4));
+    EXPECT_EQ(stored.device.renderer, "device");
+    EXPECT_EQ(stored.device.on_device, std::nullopt);
+    EXPECT_NO_THROW((void)checked(stored, model));
+    Certificate edited = stored;
+    edited.device.renderer.reset();
+    EXPECT_THROW((void)checked(edited, model), std::invalid_argument);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from models_by_hand import model_by_hand
+from palpate import DeviceProfile
 from palpate.cli.main import main
 from palpate.verdict import Verdict, no
 from test_cli_identify import spring
@@ -58,10 +59,38 @@ def test_a_verdict_of_no_exits_with_1_and_writes_the_page(
     assert "The sensor is stuck." in Path("report.html").read_text(encoding="utf-8")
 
 
+def test_a_refused_plan_is_shown_with_its_reason(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ruined = {"jitter_s": 0.02, "delay_s": 0.01, "viscous_damping": 0.0, "coulomb_friction": 0.0}
+    DeviceProfile(id="ruined", **ruined).save("ruined.toml")
+    capsys.readouterr()
+    assert main(["report", "m.json", "--device", "ruined.toml", "-o", "report.html"]) == 1
+    printed = capsys.readouterr().out
+    assert printed.startswith("verdict: no\n  no structure can render the model on this device. ")
+    assert "left out, certificate" not in printed
+    page = Path("report.html").read_text(encoding="utf-8")
+    assert "does not hold" in page
+    assert "The certificate is refused" in page
+
+
+def test_a_plan_on_a_device_replaces_the_plan_of_the_file(folder: Path) -> None:
+    assert main(["plan", "m.json", "--device", "bench-knob", "-o", "planned.json"]) == 0
+    DeviceProfile(id="other-knob").save("other.toml")
+    assert main(["report", "planned.json", "--device", "other.toml", "-o", "report.html"]) == 0
+    page = Path("report.html").read_text(encoding="utf-8")
+    assert "on the device other-knob" in page
+    assert "bench-knob" not in page
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["m.json"], "Missing option '-o'"),
+        (["m.json", "-o", "report.pdf"], "report.pdf is not a page: its name must end in .html or .htm"),
+        (
+            ["m.json", "--device", "nobody", "-o", "report.html"],
+            "for a model with positions in rad are bench-knob",
+        ),
+        (["m.json", "--device", "touch", "-o", "report.html"], "the example profiles in rad are bench-knob"),
         (["a.csv", "m.json", "-o", "report.html"], "the model comes first: palpate report m.json a.csv"),
         (["m.json", "a.csv", "-o", "missing/report.html"], "there is no folder missing"),
         (["m.json", "a.csv", "-o", "a.csv"], "a.csv is also an input; the result would overwrite it"),
@@ -69,7 +98,18 @@ def test_a_verdict_of_no_exits_with_1_and_writes_the_page(
         (["m.json", "c.csv", "-o", "report.html"], "c.csv"),
         (["m.json", "--identified-on", "b.csv", "-o", "report.html"], "b.csv did not identify the model"),
     ],
-    ids=["no output", "order", "no folder", "over the recording", "over the model", "no file", "other"],
+    ids=[
+        "no output",
+        "no page",
+        "no profile",
+        "other unit",
+        "order",
+        "no folder",
+        "over the recording",
+        "over the model",
+        "no file",
+        "other",
+    ],
 )
 def test_wrong_input_is_refused_with_one_sentence_and_writes_nothing(
     arguments: list[str], message: str, folder: Path, capsys: pytest.CaptureFixture[str]

@@ -48,6 +48,8 @@ def test_the_rendered_recording_is_written_and_its_errors_are_printed(
     assert "simulated" in captured.err
     for name in ("end of tick", "mean of a tick", "below 50 Hz", "sampled"):
         assert f"force error, {name}" in captured.out
+    assert "\nwritten                      r.csv, 500 rows\n" in captured.out
+    assert "wrote r.png\n" in captured.err
     assert len(read_recording("r.csv")) == 500
     assert Path("r.png").read_bytes().startswith(b"\x89PNG")
 

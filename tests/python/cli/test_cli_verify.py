@@ -50,6 +50,36 @@ def test_numbers_go_to_standard_output_and_progress_to_standard_error(
     assert "fresh" in captured.out
 
 
+def test_only_held_out_rows_of_the_identified_recording_are_compared(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", "a.csv", "-o", "own.json", "--hold-out-every", "5"]) == 0
+    capsys.readouterr()
+    assert main(["verify", "own.json", "a.csv", "--plot-closed-loop", "loop.png"]) == 0
+    captured = capsys.readouterr()
+    assert "the model was identified on the other rows: every 5th row is compared" in captured.err
+    assert "400 of 400 compared" in captured.out
+    assert "recording  held-out rows, new to the model\n" in captured.out
+    assert captured.out.startswith("verdict: good\n")
+
+
+def test_the_named_cause_is_not_an_input_that_the_model_has(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = keyswitch_by_hand()
+    model.save("key.json")
+    lower, upper = float(model.lower[0]), float(model.upper[0])
+    position = np.concatenate([np.linspace(lower, upper, 500), np.linspace(upper, lower, 500)])
+    direction = np.repeat([1, -1], 500)
+    phase = 12.0 * (position - lower) / (upper - lower)
+    force = model.force(position, direction=direction) * (1.0 + 0.5 * np.sin(phase))
+    Recording.from_arrays(position, force, direction=direction, units=model.units).write("other.csv")
+    main(["verify", "key.json", "other.csv"])
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "its zero position is not the same" in printed
+    assert "such as velocity or another column" in printed
+
+
 def test_json_is_one_object_with_the_fields_of_the_contract(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -24,6 +24,7 @@ from usb_emulation import emulated, frames, needs_emulation
 OBJECT = ROOT / "tests" / "models" / "good" / "position.json"
 STIFFNESS = 3.0
 SPRING = ["--lock-step", "--spring", str(STIFFNESS)]
+COUNTS_PER_TURN = 65536
 MOST_PACKETS_IN_FLIGHT = 5  # largest number of sent USB packets that are not yet received
 
 
@@ -32,12 +33,55 @@ def run_record(out: Path, *arguments: Any, device: list[str]) -> subprocess.Comp
     return emulated(*command, "--wait-ms", 2000, *arguments, device=device)
 
 
+def test_a_simulated_device_without_object_names_the_option(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["record", str(tmp_path / "a.csv")]) == 2
+    assert capsys.readouterr().err == (
+        "error: the simulated device has no object; add --object MODEL.json, a model of one\n"
+    )
+
+
 def stiffness(model: Model) -> float:
     """Returns the mean stiffness of press and release from 10 % to 90 % of the model's domain."""
     lower, upper = model.lower[0], model.upper[0]
     positions = np.array([0.9 * lower + 0.1 * upper, 0.1 * lower + 0.9 * upper])
     lower_force, upper_force = np.mean([model.force(positions, direction=sign) for sign in (1, -1)], axis=0)
     return float(upper_force - lower_force) / float(np.ptp(positions))
+
+
+@needs_emulation
+def test_the_rendering_of_a_device_is_recorded(tmp_path: Path) -> None:
+    out = tmp_path / "rendered.csv"
+    device = ["--lock-step", "--model", "10", "--no-transducer"]
+    completed = run_record(out, "--device-renders", "--json", device=device)
+    assert completed.returncode == 0, completed.stderr
+    assert json.loads(completed.stdout)["device_model"] == "0123456789abcdef"
+    recording = read_recording(out)
+    assert recording.metadata["device_model"] == "0123456789abcdef"
+    assert recording.metadata["force"] == "of the motor, from the model that the device renders"
+    after_ramp = slice(50, None)
+    spring = 10e-6 * COUNTS_PER_TURN / (2.0 * np.pi)
+    error = recording.force[after_ramp] - spring * recording.position[after_ramp]
+    assert np.abs(error).max() < 1e-9
+    assert recording.force.max() > 0.03
+
+
+@needs_emulation
+def test_a_device_without_a_model_is_not_recorded_as_renderer(tmp_path: Path) -> None:
+    completed = run_record(tmp_path / "out.csv", "--device-renders", device=["--lock-step"])
+    assert completed.returncode == 2
+    assert "has no model to render" in completed.stderr
+    assert not (tmp_path / "out.csv").exists()
+    with pytest.raises(InputError, match="device_renders needs a USB device"):
+        record(tmp_path / "out.csv", object=load_model(OBJECT), device_renders=True, duration_s=0.1)
+    completed = run_record(
+        tmp_path / "out.csv",
+        *("--device-renders", "--probe", "--upper", 0.4),
+        device=["--lock-step", "--model", "10"],
+    )
+    assert completed.returncode == 2
+    assert "leave out probe and push" in completed.stderr
 
 
 @needs_emulation

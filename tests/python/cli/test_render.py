@@ -247,3 +247,11 @@ def test_an_unknown_device_is_refused_before_anything_is_written(
     assert last_line.startswith("error: ")
     assert sentence in last_line
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("device", ["knob.toml", "bench-knob"])
+def test_a_profile_as_device_is_refused_with_its_place(
+    device: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["render", str(MODEL), "--device", device]) == 2
+    assert f"--device {device} is a profile: give it to palpate plan" in capsys.readouterr().err

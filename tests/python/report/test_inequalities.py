@@ -5,7 +5,7 @@ import re
 from typing import get_args
 
 from conftest import ROOT
-from palpate.report.inequalities import BASES, MEANINGS, VERDICTS
+from palpate.report.inequalities import BASES, MEANINGS, SYMBOLS, VERDICTS, symbols_in
 from palpate.report.of_plan import _unit
 from palpate.report.summary import LEVEL_WORDS
 from palpate.verdict import Level
@@ -32,6 +32,28 @@ def test_every_basis_and_verdict_has_words() -> None:
     assert set(BASES) == words_in("inequality.hpp", "Basis")
     assert set(VERDICTS) == words_in("certificate.hpp", "Verdict")
     assert set(LEVEL_WORDS) == set(get_args(Level))
+
+
+NOT_SYMBOLS = {"max", "min", "mean", "cos", "Re", "and", "of"}
+
+
+def test_every_symbol_of_a_formula_has_a_meaning() -> None:
+    texts = [
+        text
+        for kind in ("direct", "coupled", "explicit")
+        for text in re.findall(
+            r'"([^"\n]*)"', (STABILITY / f"{kind}_inequalities.hpp").read_text(encoding="utf-8")
+        )
+    ]
+    formulas = [text for text in texts if re.search(r" [>/+] | >= ", text) and "proved" not in text]
+    assert "b >= T M / 2" in formulas
+    words = {word for each in formulas for word in re.findall(r"[A-Za-z][A-Za-z_]*", each)}
+    assert not words - NOT_SYMBOLS - set(SYMBOLS)
+
+
+def test_only_the_symbols_of_the_given_formulas_are_listed() -> None:
+    symbols = [line.partition(":")[0] for line in symbols_in(["b >= T M / 2", "f_c >= L Delta / 2"])]
+    assert symbols == ["b", "f_c", "T", "Delta", "M", "L"]
 
 
 def test_units_are_those_of_a_rotary_or_linear_device() -> None:

@@ -263,7 +263,7 @@ def test_the_certificate_table_states_each_inequality_in_words(planned: Model, p
     for word in (
         "condition",
         "needed",
-        "there is",
+        "present",
         "reserve",
         "basis",
         "result",

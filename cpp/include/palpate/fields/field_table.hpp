@@ -128,14 +128,19 @@ inline void require_field(bool holds, const std::string& field, double value, co
     }
 }
 
+template <HasFields S>
+void check_fields(const S& object, const std::string& prefix = "");
+
 /// Throws std::invalid_argument if a number does not satisfy the rule of its field or a text is not an allowed text of
-/// its field. Accepts values of other types.
+/// its field; checks each field of a struct. Accepts values of other types.
 template <class F, class V>
 void check_value(const F& field, const V& value, const std::string& prefix) {
     if constexpr (is_optional<V>) {
         if (value) {
             check_value(field, *value, prefix);
         }
+    } else if constexpr (HasFields<V>) {
+        check_fields(value, prefix + field.name + ".");
     } else if constexpr (std::is_arithmetic_v<V>) {
         const auto number = static_cast<double>(value);
         require_field(satisfies(number, field.rule), prefix + field.name, number, text(field.rule));
@@ -151,7 +156,7 @@ void check_value(const F& field, const V& value, const std::string& prefix) {
 /// Checks the numbers and texts in all fields of one object. If a value is not allowed, throws std::invalid_argument
 /// with the name of the field, its value and the rule. In the message `prefix` precedes the name.
 template <HasFields S>
-void check_fields(const S& object, const std::string& prefix = "") {
+void check_fields(const S& object, const std::string& prefix) {
     for_each_field<S>([&](const auto& field) { check_value(field, field.of(object), prefix); });
 }
 

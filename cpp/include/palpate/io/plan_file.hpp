@@ -84,6 +84,9 @@ inline void require_given(const JsonField& field, bool used, const char* structu
                               "the structure of the plan");
     const JsonField device = file["device"];
     read.device = device.as<DeviceProfile>();
+    if (read.device.on_device) {
+        throw std::invalid_argument("certificate.device.on_device is not a key of this format");
+    }
     const double longest = longest_delay_s(read.device.period_s);
     device["delay_s"].require(read.device.delay_s <= longest, "at most " + readable(longest));
     device["position_unit"].require(position_unit.empty() || position_unit == read.device.position_unit,

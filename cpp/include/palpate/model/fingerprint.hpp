@@ -35,6 +35,8 @@ class NumberHash {
             add(static_cast<std::uint64_t>(static_cast<unsigned char>(letter)));
         }
     }
+    /// Returns the 64 bits of the hash.
+    [[nodiscard]] std::uint64_t bits() const noexcept { return value_; }
     /// Returns the hash as 16 hexadecimal digits.
     [[nodiscard]] std::string text() const {
         constexpr std::string_view digits{"0123456789abcdef"};

@@ -30,6 +30,7 @@ struct MeasureOptions : RunOptions {
     bool keep = false;            ///< true: the summary contains the records of all ticks
     bool transducer = true;       ///< true: the simulated device has a force transducer
     double friction_share = 0.0;  ///< simulated device: Coulomb friction divided by force limit
+    bool device_renders = false;  ///< true: the USB device renders its own model, and its force is recorded
 
     /// Returns true if the device moves the handle.
     [[nodiscard]] bool moves() const noexcept { return probe || push; }
@@ -43,7 +44,8 @@ inline constexpr auto fields_of<MeasureOptions> = std::tuple_cat(
                Field<&MeasureOptions::stiffness>{"stiffness"},
                Field<&MeasureOptions::force_limit>{"force_limit"}, Field<&MeasureOptions::push>{"push"},
                Field<&MeasureOptions::keep>{"keep"}, Field<&MeasureOptions::transducer>{"transducer"},
-               Field<&MeasureOptions::friction_share>{"friction_share"}});
+               Field<&MeasureOptions::friction_share>{"friction_share"},
+               Field<&MeasureOptions::device_renders>{"device_renders"}});
 
 namespace detail {
 
@@ -73,7 +75,9 @@ namespace detail {
     SessionSettings session{.loop = options.loop, .real_time = options.real_time};
     session.loop.rate_hz = device.rate_hz;
     validate(session.loop);
-    detail::require(device.transducer || options.probe || options.record.empty(),
+    detail::require(!options.device_renders || !options.moves(),
+                    "device_renders is set: leave out probe and push, because the host makes no force");
+    detail::require(device.transducer || options.probe || options.device_renders || options.record.empty(),
                     device.profile.id +
                         " has no force transducer, so it cannot measure a force while a hand moves the "
                         "handle: set probe");
@@ -94,16 +98,19 @@ namespace detail {
     validate(guards);
     Metadata metadata{{"created_by", options.created_by}};
     metadata.insert(metadata.end(), device.metadata.begin(), device.metadata.end());
-    metadata.insert(
-        metadata.end(),
-        {{"force", device.transducer ? "of the object against the handle, from the device's force transducer"
-                                     : "of the motor against the object, including the device's friction"},
-         {"moved_by", moved_by},
-         {"rate_hz", readable(device.rate_hz)}});
+    metadata.insert(metadata.end(),
+                    {{"force", options.device_renders ? "of the motor, from the model that the device renders"
+                               : device.transducer
+                                   ? "of the object against the handle, from the device's force transducer"
+                                   : "of the motor against the object, including the device's friction"},
+                     {"moved_by", moved_by},
+                     {"rate_hz", readable(device.rate_hz)}});
     const Opened opened = device.open();
     detail::require(static_cast<bool>(opened), opened.reason);
     RecordSinks sinks;
-    sinks.real_object = !options.push;
+    sinks.force = options.device_renders ? RecordedForce::Applied
+                  : options.push         ? RecordedForce::Sent
+                                         : RecordedForce::Object;
     sinks.keeps = options.keep;
     const std::string note = detail::open_sinks(options, options.units, metadata, sinks);
     const auto run = [&](auto structure) {

@@ -25,20 +25,27 @@ struct Range {
     }
 };
 
+/// Force that a recording contains.
+enum class RecordedForce : std::uint8_t {
+    Sent,    ///< the command after all guards
+    Object,  ///< the force of a real object
+    Applied  ///< the force of the motor, which the device computes itself
+};
+
 /// Passes the records of ticks to a file, to telemetry and to memory, and stores the range of positions and forces.
 struct RecordSinks {
     RecordingFile file;
     Telemetry telemetry;
     std::vector<TickRecord> kept;
-    bool keeps = false;        ///< true if every tick is kept in memory
-    bool real_object = false;  ///< true if the recorded force is that of a real object
+    bool keeps = false;  ///< true if every tick is kept in memory
+    RecordedForce force = RecordedForce::Sent;
 
     /// Writes records to the recording, sends them as telemetry and keeps them if requested. The oldest comes first.
     void take(std::span<const TickRecord> ticks) noexcept {
-        if (real_object) {
+        if (force != RecordedForce::Sent) {
             recorded_.assign(ticks.begin(), ticks.end());
             for (TickRecord& tick : recorded_) {
-                tick.force = object_force(tick);
+                tick.force = force == RecordedForce::Object ? object_force(tick) : tick.applied;
             }
             ticks = recorded_;
         }

@@ -78,6 +78,14 @@ namespace palpate {
             "faults is set: must be empty for a real device, because only the simulated device simulates "
             "faults");
     }
+    if (!options.uncertified && model.certificate && model.certificate->device.renderer) {
+        const DeviceProfile& certified = model.certificate->device;
+        refuse(model.name + " is planned for the motor controller of " + certified.id + " at " +
+               readable(1.0 / certified.period_s) +
+               " Hz, and the host cannot render this plan: export it with 'palpate export --c', or make a "
+               "plan for "
+               "the host with 'palpate plan' without on_device");
+    }
     if (model.force_unit == "A") {
         refuse("the model's force is a motor current in A: identify it with --torque-constant-Nm-per-A");
     }
@@ -95,6 +103,7 @@ namespace palpate {
     }
     detail::require(options.device == "simulated",
                     "device is '" + options.device + "', must be simulated or usb[:SERIAL]");
+    detail::require(!options.device_renders, "device_renders needs a USB device that contains a model");
     detail::require(object || options.record.empty(),
                     "the simulated device has no object: set object to a model file");
     validate(options.loop);

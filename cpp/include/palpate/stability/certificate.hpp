@@ -121,6 +121,14 @@ void hash_value(NumberHash& hash, const T& value) {
     return hash.text();
 }
 
+/// Returns 32 bits that change with every number and name of a device profile. A program in C compares them with those
+/// of the device for which its model was exported.
+[[nodiscard]] inline std::uint32_t checksum(const DeviceProfile& device) {
+    detail::NumberHash hash;
+    detail::hash_value(hash, device);
+    return static_cast<std::uint32_t>(hash.bits() ^ (hash.bits() >> 32U));
+}
+
 /// Returns the inequalities of a certificate for a force with these bounds, rendered by a scheme on a device.
 /// Inequalities that do not hold are included. Numbers of the scheme that its structure does not use are ignored.
 [[nodiscard]] inline std::vector<Inequality> inequalities_of(const ForceBounds& bounds, const Scheme& scheme,
@@ -218,7 +226,7 @@ namespace detail {
                                                   const DeviceProfile& device) {
     Certificate certificate;
     certificate.scheme = scheme;
-    certificate.device = device;
+    certificate.device = certified_part(device);
     certificate.bounds = bounds;
     std::vector<Inequality> lines = inequalities_of(bounds, scheme, device);
     const bool is_finite = finite(bounds);

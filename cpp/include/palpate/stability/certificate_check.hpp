@@ -77,13 +77,22 @@ namespace detail {
                                                    const DeviceProfile& device) {
     const std::string opening = "the certificate is for the device " + certified.id;
     std::string difference;
+    if (certified.id == device.id && certified.renderer != device.renderer) {
+        const auto place = [](const DeviceProfile& profile) {
+            return std::string(profile.renderer ? "its motor controller at " : "the host at ") +
+                   readable(1.0 / profile.period_s) + " Hz";
+        };
+        difference = opening + " with the model on " + place(certified) + ", not on " + place(device) +
+                     "; plan the model again";
+    }
     for_each_field<DeviceProfile>([&](const auto& field) {
         const auto& before = field.of(certified);
         const auto& now = field.of(device);
-        if (!difference.empty()) {
+        if constexpr (is_optional<std::remove_cvref_t<decltype(before)>>) {
+            return;  // the renderer is compared above; a certificate does not contain the timing of another renderer
+        } else if (!difference.empty()) {
             return;
-        }
-        if constexpr (std::is_same_v<decltype(before), const std::string&>) {
+        } else if constexpr (std::is_same_v<decltype(before), const std::string&>) {
             if (&before == &certified.id && before != now) {
                 difference = opening + ", not for " + now + "; plan the model again for this device";
             } else if (before != now) {

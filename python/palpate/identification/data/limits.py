@@ -157,16 +157,27 @@ def force_step(force: Float1D) -> float:
     return step if float(away.max()) <= GRID_TOLERANCE else 0.0
 
 
+def standard_deviation(residual: Float1D) -> float:
+    """Returns the standard deviation of normal residuals (n,), from the median of their absolute values."""
+    return 1.4826 * float(np.median(np.abs(residual)))
+
+
+def evenness(residual: Float1D) -> float:
+    """Returns the ratio of :func:`standard_deviation` to the RMS of residuals (n,): 1 for normal noise, small
+    if few positions cause the error, 0 without an error."""
+    power = float(residual @ residual)
+    return standard_deviation(residual) / float(np.sqrt(power / len(residual))) if power > 0.0 else 0.0
+
+
 def correlation(residual: Float1D) -> float:
     """Returns the correlation of neighbouring residuals (n,) in recorded order; 0 if the correlation can be
     random, or can come from a force that the model does not fit."""
     power = float(residual @ residual)
     if power == 0.0 or len(residual) < 2:
         return 0.0
-    even = 1.4826 * float(np.median(np.abs(residual))) / float(np.sqrt(power / len(residual)))
     found = float(residual[1:] @ residual[:-1]) / power
     limit = max(LEAST_CORRELATION, SIGNIFICANT_STANDARD_ERRORS / float(np.sqrt(len(residual))))
-    return found if even >= LEAST_NOISE_EVENNESS and found > limit else 0.0
+    return found if evenness(residual) >= LEAST_NOISE_EVENNESS and found > limit else 0.0
 
 
 def independent_share(rho: float) -> float:

@@ -30,7 +30,7 @@ from ...errors import InputError
 from ...recording import Recording
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
-from .limits import FORCE_RESOLUTION
+from .limits import FORCE_RESOLUTION, standard_deviation
 
 MOST_ISOLATED_SHARE = 0.01
 """Largest share of the rows that can be isolated: rows with a value far from the values of all other rows
@@ -237,11 +237,6 @@ SETTLED_WEIGHT_CHANGE = 1e-3
 
 MOST_OUTLIER_SHARE = 0.2
 """Share of dropped rows above which the model is unfit [-]: so many rows cannot be outliers."""
-
-
-def standard_deviation(residual: Float1D) -> float:
-    """Returns the standard deviation of normal residuals (n,), from the median of their absolute values."""
-    return 1.4826 * float(np.median(np.abs(residual)))
 
 
 def from_neighbours(

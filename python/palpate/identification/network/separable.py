@@ -30,7 +30,7 @@ from scipy.optimize import Bounds, minimize
 from ..._core.model import wavelet_columns, wavelet_jacobian, wavelet_steps
 from ..._typing import Float1D, Float2D
 from ..data.compression import Compressed, HeldOutRows
-from ..data.limits import FORCE_RESOLUTION, NO_LIMITS, RowLimits
+from ..data.limits import FORCE_RESOLUTION, NO_LIMITS, RowLimits, evenness
 from .basis import Basis, Resolution
 
 RIDGE = 1e-11
@@ -225,10 +225,8 @@ class SeparableProblem:
         return float(np.sqrt(self.total(solution.rss) / self.samples))
 
     def evenness(self, solution: Solution) -> float:
-        """Returns 1.4826 times the ratio of median to RMS of the absolute residuals: 1 for normal noise,
-        small if few positions cause the error."""
-        residual = np.abs(np.concatenate(solution.residuals))
-        return 1.4826 * float(np.median(residual)) / max(float(np.sqrt(np.mean(residual**2))), TINY)
+        """Returns the evenness of the residuals of all blocks."""
+        return evenness(np.concatenate(solution.residuals))
 
     def neighbour_correlation(self, solution: Solution) -> float:
         """Returns the correlation of residuals at neighbouring positions [standard errors]; 0 with several

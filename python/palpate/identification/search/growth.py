@@ -16,7 +16,7 @@ from ..._typing import Float1D
 from ..data.limits import FORCE_RESOLUTION
 from ..network.basis import COARSEST_CANDIDATE, MOST_LIBRARY_ENTRIES, Basis, truncated_frame
 from ..network.fitted import PathPoint
-from ..network.separable import SeparableProblem, Solution, refine, refine_all
+from ..network.separable import SIGNIFICANT_CORRELATION, SeparableProblem, Solution, refine, refine_all
 from ..options import IdentifyOptions
 from .evidence import CRITERIA, ON_HELD_OUT_ROWS, choice, criterion_of, enough, report
 from .selection import Library, orthogonal_gains, residual_gains, select_backward
@@ -39,10 +39,6 @@ residuals are taken as noise [-]. Narrower wavelets are then not tried."""
 FINER_ERROR_RATIO = 4.0
 """Narrower wavelets that the criterion does not accept are still accepted if they divide the RMS error by
 more than this factor [-]. Wavelets that fit noise divide the error by less."""
-
-SIGNIFICANT_CORRELATION = 3.0
-"""Correlation of residuals at neighbouring positions above which the residuals are not noise [standard
-errors]."""
 
 SMOOTH_CORE_SHARE = 0.25
 """While only wide wavelets are tried for several inputs, at least this share of all positions must lie in the
