@@ -134,7 +134,9 @@ class Inverse3Device {
     /// handlers store the address.
     struct Link {
         boost::asio::io_context context;
-        boost::beast::websocket::stream<boost::beast::tcp_stream> stream{context};
+        boost::beast::websocket::stream<
+            boost::beast::basic_stream<boost::asio::ip::tcp, boost::asio::io_context::executor_type>, false>
+            stream{context};
         boost::beast::flat_buffer buffer;
         std::string message;       ///< message to the service that is being sent
         std::string command_head;  ///< start of each command's text, up to the force
