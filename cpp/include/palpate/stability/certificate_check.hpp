@@ -88,19 +88,21 @@ namespace detail {
     for_each_field<DeviceProfile>([&](const auto& field) {
         const auto& before = field.of(certified);
         const auto& now = field.of(device);
-        if constexpr (is_optional<std::remove_cvref_t<decltype(before)>>) {
-            return;  // the renderer is compared above; a certificate does not contain the timing of another renderer
-        } else if (!difference.empty()) {
+        if (!difference.empty()) {
             return;
-        } else if constexpr (std::is_same_v<decltype(before), const std::string&>) {
+        }
+        if constexpr (std::is_same_v<decltype(before), const std::string&>) {
             if (&before == &certified.id && before != now) {
                 difference = opening + ", not for " + now + "; plan the model again for this device";
             } else if (before != now) {
                 difference = opening + " in " + before + ", not in " + now;
             }
-        } else if (!agree(before, now)) {
-            difference = opening + " with " + field.name + " = " + readable(before) + ", not " +
-                         readable(now) + "; plan the model again";
+        } else if constexpr (!is_optional<std::remove_cvref_t<decltype(before)>>) {
+            // The renderer is compared above; a certificate does not contain the timing of another renderer
+            if (!agree(before, now)) {
+                difference = opening + " with " + field.name + " = " + readable(before) + ", not " +
+                             readable(now) + "; plan the model again";
+            }
         }
     });
     return difference;
