@@ -16,7 +16,7 @@ from ..planning import Plan, force_error, force_range, judge, rig_for
 from ..planning import simulate as render
 from ..recording.files import require_absent
 from .exit_status import end_with, finishing
-from .figures import picture_rendering
+from .figures import drawing, picture_rendering
 from .printing import (
     number,
     print_json,
@@ -88,11 +88,13 @@ def simulate(
         "status": dict(status_counts),
     }
     written = None if status_counts["NonFinite"] else output
+    with drawing() as write_figures:
+        if plot is not None:
+            picture_rendering(plot, plan, rendered)
     with finishing():
         if written is not None:
             rendered.write(written, replace=force)
-        if plot is not None:
-            picture_rendering(plot, plan, rendered)
+        write_figures()
         if as_json:
             print_json(result)
         else:
