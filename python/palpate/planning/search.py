@@ -20,7 +20,7 @@ from ..arguments import instance_of, real_of
 from ..errors import InputError
 from ..model import Model
 from .candidates import CANDIDATES, Candidate, Refusal, Task
-from .device_profile import find_profile, mechanical_units
+from .device_profile import find_profile, mechanical_units, require_unit
 from .limited_network import renderable_slopes, sliding_bounds
 from .plan import (
     ACCEPTED_FORCE_ERROR,
@@ -110,12 +110,7 @@ def plan(
     }.items():
         _require_number(name, value)
     samples = _samples_of(predict)
-    unit = model.units["position"]
-    if unit not in ("", device.position_unit):
-        raise InputError(
-            f"position_unit of the device {device.id} is {device.position_unit}: must be {unit}, the "
-            "position unit of the model"
-        )
+    require_unit(device, model.units["position"])
     if model.units["force"] not in ("", _FORCE_UNIT[device.position_unit], "A"):
         raise InputError(
             f"the force unit of the model is {model.units['force']}: must be "
