@@ -18,6 +18,7 @@ from ..verification import verify
 from .exit_status import end_with, finishing
 from .figures import (
     close_loops,
+    drawing,
     picture_closed_loops,
     picture_structures,
     picture_verification,
@@ -74,11 +75,8 @@ def demo(output: Path, as_json: bool) -> None:
         "closed-loop.png": "recorded and rendered force over position, with a simulated device in the loop",
         "structures.png": "force error of each rendering structure",
     }
-    with finishing():
-        output.mkdir(exist_ok=True)
-        recording.write(output / "sample-1.csv")
-        fresh.write(output / "sample-2.csv")
-        model.save(output / "model.json")
+    talk("drawing the figures ...")
+    with drawing() as write_figures:
         picture_verification(output / "force-over-position.png", model, [(fresh, verification)])
         picture_closed_loops(output / "closed-loop.png", fresh, loops)
         picture_structures(
@@ -87,6 +85,12 @@ def demo(output: Path, as_json: bool) -> None:
             fresh.units["force"],
             of=f"model of simulated data, rendered for {number(RENDERED_S)} s",
         )
+    with finishing():
+        output.mkdir(exist_ok=True)
+        recording.write(output / "sample-1.csv")
+        fresh.write(output / "sample-2.csv")
+        model.save(output / "model.json")
+        write_figures()
         if as_json:
             print_json(
                 {

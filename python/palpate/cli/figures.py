@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import io
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,6 +62,36 @@ _DRIVEN = {
 }
 
 
+_LATER: ContextVar[list[tuple[Path, bytes]] | None] = ContextVar("figures to write later", default=None)
+"""Figures that were drawn inside `drawing` and are not yet written"""
+
+
+@contextmanager
+def drawing() -> Iterator[Callable[[], None]]:
+    """Context in which figures are drawn in memory; yields the function that writes their files.
+
+    Drawing takes seconds. Ctrl-C ends it without a file; `finishing` ignores Ctrl-C only while files are
+    written.
+    """
+    drawn: list[tuple[Path, bytes]] = []
+
+    def write() -> None:
+        for path, content in drawn:
+            _write(path, content)
+
+    outer = _LATER.set(drawn)
+    try:
+        yield write
+    finally:
+        _LATER.reset(outer)
+
+
+def _write(path: Path, content: bytes) -> None:
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+    talk(f"wrote {path}")
+
+
 @contextmanager
 def figure_file(
     path: Path, *, height_inches: float, rows: Sequence[float] = (1.0,), columns: int = 1, title: str = ""
@@ -96,9 +128,13 @@ def _written(path: Path, inches: tuple[float, float], *, title: str = "") -> Ite
             lines = [part for line in title.split("\n") for part in textwrap.wrap(visible(line), columns)]
             figure.suptitle("\n".join(lines).replace("$", r"\$"), fontsize=_STYLE["axes.titlesize"])
         yield figure
-        with replacing(path) as temporary:
-            figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
-    talk(f"wrote {path}")
+        stream = io.BytesIO()
+        figure.savefig(stream, format=path.suffix.lower().removeprefix("."))
+    later = _LATER.get()
+    if later is None:
+        _write(path, stream.getvalue())
+    else:
+        later.append((path, stream.getvalue()))
 
 
 def close_loops(model: Model, recording: Recording) -> list[ClosedLoop]:

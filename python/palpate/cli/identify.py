@@ -34,7 +34,7 @@ from ..verdict import Verdict
 from ..verification import Verification, verify
 from ..verification.verification import circumstances
 from .exit_status import end_with, finishing
-from .figures import picture_verification
+from .figures import drawing, picture_verification
 from .printing import (
     WIDEST,
     number,
@@ -253,9 +253,11 @@ def identify(
         judged += ", where rows far from the model have less weight"
     # The NRMSE of the fit leaves out wrong readings, which `verify` compares.
     rms = "" if hold_out_every is None else _rms_text(verified)
-    with finishing():
+    with drawing() as write_figures:
         if plot is not None:
             picture_verification(plot, model, verified, recordings)
+    with finishing():
+        write_figures()
         model.save(output)
         if as_json:
             print_json(result)

@@ -16,7 +16,7 @@ from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, 
 from ..planning.candidates import CANDIDATES
 from ..planning.search import plan as choose
 from .exit_status import end_with, finishing
-from .figures import figure_file, source_name
+from .figures import drawing, figure_file, source_name
 from .printing import (
     Verb,
     number,
@@ -186,11 +186,13 @@ def plan(
     verdict, certificate = chosen.verdict, chosen.certificate
     assert certificate is not None
     holds = verdict.level != "no"
+    with drawing() as write_figures:
+        if plot is not None:
+            _picture(plot, chosen, profile)
     with finishing():
         if output is not None and holds:
             chosen.stored().save(output)
-        if plot is not None:
-            _picture(plot, chosen, profile)
+        write_figures()
         written = output if holds else None
         if as_json:
             print_json(_result(chosen, certificate, written, seconds))

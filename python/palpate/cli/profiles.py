@@ -6,9 +6,9 @@ from __future__ import annotations
 import click
 from click.shell_completion import CompletionItem
 
-from ..errors import InputError
 from ..model import Model
-from ..planning import DeviceProfile, example_profiles, profile_file
+from ..planning import DeviceProfile, example_profiles
+from ..planning.device_profile import require_profile
 from .completion import files_with
 
 
@@ -31,22 +31,6 @@ def device_for(model: Model, name: str) -> DeviceProfile:
     Raises
     ------
     InputError
-        There is no such file or example, the file is not a profile, or the device moves in another
-        unit than the model. The message names the examples that can be used.
+        There is no such file or example, or the file is not a profile.
     """
-    unit = model.units["position"]
-    examples = {each: DeviceProfile.load(file) for each, (file, _) in example_profiles().items()}
-    usable = ", ".join(each for each, profile in examples.items() if unit in ("", profile.position_unit))
-    file = profile_file(name)
-    if not file.exists():
-        raise InputError(
-            f"there is no file {name}, and no example profile of this name; the examples for a model with "
-            f"positions in {unit or 'any unit'} are {usable or 'none'}"
-        )
-    profile = DeviceProfile.load(file)
-    if unit not in ("", profile.position_unit):
-        raise InputError(
-            f"position_unit of the device {profile.id} is {profile.position_unit}: must be {unit}, the "
-            f"position unit of the model; the example profiles in {unit} are {usable or 'none'}"
-        )
-    return profile
+    return DeviceProfile.load(require_profile(name, model.units["position"]))

@@ -15,7 +15,7 @@ from ..planning import Plan
 from ..verdict import GOOD, Verdict, usable
 from ..verification import Stroke, compare
 from .exit_status import end_with, finishing
-from .figures import figure_file, picture_frame, picture_path
+from .figures import drawing, figure_file, picture_frame, picture_path
 from .printing import (
     number,
     print_json,
@@ -72,12 +72,14 @@ def show(
     if other_file is not None:
         _compare(model, model_file, load_model(other_file), other_file, plot=plot, as_json=as_json)
         return
-    with finishing():
+    with drawing() as write_figures:
         if plot is not None:
             picture_path(plot, model)
         if plot_frame is not None:
             domain = float(model.lower[0]), float(model.upper[0])
             picture_frame(plot_frame, domain, model.units["position"], of=file.name)
+    with finishing():
+        write_figures()
         if as_json:
             print_json(_record(model, model_file))
         else:
@@ -131,7 +133,7 @@ def _compare(
     """Prints the largest force difference of two models, and a verdict on both models and the difference."""
     strokes = compare(model, other)
     verdict = model.verdict + other.verdict + _noticed(strokes)
-    with finishing():
+    with drawing() as write_figures:
         if plot is not None:
             from ..plotting import draw_two_models
 
@@ -139,6 +141,8 @@ def _compare(
             with figure_file(plot, height_inches=3.6, rows=(2.2, 1.0), title=title) as (above, beneath):
                 names = (model_file.stem, other_file.stem)
                 draw_two_models(above, beneath, strokes, model.units, names=names)
+    with finishing():
+        write_figures()
         if as_json:
             largest = {stroke.name or "both": stroke.worst for stroke in strokes}
             files = {"model": str(model_file), "beside": str(other_file)}

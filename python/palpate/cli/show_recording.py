@@ -13,7 +13,7 @@ from ..recording.motion import GAP_RATIO, ordered_strokes
 from ..recording.quality import quality_findings
 from ..verdict import Verdict
 from .exit_status import end_with, finishing
-from .figures import picture_frame, picture_recording
+from .figures import drawing, picture_frame, picture_recording
 from .printing import number, print_json, print_numbers, print_paragraph, print_verdict
 from .verb import ReadingOptions
 
@@ -39,11 +39,13 @@ def show_recording(
     recording = reading.read(file)
     verdict = Verdict(tuple(quality_findings(recording)))
     strokes = _strokes(recording)
-    with finishing():
+    with drawing() as write_figures:
         notes = () if plot is None else picture_recording(plot, recording)
         if plot_frame is not None:
             domain = float(recording.position.min()), float(recording.position.max())
             picture_frame(plot_frame, domain, recording.units["position"], of=file.name)
+    with finishing():
+        write_figures()
         if as_json:
             print_json(_record(file, recording, strokes) | {"verdict": str(verdict)})
         else:

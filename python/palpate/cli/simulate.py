@@ -12,11 +12,12 @@ import click
 
 from .._core.simulation import TestRig
 from ..model import Model, load_model
-from ..planning import Plan, force_error, force_range, judge, rig_for
+from ..planning import Plan, force_error, force_range, hand_for, judge, rig_for
 from ..planning import simulate as render
+from ..planning.simulation import covered_text
 from ..recording.files import require_absent
 from .exit_status import end_with, finishing
-from .figures import picture_rendering
+from .figures import drawing, picture_rendering
 from .printing import (
     number,
     print_json,
@@ -28,9 +29,20 @@ from .printing import (
 from .verb import PATH, json_option, plot_option, require_writable, scheme_options, sized, verb
 
 
+def _refuse_device(ctx: click.Context, param: click.Parameter, device: str | None) -> None:
+    """Refuses a device: it is part of the plan in the model file."""
+    if device is not None:
+        raise click.UsageError(
+            "the device comes from the plan in the model file: run palpate plan MODEL.json --device "
+            f"{device} -o MODEL.json first",
+            ctx,
+        )
+
+
 @verb("palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv")
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @scheme_options
+@click.option("--device", hidden=True, expose_value=False, callback=_refuse_device)
 @click.option("--duration-s", type=float, default=4.0, help="Simulated time [s].")
 @click.option(
     "-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Recording of the rendering to write."
@@ -49,9 +61,10 @@ def simulate(
 ) -> None:
     """Render a model in closed loop with a simulated device and a simulated hand.
 
-    The hand sweeps through the model's domain twice in four seconds. An angle is rendered on a knob with a
-    16-bit encoder at 1 kHz; for other units the knob is scaled to the model's travel and force. A model with
-    a plan is rendered as planned, on the device that it was certified for, unless a structure is given.
+    The hand sweeps through the model's domain twice in four seconds, as far as the device holds the force. An
+    angle is rendered on a knob with a 16-bit encoder at 1 kHz; for other units the knob is scaled to the
+    model's travel and force. A model with a plan is rendered as planned, on the device that it was certified
+    for, unless a structure is given.
     A simulation shows one case; it does not prove stability.
     """
     require_writable(output, plot, inputs=(model_file,))
@@ -65,7 +78,11 @@ def simulate(
     ticks = max(duration_s / device.period_s, 1.0)
     with progress("simulating") as shown:
         rendered = render(
-            plan, device, rig.hand, duration_s, lambda tick: shown(f"{100 * tick / ticks:.1f} %")
+            plan,
+            device,
+            hand_for(plan, device),
+            duration_s,
+            lambda tick: shown(f"{100 * tick / ticks:.1f} %"),
         )
     error = force_error(plan, rendered)
     verdict = judge(plan, rendered, error)
@@ -88,11 +105,13 @@ def simulate(
         "status": dict(status_counts),
     }
     written = None if status_counts["NonFinite"] else output
+    with drawing() as write_figures:
+        if plot is not None:
+            picture_rendering(plot, plan, rendered)
     with finishing():
         if written is not None:
             rendered.write(written, replace=force)
-        if plot is not None:
-            picture_rendering(plot, plan, rendered)
+        write_figures()
         if as_json:
             print_json(result)
         else:
@@ -102,6 +121,7 @@ def simulate(
                 {
                     "structure": plan.description,
                     "duration": f"{number(duration_s)} s",
+                    "handle": covered_text(plan, device, rendered),
                     "force error, end of tick": f"{number(error.end)} {unit} RMS"
                     + ("" if share is None else f", {100 * share:.3g} % of the object's force range"),
                     "force error, mean of a tick": f"{number(error.mean)} {unit} RMS",

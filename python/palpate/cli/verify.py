@@ -18,6 +18,7 @@ from ..verification.verification import is_fresh
 from .exit_status import end_with, finishing
 from .figures import (
     close_loops,
+    drawing,
     picture_closed_loops,
     picture_verification,
     print_closed_loops,
@@ -96,11 +97,13 @@ def verify(
     loops: list[ClosedLoop] = []
     if plot_closed_loop is not None:
         loops = close_loops(model, whole)
-    with finishing():
+    with drawing() as write_figures:
         if plot is not None:
             picture_verification(plot, model, [(recording, verification)])
         if plot_closed_loop is not None:
             picture_closed_loops(plot_closed_loop, whole, loops)
+    with finishing():
+        write_figures()
         if as_json:
             print_json(
                 {

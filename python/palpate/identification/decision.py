@@ -22,7 +22,7 @@ _ROUNDED = 100.0
 
 @dataclass(frozen=True)
 class Decision:
-    """Decision on one model class, printed as ``straight line: accepted (BIC -426)``."""
+    """Decision on one model class, printed as ``straight line: accepted (lowers BIC by 426)``."""
 
     model_class: str
     """Name of the model class in words"""
@@ -55,9 +55,18 @@ def latest(decisions: Iterable[Decision]) -> tuple[tuple[Decision, ...], tuple[D
     return tuple(last.values()), tuple(replaced)
 
 
-def signed(value: float) -> str:
-    """Returns a number with its sign: at most three digits below 100, else without decimals."""
-    return f"{value:+.0f}" if abs(value) >= _ROUNDED else f"{value:+.3g}"
+def lowered(quantity: str, decrease: float) -> str:
+    """Returns the change of a quantity in words, as "lowers BIC by 1455" or "raises BIC by 2"."""
+    return f"{_verb(decrease)} {quantity} by {_short(decrease)}"
+
+
+def _verb(decrease: float) -> str:
+    return "lowers" if decrease >= 0.0 else "raises"
+
+
+def _short(value: float) -> str:
+    """Returns the absolute value as text: at most three digits below 100, else without decimals."""
+    return f"{abs(value):.0f}" if abs(value) >= _ROUNDED else f"{abs(value):.3g}"
 
 
 def squared_error_change(share: float, error: float, on: str) -> str:
@@ -72,4 +81,4 @@ def squared_error_change(share: float, error: float, on: str) -> str:
     on : str
         Name of the rows on which the error was computed.
     """
-    return f"squared error on {on} {signed(-100.0 * share)} +- {100.0 * error:.2g} %"
+    return f"{_verb(share)} the squared error on {on} by {_short(100.0 * share)} +- {100.0 * error:.2g} %"

@@ -153,9 +153,10 @@ class IdentifyOptions:
             names = self.inputs.split(",") if isinstance(self.inputs, str) else self.inputs
             object.__setattr__(self, "inputs", tuple(name.strip() for name in names))
             if "position" not in self.inputs or "" in self.inputs or len(set(self.inputs)) < len(self.inputs):
+                example = " (position,velocity; velocity needs time)" if "velocity" in self.inputs else ""
                 raise InputError(
                     f'inputs is {",".join(self.inputs)!r}; use "auto", or position and the further inputs '
-                    "of the force: hysteresis, velocity, columns"
+                    f"of the force: hysteresis, velocity, columns{example}"
                 )
         _require(self)
         given: object = self.search

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import tomli_w
 
@@ -72,8 +73,8 @@ class DeviceProfile(_core.device.DeviceProfile):
         Raises
         ------
         InputError
-            The file does not exist or is not TOML, or a field is missing, unknown or impossible. The message
-            names the file, the field and its value.
+            The file does not exist or is not TOML, or fields are missing, unknown or impossible. The message
+            names the file, and every such field with its value.
         """
         file = path_of("path", path)
         require_file(file)
@@ -95,7 +96,7 @@ class DeviceProfile(_core.device.DeviceProfile):
         try:
             return cls(**_core.io.profile_of(content).to_dict())
         except ValueError as error:
-            raise InputError(f"{file}: {error}") from None
+            raise InputError(f"{file}: {'; '.join(_wrong_fields(content) or [str(error)])}") from None
 
     def save(self, path: str | os.PathLike[str], *, notes: Sequence[str] = ()) -> Path:
         """Writes the profile as a TOML file. The file gets its name only when it is complete.
@@ -114,6 +115,22 @@ class DeviceProfile(_core.device.DeviceProfile):
         return file
 
 
+def _wrong_fields(content: Mapping[str, Any]) -> list[str]:
+    """Returns the error of each field of a profile that is missing, unknown or impossible by itself."""
+    # In a long period any delay is possible, so that each field is checked independently of the others.
+    possible = _core.device.DeviceProfile().to_dict() | {"period_s": 1e9}
+    errors = []
+    for name in {**content, **possible}:
+        fields = {key: value for key, value in possible.items() if key != name}
+        if name in content:
+            fields[name] = content[name]
+        try:
+            _core.io.profile_of(fields)
+        except ValueError as error:
+            errors.append(str(error))
+    return errors
+
+
 def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) -> _core.device.DeviceProfile:
     """Returns a device from an object, the name of an example profile, or the path of a TOML file.
 
@@ -127,15 +144,43 @@ def find_profile(device: _core.device.DeviceProfile | str | os.PathLike[str]) ->
     if not isinstance(device, (str, os.PathLike)):
         raise InputError(
             f"device is a {type(device).__name__}: must be a DeviceProfile, the path of its TOML file, or "
-            f"{_example_names()}"
+            f"one of the examples {_example_names()}"
         )
     file = profile_file(os.fspath(device))
     if not file.exists() and file == Path(file.name) and not file.suffix:
         raise InputError(
-            f"device is '{device}': must be the path of an existing TOML file, or {_example_names()}"
+            f"device is '{device}': must be the path of an existing TOML file, or one of the examples "
+            f"{_example_names()}"
         )
     return DeviceProfile.load(file)
 
 
-def _example_names() -> str:
-    return f"one of the examples {', '.join(example_profiles())}"
+def require_unit(device: _core.device.DeviceProfile, unit: str) -> None:
+    """Refuses a device that moves in another unit than a model. The unit of a model can be empty."""
+    if unit not in ("", device.position_unit):
+        raise InputError(
+            f"position_unit of the device {device.id} is {device.position_unit}: must be {unit}, the "
+            f"position unit of the model; the example profiles in {unit} are {_example_names(unit)}"
+        )
+
+
+def require_profile(name: str, unit: str) -> Path:
+    """Returns the file or example profile of this name; the message of a refusal names the examples in the
+    unit of a model."""
+    file = profile_file(name)
+    if not file.exists():
+        raise InputError(
+            f"there is no file {name}, and no example profile of this name; the examples for a model with "
+            f"positions in {unit or 'any unit'} are {_example_names(unit)}"
+        )
+    return file
+
+
+def _example_names(unit: str = "") -> str:
+    """Returns the names of the example profiles with positions in a unit; of all examples without a unit."""
+    usable = (
+        name
+        for name, (file, _) in example_profiles().items()
+        if unit in ("", DeviceProfile.load(file).position_unit)
+    )
+    return ", ".join(usable) or "none"

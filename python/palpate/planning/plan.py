@@ -37,6 +37,9 @@ _CERTIFICATE = {
 ACCEPTED_FORCE_ERROR = 0.1
 """Default limit of the force error [share of the range of the identified force]"""
 
+_MOST_ADVISED_ERROR = 0.5
+"""Largest force error that a verdict advises to accept [share of the range]; with more the object is lost"""
+
 SAMPLES = 1001
 """Number of positions over the domain at which the force error is computed [-]"""
 
@@ -155,7 +158,7 @@ class Plan:
             The verdict on the plan is no.
         """
         if self.verdict.level == "no":
-            raise InputError(f"a plan with verdict no is not stored: {self.verdict}")
+            raise InputError(f"a plan with verdict no is not stored: {'; '.join(self.verdict.reasons)}")
         content = self.model.to_dict()
         content["plan"] = self.record()
         content["certificate"] = None if self.certificate is None else certificate_record(self.certificate)
@@ -300,7 +303,7 @@ class Plan:
             reason = "" if self.needs else f": {self.certificate.reason}"
             return (no(f"no structure can render the model on this device{cure}{reason}"),)
         if not self.certificate.certified:
-            cure = f"; for a certificate the object {self.needs}" if self.needs else ""
+            cure = f". For a certificate the object {self.needs}" if self.needs else ""
             return (
                 usable(
                     "the linearised system is stable near each equilibrium; energy is not accounted for, "
@@ -324,12 +327,12 @@ class Plan:
             return (usable(f"{difference}; at most {_percent(self.accept_force_error)} is accepted"),)
         cause = f". The object {self.needs}" if self.needs else ""
         share = math.ceil(100.0 * error.share) / 100.0
-        return (
-            no(
-                f"{difference}: at most {_percent(self.accept_force_error)} is accepted{cause}. To accept "
-                f"this error, give --accept-force-error {share:g} (in Python accept_force_error)"
-            ),
+        accept = (
+            f". To accept this error, give --accept-force-error {share:g} (in Python accept_force_error)"
+            if share <= _MOST_ADVISED_ERROR
+            else ""
         )
+        return (no(f"{difference}: at most {_percent(self.accept_force_error)} is accepted{cause}{accept}"),)
 
 
 def describe(scheme: Scheme) -> str:

@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from .._core.device import DeviceProfile
 from .._core.device import on_device as timed_on_device
 from .._core.model import ForceModel
@@ -18,9 +20,18 @@ from ..arguments import instance_of, real_of
 from ..errors import InputError
 from ..model import Model
 from .candidates import CANDIDATES, Candidate, Refusal, Task
-from .device_profile import find_profile
-from .limited_network import sliding_bounds
-from .plan import ACCEPTED_FORCE_ERROR, Plan, network_of, require_force, static_force_error, with_network
+from .device_profile import find_profile, mechanical_units, require_unit
+from .limited_network import renderable_slopes, sliding_bounds
+from .plan import (
+    ACCEPTED_FORCE_ERROR,
+    SAMPLES,
+    Plan,
+    network_of,
+    require_force,
+    static_force_error,
+    strokes,
+    with_network,
+)
 
 _FORCE_UNIT = {"rad": "N*m", "m": "N"}
 """Maps the position unit of a device to its force unit."""
@@ -99,12 +110,7 @@ def plan(
     }.items():
         _require_number(name, value)
     samples = _samples_of(predict)
-    unit = model.units["position"]
-    if unit not in ("", device.position_unit):
-        raise InputError(
-            f"position_unit of the device {device.id} is {device.position_unit}: must be {unit}, the "
-            "position unit of the model"
-        )
+    require_unit(device, model.units["position"])
     if model.units["force"] not in ("", _FORCE_UNIT[device.position_unit], "A"):
         raise InputError(
             f"the force unit of the model is {model.units['force']}: must be "
@@ -185,6 +191,18 @@ explicit structure diverge"""
 _BISECTIONS = 15
 """Number of bisections that find the least sufficient value of a device property within 0.1 % [-]"""
 
+_FASTEST_HZ = 60_000.0
+"""Highest advised rate [Hz]: the highest PWM rate of the example motor controllers (moteus r4)"""
+
+_FASTEST_HOST_HZ = 10_000.0
+"""Rate above which only a motor controller can run the model, not a host computer [Hz]"""
+
+_MOST_IMPROVED = 20.0
+"""Largest advised factor between a property of another device of the same kind and this device [-]"""
+
+_LONGEST_TRAVEL_M = 0.3
+"""Longest travel of a desktop device that is advised for a scaled recording [m]"""
+
 Fits = Callable[[DeviceProfile], bool]
 """Function that returns True if a model can be rendered on a device."""
 
@@ -197,12 +215,16 @@ class _Property:
     """Function that returns the device with this property improved by a factor, rounded to three digits"""
     text: Callable[[DeviceProfile], str]
     """Function that returns, in words, the requirement that an improved device just meets"""
+    is_realistic: Callable[[DeviceProfile], bool]
+    """Function that returns True if a device of the same kind can have the improved property"""
 
 
 def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
-    """Returns the device property that a model needs: "needs device damping b >= 6.07 N*s/m (has 0.005)".
+    """Returns the device property that a model needs: "needs device damping b >= 6.07 N*s/m (has 0.05)".
 
-    The text is empty if no property helps.
+    If no realistic device property is sufficient, the text states the slope that the device renders, the
+    need at the highest rate, and the scale of an object that the device renders. The text is empty if no
+    property helps.
 
     Parameters
     ----------
@@ -228,20 +250,74 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
             return error.share <= accept_force_error
         return False
 
-    def least(*properties: _Property) -> str:
-        found = _improved(device, properties, fits)
-        return "" if found is None else " and ".join(each.text(found) for each in properties)
-
-    device_damping, friction, rate, encoder = _properties(task.model, device)
-    for short, otherwise in (
-        ((device_damping,), (rate,)),
+    device_damping, friction, rate, controller_rate, encoder = _properties(task.model, device)
+    for short, *others in (
+        ((device_damping,), (controller_rate,), (rate,)),
         ((friction,), (encoder,)),
-        ((device_damping, friction), (rate, encoder)),
+        ((device_damping, friction), (controller_rate, encoder), (rate, encoder)),
     ):
-        if need := least(*short):
-            other = least(*otherwise)
-            return f"needs {need}" + (f", or {other}" if other else "")
+        strong = _improved(device, short, fits)
+        if strong is None:
+            continue
+        realistic = []
+        for properties in (short, *others):
+            found = strong if properties is short else _improved(device, properties, fits)
+            if found is not None and all(each.is_realistic(found) for each in properties):
+                realistic.append(" and ".join(each.text(found) for each in properties))
+        if realistic:
+            return f"needs {', or '.join(realistic)}"
+        at_limit = rate.improved(device, _FASTEST_HZ * device.period_s)
+        stronger = _improved(at_limit, short, fits)
+        need = "" if stronger is None else " and ".join(each.text(stronger) for each in short)
+        return _too_steep(task, need, _improved(device, (_SCALE,), fits))
     return ""
+
+
+def _too_steep(task: Task, need: str, scaled: DeviceProfile | None) -> str:
+    """Returns the reason why no realistic device of this kind renders an object, and the scale that helps.
+
+    `need` is the device property that is needed at the highest rate. `scaled` is the device in units in which
+    it renders the object.
+    """
+    device, model = task.device, task.model
+    _, _, force = mechanical_units(device.position_unit)
+    position = device.position_unit
+    steepest, rendered = sliding_bounds(model).steepest, renderable_slopes(device)[1]
+    sentences = [
+        f"is too steep for this device: its slope is up to {steepest:.3g} {force}/{position}, and the device "
+        f"renders {rendered:.3g} {force}/{position} at {1.0 / device.period_s:.6g} Hz"
+    ]
+    if need:
+        sentences.append(
+            f"Even at {_FASTEST_HZ:g} Hz, the highest rate of motor controllers, it needs {need}"
+        )
+    if scaled is not None:
+        factor = scaled.inertia / device.inertia
+        x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
+        force_at_x = strokes(model, x)
+        weaker = max(math.sqrt(factor), float(np.abs(force_at_x).max()) / device.force_limit)
+        longer = max(factor / weaker, 1.0)
+        force_range, travel = float(np.ptp(force_at_x)) / weaker, float(x[-1] - x[0]) * longer
+        result = f"a travel of {travel:.2g} {position} and a force range of {force_range:.2g} {force}"
+        if position == "m" and travel > _LONGEST_TRAVEL_M:
+            cannot = f"needs more than the {_LONGEST_TRAVEL_M:g} m of a desktop device"
+        elif force_range < device.coulomb_friction:
+            cannot = f"cannot be felt above the device friction of {device.coulomb_friction:.3g} {force}"
+        else:
+            cannot = ""
+        sentences += (
+            [
+                f"The slope must be {factor:.3g} times smaller. A scaled recording with {result} {cannot}",
+                "Use a device with more damping",
+            ]
+            if cannot
+            else [
+                f"Scale the recording so that the slope is {factor:.3g} times smaller: position times "
+                f"{longer:.3g} and force times {1.0 / weaker:.3g} give {result}",
+                "Or use a device with more damping",
+            ]
+        )
+    return ". ".join(sentences)
 
 
 def _candidates(task: Task) -> tuple[str, ...]:
@@ -253,11 +329,40 @@ def _candidates(task: Task) -> tuple[str, ...]:
     return ("direct",)
 
 
+def _scaled(device: DeviceProfile, factor: float) -> DeviceProfile:
+    """Returns the device for an object whose force is divided by a factor, in the units of the object."""
+    names = ("inertia", "viscous_damping", "coulomb_friction", "force_step", "force_limit")
+    return _changed(device, **{name: factor * getattr(device, name) for name in names})
+
+
+_SCALE = _Property(_scaled, lambda on: "", lambda on: True)
+
+
+def _fastest_on_device(device: DeviceProfile) -> float:
+    """Returns a high rate of a model on the motor controller [Hz].
+
+    Returns 0 if the profile does not state its timing, or if the model already runs there.
+    """
+    if device.on_device is None or device.renderer is not None:
+        return 0.0
+    rate = min(_FASTEST_HZ, device.on_device.highest_rate_hz or _FASTEST_HZ)
+    while rate * device.period_s >= 1.0:
+        try:
+            timed_on_device(device, rate)
+        except ValueError:  # the delay of the controller has too many periods at this rate
+            rate *= 0.5
+        else:
+            return rate
+    return 0.0
+
+
 def _properties(
     model: ForceModel, device: DeviceProfile
-) -> tuple[_Property, _Property, _Property, _Property]:
-    """Returns damping, friction, rate and encoder of the device as properties that can be improved."""
-    force, position = ("N*m", "rad") if device.position_unit == "rad" else ("N", "m")
+) -> tuple[_Property, _Property, _Property, _Property, _Property]:
+    """Returns damping, friction, rate of the host, rate of the motor controller and encoder of the device as
+    properties that can be improved."""
+    _, damping, force = mechanical_units(device.position_unit)
+    position = device.position_unit
     steepest = max(sliding_bounds(model).steepest, 1e-9)
     # A property that is 0 cannot be doubled: start with a value far below the need of the model.
     b = device.viscous_damping or 1e-3 * device.longest_period_s * steepest
@@ -269,15 +374,28 @@ def _properties(
         delay_s = device.delay_s / (rate * device.period_s)
         return _changed(on, period_s=1.0 / rate, jitter_s=jitter_s, delay_s=delay_s)
 
+    fastest = _fastest_on_device(device)
+
+    def on_controller(on: DeviceProfile, factor: float) -> DeviceProfile:
+        rate = min(_rounded(math.ceil, factor / device.period_s), fastest)
+        return timed_on_device(on, rate) if fastest else on
+
     shorter = [name for name, value in (("jitter", device.jitter_s), ("delay", device.delay_s)) if value]
     in_proportion = f" with {' and '.join(shorter)} in proportion" if shorter else ""
+
+    def rate_text(on: DeviceProfile) -> str:
+        rate = 1.0 / on.period_s
+        return f"a rate of {rate:g} Hz{in_proportion}" + (
+            ", which only motor controllers reach" if rate > _FASTEST_HOST_HZ else ""
+        )
+
     return (
         _Property(
             lambda on, factor: _changed(on, viscous_damping=_rounded(math.ceil, factor * b)),
             lambda on: (
-                f"device damping b >= {on.viscous_damping:.3g} {force}*s/{position} "
-                f"(has {device.viscous_damping:.3g})"
+                f"device damping b >= {on.viscous_damping:.3g} {damping} (has {device.viscous_damping:.3g})"
             ),
+            lambda on: not 0.0 < _MOST_IMPROVED * device.viscous_damping < on.viscous_damping,
         ),
         _Property(
             lambda on, factor: _changed(on, coulomb_friction=_rounded(math.ceil, factor * f_c)),
@@ -285,11 +403,18 @@ def _properties(
                 f"device friction f_c >= {on.coulomb_friction:.3g} {force} "
                 f"(has {device.coulomb_friction:.3g})"
             ),
+            lambda on: not 0.0 < _MOST_IMPROVED * device.coulomb_friction < on.coulomb_friction,
         ),
-        _Property(faster, lambda on: f"a rate of {1.0 / on.period_s:.3g} Hz{in_proportion}"),
+        _Property(faster, rate_text, lambda on: 1.0 / on.period_s <= _FASTEST_HZ * (1.0 + 1e-9)),
+        _Property(
+            on_controller,
+            lambda on: f"the model on the motor controller (--on-device {1.0 / on.period_s:g})",
+            lambda on: fastest > 0.0,
+        ),
         _Property(
             lambda on, factor: _changed(on, encoder_step=_rounded(math.floor, device.encoder_step / factor)),
             lambda on: f"an encoder step of {on.encoder_step:.3g} {position}",
+            lambda on: on.encoder_step * _MOST_IMPROVED >= device.encoder_step,
         ),
     )
 

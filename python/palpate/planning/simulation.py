@@ -38,6 +38,13 @@ _GRID = 1001
 _TOLERATED_ERROR_SHARE = 0.02
 """Largest force error without a finding [share of the force range]"""
 
+_HELD_SHARE = 0.8
+"""Largest felt force against which the simulated hand presses [share of the force limit]; the rest is for
+coupling and damping"""
+
+_DOMAIN_MARGIN = 0.01
+"""Part of the domain at each end that the simulated hand leaves out [share of the domain]"""
+
 _COMPENSATED_DAMPING_RATIO = 0.25
 """Coupling damping of the compensated structure divided by that of the other structures [-]; the share
 (f'/K_c)^2 of this damping is felt."""
@@ -53,6 +60,37 @@ def rig_for(model: Model) -> TestRig:
     """Returns the test rig for a model: the default knob, scaled to the model unless its position is an
     angle, and a hand that moves it through the model's domain."""
     return _core.simulation.rig_for(model, is_angle=model.units["position"] == "rad")
+
+
+def hand_for(plan: Plan, device: DeviceProfile) -> Hand:
+    """Returns a simulated hand that moves the handle through the domain of a model while a plan is rendered.
+
+    Near the ends of the domain 1 % is left out, because the handle overshoots. The hand stops where the felt
+    force would exceed 80 % of the force limit of the device.
+    """
+    usual = rig_for(plan.model).hand
+    x, _, felt = plan.forces_at_rest()
+    margin = _DOMAIN_MARGIN * (x[-1] - x[0])
+    held = np.abs(felt).max(axis=0) <= _HELD_SHARE * device.force_limit
+    inside = np.flatnonzero(held & (x >= x[0] + margin) & (x <= x[-1] - margin))
+    if not len(inside):
+        return usual
+    first, last = inside[0], inside[-1]
+    # The handle stops where the force of the hand's spring equals the felt force and the device friction.
+    friction = device.coulomb_friction
+    ends = sorted(
+        (
+            x[first] + (felt[-1][first] - friction) / usual.stiffness,
+            x[last] + (felt[0][last] + friction) / usual.stiffness,
+        )
+    )
+    return Hand(
+        stiffness=usual.stiffness,
+        damping=usual.damping,
+        lower=ends[0],
+        upper=ends[1],
+        frequency_hz=usual.frequency_hz,
+    )
 
 
 def simulate(
@@ -195,6 +233,23 @@ def force_range(plan: Plan) -> float:
         sweep = np.linspace(lower[0], upper[0], _GRID)
         force = force_at(plan, np.concatenate([sweep, sweep[::-1]]))
     return float(np.ptp(force))
+
+
+def covered_text(plan: Plan, device: DeviceProfile, rendered: Recording) -> str:
+    """Returns the positions that the simulated handle reached, as a share of the domain, in words."""
+    lower, upper = float(plan.model.lower[0]), float(plan.model.upper[0])
+    low, high = float(rendered.position.min()), float(rendered.position.max())
+    inside = max(0.0, min(high, upper) - max(low, lower)) / (upper - lower)
+    reached = Unit.of_si(plan.model.units["position"]).interval(low, high)
+    text = f"{reached}, {100.0 * inside:.3g} % of the domain"
+    _, _, felt = plan.forces_at_rest()
+    if np.abs(felt).max() <= _HELD_SHARE * device.force_limit:
+        return text
+    force_unit = Unit.of_si(plan.model.units["force"])
+    return (
+        f"{text}; the hand presses with at most {100.0 * _HELD_SHARE:g} % of the force limit of "
+        f"{force_unit.text(device.force_limit)}"
+    )
 
 
 def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:

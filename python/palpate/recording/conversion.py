@@ -218,7 +218,7 @@ class Conversion:
         choice = self.choice
         parts = [f"position is {choice.position.name}", f"force is {choice.force.name}"]
         if torque_constant is not None:
-            parts[-1] += f" times {torque_constant:g} N*m/A"
+            parts[-1] = f"force is {_torque_text(choice.force.name, torque_constant)}"
         elif choice.force.unit is not None and choice.force.unit.si == "A":
             parts[-1] += " (a current; it stays in A)"
         parts.append(f"time is {choice.time.name}" if choice.time else "there is no time")
@@ -226,6 +226,11 @@ class Conversion:
         if choice.inputs:
             parts.append(f"inputs are {', '.join(column.name for column in choice.inputs)}")
         return ", ".join(parts) + (f"; read as: {', '.join(dialect)}" if dialect else "")
+
+
+def _torque_text(column: str, torque_constant: float) -> str:
+    """Returns the origin of a torque that was computed from a column of currents."""
+    return f"{column} times {torque_constant:g} N*m/A"
 
 
 def converted(
@@ -278,7 +283,7 @@ def converted(
         directions = None if directions is None else directions[check.kept]
     notes += check.notes
     x, f = conversion.si(choice.position, cells), conversion.si(choice.force, cells)
-    units, file_units = conversion.units, conversion.file_units
+    units, file_units, names = conversion.units, conversion.file_units, dict(conversion.names)
     if torque_constant is not None:
         if not (math.isfinite(torque_constant) and torque_constant > 0):
             raise InputError(f"--torque-constant-Nm-per-A is {torque_constant}; it must be a number > 0")
@@ -288,6 +293,7 @@ def converted(
                 f"{choice.force.name}, which is not in A"
             )
         f, units["force"], file_units["force"] = f * torque_constant, "N*m", UNITS["Nm"]
+        names["force"] = _torque_text(choice.force.name, torque_constant)
     if zero is not None:
         first, last = _row_range(name, zero, total)
         numbers = np.arange(start, stop)[check.kept]
@@ -318,7 +324,7 @@ def converted(
             files=() if file is None else (str(file),),
             sha256=digest_of(x, f, time, *inputs, directions) if file is None else sha256_of_file(file),
             rows=len(x),
-            columns=conversion.names,
+            columns=names,
             file_rows=total,
         ),
         "notes": (conversion.note(torque_constant, table.notes), *notes, *_sign_notes(x, f, directions)),

@@ -291,7 +291,9 @@ def pieces(recording: Recording) -> list[Piece]:
     """
     motion = recording.motion
     if recording.time is None or motion.time is None or len(motion.time) < 2:
-        raise InputError("velocity needs time: the recording has none (--time NAME)")
+        raise InputError(
+            "velocity needs time, and the recording has no time: name its column with --time, or record time"
+        )
     steps = np.diff(motion.time)
     period = float(np.median(steps))
     edges = [0, *(np.flatnonzero(steps > GAP_RATIO * period) + 1), len(motion.time)]

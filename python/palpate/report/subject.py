@@ -16,7 +16,7 @@ from .._typing import Float1D
 from ..arguments import instance_of, path_of
 from ..errors import InputError
 from ..model import Model, load_model
-from ..planning import DeviceProfile, ForceError, Plan, force_error, judge, rig_for, simulate
+from ..planning import DeviceProfile, ForceError, Plan, force_error, hand_for, judge, simulate
 from ..planning.search import plan as make_plan
 from ..recording import Recording
 from ..verdict import Verdict, no
@@ -135,7 +135,8 @@ class Subject:
         if self.plan.certificate.refused:
             return "no structure can render the model on this device"
         try:
-            rendered = simulate(self.plan, self.plan.certificate.device, rig_for(self.model).hand, RENDERED_S)
+            device = self.plan.certificate.device
+            rendered = simulate(self.plan, device, hand_for(self.plan, device), RENDERED_S)
         except InputError as error:
             return str(error)
         error_of = force_error(self.plan, rendered)

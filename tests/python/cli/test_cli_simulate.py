@@ -332,3 +332,21 @@ def test_the_demo_refuses_a_folder_that_cannot_be_created_before_the_work(
         error = capsys.readouterr().err
         assert re.match(f"error: {target}(/model.json)? (cannot be written: |is a file, )", error)
         assert error.count("\n") == 1
+
+
+def test_a_device_is_refused_because_it_comes_from_the_plan(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", "m.json", "--device", "bench-knob"]) == 2
+    message = capsys.readouterr().err
+    assert "the device comes from the plan in the model file" in message
+    assert "palpate plan MODEL.json --device bench-knob -o MODEL.json" in message
+
+
+def test_the_positions_that_the_hand_reached_are_printed(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", "m.json", "--structure", "direct"]) == 0
+    shown = re.search(r"handle +\S+ to \S+ rad, (\S+) % of the domain\n", capsys.readouterr().out)
+    assert shown
+    assert float(shown[1]) > 95.0

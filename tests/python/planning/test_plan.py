@@ -52,6 +52,25 @@ def test_every_example_loads_by_name_and_states_its_sources(name: str) -> None:
     assert "not published" in text or "EVERY NUMBER IS AN ASSUMPTION" in text
 
 
+def test_all_wrong_fields_of_a_profile_are_reported_at_once(tmp_path: Path) -> None:
+    file = tmp_path / "wrong.toml"
+    file.write_text(
+        'id = "a"\nposition_unit = "m"\ncolour = 1\nperiod_s = "x"\ninertia = -1.0\ndelay_s = 0.5\n'
+    )
+    with pytest.raises(InputError) as caught:
+        DeviceProfile.load(file)
+    reported = str(caught.value)
+    for part in (
+        "colour is not a key",
+        'period_s is "x": must be a number',
+        "inertia is -1.0: must be > 0",
+        "force_limit is missing",
+        "jitter_s is missing",
+    ):
+        assert part in reported
+    assert "delay_s" not in reported
+
+
 def test_a_profile_is_read_as_it_was_written(tmp_path: Path) -> None:
     again = DeviceProfile.load(KNOB.save(tmp_path / "knob.toml"))
     assert again.to_dict() == KNOB.to_dict()

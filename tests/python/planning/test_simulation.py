@@ -16,6 +16,7 @@ from palpate import (
     Recording,
     Scheme,
     _core,
+    plan,
     read_recording,
     simulate,
 )
@@ -24,8 +25,10 @@ from palpate.planning import (
     explicit_slope_limit,
     force_at,
     force_error,
+    hand_for,
     rig_for,
 )
+from palpate.planning.simulation import covered_text
 
 
 def rendered(model: Model, duration: float = 4.0, **scheme: Any) -> tuple[Plan, Recording]:
@@ -218,3 +221,32 @@ def test_invalid_duration_raises_input_error() -> None:
     plan = Plan(model_by_hand(), Scheme())
     with pytest.raises(InputError, match="duration"):
         simulate(plan, DeviceProfile(), Hand(), -1.0)
+
+
+@pytest.mark.parametrize(
+    "device",
+    [
+        DeviceProfile(coulomb_friction=0.02),
+        DeviceProfile(coulomb_friction=0.5, viscous_damping=0.1),
+        DeviceProfile(coulomb_friction=0.02, viscous_damping=5e-3),
+    ],
+    ids=["bench", "friction", "limited network"],
+)
+def test_the_hand_for_a_plan_covers_the_domain(device: DeviceProfile) -> None:
+    chosen = plan(model_by_hand(), device, accept_force_error=1.0)
+    rendered = simulate(chosen, device, hand_for(chosen, device), 4.0)
+    lower, upper = float(chosen.model.lower[0]), float(chosen.model.upper[0])
+    tolerance = 0.025 * (upper - lower)
+    assert rendered.position.min() == pytest.approx(lower, abs=tolerance)
+    assert rendered.position.max() == pytest.approx(upper, abs=tolerance)
+    assert covered_text(chosen, device, rendered).endswith(" % of the domain")
+
+
+def test_the_hand_stops_where_the_device_does_not_hold_the_force() -> None:
+    model = model_by_hand(weight=[0.0], linear=[10.0])
+    weak = DeviceProfile(coulomb_friction=0.02, force_limit=2.0)
+    chosen = plan(model, weak)
+    rendered = simulate(chosen, weak, hand_for(chosen, weak), 4.0)
+    assert 0.7 * 2.0 < rendered.force.max() < 2.0
+    text = covered_text(chosen, weak, rendered)
+    assert text.endswith("the hand presses with at most 80 % of the force limit of 2 N*m")

@@ -111,6 +111,7 @@ def test_a_current_is_converted_only_with_a_torque_constant(csv_file: Write) -> 
     assert recording.units["force"] == "A"
     assert "it stays in A" in recording.notes[0]
     torque = read_recording(path, torque_constant=0.0075)
+    assert torque.source.columns["force"].endswith(" times 0.0075 N*m/A"), "the origin is in the model file"
     assert torque.units["force"] == "N*m"
     np.testing.assert_allclose(torque.force, recording.force * 0.0075, rtol=1e-15)
 

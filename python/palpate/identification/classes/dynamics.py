@@ -19,7 +19,7 @@ from ..._typing import Float1D, Float2D
 from ...recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
 from ..data.limits import FORCE_RESOLUTION
 from ..data.rows import Rows, modulo
-from ..decision import Decision, decided, signed, squared_error_change
+from ..decision import Decision, decided, lowered, squared_error_change
 from ..network.basis import Basis
 from ..network.separable import TINY, solve_gram
 from ..options import IdentifyOptions
@@ -179,9 +179,9 @@ class Dynamics:
             with_it = tuple(other for other in allowed if other in names or other == name)
             without = tuple(other for other in with_it if other != name)
             falls = regression.value(use, without, criterion) - regression.value(use, with_it, criterion)
-            change = f"{CRITERION_NAMES[criterion]} {signed(-falls)}"
+            change = lowered(CRITERION_NAMES[criterion], falls)
             if name not in names:
-                bound = f"must fall by at least {self._evidence:.4g}"
+                bound = f"must lower it by at least {self._evidence:.4g}"
                 decisions.append(decided(name, False, f"{change}, {bound}"))
                 continue
             share, error = regression.held_out_gain(use, without, with_it)
@@ -191,7 +191,7 @@ class Dynamics:
                 decisions.append(decided(name, True, f"{measured}, {change}"))
                 continue
             names = tuple(other for other in names if other != name)
-            reason = f"{measured}, must fall by more than {100 * error:.2g} %"
+            reason = f"{measured}, must lower it by more than {100 * error:.2g} %"
             if not found > 0.0:
                 reason = f"the fitted {name} is {found:.4g} {self._unit_of(name)}, a passive object has > 0"
             decisions.append(decided(name, False, f"{reason}; {change}"))

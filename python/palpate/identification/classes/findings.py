@@ -401,11 +401,10 @@ def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     limit = options.max_wavelets
     if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
         return []
-    period = "" if options.period or best.problem.dimension > 1 else ", or --period if the force repeats"
     return [
         usable(
             f"the network has {limit} wavelets, the largest number allowed, and the error (NRMSE "
-            f"{best.error.nrmse:.3g}) is not yet noise; give --max-wavelets {4 * limit}{period}"
+            f"{best.error.nrmse:.3g}) is not yet noise; give --max-wavelets {4 * limit}"
         )
     ]
 

@@ -18,7 +18,7 @@ from ..data.limits import (
 )
 from ..data.outliers import robust_weights, suspects
 from ..data.rows import Rows
-from ..decision import decided, in_words, signed
+from ..decision import decided, in_words, lowered
 from ..network.separable import HALF_CORE_NOISE_RATIO
 from ..options import IdentifyOptions
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
@@ -244,8 +244,8 @@ class Velocity(ModelClass):
         share = 1.0 - both.best.error.rmse**2 / before if before > 0.0 else 0.0
         constant = moving is not None and moving.damping is not None
         compared = "constant damping" if constant else in_words(below.model_class)
-        change = f"squared error {signed(-100 * share)} % compared with {compared}"
-        bound = f"must fall by at least {100 * least_share:g} %"
+        change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"
+        bound = f"must lower it by at least {100 * least_share:g} %"
         report.path += both.report.path
         report.decisions.append(decided("velocity", share >= least_share, f"{change}, {bound}"))
         if share < least_share:

@@ -41,7 +41,7 @@ from ..data.compression import (
 )
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
-from ..decision import Decision, decided, in_words, signed, squared_error_change
+from ..decision import Decision, decided, in_words, lowered, squared_error_change
 from ..network.fitted import FittedNetwork, PathPoint
 from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
@@ -531,20 +531,20 @@ class Judge:
         name, evidence = self.criterion, self.evidence
         if not self.on_held_out:
             falls = self.fall(below, above)
-            return Judgement(falls >= evidence, f"{CRITERION_NAMES[name]} {signed(-falls)}", False)
+            return Judgement(falls >= evidence, lowered(CRITERION_NAMES[name], falls), False)
         if enough(name, below.criterion(name)):
             reason = f"the error of the {in_words(below.model_class)} is below the just noticeable difference"
             return Judgement(False, reason, False)
         falls = self.fall(below, above)
-        change = f"{CRITERION_NAMES[name]} {signed(-falls)}"
+        change = lowered(CRITERION_NAMES[name], falls)
         rows = self._samples.held_out_rows(above.strokes)
         if name in ON_HELD_OUT_ROWS:
             evidence = max(evidence, standard_error(len(rows.force)))
         if falls < evidence:
-            return Judgement(False, f"{change}, must fall by at least {evidence:.4g}", False)
+            return Judgement(False, f"{change}, must lower it by at least {evidence:.4g}", False)
         share, error = self._samples.held_out_gain(below, above)
         measured = squared_error_change(share, error, "held-out rows")
         if share <= errors * error and len(rows.force) >= LEAST_HELD_OUT:
-            bound = f"must fall by more than {100.0 * errors * error:.2g} %"
+            bound = f"must lower it by more than {100.0 * errors * error:.2g} %"
             return Judgement(False, f"{measured}, {bound}; {change}", True)
         return Judgement(True, f"{measured}, {change}", True)

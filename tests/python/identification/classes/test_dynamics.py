@@ -86,9 +86,9 @@ def test_velocity_and_hysteresis_are_accepted_only_if_present(
 def test_decision_on_each_term_reports_its_gain() -> None:
     decisions = identify(moved(1, damping=0.03)).notes["model_selection"]
     (accepted,) = (line for line in decisions if line.startswith("damping: accepted"))
-    assert "squared error on held-out sections -" in accepted
-    assert ", BIC -" in accepted
-    assert any(line.startswith("mass: not accepted (BIC ") for line in decisions)
+    assert "lowers the squared error on held-out sections by " in accepted
+    assert ", lowers BIC by " in accepted
+    assert any(line.startswith("mass: not accepted (") for line in decisions)
 
 
 def test_damping_that_depends_on_position_makes_velocity_an_input() -> None:
@@ -134,7 +134,7 @@ def test_friction_without_passive_hysteresis_makes_velocity_an_input() -> None:
     (gains,) = (reason for reason in model.verdict.reasons if reason.startswith("hysteresis gains energy"))
     assert "give --negate force" in gains
     assert any(
-        line.startswith("curve over position and velocity: accepted (squared error -")
+        line.startswith("curve over position and velocity: accepted (lowers the squared error by ")
         for line in model.notes["model_selection"]
     )
 

@@ -117,6 +117,7 @@ def test_velocity_is_derived_from_time_without_a_column() -> None:
         ("position,place", "has no input place, only position, velocity; read the recording with"),
         ("position,hysteresis,velocity", "hysteresis needs position as the only other input"),
         ("position,position", "inputs is 'position,position'"),
+        ("velocity", r"inputs is 'velocity'; .* \(position,velocity; velocity needs time\)"),
     ],
 )
 def test_unavailable_input_is_refused_in_one_sentence(inputs: str, reported: str) -> None:
@@ -126,7 +127,9 @@ def test_unavailable_input_is_refused_in_one_sentence(inputs: str, reported: str
 
 def test_a_velocity_without_time_is_refused() -> None:
     x = np.linspace(0.0, 1.0, 100)
-    with pytest.raises(InputError, match="velocity needs time"):
+    with pytest.raises(
+        InputError, match="velocity needs time, and the recording has no time: name its column"
+    ):
         identify(Recording.from_arrays(x, x), inputs="position,velocity")
 
 

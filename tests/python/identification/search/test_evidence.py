@@ -82,13 +82,13 @@ def test_smaller_network_is_tried_if_held_out_rows_refuse_a_larger_one(
     assert (network.model_class, network.stop_reason) == ("position", "held-out rows")
     assert 1 <= len(network.weight) <= 3
     assert [str(decision) for decision in network.decisions][-1].startswith("curve over position: accepted (")
-    replaced = "Replaced decision: curve over position: not accepted (squared error on held-out rows +100 "
+    replaced = "Replaced decision: curve over position: not accepted (raises the squared error on "
     assert sum(note.startswith(replaced) for note in network.notes) >= 1
 
 
 def test_decisions_report_gain_of_each_model_class_on_held_out_rows() -> None:
     straight, curve, *_ = identify(sample_recording(1, duration_s=20.0)).notes["model_selection"]
-    reason = r"accepted \(squared error on held-out rows -\S+ \+- \S+ %, BIC -\d+\)"
+    reason = r"accepted \(lowers the squared error on held-out rows by \S+ \+- \S+ %, lowers BIC by \d+\)"
     assert re.fullmatch(f"straight line: {reason}", straight)
     assert re.fullmatch(f"curve over position: {reason}", curve)
 

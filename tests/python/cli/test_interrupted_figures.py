@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ctrl-C while figures are drawn: a quick normal ending that writes nothing."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from models_by_hand import model_by_hand
+from palpate import Recording
+from palpate.cli.main import main
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    model = model_by_hand()
+    model.save("m.json")
+    t = np.arange(2000) * 1e-3
+    position = 0.25 - 0.25 * np.cos(2 * np.pi * t)
+    units = {"position": "rad", "force": "N*m"}
+    Recording.from_arrays(position, model.force(position), t, units=units).write("a.csv")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["identify", "a.csv", "-o", "new.json", "--plot", "p.png"],
+        ["verify", "m.json", "a.csv", "--plot", "p.png"],
+        ["verify", "m.json", "a.csv", "--plot", "p.png", "--plot-closed-loop", "loop.png"],
+        ["simulate", "m.json", "-o", "r.csv", "--duration-s", "1", "--plot", "p.png"],
+        ["plan", "m.json", "--device", "bench-knob", "-o", "new.json", "--plot", "p.png"],
+        ["show", "m.json", "--beside", "m.json", "--plot", "p.png"],
+        ["show", "a.csv", "--plot", "p.png", "--plot-frame", "frame.png"],
+    ],
+)
+def test_ctrl_c_while_the_last_figure_is_drawn_writes_nothing(
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+) -> None:
+    figures_left = sum(word.startswith("--plot") for word in arguments)
+    savefig = Figure.savefig
+
+    def interrupted(figure: Figure, *given: Any, **options: Any) -> None:
+        nonlocal figures_left
+        figures_left -= 1
+        if not figures_left:
+            os.kill(os.getpid(), signal.SIGINT)
+        savefig(figure, *given, **options)
+
+    monkeypatch.setattr(Figure, "savefig", interrupted)
+    before = sorted(folder.iterdir())
+    assert main(arguments) == 130
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.endswith("error: interrupted; nothing was written\n")
+    assert sorted(folder.iterdir()) == before
+
+
+def test_ctrl_c_while_the_demo_draws_ends_it_within_a_second(tmp_path: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-m", "palpate", "demo", "-o", str(tmp_path / "demo")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.startswith("drawing"):
+                break
+        time.sleep(0.3)
+        began = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        output, messages = process.communicate()
+        seconds = time.monotonic() - began
+    assert process.returncode == 130
+    assert seconds < 1.0
+    assert output == ""
+    assert messages == "error: interrupted; nothing was written\n"
+    assert list(tmp_path.iterdir()) == []
