@@ -80,11 +80,11 @@ namespace palpate {
     }
     if (kind != "usb" && rendered_by_device(options, model)) {
         const DeviceProfile& certified = model.certificate->device;
-        refuse(model.name + " is planned for the motor controller of " + certified.id + " at " +
-               readable(1.0 / certified.period_s) +
-               " Hz, and the host cannot render this plan: build it into the firmware of a USB device with "
-               "'palpate export --c' and set device to usb, or make a plan for the host with 'palpate plan' "
-               "without on_device");
+        refuse(
+            model.name + " is planned for the motor controller of " + certified.id + " at " +
+            readable(1.0 / certified.period_s) +
+            " Hz: set device to a USB device that contains the exported model, or make a plan for the host "
+            "with 'palpate plan' without on_device");
     }
     if (model.force_unit == "A") {
         refuse("the model's force is a motor current in A: identify it with --torque-constant-Nm-per-A");
