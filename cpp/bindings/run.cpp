@@ -141,7 +141,8 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
     const auto device = open_device(options, planned);
     RecordSinks sinks;
     const RenderJob job = prepare_rendering(options, planned, *device, sinks);
-    Watcher watcher{progress, &LoopProgress::force};
+    Watcher watcher{progress,
+                    rendered_by_device(options, planned) ? &LoopProgress::applied : &LoopProgress::force};
     const auto summary = [&] {
         const py::gil_scoped_release unlocked;
         return render(options, planned, job, *device, sinks, watcher.stop_requested, std::ref(watcher));

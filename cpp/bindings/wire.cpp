@@ -37,7 +37,8 @@ py::dict decode_model(const py::bytes& data) {
     if (!fault.empty()) {
         throw std::invalid_argument(fault);
     }
-    return py::dict("fingerprint"_a = wire::fingerprint_text(model.fingerprint), "rate_hz"_a = model.rate_hz,
+    return py::dict("fingerprint"_a = wire::fingerprint_text(model.fingerprint),
+                    "certificate"_a = wire::fingerprint_text(model.certificate), "rate_hz"_a = model.rate_hz,
                     "is_rendered"_a = model.renderer == wire::Renderer::Device);
 }
 
@@ -52,7 +53,8 @@ void bind_wire(py::module_& module) {
     module.def("decode_model", &decode_model, "data"_a,
                "Returns the model in a USB device's answer to the request GET_MODEL, by name. Raises\n"
                "InputError with the wrong field.\n\n"
-               "fingerprint (16 hexadecimal digits), rate_hz (certified), is_rendered (now, by the device).");
+               "fingerprint and certificate (16 hexadecimal digits each), rate_hz (certified), is_rendered\n"
+               "(now, by the device).");
     module.def("usb_cause", &wire::usb_cause, "code"_a,
                "Returns cause and cure for an error code of libusb; empty for a code without a text.");
     py::enum_<wire::Request>(

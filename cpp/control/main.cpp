@@ -96,7 +96,8 @@ int run(const Options& options) {
         std::cerr << note << "\n";
     }
     handle_signals();
-    LiveView view{loop, model.units()};
+    LiveView view{loop, model.units(),
+                  rendered_by_device(options.render, model) ? &LoopProgress::applied : &LoopProgress::force};
     const Summary summary = render(options.render, model, job, *device, sinks, stop_requested,
                                    [&](const SessionView& now) { view.show(now); });
     view.end();

@@ -84,8 +84,8 @@ void print_last_ticks(const Summary& summary) {
 
 }  // namespace
 
-LiveView::LiveView(const LoopSettings& settings, RecordUnits units)
-    : settings_{settings}, units_{std::move(units)}, terminal_{isatty(STDERR_FILENO) == 1} {}
+LiveView::LiveView(const LoopSettings& settings, RecordUnits units, std::atomic<double> LoopProgress::* force)
+    : settings_{settings}, units_{std::move(units)}, force_{force}, terminal_{isatty(STDERR_FILENO) == 1} {}
 
 void LiveView::warn(const std::string& sentence) {
     end();
@@ -122,7 +122,7 @@ void LiveView::show(const SessionView& view) {
         const std::string line =
             fitting({readable(static_cast<double>(ticks + missed) / settings_.rate_hz) + " s",
                      readable(view.progress.position.load(std::memory_order_relaxed)) + " " + units_.position,
-                     readable(view.progress.force.load(std::memory_order_relaxed)) + " " + units_.force,
+                     readable((view.progress.*force_).load(std::memory_order_relaxed)) + " " + units_.force,
                      readable(rate) + " Hz", "missed " + std::to_string(missed)});
         std::cerr << "\r\033[K" << line << std::flush;
         line_is_open_ = true;

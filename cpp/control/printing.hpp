@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,7 +15,7 @@ namespace palpate::control {
 /// force and rate on one line that is overwritten ten times a second.
 class LiveView {
   public:
-    LiveView(const LoopSettings& settings, RecordUnits units);
+    LiveView(const LoopSettings& settings, RecordUnits units, std::atomic<double> LoopProgress::* force);
     void show(const SessionView& view);
     void end();
 
@@ -23,6 +24,7 @@ class LiveView {
 
     LoopSettings settings_;
     RecordUnits units_;
+    std::atomic<double> LoopProgress::* force_;  ///< the shown force
     bool terminal_;
     bool warned_of_privileges_ = false;
     bool warned_of_disk_ = false;

@@ -222,6 +222,7 @@ static int put_model(const palpate_device* device, uint8_t* answer) {
         return PALPATE_STALL;
     }
     at = put64(at, device->model->fingerprint);
+    at = put64(at, device->model->certificate);
     at = put(at, device->model->rate_hz, 4);
     at = put(at, device->uses_model, 4);
     return (int)(at - answer);

@@ -46,8 +46,9 @@ enum { PALPATE_HAS_TRANSDUCER = 1, PALPATE_MEASURES_VELOCITY = 2 };
 
 /* A model that the device renders, made from the header that `palpate export --c` writes. */
 typedef struct palpate_model {
-    uint64_t fingerprint;
-    uint32_t rate_hz; /* certified rate of the control loop */
+    uint64_t fingerprint; /* of the model */
+    uint64_t certificate; /* fingerprint of the certificate of its plan */
+    uint32_t rate_hz;     /* certified rate of the control loop */
     uint32_t counts_per_rev;
     void (*start)(void* state, int32_t count);         /* object at rest at this position */
     int32_t (*torque_uNm)(void* state, int32_t count); /* torque of this tick */

@@ -9,6 +9,7 @@ comment before a block changes this:
 
     <!-- first: COMMAND -->      runs this command before the block and shows nothing of it
     <!-- not run: REASON -->     does not run the block; the tests count these blocks
+    <!-- needs: PROGRAM... -->   runs the block only if these programs are installed
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-REPOSITORY_FOLDERS = ("bench", "build", "docs", "examples")
+REPOSITORY_FOLDERS = ("bench", "build", "cpp", "docs", "examples", "tests")
 """Folders that a command of a page may name, as if it ran in the repository"""
 _BLOCK = re.compile(
-    r"(?:^<!-- (?P<mark>first|not run): (?P<words>[^\n]+) -->\n)?"
+    r"(?:^<!-- (?P<mark>first|not run|needs): (?P<words>[^\n]+) -->\n)?"
     r"^```(?P<language>python|sh|cpp)\n(?P<code>.*?)^```\n",
     re.DOTALL | re.MULTILINE,
 )
@@ -49,6 +50,8 @@ class Block(NamedTuple):
     """Command that runs before the block"""
     not_run: str
     """Reason for which the block is not run; empty if it is run"""
+    needs: tuple[str, ...]
+    """Programs without which the block is not run"""
     end: int
     """Place behind the block in the text of the page"""
 
@@ -63,6 +66,7 @@ def blocks(text: str) -> Iterator[Block]:
             found["code"],
             words if mark == "first" else "",
             words if mark == "not run" else "",
+            tuple(words.split()) if mark == "needs" else (),
             found.end(),
         )
 
@@ -124,7 +128,7 @@ def show_outputs(name: str, source: list[str], outputs: Mapping[str, list[str]])
 
 def _run(block: Block, folder: Path, variables: dict[str, object]) -> str:
     """Runs a block in the present folder; returns its output."""
-    if block.not_run:
+    if block.not_run or any(shutil.which(program) is None for program in block.needs):
         return ""
     if block.first:
         _command(["bash", "-euo", "pipefail", "-c", block.first])

@@ -3,7 +3,7 @@
  * instructions is its cost. The macro CASE chooses the function. */
 #include "palpate_device.h"
 
-enum { HOST_TICK, MODEL_TICK, RAMP_TICK, EXPIRED_TICK, OUT, IN };
+enum { HOST_TICK, MODEL_TICK, RAMP_TICK, START_TICK, EXPIRED_TICK, OUT, IN };
 
 static void start_model(void* state, int32_t count) {
     (void)state;
@@ -12,12 +12,13 @@ static void start_model(void* state, int32_t count) {
 
 static int32_t model_torque(void* state, int32_t count) {
     (void)state;
-    return CASE == RAMP_TICK ? INT32_MIN : count; /* the longest way through the limit */
+    return CASE == RAMP_TICK || CASE == START_TICK ? INT32_MIN
+                                                   : count; /* the longest way through the limit */
 }
 
 static const palpate_properties properties = {
-    1, 65536, 0, 5000000, 10000, 1000, 20, CASE == RAMP_TICK ? 10000 : 1, 1};
-static const palpate_model model = {2, 10000, 65536, start_model, model_torque, 0};
+    1, 65536, 0, 5000000, 10000, 1000, 20, CASE == RAMP_TICK || CASE == START_TICK ? 10000 : 1, 1};
+static const palpate_model model = {2, 3, 10000, 65536, start_model, model_torque, 0};
 static palpate_device device;
 
 static void request(uint8_t number, uint8_t value) {
@@ -32,7 +33,7 @@ int main(void) {
     uint8_t packet[PALPATE_IN_SIZE];
     palpate_sample sample = {0, 0, 0, 0, 250};
     palpate_device_start(&device, &properties, &model);
-    request(7, CASE == MODEL_TICK || CASE == RAMP_TICK);
+    request(7, CASE == MODEL_TICK || CASE == RAMP_TICK || CASE == START_TICK);
     request(2, 1);
     palpate_device_out(&device, command, sizeof command, 0);
     for (int32_t k = 0; k < CALLS; ++k) {
@@ -46,6 +47,7 @@ int main(void) {
             default:
                 sample.clock_us += CASE == EXPIRED_TICK ? 1000000U : 1U;
                 sample.count = k;
+                device.runs_model &= CASE != START_TICK;
                 palpate_device_tick(&device, &sample);
         }
     }

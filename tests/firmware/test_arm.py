@@ -66,6 +66,27 @@ def built(folder: Path, main: Path, name: str, flags: str = "") -> Path:
     return folder / f"{name}-m4.elf"
 
 
+@pytest.mark.skipif(not Path("/usr/include/newlib").exists(), reason="needs libnewlib-arm-none-eabi")
+@needs("clang")
+@pytest.mark.parametrize("source", ["main.c", "startup.c", "../palpate_device.c"])
+def test_clang_compiles_the_port_without_a_warning(source: str, tmp_path: Path) -> None:
+    target = ["--target=arm-none-eabi", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]
+    warnings = [*GCC.replace("-Wcast-align=strict", "").split(), "-Werror"]
+    folders = ["-isystem", "/usr/include/newlib", "-I", FIRMWARE, "-I", PORT]
+    run(
+        "clang",
+        "-std=c99",
+        "-O2",
+        *target,
+        *warnings,
+        *folders,
+        "-c",
+        PORT / source,
+        "-o",
+        tmp_path / "port.o",
+    )
+
+
 @needs_arm
 def test_flash_and_memory_are_within_the_marks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     flags = [
@@ -122,6 +143,7 @@ def instructions(program: Path, counter: Path) -> int:
         ("HOST_TICK", MOST_TICK_INSTRUCTIONS),
         ("MODEL_TICK", MOST_TICK_INSTRUCTIONS),
         ("RAMP_TICK", MOST_TICK_INSTRUCTIONS),
+        ("START_TICK", MOST_TICK_INSTRUCTIONS),
         ("EXPIRED_TICK", MOST_TICK_INSTRUCTIONS),
         ("OUT", 100),
         ("IN", 150),

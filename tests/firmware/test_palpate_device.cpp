@@ -26,7 +26,8 @@ struct CountingModel {
     std::function<void()> during_step = [] {};
 
     [[nodiscard]] palpate_model model() {
-        return {0xFEDC'BA98'7654'3210U, 10'000, 65'536, &CountingModel::start, &CountingModel::step, this};
+        return {0xFEDC'BA98'7654'3210U, 0x0F1E'2D3C'4B5A'6978U, 10'000, 65'536,
+                &CountingModel::start,  &CountingModel::step,   this};
     }
     static void start(void* state, std::int32_t count) {
         auto& self = *static_cast<CountingModel*>(state);
@@ -120,9 +121,10 @@ TEST(PalpateDevice, HostDecodesItsInfoAndItsModel) {
     EXPECT_EQ(info.uid, 7U);
     wire::DeviceModel model;
     EXPECT_EQ(rig.control(7, 1), 0);
-    ASSERT_EQ(palpate_device_control(&rig.device, setup(0xC1, 6, 0, 64).data(), answer), 16);
-    ASSERT_EQ(wire::decode(std::span{answer}.first(16), model), "");
+    ASSERT_EQ(palpate_device_control(&rig.device, setup(0xC1, 6, 0, 64).data(), answer), 24);
+    ASSERT_EQ(wire::decode(std::span{answer}.first(24), model), "");
     EXPECT_EQ(model.fingerprint, 0xFEDC'BA98'7654'3210U);
+    EXPECT_EQ(model.certificate, 0x0F1E'2D3C'4B5A'6978U);
     EXPECT_EQ(model.rate_hz, 10'000U);
     EXPECT_EQ(model.renderer, wire::Renderer::Device);
 }

@@ -65,6 +65,7 @@ class ArmFirmware : public Firmware {
         put(data, identity_.ramp_ms);
         put(data, identity_.firmware);
         put(data, identity_.model_fingerprint);
+        put(data, identity_.model_certificate);
         put(data, -identity_.model_uNm_per_count);
         exchange('S', 0, data);
     }

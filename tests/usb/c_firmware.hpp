@@ -21,6 +21,7 @@ class CFirmware : public Firmware {
               identity_.loop_hz, identity_.rate_hz,        identity_.watchdog_ms,  identity_.ramp_ms,
               identity_.firmware},
           model_{identity_.model_fingerprint,
+                 identity_.model_certificate,
                  identity_.loop_hz,
                  identity_.counts_per_rev,
                  [](void*, std::int32_t) {},

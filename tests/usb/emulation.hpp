@@ -40,6 +40,8 @@ inline constexpr const char* options_text =
     "                         cpp/firmware as machine code of a Cortex-M4F in QEMU\n"
     "                         [environment variable PALPATE_USB_FIRMWARE, otherwise cpp].\n"
     "  --model UNM_PER_COUNT  The device has a model: a spring with this stiffness.\n"
+    "  --model-fingerprint HEX, --model-certificate HEX  Fingerprints of the model in GET_MODEL.\n"
+    "  --loop-hz RATE         Rate of the control loop in the device, also that of its model [10000].\n"
     "  --lock-step-ms MS      Longest wait of lock-step for the host [3000].\n"
     "  --serial SERIAL        One device with this serial number; repeatable [EMU-1].\n"
     "  --no-device            No device is connected.\n"
@@ -96,6 +98,12 @@ inline constexpr const char* options_text =
             settings.firmware = value();
         } else if (word == "--model") {
             common.model_uNm_per_count = std::stoi(value());
+        } else if (word == "--model-fingerprint") {
+            common.model_fingerprint = std::stoull(value(), nullptr, 16);
+        } else if (word == "--model-certificate") {
+            common.model_certificate = std::stoull(value(), nullptr, 16);
+        } else if (word == "--loop-hz") {
+            common.loop_hz = static_cast<std::uint32_t>(std::stoul(value()));
         } else if (word == "--serial") {
             serials.push_back(value());
         } else if (word == "--seed") {

@@ -27,6 +27,7 @@ struct Identity {
     // Model on the device: a spring
     std::int32_t model_uNm_per_count = 0;  ///< stiffness; 0: no model
     std::uint64_t model_fingerprint = 0x0123'4567'89AB'CDEFULL;
+    std::uint64_t model_certificate = 0xFEDC'BA98'7654'3210ULL;
     std::uint16_t ramp_ms = 20;  ///< the force of the model grows for this time after its start
     std::size_t info_size = 32;  ///< Bytes of the answer to GET_INFO; another value means another protocol.
     /// False: GET_INFO reports the watchdog time at power-up, also after a change.

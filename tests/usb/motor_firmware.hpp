@@ -77,6 +77,7 @@ class MotorFirmware : public Firmware {
             put(bytes, identity_.uid);
         } else if (request == 6 && identity_.model_uNm_per_count != 0) {  // GET_MODEL
             put(bytes, identity_.model_fingerprint);
+            put(bytes, identity_.model_certificate);
             put(bytes, identity_.loop_hz);
             bytes.insert(bytes.end(), {static_cast<std::uint8_t>(motor_.renders_itself()), 0, 0, 0});
         }

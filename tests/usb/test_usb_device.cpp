@@ -73,7 +73,7 @@ TEST(UsbDevice, WithoutAModelItDoesNotRenderItself) {
     options.device_renders = true;
     const std::string reason = UsbDevice{options}.open().reason;
     EXPECT_NE(reason.find("emulated knob EMU-1"), std::string::npos) << reason;
-    EXPECT_NE(reason.find("has no model to render"), std::string::npos) << reason;
+    EXPECT_NE(reason.find("does not report a model to render"), std::string::npos) << reason;
 }
 
 TEST(UsbDevice, StreamsEverySampleOnceAndInOrder) {

@@ -6,11 +6,21 @@
  *     request  u8 operation, u8 size, u16 0, u32 clock_us, 72 B data
  *     answer   i32 torque_uNm, u16 status, u16 out_sequence, i32 result, 36 B data
  *
- * All numbers are little endian, as in the memory of the processor. */
+ * All numbers are little endian, as in the memory of the processor.
+ *
+ * The device renders a spring, or with MODEL the model of a header that `palpate export --c` wrote: MODEL is the name
+ * of the model, HEADER its file in quotes. */
 #include <string.h>
 
 #include "palpate_device.h"
 #include "semihosting.h"
+
+#ifdef MODEL
+#include HEADER
+#define JOINED_(first, second) first##second
+#define JOINED(first, second) JOINED_(first, second)
+#define OF_MODEL(name) JOINED(MODEL, name)
+#endif
 
 typedef struct request {
     uint8_t operation;
@@ -28,15 +38,34 @@ typedef struct answer {
     uint8_t data[36];
 } answer;
 
-/* Data of the operation 'S': the properties and a model, a spring. */
+/* Data of the operation 'S': the properties, and a spring as model. */
 typedef struct power_up {
     palpate_properties properties;
     uint64_t fingerprint;
+    uint64_t certificate;
     int32_t torque_uNm_per_count; /* 0: no model */
 } power_up;
 
 static palpate_device device;
 static power_up settings;
+
+#ifdef MODEL
+
+static OF_MODEL(_state) object;
+static const palpate_model exported = {OF_MODEL(_FINGERPRINT),
+                                       OF_MODEL(_CERTIFICATE_FINGERPRINT),
+                                       OF_MODEL(_RATE_HZ),
+                                       OF_MODEL(_COUNTS_PER_REV),
+                                       OF_MODEL(_start_of),
+                                       OF_MODEL(_torque_uNm),
+                                       &object};
+
+static const palpate_model* chosen_model(void) {
+    return &exported;
+}
+
+#else
+
 static palpate_model model;
 
 static void start_spring(void* state, int32_t count) {
@@ -50,15 +79,22 @@ static int32_t spring_torque_uNm(void* state, int32_t count) {
     return torque_uNm > INT32_MAX ? INT32_MAX : torque_uNm < INT32_MIN ? INT32_MIN : (int32_t)torque_uNm;
 }
 
-static void start(const uint8_t* data) {
-    memcpy(&settings, data, sizeof settings);
+static const palpate_model* chosen_model(void) {
     model.fingerprint = settings.fingerprint;
+    model.certificate = settings.certificate;
     model.rate_hz = settings.properties.loop_hz;
     model.counts_per_rev = settings.properties.counts_per_rev;
     model.start = start_spring;
     model.torque_uNm = spring_torque_uNm;
     model.state = &settings;
-    palpate_device_start(&device, &settings.properties, settings.torque_uNm_per_count != 0 ? &model : 0);
+    return settings.torque_uNm_per_count != 0 ? &model : 0;
+}
+
+#endif
+
+static void start(const uint8_t* data) {
+    memcpy(&settings, data, sizeof settings);
+    palpate_device_start(&device, &settings.properties, chosen_model());
 }
 
 static int32_t execute(const request* asked, uint8_t* data) {

@@ -215,7 +215,8 @@ def decode_model(data: bytes) -> dict:
     Returns the model in a USB device's answer to the request GET_MODEL, by name. Raises
     InputError with the wrong field.
     
-    fingerprint (16 hexadecimal digits), rate_hz (certified), is_rendered (now, by the device).
+    fingerprint and certificate (16 hexadecimal digits each), rate_hz (certified), is_rendered
+    (now, by the device).
     """
 def on_device(profile: DeviceProfile, rate_hz: typing.SupportsFloat | typing.SupportsIndex) -> DeviceProfile:
     """

@@ -85,7 +85,8 @@ def devices(
         )
         if one.model is not None:
             print_line(
-                f"  model on the device: fingerprint {one.model['fingerprint']}, certified for "
+                f"  model on the device: fingerprint {one.model['fingerprint']}, "
+                f"certificate {one.model['certificate']}, certified for "
                 f"{one.model['rate_hz']} Hz{', rendered now' if one.model['is_rendered'] else ''}"
             )
     end_with(verdict)

@@ -173,7 +173,8 @@ class Found:
     info: dict[str, Any] | None
     problem: str = ""
     model: dict[str, Any] | None = None
-    """Model that the device can render itself: fingerprint, certified rate_hz, is_rendered"""
+    """Model that the device can render itself: its fingerprint, that of its certificate, certified rate_hz,
+    is_rendered"""
 
 
 def _candidates() -> Iterator[UsbSetup]:

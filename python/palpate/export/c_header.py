@@ -25,6 +25,9 @@ EXPORT_VERSION = 1
 Literal = Callable[[float], str]
 """Writes a number as a literal of C."""
 
+_WHOLE_COUNTS = 0.01
+"""Largest difference of the counts of a revolution from a whole number."""
+
 _WIDTH = 118
 """Largest width of a line of the header [characters]."""
 
@@ -122,14 +125,26 @@ class _Numbers:
         yield _define("EXPORT_VERSION", EXPORT_VERSION, "version of these functions and macros")
         yield _define("RATE_HZ", exported.rate_hz, "certified ticks for each second; 0: no certificate")
         yield _define("FINGERPRINT", f"UINT64_C(0x{exported.fingerprint})", "of the model")
+        certificate = exported.certificate
+        digits = certificate.fingerprint if exported.has_certificate and certificate else "0"
+        yield _define(
+            "CERTIFICATE_FINGERPRINT", f"UINT64_C(0x{digits})", "of the certificate; 0: no certificate"
+        )
         yield _define("PROFILE", f"UINT32_C({exported.profile:#010x})", "of the device; 0: no certificate")
         yield _define("STEP", _double(model.encoder_step), f"position for each count [{position}]")
+        yield _define("COUNTS_PER_REV", f"UINT32_C({self.counts_per_rev()})", "0: no whole number")
         yield _define("FORCE_ERROR", self.bound(model.force_error), f"largest error of the force [{force}]")
         yield _define("SLOPE_ERROR", self.bound(model.slope_error), f"largest error of the slope [{slope}]")
         yield _define("STEP_ERROR", self.bound(model.step_error), f"largest error of a step [{force}]")
         if not np.isinf(model.force_limit):
             yield _define("FORCE_LIMIT", self.real(model.force_limit), f"of the device [{force}]")
         yield ""
+
+    def counts_per_rev(self) -> int:
+        """Counts of the encoder for a revolution; 0 if they are not a whole number."""
+        counts = 2.0 * np.pi / self.model.encoder_step
+        is_whole = abs(counts - round(counts)) < _WHOLE_COUNTS and round(counts) < 2**32
+        return round(counts) if is_whole and self.exported.position_unit == "rad" else 0
 
     def certificate(self) -> Iterator[str]:
         lines = textwrap.wrap(_plain(self.exported.certificate_text), 100)

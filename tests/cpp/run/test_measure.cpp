@@ -160,6 +160,21 @@ TEST(FreeMotion, SendsZeroForce) {
     EXPECT_EQ(free.step(std::nan("")).status, Status::NonFinite);
 }
 
+TEST(Watching, SendsZeroForceAndMarksPositionsOutsideTheDomain) {
+    Domain domain;
+    domain.lower = {0.0};
+    domain.upper = {0.5};
+    Watching watching{domain};
+    watching.reset(1.0);
+    EXPECT_EQ(watching.step(0.3).force, 0.0);
+    EXPECT_FALSE(watching.step(0.5).extrapolated);
+    EXPECT_TRUE(watching.step(0.501).extrapolated);
+    EXPECT_TRUE(watching.step(-0.001).extrapolated);
+    EXPECT_EQ(watching.step(std::nan("")).status, Status::NonFinite);
+    domain.period = 0.5;
+    EXPECT_FALSE(Watching{domain}.step(7.0).extrapolated);
+}
+
 TEST(SimulatedRig, MovesAgainstItsMountedObject) {
     SimulatedRig device{DeviceProfile{}, Hand{15.0, 0.05, 0.3, 0.3, 0.5}};
     device.mount({[](double x) { return 5.0 * x; }, true});

@@ -71,7 +71,7 @@ def test_the_rendering_of_a_device_is_recorded(tmp_path: Path) -> None:
 def test_a_device_without_a_model_is_not_recorded_as_renderer(tmp_path: Path) -> None:
     completed = run_record(tmp_path / "out.csv", "--device-renders", device=["--lock-step"])
     assert completed.returncode == 2
-    assert "has no model to render" in completed.stderr
+    assert "does not report a model to render" in completed.stderr
     assert not (tmp_path / "out.csv").exists()
     with pytest.raises(InputError, match="device_renders needs a USB device"):
         record(tmp_path / "out.csv", object=load_model(OBJECT), device_renders=True, duration_s=0.1)

@@ -159,13 +159,12 @@ def test_a_changed_certificate_is_refused(planned: Path, change: dict[str, Any],
 
 def test_a_plan_for_the_motor_controller_is_not_rendered_from_the_host(tmp_path: Path) -> None:
     path = plan(model_by_hand(), SLOW_PERIOD_KNOB, on_device=20e3).stored().save(tmp_path / "planned.json")
-    for device in ("simulated", "usb"):
+    for device in ("simulated", "inverse3"):
         completed = control(path, "--device", device)
         assert completed.returncode == 2
         assert completed.stderr == (
-            f"error: {path} is planned for the motor controller of knob at 20000 Hz, and the host cannot "
-            "render this plan: export it with 'palpate export --c', or make a plan for the host with "
-            "'palpate plan' without on_device\n"
+            f"error: {path} is planned for the motor controller of knob at 20000 Hz: set device to a USB device that contains "
+            "the exported model, or make a plan for the host with 'palpate plan' without on_device\n"
         )
     completed = control(path, "--uncertified", "--duration-s", 0.1, "--lowest-rate-share", 0)
     assert completed.returncode == 0, completed.stderr

@@ -110,9 +110,15 @@ def test_devices_lists_every_connected_device() -> None:
 
 def test_devices_prints_the_model_on_the_device() -> None:
     answer = devices(device=["--model", "10"])
-    assert "model on the device: fingerprint 0123456789abcdef, certified for 10000 Hz\n" in answer.stdout
+    model = "fingerprint 0123456789abcdef, certificate fedcba9876543210, certified for 10000 Hz"
+    assert f"model on the device: {model}\n" in answer.stdout
     found = json.loads(devices("--json", device=["--model", "10"]).stdout)["devices"][0]
-    assert found["model"] == {"fingerprint": "0123456789abcdef", "rate_hz": 10000, "is_rendered": False}
+    assert found["model"] == {
+        "fingerprint": "0123456789abcdef",
+        "certificate": "fedcba9876543210",
+        "rate_hz": 10000,
+        "is_rendered": False,
+    }
     assert "model on the device" not in devices(device=[]).stdout
 
 

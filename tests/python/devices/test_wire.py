@@ -68,9 +68,10 @@ def test_an_invalid_field_is_refused_by_name(changed: dict[str, int], sentence: 
 
 
 def test_the_model_of_a_device_is_decoded() -> None:
-    answer = struct.pack("<QIBBBB", 0x0123456789ABCDEF, 40_000, 1, 0, 0, 0)
+    answer = struct.pack("<QQIBBBB", 0x0123456789ABCDEF, 0xFEDC, 40_000, 1, 0, 0, 0)
     assert decode_model(answer) == {
         "fingerprint": "0123456789abcdef",
+        "certificate": "000000000000fedc",
         "rate_hz": 40_000,
         "is_rendered": True,
     }
@@ -79,10 +80,10 @@ def test_the_model_of_a_device_is_decoded() -> None:
 @pytest.mark.parametrize(
     ("answer", "sentence"),
     [
-        (bytes(15), "the answer to GET_MODEL has 15 bytes, must have 16"),
-        (bytes(16), "rate_hz is 0, must be > 0"),
-        (struct.pack("<QIBBBB", 1, 1, 2, 0, 0, 0), "renderer is 2, must be 0 or 1"),
-        (struct.pack("<QIBBBB", 1, 1, 1, 1, 0, 0), "renderer is 257, must be 0 or 1"),
+        (bytes(16), "the answer to GET_MODEL has 16 bytes, must have 24"),
+        (bytes(24), "rate_hz is 0, must be > 0"),
+        (struct.pack("<QQIBBBB", 1, 1, 1, 2, 0, 0, 0), "renderer is 2, must be 0 or 1"),
+        (struct.pack("<QQIBBBB", 1, 1, 1, 1, 1, 0, 0), "renderer is 257, must be 0 or 1"),
     ],
 )
 def test_an_invalid_answer_to_get_model_is_refused(answer: bytes, sentence: str) -> None:

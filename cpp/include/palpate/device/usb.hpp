@@ -28,6 +28,8 @@ struct UsbOptions {
     bool makes_force = true;  ///< false: the motor is never enabled; the device only sends samples
     /// True: the device renders its own model. The commands only keep it active; their force has no effect.
     bool device_renders = false;
+    /// With `device_renders`: fingerprints and rate of the model that the device must contain; unset: any model
+    std::optional<wire::DeviceModel> model = std::nullopt;
 };
 
 /// Counters of the packets and USB transfers of a device.
@@ -251,8 +253,16 @@ class UsbDevice {
 
     /// Makes the device render its own model after it is enabled. Returns "", or a sentence with the reason.
     [[nodiscard]] std::string choose_device_renderer() {
-        if (!open_->connection.model()) {
-            return "has no model to render: load a firmware with an exported model, or render on the host";
+        const std::optional<wire::DeviceModel> model = open_->connection.model();
+        if (!model) {
+            return "does not report a model to render: build the header of 'palpate export --c' into its "
+                   "firmware, or render on the host with a plan made without on_device";
+        }
+        if (options_.model) {
+            if (std::string difference = wire::difference(*model, *options_.model); !difference.empty()) {
+                return difference +
+                       ": build the header that 'palpate export --c' writes for this plan into its firmware";
+            }
         }
         const int code = open_->connection.request(wire::Request::Renderer,
                                                    static_cast<std::uint16_t>(wire::Renderer::Device));

@@ -105,7 +105,7 @@ inline constexpr std::size_t largest_packet = 64;
 inline constexpr std::size_t in_size = 32;     ///< size of an `InPacket` [bytes]
 inline constexpr std::size_t out_size = 16;    ///< size of an `OutPacket` [bytes]
 inline constexpr std::size_t info_size = 32;   ///< size of an `Info` [bytes]
-inline constexpr std::size_t model_size = 16;  ///< size of a `DeviceModel` [bytes]
+inline constexpr std::size_t model_size = 24;  ///< size of a `DeviceModel` [bytes]
 
 /// Packet that the device sends `Info::rate_hz` times a second.
 struct InPacket {
@@ -143,6 +143,7 @@ struct Info {
 /// Model that a device can render itself.
 struct DeviceModel {
     std::uint64_t fingerprint = 0;  ///< that of the exported model
+    std::uint64_t certificate = 0;  ///< fingerprint of the certificate of its plan; 0 without a certificate
     std::uint32_t rate_hz = 0;      ///< certified rate of the device's control loop
     Renderer renderer = Renderer::Host;
 };
@@ -267,7 +268,7 @@ class ByteWriter {
                std::to_string(model_size);
     }
     std::uint32_t renderer = 0;  // one byte, and three reserved bytes that must be 0
-    detail::ByteReader{bytes}(model.fingerprint, model.rate_hz, renderer);
+    detail::ByteReader{bytes}(model.fingerprint, model.certificate, model.rate_hz, renderer);
     if (model.rate_hz == 0) {
         return answer + ": rate_hz is 0, must be > 0";
     }
@@ -286,6 +287,24 @@ class ByteWriter {
         text += digits[fingerprint >> (shift - 4) & 15U];
     }
     return text;
+}
+
+/// Returns the difference between the model of a device and the planned model as a part of a sentence; empty if the
+/// device contains the planned model with the same certificate and rate.
+[[nodiscard]] inline std::string difference(const DeviceModel& model, const DeviceModel& planned) {
+    if (model.fingerprint != planned.fingerprint) {
+        return "contains the model " + fingerprint_text(model.fingerprint) +
+               ", but the plan is for the model " + fingerprint_text(planned.fingerprint);
+    }
+    if (model.certificate != planned.certificate) {
+        return "contains this model with the certificate " + fingerprint_text(model.certificate) +
+               ", but that of the plan is " + fingerprint_text(planned.certificate);
+    }
+    if (model.rate_hz != planned.rate_hz) {
+        return "renders this model at " + std::to_string(model.rate_hz) +
+               " Hz, but the certificate of the plan is for " + std::to_string(planned.rate_hz) + " Hz";
+    }
+    return "";
 }
 
 /// Returns the bytes of a command packet.

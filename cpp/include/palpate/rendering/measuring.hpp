@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <tuple>
 
 #include "palpate/fields/field_table.hpp"
+#include "palpate/model/continuation.hpp"
 #include "palpate/rendering/structure.hpp"
 
 // Structures that compute the device's force while a real object or the device itself is measured.
@@ -25,6 +27,29 @@ class FreeMotion {
         return std::isfinite(position) ? Rendered{0.0, position, 0, Status::Ok, false}
                                        : detail::refused(position);
     }
+};
+
+/// Renders zero force while the device renders a model itself; marks positions outside of the model's domain.
+class Watching {
+  public:
+    explicit Watching(const Domain& domain)
+        : lower_{domain.period ? -infinity : domain.lower[0]},
+          upper_{domain.period ? infinity : domain.upper[0]} {}
+
+    /// Does nothing, because the device has the state of the object.
+    void reset(double /*position*/) noexcept {}
+
+    /// Returns zero force; with the status NonFinite if the position is not finite.
+    [[nodiscard]] Rendered step(double position) noexcept {
+        return std::isfinite(position)
+                   ? Rendered{0.0, position, 0, Status::Ok, position < lower_ || position > upper_}
+                   : detail::refused(position);
+    }
+
+  private:
+    static constexpr double infinity = std::numeric_limits<double>::infinity();
+    double lower_;
+    double upper_;
 };
 
 /// Settings of an automatic slow motion over a real object: the device moves the handle from `lower` to `upper` and

@@ -67,6 +67,7 @@ struct LoopProgress {
     std::atomic<std::uint64_t> lost{0};     ///< number of the device's samples that did not arrive
     std::atomic<double> position{0.0};      ///< position of the handle [m or rad]
     std::atomic<double> force{0.0};         ///< force sent to the device [N or N*m]
+    std::atomic<double> applied{0.0};       ///< force of the motor [N or N*m]
     std::atomic<double> object_force{0.0};  ///< force of a real object on the handle [N or N*m]
     RateCheck rate;
 };
@@ -159,6 +160,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
         progress.lost.store(controller.reading_guard().lost(), std::memory_order_relaxed);
         progress.position.store(tick.reading.position, std::memory_order_relaxed);
         progress.force.store(tick.command.force, std::memory_order_relaxed);
+        progress.applied.store(tick.reading.applied, std::memory_order_relaxed);
         progress.object_force.store(object_force(record), std::memory_order_relaxed);
 
         const bool window_ended = progress.rate.add(wake.now);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "palpate/fields/readable.hpp"
@@ -17,6 +19,7 @@
 #include "palpate/run/measure.hpp"
 #include "palpate/run/render.hpp"
 #include "palpate/run/session_text.hpp"
+#include "palpate/stability/certificate.hpp"
 
 #ifdef PALPATE_HAS_USB
 #include "palpate/device/usb.hpp"
@@ -75,6 +78,20 @@ namespace detail {
     return report;
 }
 
+/// Returns the model that a device must contain so that it renders the plan of a certificate.
+[[nodiscard]] inline wire::DeviceModel device_model_of(const Certificate& certificate) {
+    const auto bits = [](const std::string& digits) {
+        std::uint64_t value = 0;
+        const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
+        require(end.ec == std::errc{} && end.ptr == digits.data() + digits.size(),
+                "the fingerprint '" + digits + "' of the certificate is not a hexadecimal number");
+        return value;
+    };
+    return {bits(certificate.model), bits(certificate.fingerprint),
+            static_cast<std::uint32_t>(std::lround(1.0 / certificate.device.period_s)),
+            wire::Renderer::Device};
+}
+
 /// Returns the USB options of a device named usb[:SERIAL].
 [[nodiscard]] inline UsbOptions usb_options(const RunOptions& options) {
     UsbOptions usb;
@@ -97,6 +114,11 @@ namespace detail {
         // The allowed delay is the certified delay, because the certificate does not hold for a longer delay
         usb.longest_delay_s = model.certificate->device.delay_s;
     }
+    if (rendered_by_device(options, model)) {
+        usb.longest_delay_s = UsbOptions{}.longest_delay_s;  // the commands carry no force
+        usb.device_renders = true;
+        usb.model = detail::device_model_of(*model.certificate);
+    }
     auto live = std::make_unique<LiveDeviceOf<UsbDevice>>(UsbDevice{std::move(usb)}, detail::usb_report);
     if (const Opened opened = live->open(); !opened) {
         refuse("device " + options.device + ": " + opened.reason);
@@ -115,6 +137,9 @@ namespace detail {
     live->profile = device.profile();
     live->rate_hz = options.loop.rate_hz;
     live->metadata = {{"device", name}};
+    if (rendered_by_device(options, model)) {
+        live->metadata.emplace_back("device_model", model.certificate->model);
+    }
     return live;
 }
 

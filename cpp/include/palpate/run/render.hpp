@@ -19,6 +19,7 @@
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/model/force_model.hpp"
+#include "palpate/rendering/measuring.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/controller.hpp"
@@ -122,6 +123,12 @@ struct RenderJob {
     return options.scheme.any() || options.force_limit || options.slew_s || options.tolerated;
 }
 
+/// Returns true if the device renders the plan itself. The host then sends no force; it watches the device and records.
+[[nodiscard]] inline bool rendered_by_device(const RenderOptions& options,
+                                             const PlannedModel& model) noexcept {
+    return !options.uncertified && model.certificate && model.certificate->device.renderer;
+}
+
 /// Returns true if a simulated run uses the device and the rate for which the model was planned.
 [[nodiscard]] inline bool follows_certificate(const RenderOptions& options,
                                               const PlannedModel& model) noexcept {
@@ -167,7 +174,13 @@ namespace detail {
     if (certified.id != device.id) {
         return "is certified for the device " + certified.id + ", not for " + device.id;
     }
-    if (differs(certified.period_s, device.period_s)) {
+    // The period of a device that renders the plan itself was compared with that of its model when it was opened
+    const bool on_device = rendered_by_device(options, model);
+    if (on_device && differs(certified.encoder_step, device.encoder_step)) {
+        return "is exported for an encoder step of " + readable(certified.encoder_step) +
+               " rad, the device has " + readable(device.encoder_step) + " rad";
+    }
+    if (!on_device && differs(certified.period_s, device.period_s)) {
         return "is certified for a period of " + readable(1e3 * certified.period_s) + " ms, the device has " +
                readable(1e3 * device.period_s) + " ms";
     }
@@ -297,14 +310,19 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     LoopSettings& loop = job.session.loop;
     loop.rate_hz = device.rate_hz;
     loop.tolerated = options.tolerated.value_or(loop.tolerated);
-    if (reason.empty()) {
+    const bool on_device = rendered_by_device(options, model);
+    if (on_device) {
+        sinks.force = RecordedForce::Applied;
+        job.notes.emplace_back(
+            "the device renders the model; the host watches and records the force of its motor");
+    } else if (reason.empty()) {
         detail::apply_certificate(*model.certificate, job.guards, loop);
     } else if (model.certificate && device.simulated) {
         job.notes.push_back("uncertified: " + reason);
     }
     validate(loop);
     validate(job.guards);
-    validate(job.scheme, job.model, 1.0 / loop.rate_hz);
+    validate(job.scheme, job.model, on_device ? model.certificate->device.period_s : 1.0 / loop.rate_hz);
     if (!model.plan && !options.scheme.any() && has_coupling(job.scheme.structure)) {
         job.notes.emplace_back(
             "the model has no plan: rendered behind the default coupling, which makes the object softer; "
@@ -315,6 +333,9 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
                                            : device.simulated
                                                ? std::string(name_of(model.certificate->verdict))
                                                : "yes");
+    if (on_device) {
+        job.metadata.emplace_back("force", "of the motor, from the model that the device renders");
+    }
     job.metadata =
         flight_metadata(options.created_by, job.metadata, model.name, job.scheme, job.guards, loop.rate_hz);
     if (std::error_code ignored;
@@ -332,13 +353,19 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
                                     const RenderJob& job, LiveDevice& device, RecordSinks& sinks,
                                     const std::atomic<bool>& stop_requested, const Watch& watch) {
     const double period_s = 1.0 / job.session.loop.rate_hz;
-    SessionReport report =
-        with_structure(job.model, job.scheme, period_s, job.guards.force_limit, [&](auto structure) {
-            Controller controller{device, std::move(structure),
-                                  guards_of(job.guards, job.model, job.scheme, period_s)};
-            return run_session(controller, job.session, sinks, stop_requested, watch);
-        });
+    const auto run = [&](auto structure, const Guards& guards) {
+        Controller controller{device, std::move(structure), guards};
+        return run_session(controller, job.session, sinks, stop_requested, watch);
+    };
     const Domain& domain = model.model.domain();
+    SessionReport report =
+        rendered_by_device(options, model)
+            ? run(Watching{domain}, Guards{.reading = reading_guard(job.guards, period_s),
+                                           .limit = force_limit(job.guards),
+                                           .ramp = force_ramp(job.guards, period_s)})
+            : with_structure(job.model, job.scheme, period_s, job.guards.force_limit, [&](auto structure) {
+                  return run(std::move(structure), guards_of(job.guards, job.model, job.scheme, period_s));
+              });
     Summary summary =
         detail::finish(options, job.session.loop, model.units(), job.metadata, sinks, std::move(report),
                        {.encoder_step = job.guards.encoder_step,

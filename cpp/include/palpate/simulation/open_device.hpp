@@ -78,13 +78,13 @@ namespace palpate {
             "faults is set: must be empty for a real device, because only the simulated device simulates "
             "faults");
     }
-    if (!options.uncertified && model.certificate && model.certificate->device.renderer) {
+    if (kind != "usb" && rendered_by_device(options, model)) {
         const DeviceProfile& certified = model.certificate->device;
-        refuse(model.name + " is planned for the motor controller of " + certified.id + " at " +
-               readable(1.0 / certified.period_s) +
-               " Hz, and the host cannot render this plan: export it with 'palpate export --c', or make a "
-               "plan for "
-               "the host with 'palpate plan' without on_device");
+        refuse(
+            model.name + " is planned for the motor controller of " + certified.id + " at " +
+            readable(1.0 / certified.period_s) +
+            " Hz: set device to a USB device that contains the exported model, or make a plan for the host "
+            "with 'palpate plan' without on_device");
     }
     if (model.force_unit == "A") {
         refuse("the model's force is a motor current in A: identify it with --torque-constant-Nm-per-A");
