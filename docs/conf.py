@@ -19,6 +19,7 @@ sys.path.insert(0, str(DOCS / "builder"))
 import command_pages  # noqa: E402
 import cpp_pages  # noqa: E402
 import figures  # noqa: E402
+import notebook_page  # noqa: E402
 import page_code  # noqa: E402
 import python_pages  # noqa: E402
 import site_links  # noqa: E402
@@ -117,7 +118,8 @@ def setup(app: Any) -> None:
     command_pages.write_pages(generated)
     shutil.copy(DOCS.parent / "SECURITY.md", generated / "security.md")
     figures.write_figures(generated / "figures")
-    outputs = page_code.run_pages(DOCS.parent / "build" / "docs" / "pages")
+    notebook_page.write_page(generated)
+    outputs = page_code.run_pages()
     app.connect("source-read", lambda _app, name, source: page_code.show_outputs(name, source, outputs))
     # Before napoleon, which writes its own markup.
     app.connect("autodoc-process-docstring", python_pages.escape_formulas, priority=400)

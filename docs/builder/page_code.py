@@ -29,8 +29,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
+import once
+
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
+PAGE_FOLDERS = ROOT / "build" / "docs" / "pages"
+"""Folder of the folders in which the pages run"""
 REPOSITORY_FOLDERS = ("bench", "build", "cpp", "docs", "examples", "tests")
 """Folders that a command of a page may name, as if it ran in the repository"""
 _BLOCK = re.compile(
@@ -77,13 +81,27 @@ def pages() -> list[Path]:
     return sorted(page for page in DOCS.rglob("*.md") if not made.intersection(page.parents))
 
 
-def run_pages(folder: Path) -> dict[str, list[str]]:
-    """Runs the code of every page; returns page -> output of each block."""
+def run_pages() -> dict[str, list[str]]:
+    """Runs the code of every page that has changed; returns page -> output of each block."""
     found = {str(page.relative_to(DOCS).with_suffix("")): page for page in pages()}
     found = {name: page for name, page in found.items() if any_runs(page)}
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        outputs = pool.map(lambda name: run_page(found[name], folder / name), found)
+        outputs = pool.map(run_once, found.values())
         return dict(zip(found, outputs, strict=True))
+
+
+def folder_of(page: Path) -> Path:
+    """Returns the folder in which a page of the site runs."""
+    return PAGE_FOLDERS / page.relative_to(DOCS).with_suffix("")
+
+
+def run_once(page: Path) -> list[str]:
+    """Returns the output of each block of a page of the site; runs the page only after a change."""
+    folder = folder_of(page)
+    outputs: list[str] = once.kept(
+        folder.with_suffix(".json"), page.read_text(encoding="utf-8"), lambda: run_page(page, folder)
+    )
+    return outputs
 
 
 def any_runs(page: Path) -> bool:

@@ -11,11 +11,13 @@ from pathlib import Path
 import click
 import pytest
 
+from palpate import _core
 from palpate.cli.main import palpate
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "docs" / "builder"))
 
+import once  # noqa: E402
 import page_code  # noqa: E402
 
 PROGRAM = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
@@ -37,15 +39,15 @@ NOT_RUN = {
 @pytest.mark.parametrize(
     "name", [name for name, found in BLOCKS.items() if any(not block.not_run for block in found)]
 )
-def test_code_of_a_page_runs(name: str, tmp_path: Path) -> None:
+def test_code_of_a_page_runs(name: str) -> None:
     if "palpate-control" in PAGES[name] and not PROGRAM.exists():
         pytest.skip("needs palpate-control, run make control")
-    outputs = page_code.run_page(ROOT / name, tmp_path / "page")
+    outputs = page_code.run_once(ROOT / name)
     assert len(outputs) == len(BLOCKS[name])
     made = re.findall(r"\]\((?:\.\./)+build/docs/pages/([^)]+)\)", PAGES[name])
     folder = Path(name).relative_to("docs").with_suffix("")
     own = [Path(each).relative_to(folder) for each in made if Path(each).is_relative_to(folder)]
-    assert [each for each in own if not (tmp_path / "page" / each).is_file()] == []
+    assert [each for each in own if not (page_code.folder_of(ROOT / name) / each).is_file()] == []
 
 
 def test_blocks_that_are_not_run_are_counted() -> None:
@@ -65,6 +67,35 @@ def test_a_failing_block_is_reported_with_page_and_line(tmp_path: Path) -> None:
     page.write_text("# Title\n\n```python\nx = 1\n```\n\n```sh\nexit 3\n```\n", encoding="utf-8")
     with pytest.raises(SystemExit, match=r"page\.md: the block at line 7 failed"):
         page_code.run_page(page, tmp_path / "folder")
+
+
+def test_code_runs_again_only_after_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file, runs = tmp_path / "result.json", []
+
+    def result_of(code: str) -> list[str]:
+        outputs: list[str] = once.kept(file, code, lambda: runs.append(code) or [code, "output"])
+        return outputs
+
+    assert [result_of("a"), result_of("a"), result_of("b")] == [["a", "output"]] * 2 + [["b", "output"]]
+    assert runs == ["a", "b"]
+    monkeypatch.setattr(once, "programs", lambda: "another version of palpate")
+    assert result_of("b") == ["b", "output"]
+    assert runs == ["a", "b", "b"]
+
+
+def test_a_change_of_a_source_or_of_the_module_makes_kept_results_invalid(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = {str(file) for file in once.files()}
+    for used in (page_code.__file__, _core.__file__, ROOT / "python" / "palpate" / "cli" / "main.py"):
+        assert str(used) in files
+    source = tmp_path / "source.py"
+    monkeypatch.setattr(once, "files", lambda: [source])
+    digests = []
+    for text in ("x = 1", "x = 2", "x = 1"):
+        source.write_text(text, encoding="utf-8")
+        digests.append(once.programs.__wrapped__())
+    assert digests[0] == digests[2] != digests[1]
 
 
 def test_outputs_are_shown_behind_their_blocks() -> None:

@@ -72,6 +72,17 @@ def test_every_public_cpp_type_has_an_entry() -> None:
     assert types - names == set()
 
 
+def test_the_notebook_is_in_the_navigation_with_its_outputs() -> None:
+    page = "generated/notebook.html"
+    assert f'href="{page}"' in (SITE / "index.html").read_text(encoding="utf-8")
+    text = (SITE / page).read_text(encoding="utf-8")
+    assert text.count("Output of the cell above") == 5
+    captions = re.findall(r"<caption[^>]*>(\w+)</caption>", text)
+    assert captions == ["Recording", "Model", "Verification", "Plan", "Recording"]
+    (download,) = re.findall(r'href="(\.\./_downloads/[^"]+/notebook\.ipynb)"', text)
+    assert (SITE / page).parent.joinpath(download).is_file()
+
+
 def search_index() -> dict[str, object]:
     text = (SITE / "searchindex.js").read_text(encoding="utf-8")
     index: dict[str, object] = json.loads(text.removeprefix("Search.setIndex(").rstrip().rstrip(")"))

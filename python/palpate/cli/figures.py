@@ -8,6 +8,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from .._core.rendering import Scheme
 from ..errors import InputError
+from ..identification import SearchOptions
 from ..model import Model
 from ..planning import Comparison, Plan, describe, force_at
 from ..recording import Recording
@@ -252,15 +254,32 @@ def picture_recording(path: Path, recording: Recording) -> tuple[str, ...]:
     return history.notes
 
 
-def picture_frame(path: Path, domain: tuple[float, float], position_unit: str, *, of: str) -> None:
+@dataclass(frozen=True)
+class FrameFigure:
+    """File and settings of the figure of a frame."""
+
+    path: Path
+    a0: float = SearchOptions.frame_scale
+    b0: float = SearchOptions.frame_step
+    voices: tuple[int, ...] = (1, 2, 4)
+
+
+def picture_frame(drawn: FrameFigure, domain: tuple[float, float], position_unit: str, *, of: str) -> None:
     """Draws the bounds of the frame of candidate wavelets, and its grid over a domain."""
     from ..plotting import draw_frame_bounds, draw_frame_grid
 
     title = f"frame of candidate wavelets over the positions of {of}"
-    with _written(path, (_PAGE_INCHES, 5.2), title=title) as figure:
+    with _written(drawn.path, (_PAGE_INCHES, 5.2), title=title) as figure:
         axes = figure.subplot_mosaic([["bounds", "voices", "scales"], ["grid", "grid", "grid"]])
-        draw_frame_bounds(axes["bounds"], axes["voices"], axes["scales"])
-        draw_frame_grid(axes["grid"], domain, position_unit)
+        draw_frame_bounds(
+            axes["bounds"],
+            axes["voices"],
+            axes["scales"],
+            scale=drawn.a0,
+            step=drawn.b0,
+            voices=drawn.voices,
+        )
+        draw_frame_grid(axes["grid"], domain, position_unit, scale=drawn.a0, step=drawn.b0)
 
 
 def picture_rendering(path: Path, plan: Plan, rendered: Recording) -> None:

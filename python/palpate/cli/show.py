@@ -15,7 +15,7 @@ from ..planning import Plan
 from ..verdict import GOOD, Verdict, usable
 from ..verification import Stroke, compare
 from .exit_status import end_with, finishing
-from .figures import drawing, figure_file, picture_frame, picture_path
+from .figures import FrameFigure, drawing, figure_file, picture_frame, picture_path
 from .printing import (
     number,
     print_json,
@@ -30,6 +30,15 @@ from .verb import PATH, ReadingOptions, json_option, plot_option, reading_option
 _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping", "domain", "continuation",
           "slope_bounds", "data")  # fmt: skip
 """Fields of a model file that `palpate show --json` prints unchanged."""
+
+
+def _voices(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int, ...]:
+    """Parses numbers of voices that are separated by commas."""
+    try:
+        return tuple(int(number) for number in value.split(","))
+    except ValueError:
+        message = f"{value!r} must be whole numbers separated by commas, such as 1,2,4"
+        raise click.BadParameter(message, ctx, param) from None
 
 
 @verb("palpate show press.json")
@@ -47,6 +56,28 @@ _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping"
     "wavelet transform"
 )
 @plot_option("bounds of the frame of candidate wavelets, and its grid over the positions", "--plot-frame")
+@click.option(
+    "--a0",
+    type=float,
+    default=FrameFigure.a0,
+    show_default=True,
+    help="Ratio of neighbouring dilations in the figure of --plot-frame, above 1.",
+)
+@click.option(
+    "--b0",
+    type=float,
+    default=FrameFigure.b0,
+    show_default=True,
+    help="Translation step in the figure of --plot-frame, above 0.",
+)
+@click.option(
+    "--voices",
+    metavar="N,...",
+    callback=_voices,
+    default=",".join(map(str, FrameFigure.voices)),
+    show_default=True,
+    help="Numbers of voices in the figure of --plot-frame, at most four; the grid has one voice.",
+)
 @json_option
 @reading_options
 def show(
@@ -54,6 +85,9 @@ def show(
     other_file: Path | None,
     plot: Path | None,
     plot_frame: Path | None,
+    a0: float,
+    b0: float,
+    voices: tuple[int, ...],
     as_json: bool,
     reading: ReadingOptions,
 ) -> None:
@@ -62,22 +96,27 @@ def show(
     Of a recording, print verdict, columns, ranges, rate and strokes. Exit code 1: the verdict is "no".
     """
     require_writable(plot, plot_frame, inputs=(file, other_file))
+    frame = None if plot_frame is None else FrameFigure(plot_frame, a0, b0, voices)
+    if frame is None and (unused := _given("a0", "b0", "voices")):
+        raise click.UsageError(f"--{unused[0]} is a setting of the figure --plot-frame PNG: give both")
     if is_recording(file):
         if other_file is not None:
             raise InputError(f"--beside compares two models, but {file} is a recording: identify it first")
-        show_recording(file, reading, plot=plot, plot_frame=plot_frame, as_json=as_json)
+        show_recording(file, reading, plot=plot, frame=frame, as_json=as_json)
         return
     _refuse_reading_options(file, reading)
     model_file, model = file, load_model(file)
     if other_file is not None:
+        if frame is not None:
+            raise click.UsageError("--plot-frame draws the frame of one model, and --beside compares two")
         _compare(model, model_file, load_model(other_file), other_file, plot=plot, as_json=as_json)
         return
     with drawing() as write_figures:
         if plot is not None:
             picture_path(plot, model)
-        if plot_frame is not None:
+        if frame is not None:
             domain = float(model.lower[0]), float(model.upper[0])
-            picture_frame(plot_frame, domain, model.units["position"], of=file.name)
+            picture_frame(frame, domain, model.units["position"], of=file.name)
     with finishing():
         write_figures()
         if as_json:
@@ -94,12 +133,16 @@ def show(
 
 def _refuse_reading_options(file: Path, reading: ReadingOptions) -> None:
     """Refuses options of the reading of recordings if the file is a model."""
-    context = click.get_current_context()
-    for parameter in context.command.params:
-        name = parameter.name or ""
-        given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-        if given and name in reading.options:
+    given = _given(*reading.options)
+    for parameter in click.get_current_context().command.params:
+        if parameter.name in given:
             raise InputError(f"{parameter.opts[0]} is an option for recordings, but {file} is a model")
+
+
+def _given(*names: str) -> list[str]:
+    """Returns the parameters among `names` that the command line contains."""
+    source = click.get_current_context().get_parameter_source
+    return [name for name in names if source(name) is ParameterSource.COMMANDLINE]
 
 
 def _record(model: Model, file: Path) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from ..recording.motion import GAP_RATIO, ordered_strokes
 from ..recording.quality import quality_findings
 from ..verdict import Verdict
 from .exit_status import end_with, finishing
-from .figures import drawing, picture_frame, picture_recording
+from .figures import FrameFigure, drawing, picture_frame, picture_recording
 from .printing import number, print_json, print_numbers, print_paragraph, print_verdict
 from .verb import ReadingOptions
 
@@ -33,7 +33,7 @@ def is_recording(file: Path) -> bool:
 
 
 def show_recording(
-    file: Path, reading: ReadingOptions, *, plot: Path | None, plot_frame: Path | None, as_json: bool
+    file: Path, reading: ReadingOptions, *, plot: Path | None, frame: FrameFigure | None, as_json: bool
 ) -> None:
     """Prints a recording, its verdict first, and draws its views."""
     recording = reading.read(file)
@@ -41,9 +41,9 @@ def show_recording(
     strokes = _strokes(recording)
     with drawing() as write_figures:
         notes = () if plot is None else picture_recording(plot, recording)
-        if plot_frame is not None:
+        if frame is not None:
             domain = float(recording.position.min()), float(recording.position.max())
-            picture_frame(plot_frame, domain, recording.units["position"], of=file.name)
+            picture_frame(frame, domain, recording.units["position"], of=file.name)
     with finishing():
         write_figures()
         if as_json:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from .._typing import Float1D
+from ..errors import InputError
 from ..identification import SearchOptions, frame_bounds
 from ..identification.network.basis import COARSEST_CANDIDATE, truncated_frame
 from .look import grid, plain_decades, scale_for
@@ -29,12 +30,14 @@ def draw_frame_bounds(
     scales_axes: Axes,
     *,
     scale: float = _DEFAULT.frame_scale,
+    step: float = _DEFAULT.frame_step,
     voices: Sequence[int] = (1, 2, 4),
     scales: Sequence[float] = (1.5, 2.0, 2.5, 3.0),
 ) -> None:
     """Draws A and B over the translation step, and B/A over the step for several voices and ratios a0.
 
     A ratio is drawn only for A > 0: otherwise the estimate does not prove that the wavelets form a frame.
+    A vertical line marks the translation step b0.
 
     Parameters
     ----------
@@ -42,11 +45,22 @@ def draw_frame_bounds(
         Target axes: A and B; B/A for each number of voices; B/A for each a0 with one voice.
     scale : float
         a0 of the first two axes, the ratio of neighbouring dilations.
+    step : float
+        Marked translation step b0.
     voices : sequence of int
-        Dilations per octave.
+        Numbers of voices of the first two axes, at most four.
     scales : sequence of float
-        Ratios a0 of the third axes.
+        Ratios a0 of the third axes, at most four.
+
+    Raises
+    ------
+    palpate.InputError
+        There are more curves than line styles, or a value is out of range; the message names the argument.
     """
+    for argument, values in (("voices", voices), ("scales", scales)):
+        if not 1 <= len(values) <= len(_LINES):
+            raise InputError(f"{argument} has {len(values)} values: must have 1 to {len(_LINES)}")
+    frame_bounds(scale, step)  # refuses values out of range
     for style, count in zip(_LINES, voices, strict=False):
         low, high = _bounds(scale, count)
         name = f"{count} voice{'s' * (count > 1)}"
@@ -64,7 +78,7 @@ def draw_frame_bounds(
     bounds_axes.set_yscale("log")
     for axes in (bounds_axes, voices_axes, scales_axes):
         axes.set_xscale("log")
-        axes.axvline(_DEFAULT.frame_step, color="0.8", linewidth=2.0, zorder=0)
+        axes.axvline(step, color="0.8", linewidth=2.0, zorder=0)
         axes.set_xlabel("translation step b0 [-]")
         axes.legend(frameon=False)
         axes.set_xticks(_MARKED_STEPS, [f"{step:g}" for step in _MARKED_STEPS])

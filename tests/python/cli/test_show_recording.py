@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 
@@ -84,6 +85,46 @@ def test_the_frame_of_a_model_is_drawn(tmp_path: Path) -> None:
     model, frame = model_by_hand().save(tmp_path / "m.json"), tmp_path / "frame.png"
     assert main(["show", str(model), "--plot-frame", str(frame)]) == 0
     assert frame.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", ["model", "recording"])
+def test_the_figure_of_the_frame_has_the_given_settings(name: str, timed: Path, tmp_path: Path) -> None:
+    file = timed if name == "recording" else model_by_hand().save(tmp_path / "m.json")
+    frame = tmp_path / "frame.svg"
+    with mpl.rc_context({"svg.fonttype": "none"}):  # text as text
+        settings = ["--a0", "1.5", "--b0", "0.75", "--voices", "3,5"]
+        assert main(["show", str(file), "--plot-frame", str(frame), *settings]) == 0
+    drawn = frame.read_text(encoding="utf-8")
+    for text in ("bounds, a0 = 1.5: A grey, B black", "grid, a0 = 1.5, b0 = 0.75", "3 voices", "5 voices"):
+        assert text in drawn
+    assert "4 voices" not in drawn
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["--a0", "1"], "a0, the ratio of neighbouring dilations, is 1.0: must be a finite number > 1"),
+        (["--b0", "0"], "b0, the translation step, is 0.0: must be a finite number > 0"),
+        (["--voices", "0"], "voices is 0: must be a whole number >= 1"),
+        (["--voices", "1,2,3,4,5"], "voices has 5 values: must have 1 to 4"),
+        (["--voices", "two"], "'two' must be whole numbers separated by commas, such as 1,2,4"),
+    ],
+)
+def test_settings_of_the_frame_out_of_range_are_refused(
+    settings: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, frame = model_by_hand().save(tmp_path / "m.json"), tmp_path / "frame.png"
+    assert main(["show", str(model), "--plot-frame", str(frame), *settings]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not frame.exists()
+
+
+def test_settings_of_the_frame_without_its_figure_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = model_by_hand().save(tmp_path / "m.json")
+    assert main(["show", str(model), "--b0", "1"]) == 2
+    assert "--b0 is a setting of the figure --plot-frame PNG" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize("rows", [9, 10, 11])

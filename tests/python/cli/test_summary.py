@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -30,19 +31,27 @@ SUMMARIES = {
 }
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Returns a folder with a recording in mm and gf, models, and the profile of a weak device."""
-    monkeypatch.chdir(tmp_path)
-    model_by_hand().save("m.json")
+    folder = tmp_path_factory.mktemp("files")
+    model_by_hand().save(folder / "m.json")
     time = np.arange(2000) * 1e-3
     depth = 2.0 - 2.0 * np.cos(2.0 * np.pi * time)
     side = np.sign(np.sin(2.0 * np.pi * time))
     force = 40.0 * depth + 3.0 * side + np.random.default_rng(0).normal(0.0, 0.2, time.size)
     rows = "\n".join(f"{a:.6f},{b:.6f},{c:.6f}" for a, b, c in zip(time, depth, force, strict=True))
-    Path("dome.csv").write_text(f"time_s,depth_mm,load_gf\n{rows}\n", encoding="utf-8")
-    assert main(["identify", "dome.csv", "-o", "dome-model.json"]) == 0
-    DeviceProfile(viscous_damping=1e-9, coulomb_friction=1e-9).save("weak.toml")
+    (folder / "dome.csv").write_text(f"time_s,depth_mm,load_gf\n{rows}\n", encoding="utf-8")
+    assert main(["identify", str(folder / "dome.csv"), "-o", str(folder / "dome-model.json")]) == 0
+    DeviceProfile(viscous_damping=1e-9, coulomb_friction=1e-9).save(folder / "weak.toml")
+    return folder
+
+
+@pytest.fixture
+def here(files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Returns a copy of the folder `files`, which is the working directory of the test."""
+    shutil.copytree(files, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
     return tmp_path
 
 

@@ -15,9 +15,9 @@ namespace palpate {
 /// Parameters of a network of N wavelets with d inputs. Matrices are stored row by row, one row for each wavelet.
 struct NetworkParameters {
     std::size_t dimension = 1;      ///< number of inputs d
-    std::vector<double> alpha;      ///< N x d dilations, > 0 [1/m]
-    std::vector<double> beta;       ///< N x d translations [m]
-    std::vector<double> weight;     ///< N weights [N]
+    std::vector<double> alpha{};    ///< N x d dilations, > 0 [1/m]
+    std::vector<double> beta{};     ///< N x d translations [m]
+    std::vector<double> weight{};   ///< N weights [N]
     std::vector<double> linear{0};  ///< d slopes of the straight line [N/m]
     double bias = 0.0;              ///< constant b of the network [N]
 };
@@ -30,7 +30,7 @@ struct Domain {
     Continuation below = Continuation::Linear;  ///< continuation below the domain, if d = 1
     Continuation above = Continuation::Linear;  ///< continuation above the domain, if d = 1.
     /// Length after which a periodic force repeats, if d = 1; equals upper - lower
-    std::optional<double> period;
+    std::optional<double> period = std::nullopt;
 };
 
 namespace detail {

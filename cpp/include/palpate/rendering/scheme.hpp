@@ -26,8 +26,8 @@ namespace palpate {
 /// use.
 struct Scheme {
     StructureKind structure = StructureKind::Massless;
-    VirtualCoupling coupling;
-    Inertia inertia;
+    VirtualCoupling coupling{};
+    Inertia inertia{};
     bool compensated = false;
     double play_radius = 0.0;
     int predict = 0;
