@@ -65,8 +65,8 @@ def rig_for(model: Model) -> TestRig:
 def hand_for(plan: Plan, device: DeviceProfile) -> Hand:
     """Returns a simulated hand that moves the handle through the domain of a model while a plan is rendered.
 
-    Near the ends of the domain 1 % is left out, because the handle overshoots. The hand stops where the rendered
-    force would exceed 80 % of the force limit of the device.
+    Near the ends of the domain 1 % is left out, because the handle overshoots. The hand stops where
+    the rendered force would exceed 80 % of the force limit of the device.
     """
     usual = rig_for(plan.model).hand
     x, _, rendered = plan.forces_at_rest()
