@@ -242,8 +242,8 @@ def covered_text(plan: Plan, device: DeviceProfile, rendered: Recording) -> str:
     inside = max(0.0, min(high, upper) - max(low, lower)) / (upper - lower)
     reached = Unit.of_si(plan.model.units["position"]).interval(low, high)
     text = f"{reached}, {100.0 * inside:.3g} % of the domain"
-    _, _, rendered = plan.forces_at_rest()
-    if np.abs(rendered).max() <= _HELD_SHARE * device.force_limit:
+    _, _, forces = plan.forces_at_rest()
+    if np.abs(forces).max() <= _HELD_SHARE * device.force_limit:
         return text
     force_unit = Unit.of_si(plan.model.units["force"])
     return (
