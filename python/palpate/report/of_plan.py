@@ -7,6 +7,7 @@ import numpy as np
 
 from .._core.stability import Certificate, Inequality
 from ..planning import force_at, mechanical_units
+from ..planning.plan import NO_CERTIFICATE
 from ..plotting.look import scale_for
 from .charts import Chart, Panel
 from .inequalities import BASES, MEANINGS, VERDICTS, symbols_in
@@ -68,8 +69,7 @@ def certificate_table(subject: Subject) -> Section:
     if plan is None:
         return Section(key, title, explanation, left_out=subject.no_plan)
     if plan.certificate is None:
-        reason = "the plan has no certificate: make a plan for a device with palpate plan"
-        return Section(key, title, explanation, left_out=reason)
+        return Section(key, title, explanation, left_out=NO_CERTIFICATE)
     certificate = plan.certificate
     sentences = [VERDICTS[certificate.verdict]]
     if subject.refusal:
