@@ -248,10 +248,8 @@ class Plan:
                 f"damping {scheme.object_damping:.4g}{units['damping']}"
             )
         if scheme.predict:
-            samples = (
-                "the previous sample" if scheme.predict == 1 else f"the {scheme.predict} previous samples"
-            )
-            rows["prediction"] = f"half a sample ahead, from {samples}"
+            samples = "sample" if scheme.predict == 1 else f"{scheme.predict} samples"
+            rows["prediction"] = f"half a sample ahead, from the previous {samples}"
         if scheme.play_radius:
             rows["play radius"] = f"{scheme.play_radius:.4g}{units['position']}"
         return rows
