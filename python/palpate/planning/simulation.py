@@ -292,8 +292,12 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
         findings.append(
             level(
                 f"the force error is {100 * share:.3g} % of the object's force range, above "
-                f"{100 * _TOLERATED_ERROR_SHARE:.3g} %: choose a structure with palpate plan, or a stiffer "
-                "coupling"
+                f"{100 * _TOLERATED_ERROR_SHARE:.3g} %: "
+                + (
+                    "choose a structure with palpate plan, or a stiffer coupling"
+                    if plan.limited is None
+                    else "the device is too weak for the object, so the plan limits the slopes of the force"
+                )
             )
         )
     outside = int(rendered.columns["extrapolated"].sum())
