@@ -28,8 +28,8 @@ FORMATS = {
     "c": ("c_header", "A C header for a microcontroller: force law and structure with proved errors."),
     "fmu": ("fmu", "An FMU (FMI 3.0, co-simulation) of the force law for simulators; needs a C compiler."),
     "table": ("table", "A CSV table of the force over the position."),
-    "mcap": ("mcap", "An MCAP file of a recording or flight record, for tools that show logs."),
     "schema": ("schema", "The JSON schema of model files; needs no MODEL.json."),
+    "mcap": ("mcap", "An MCAP file of a recording or flight record, for tools that show logs."),
 }
 """Formats: option -> module of `palpate.export` with a function `write`, and the help."""
 

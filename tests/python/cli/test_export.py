@@ -110,7 +110,7 @@ def test_encoder_step_of_a_certified_device_cannot_be_changed(
 
 def test_format_is_required(planned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(planned), "-o", str(tmp_path / "m.h")]) == 2
-    assert "one of --c, --fmu, --table, --schema" in capsys.readouterr().err
+    assert "one of --c, --fmu, --table, --schema, --mcap" in capsys.readouterr().err
 
 
 def test_failed_comparison_writes_nothing_and_exits_with_code_1(
