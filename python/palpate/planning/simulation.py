@@ -69,9 +69,9 @@ def hand_for(plan: Plan, device: DeviceProfile) -> Hand:
     force would exceed 80 % of the force limit of the device.
     """
     usual = rig_for(plan.model).hand
-    x, _, felt = plan.forces_at_rest()
+    x, _, at_rest = plan.forces_at_rest()
     margin = _DOMAIN_MARGIN * (x[-1] - x[0])
-    held = np.abs(felt).max(axis=0) <= _HELD_SHARE * device.force_limit
+    held = np.abs(at_rest).max(axis=0) <= _HELD_SHARE * device.force_limit
     inside = np.flatnonzero(held & (x >= x[0] + margin) & (x <= x[-1] - margin))
     if not len(inside):
         return usual
@@ -80,8 +80,8 @@ def hand_for(plan: Plan, device: DeviceProfile) -> Hand:
     friction = device.coulomb_friction
     ends = sorted(
         (
-            x[first] + (felt[-1][first] - friction) / usual.stiffness,
-            x[last] + (felt[0][last] + friction) / usual.stiffness,
+            x[first] + (at_rest[-1][first] - friction) / usual.stiffness,
+            x[last] + (at_rest[0][last] + friction) / usual.stiffness,
         )
     )
     return Hand(
@@ -242,8 +242,8 @@ def covered_text(plan: Plan, device: DeviceProfile, rendered: Recording) -> str:
     inside = max(0.0, min(high, upper) - max(low, lower)) / (upper - lower)
     reached = Unit.of_si(plan.model.units["position"]).interval(low, high)
     text = f"{reached}, {100.0 * inside:.3g} % of the domain"
-    _, _, felt = plan.forces_at_rest()
-    if np.abs(felt).max() <= _HELD_SHARE * device.force_limit:
+    _, _, at_rest = plan.forces_at_rest()
+    if np.abs(at_rest).max() <= _HELD_SHARE * device.force_limit:
         return text
     force_unit = Unit.of_si(plan.model.units["force"])
     return (
