@@ -107,7 +107,12 @@ def test_the_wheel_contains_types_licence_and_both_programs(wheel: Path) -> None
     tops = {name.split("/")[0] for name in names}
     assert tops == {"palpate", f"palpate-{version}.dist-info", f"palpate-{version}.data"}
     assert f"palpate-{version}.data/scripts/palpate-control" in names
-    assert {"palpate/py.typed", "palpate/_core/__init__.pyi", "palpate/model/model.schema.json"} <= names
+    assert {
+        "palpate/py.typed",
+        "palpate/_core/__init__.pyi",
+        "palpate/model/model.schema.json",
+        "palpate/glossary.md",
+    } <= names
     assert f"palpate-{version}.dist-info/licenses/LICENSE" in names
     assert not [name for name in names if name.endswith((".hpp", ".cmake"))]
 

@@ -11,7 +11,7 @@ import click
 from ..errors import InputError
 from ..identification import identify
 from ..identification.classes.findings import error_findings
-from ..planning import Comparison, compare_structures, describe, rig_for
+from ..planning import Comparison, compare_structures, describe, mechanical_units, rig_for
 from ..recording.sample import sample_recording
 from ..verdict import Verdict
 from ..verification import verify
@@ -154,7 +154,8 @@ def _require_folder(folder: Path) -> None:
 
 def _print_structures(rows: tuple[Comparison, ...], unit: str) -> None:
     """Prints the force error of each structure, or the reason why the structure is refused."""
-    print_line(f"force error of each structure, RMS in {unit}")
+    mass, damping, _ = mechanical_units("rad")
+    print_line(f"force error of each structure, RMS in {unit}; m in {mass}, B_o in {damping}")
     print_table(
         ("structure", "tick mean", "below 50 Hz", "end of tick", "sampled"),
         [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate export: writes a model as a file for programs without palpate."""
+"""palpate export: writes a model or a recording as a file for programs without palpate."""
 
 from __future__ import annotations
 
@@ -14,13 +14,22 @@ from ..errors import InputError
 from ..export.request import Request, Written
 from .exit_status import end_with, finishing
 from .printing import print_json, print_numbers, print_verdict, talk
-from .verb import PATH, json_option, options, require_writable, verb
+from .verb import (
+    PATH,
+    ReadingOptions,
+    json_option,
+    options,
+    reading_options,
+    require_writable,
+    verb,
+)
 
 FORMATS = {
     "c": ("c_header", "A C header for a microcontroller: force law and structure with proved errors."),
     "fmu": ("fmu", "An FMU (FMI 3.0, co-simulation) of the force law for simulators; needs a C compiler."),
     "table": ("table", "A CSV table of the force over the position."),
     "schema": ("schema", "The JSON schema of model files; needs no MODEL.json."),
+    "mcap": ("mcap", "An MCAP file of a recording or flight record, for tools that show logs."),
 }
 """Formats: option -> module of `palpate.export` with a function `write`, and the help."""
 
@@ -35,7 +44,7 @@ format_options: Callable[[Any], Any] = options(
 
 
 @verb("palpate export knob.json --c -o knob.h")
-@click.argument("model_file", metavar="[MODEL.json]", type=PATH, required=False)
+@click.argument("source", metavar="[MODEL.json|RECORDING]", type=PATH, required=False)
 @format_options
 @click.option(
     "-o",
@@ -43,7 +52,7 @@ format_options: Callable[[Any], Any] = options(
     type=PATH,
     metavar="OUT",
     required=True,
-    help="File to write; an existing one is replaced.",
+    help="File to write; an existing one is replaced, except a recording (--mcap).",
 )
 @click.option(
     "--precision",
@@ -67,8 +76,9 @@ format_options: Callable[[Any], Any] = options(
     help="Position for each count of the encoder, without certificate.",
 )
 @json_option
+@reading_options
 def export(
-    model_file: Path | None,
+    source: Path | None,
     kind: str | None,
     output: Path,
     precision: str,
@@ -76,8 +86,9 @@ def export(
     uncertified: bool,
     encoder_step: float | None,
     as_json: bool,
+    reading: ReadingOptions,
 ) -> None:
-    """Write a model as a file for programs without palpate.
+    """Write a model or a recording as a file for programs without palpate.
 
     The file is compared with the model before it is written. A model needs a certificate for its device
     (palpate plan), because the file renders it without the guards of palpate. The exit code is 1 if the
@@ -85,10 +96,11 @@ def export(
     """
     if kind is None:
         raise InputError(f"no format is given: one of {', '.join(f'--{each}' for each in FORMATS)}")
-    require_writable(output, inputs=(model_file,))
+    require_writable(output, inputs=(source,))
     talk(f"writing {output} ...")
     module = import_module(f"palpate.export.{FORMATS[kind][0]}")
-    request = Request(output, model_file, precision, name, uncertified, encoder_step)
+    recording = reading.read(source) if kind == "mcap" and source is not None else None
+    request = Request(output, source, precision, name, uncertified, encoder_step, recording)
     with finishing():
         written: Written = module.write(request)
         if as_json:

@@ -28,7 +28,7 @@ _VERBS = {
     "check-device": "Measure a device and judge if it can render force.",
     "show": "Print a model or a recording.",
     "report": "Write one HTML page about a model.",
-    "export": "Write a model as a C header, table or schema.",
+    "export": "Write a model or a recording for other programs.",
     "demo": "Identify, verify and render a simulated sample.",
 }
 """Verbs with their lines in the help. The file of a verb is imported only when the verb is used."""
@@ -105,6 +105,16 @@ def _print_script(ctx: click.Context, param: click.Parameter, shell: str | None)
         ctx.exit()
 
 
+def _print_glossary(ctx: click.Context, param: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        package = Path(__file__).parents[1]
+        installed, source = package / "glossary.md", package.parents[1] / "docs" / "glossary.md"
+        text = (installed if installed.exists() else source).read_text(encoding="utf-8")
+        for line in text.splitlines():
+            echo(line)
+        ctx.exit()
+
+
 @click.group(
     cls=_LazyVerbs,
     no_args_is_help=True,
@@ -119,6 +129,15 @@ def _print_script(ctx: click.Context, param: click.Parameter, shell: str | None)
     show_default=False,
     callback=_print_version,
     help="Print the version.",
+)
+@click.option(
+    "--glossary",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    show_default=False,
+    callback=_print_glossary,
+    help="Print the terms of palpate with their meaning.",
 )
 @click.option(
     "--completion",

@@ -24,8 +24,8 @@ import click
 
 from ..verdict import Verdict
 
-TERMS = "Terms: docs/glossary.md"
-"""Last line of the help of each verb; it names the file that explains the terms."""
+TERMS = "Terms: palpate --glossary"
+"""Last line of the help of each verb; it names the command that explains the terms."""
 
 WIDEST = 80
 """Largest width to which printed text is wrapped [columns]."""

@@ -42,7 +42,13 @@ def _refuse_device(ctx: click.Context, param: click.Parameter, device: str | Non
 @verb("palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv")
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @scheme_options
-@click.option("--device", hidden=True, expose_value=False, callback=_refuse_device)
+@click.option(
+    "--device",
+    hidden=True,
+    expose_value=False,
+    callback=_refuse_device,
+    help="Refused: the plan has the device.",
+)
 @click.option("--duration-s", type=float, default=4.0, help="Simulated time [s].")
 @click.option(
     "-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Recording of the rendering to write."

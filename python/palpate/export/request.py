@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..model import Model, load_model
+from ..recording import Recording
 from ..recording.files import replacing
 from ..verdict import Verdict
 
@@ -42,6 +43,8 @@ class Request:
     """True if a model without certificate is exported too"""
     encoder_step: float | None = None
     """Position for each count, for a model without the profile of a device"""
+    recording: Recording | None = None
+    """Recording to export in place of a model"""
 
     def model(self) -> Model:
         """Reads the model file."""

@@ -21,6 +21,7 @@ from .._core.stability import (
     stiffest_coupling,
     usual_coupling_share,
 )
+from .device_profile import mechanical_units
 from .limited_network import (
     LONGEST_PLAY,
     limit_slopes,
@@ -128,9 +129,10 @@ class Task:
         """Refuses a structure without mass for an object with mass or damping."""
         if not self.dynamic:
             return None
+        mass, damping, _ = mechanical_units(self.device.position_unit)
         parts = [
-            f"a {word} of {value:.4g}"
-            for word, value in (("mass", self.mass), ("damping", self.object_damping))
+            f"a {word} of {value:.4g} {unit}"
+            for word, value, unit in (("mass", self.mass, mass), ("damping", self.object_damping, damping))
             if value
         ]
         return Refusal(f"the object has {' and '.join(parts)}, which this structure cannot render")
@@ -186,7 +188,8 @@ def _direct_limited(task: Task) -> Candidate | Refusal:
         else _within(task.model, low, high, task.device)
     )
     if limited is None:
-        return Refusal(f"no network with slopes between {low:.4g} and {high:.4g} was found")
+        unit = _slope_unit(task.device)
+        return Refusal(f"no network with slopes between {low:.4g} and {high:.4g} {unit} was found")
     return _predicted(task.certified(task.direct_scheme(limited), limited), task)
 
 
@@ -225,7 +228,10 @@ def _massless(task: Task) -> Candidate | Refusal:
         return _NOT_LIMITED
     limited = _within(balanced, low, high, device)
     if limited is None:
-        return Refusal(f"no network with slopes below {highest:.4g} = {compensated_share} K_c was found")
+        unit = _slope_unit(task.device)
+        return Refusal(
+            f"no network with slopes below {highest:.4g} {unit} = {compensated_share} K_c was found"
+        )
     return task.certified(scheme, limited)
 
 
@@ -242,7 +248,10 @@ def _with_mass(structure: str, task: Task) -> Candidate | Refusal:
     if stiffness is None:
         stiffness = stiffest_coupling(coupling_damping=coupling_damping, falling=0.0, device=task.device)
     if stiffness <= 0.0:
-        return Refusal(f"device damping is {task.device.viscous_damping:.4g}: too small for any coupling")
+        _, unit, _ = mechanical_units(task.device.position_unit)
+        return Refusal(
+            f"device damping is {task.device.viscous_damping:.4g} {unit}: too small for any coupling"
+        )
     return task.certified(
         Scheme(
             structure=structure,
@@ -341,11 +350,17 @@ def _predicted(found: Candidate, task: Task) -> Candidate:
 
 
 def _no_slope(device: DeviceProfile) -> Refusal:
+    _, damping, force = mechanical_units(device.position_unit)
     return Refusal(
-        f"the device can render no slope: device friction {device.coulomb_friction:.4g}, device damping "
-        f"{device.viscous_damping:.4g}, encoder step {device.encoder_step:.4g}, force step "
-        f"{device.force_step:.4g}"
+        f"the device can render no slope: device friction {device.coulomb_friction:.4g} {force}, "
+        f"device damping {device.viscous_damping:.4g} {damping}, encoder step {device.encoder_step:.4g} "
+        f"{device.position_unit}, force step {device.force_step:.4g} {force}"
     )
+
+
+def _slope_unit(device: DeviceProfile) -> str:
+    _, _, force = mechanical_units(device.position_unit)
+    return f"{force}/{device.position_unit}"
 
 
 def _within(model: ForceModel, low: float, high: float, device: DeviceProfile) -> ForceModel | None:

@@ -116,7 +116,7 @@ class DeviceProfile(_core.device.DeviceProfile):
 
 
 def _wrong_fields(content: Mapping[str, Any]) -> list[str]:
-    """Returns the error of each field of a profile that is missing, unknown or impossible alone."""
+    """Returns the error of each field of a profile that is missing, unknown or impossible."""
     # In a long period any delay is possible, so that each field is checked independently of the others.
     possible = _core.device.DeviceProfile().to_dict() | {"period_s": 1e9}
     errors = []

@@ -23,6 +23,7 @@ from ..html_table import Curve, html_table
 from ..model import Model
 from ..model.model_file import certificate_record
 from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
+from .device_profile import mechanical_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,6 +43,9 @@ _MOST_ADVISED_ERROR = 0.5
 
 SAMPLES = 1001
 """Number of positions over the domain at which the force error is computed [-]"""
+
+NO_CERTIFICATE = "the plan has no certificate: make a plan for a device with palpate plan"
+"""Finding on a plan that was made by hand"""
 
 NETWORK = (
     "alpha",
@@ -212,10 +216,11 @@ class Plan:
         unit = self.model.units["force"] or "in the model's unit"
         slope, steepest = self.slopes_behind_coupling
         if slope < steepest:
-            rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {slope:.4g}"
+            stiffness = self._units()["stiffness"]
+            rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {slope:.4g}{stiffness}"
         rows["force error"] = (
-            f"up to {error.largest:.4g} {unit}, "
-            f"{100.0 * error.share:.3g} % of range; RMS {100.0 * error.rms_share:.3g} % of spread"
+            f"up to {error.largest:.4g} {unit}, {_percent(error.share)} of the force range; RMS "
+            f"{error.rms:.4g} {unit}"
             if error.largest
             else "none"
         )
@@ -229,18 +234,38 @@ class Plan:
 
     def settings(self) -> dict[str, str]:
         """Returns the settings of the structure for display, by name."""
-        scheme, rows = self.scheme, {}
+        scheme, rows, units = self.scheme, {}, self._units()
         if self.solver is not None:
             rows["solver"] = self.solver
         if scheme.has_coupling:
-            rows["coupling"] = f"K_c = {scheme.coupling_stiffness:.4g}, B_c = {scheme.coupling_damping:.4g}"
+            rows["coupling"] = (
+                f"K_c = {scheme.coupling_stiffness:.4g}{units['stiffness']}, "
+                f"B_c = {scheme.coupling_damping:.4g}{units['damping']}"
+            )
         if scheme.has_mass:
-            rows["object"] = f"mass {scheme.mass:.4g}, damping {scheme.object_damping:.4g}"
+            rows["object"] = (
+                f"mass {scheme.mass:.4g}{units['mass']}, "
+                f"damping {scheme.object_damping:.4g}{units['damping']}"
+            )
         if scheme.predict:
-            rows["prediction"] = f"half a sample ahead, from {scheme.predict} previous samples"
+            samples = "sample" if scheme.predict == 1 else f"{scheme.predict} samples"
+            rows["prediction"] = f"half a sample ahead, from the previous {samples}"
         if scheme.play_radius:
-            rows["play radius"] = f"{scheme.play_radius:.4g}"
+            rows["play radius"] = f"{scheme.play_radius:.4g}{units['position']}"
         return rows
+
+    def _units(self) -> dict[str, str]:
+        """Returns the unit of each kind of quantity with a space before it; empty text without units."""
+        position, force = self.model.units["position"], self.model.units["force"]
+        if position not in ("m", "rad") or not force:
+            return dict.fromkeys(("mass", "damping", "stiffness", "position"), "")
+        mass, damping, _ = mechanical_units(position)
+        return {
+            "mass": f" {mass}",
+            "damping": f" {damping}",
+            "stiffness": f" {force}/{position}",
+            "position": f" {position}",
+        }
 
     def forces_at_rest(self) -> tuple[Float1D, Float2D, Float2D]:
         """Returns positions (n,) over the domain, and identified and felt force (k, n) of a handle at rest.
@@ -297,7 +322,7 @@ class Plan:
 
     def _certificate_findings(self) -> tuple[Finding, ...]:
         if self.certificate is None:
-            return (usable("the plan has no certificate: make a plan for a device with palpate plan"),)
+            return (usable(NO_CERTIFICATE),)
         if self.certificate.refused:
             cure = f". The object {self.needs}" if self.needs else ""
             reason = "" if self.needs else f": {self.certificate.reason}"

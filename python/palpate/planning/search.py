@@ -284,8 +284,8 @@ def _too_steep(task: Task, need: str, scaled: DeviceProfile | None) -> str:
     position = device.position_unit
     steepest, rendered = sliding_bounds(model).steepest, renderable_slopes(device)[1]
     sentences = [
-        f"is too steep for this device: its slope is up to {steepest:.3g} {force}/{position}, and the device "
-        f"renders {rendered:.3g} {force}/{position} at {1.0 / device.period_s:.6g} Hz"
+        f"is too steep for this device: its slope is up to {_plain(steepest)} {force}/{position}, and the "
+        f"device renders {_plain(rendered)} {force}/{position} at {1.0 / device.period_s:.6g} Hz"
     ]
     if need:
         sentences.append(
@@ -307,17 +307,23 @@ def _too_steep(task: Task, need: str, scaled: DeviceProfile | None) -> str:
             cannot = ""
         sentences += (
             [
-                f"The slope must be {factor:.3g} times smaller. A scaled recording with {result} {cannot}",
+                f"The slope must be {_plain(factor)} times smaller",
+                f"A scaled recording with {result} {cannot}",
                 "Use a device with more damping",
             ]
             if cannot
             else [
-                f"Scale the recording so that the slope is {factor:.3g} times smaller: position times "
+                f"Scale the recording so that the slope is {_plain(factor)} times smaller: position times "
                 f"{longer:.3g} and force times {1.0 / weaker:.3g} give {result}",
                 "Or use a device with more damping",
             ]
         )
     return ". ".join(sentences)
+
+
+def _plain(value: float) -> str:
+    """Returns a number with three digits; below 1e6 without an exponent."""
+    return f"{float(f'{value:.3g}'):g}"
 
 
 def _candidates(task: Task) -> tuple[str, ...]:

@@ -39,7 +39,7 @@ _TOLERATED_ERROR_SHARE = 0.02
 """Largest force error without a finding [share of the force range]"""
 
 _HELD_SHARE = 0.8
-"""Largest rendered force against which the simulated hand presses [share of the force limit]; the rest is for
+"""Largest felt force against which the simulated hand presses [share of the force limit]; the rest is for
 coupling and damping"""
 
 _DOMAIN_MARGIN = 0.01
@@ -47,7 +47,7 @@ _DOMAIN_MARGIN = 0.01
 
 _COMPENSATED_DAMPING_RATIO = 0.25
 """Coupling damping of the compensated structure divided by that of the other structures [-]; the share
-(f'/K_c)^2 of this damping is rendered."""
+(f'/K_c)^2 of this damping is felt."""
 
 _COMPARED_PREDICTION = 4
 """Number of previous position samples that a prediction uses in a comparison of structures [-]"""
@@ -65,23 +65,23 @@ def rig_for(model: Model) -> TestRig:
 def hand_for(plan: Plan, device: DeviceProfile) -> Hand:
     """Returns a simulated hand that moves the handle through the domain of a model while a plan is rendered.
 
-    Near the ends of the domain 1 % is left out, because the handle overshoots. The hand stops where
-    the rendered force would exceed 80 % of the force limit of the device.
+    Near the ends of the domain 1 % is left out, because the handle overshoots. The hand stops where the felt
+    force would exceed 80 % of the force limit of the device.
     """
     usual = rig_for(plan.model).hand
-    x, _, rendered = plan.forces_at_rest()
+    x, _, at_rest = plan.forces_at_rest()
     margin = _DOMAIN_MARGIN * (x[-1] - x[0])
-    held = np.abs(rendered).max(axis=0) <= _HELD_SHARE * device.force_limit
+    held = np.abs(at_rest).max(axis=0) <= _HELD_SHARE * device.force_limit
     inside = np.flatnonzero(held & (x >= x[0] + margin) & (x <= x[-1] - margin))
     if not len(inside):
         return usual
     first, last = inside[0], inside[-1]
-    # The handle stops where the force of the hand's spring equals the rendered force and the device friction.
+    # The handle stops where the force of the hand's spring equals the felt force and the device friction.
     friction = device.coulomb_friction
     ends = sorted(
         (
-            x[first] + (rendered[-1][first] - friction) / usual.stiffness,
-            x[last] + (rendered[0][last] + friction) / usual.stiffness,
+            x[first] + (at_rest[-1][first] - friction) / usual.stiffness,
+            x[last] + (at_rest[0][last] + friction) / usual.stiffness,
         )
     )
     return Hand(
@@ -242,8 +242,8 @@ def covered_text(plan: Plan, device: DeviceProfile, rendered: Recording) -> str:
     inside = max(0.0, min(high, upper) - max(low, lower)) / (upper - lower)
     reached = Unit.of_si(plan.model.units["position"]).interval(low, high)
     text = f"{reached}, {100.0 * inside:.3g} % of the domain"
-    _, _, forces = plan.forces_at_rest()
-    if np.abs(forces).max() <= _HELD_SHARE * device.force_limit:
+    _, _, at_rest = plan.forces_at_rest()
+    if np.abs(at_rest).max() <= _HELD_SHARE * device.force_limit:
         return text
     force_unit = Unit.of_si(plan.model.units["force"])
     return (
@@ -292,8 +292,12 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
         findings.append(
             level(
                 f"the force error is {100 * share:.3g} % of the object's force range, above "
-                f"{100 * _TOLERATED_ERROR_SHARE:.3g} %: choose a structure with palpate plan, or a stiffer "
-                "coupling"
+                f"{100 * _TOLERATED_ERROR_SHARE:.3g} %: "
+                + (
+                    "choose a structure with palpate plan, or a stiffer coupling"
+                    if plan.limited is None
+                    else "the device is too weak for the object, so the plan limits the slopes of the force"
+                )
             )
         )
     outside = int(rendered.columns["extrapolated"].sum())

@@ -43,6 +43,9 @@ LEAST_LOOP_SHARE = 0.02
 LEAST_LOOP_ERRORS = 5.0
 """Least mean of press minus release force that is hysteresis, divided by the standard error of this mean."""
 
+LONGEST_LAG_S = 0.1
+"""Longest lag of a force sensor that is advised to be corrected [s]"""
+
 LEAST_CLIPPED_ROWS = 5
 """Least number of rows at the largest or least force (or position) that are reported as a clipped sensor."""
 
@@ -199,7 +202,10 @@ def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) 
         return []
     mean, is_loop = _loop(recording, cells)
     if is_loop and mean < 0.0:
-        late = "" if recording.time is None else "; if the force was recorded late, --force-late-s SECONDS"
+        lag_s = _lag_of(recording, -mean)
+        late = (
+            f"; if the force was recorded late, --force-late-s {lag_s:.2g}" if lag_s <= LONGEST_LAG_S else ""
+        )
         return [
             usable(
                 f"on average the force on release is {recording.file_unit('force').text(-mean)} above that "
@@ -222,6 +228,19 @@ def _loop(recording: Recording, cells: CellRows | None) -> tuple[float, bool]:
     same_sign = float(np.mean(np.sign(cells.loop) == np.sign(mean)))
     large = abs(mean) > max(LEAST_LOOP_ERRORS * error, LEAST_LOOP_SHARE * float(np.std(recording.force)))
     return mean, large and same_sign >= LEAST_SAME_SIGN_SHARE
+
+
+def _lag_of(recording: Recording, gap: float) -> float:
+    """Returns the lag of the force that raises release above press by `gap` [s]; infinite without time.
+
+    A force that is late by t is lower on press and higher on release by slope * speed * t.
+    """
+    period = recording.sample_period
+    if period is None:
+        return np.inf
+    slope = abs(float(np.polyfit(recording.position, recording.force, 1)[0]))
+    speed = float(np.mean(np.abs(np.diff(recording.position)))) / period
+    return gap / (2.0 * slope * speed) if slope * speed > 0.0 else np.inf
 
 
 def saturation_findings(recording: Recording, travel: Travel) -> list[Finding]:

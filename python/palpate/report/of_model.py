@@ -21,7 +21,7 @@ from .charts import CLASS_MARKS, Chart, Panel
 from .of_comparison import LINE_MARKS, curves_of
 from .page import Section
 from .subject import Subject
-from .words import amount, date_text, interval, percent
+from .words import amount, counted, date_text, interval, percent
 
 WAVELET_POINTS = 61
 """Number of points at which one wavelet is drawn"""
@@ -78,7 +78,9 @@ def wavelets(subject: Subject) -> Section:
             "Wavelets and line give the mean force of press and release; the hysteresis uses the same "
             "wavelets with other weights."
         )
-    description = f"Force of the model with its straight line; below, its {model.n_wavelets} wavelets."
+    description = (
+        f"Force of the model with its straight line; below, its {counted(model.n_wavelets, 'wavelet')}."
+    )
     return Section(key, title, explanation, sentences, [Chart(description, above, below)])
 
 
@@ -123,7 +125,7 @@ def selection_path(subject: Subject) -> Section:
         judged = rows & np.isfinite(criterion)
         below.steps(size[judged], criterion[judged], mark, "")
     sentence = (
-        f"The model class is {model.fit.model_class} with {model.n_wavelets} wavelets and "
+        f"The model class is {model.fit.model_class} with {counted(model.n_wavelets, 'wavelet')} and "
         f"{model.n_parameters} parameters: the last point of its line, after wavelets that were not needed "
         f"were removed. {STOPS.get(model.stop_reason, f'Growth was stopped by {model.stop_reason}')}."
     )
@@ -148,7 +150,7 @@ def provenance(subject: Subject) -> Section:
         *_columns(data.columns),
     ]
     facts["model"] = [
-        f"{model.kind}, model class {model.fit.model_class}, {model.n_wavelets} wavelets, "
+        f"{model.kind}, model class {model.fit.model_class}, {counted(model.n_wavelets, 'wavelet')}, "
         f"{model.n_parameters} parameters",
         f"NRMSE {percent(model.fit.nrmse)} on the fitted rows",
         *_domain(model),

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._core.device import DeviceProfile
 from .._core.stability import Certificate, Inequality
 from ..planning import force_at, mechanical_units
+from ..planning.plan import NO_CERTIFICATE
 from ..plotting.look import scale_for
 from .charts import Chart, Panel
 from .inequalities import BASES, MEANINGS, VERDICTS, symbols_in
@@ -68,8 +70,7 @@ def certificate_table(subject: Subject) -> Section:
     if plan is None:
         return Section(key, title, explanation, left_out=subject.no_plan)
     if plan.certificate is None:
-        reason = "the plan has no certificate: make a plan for a device with palpate plan"
-        return Section(key, title, explanation, left_out=reason)
+        return Section(key, title, explanation, left_out=NO_CERTIFICATE)
     certificate = plan.certificate
     sentences = [VERDICTS[certificate.verdict]]
     if subject.refusal:
@@ -86,6 +87,7 @@ def certificate_table(subject: Subject) -> Section:
     facts = {
         "device": [
             f"{certificate.device.id}, {1.0 / certificate.device.period_s:g} samples per second",
+            *_profile(certificate.device),
         ],
         **{name: [value] for name, value in (plan.summary() | plan.settings()).items()},
         "fingerprint": [certificate.fingerprint],
@@ -114,10 +116,32 @@ def _row(line: Inequality, certificate: Certificate) -> list[str]:
         "\n".join(filter(None, (f"{line.name[:1].upper()}{line.name[1:]}", meaning, line.formula))),
         f"{sign} {side(line.right)}",
         side(line.left),
-        side(line.margin),
-        f"{line.basis}: {BASES[line.basis]}" + (f"\n{line.source}" if line.source else ""),
+        # At 0 the condition is met without a reserve, and none is needed.
+        "not needed" if line.right == 0.0 == line.left and line.holds else side(line.margin),
+        f"{line.basis}: {BASES[line.basis]}" + (f"\n{_source(line)}" if line.source else ""),
         "holds" if line.holds else "does not hold",
     ]
+
+
+def _source(line: Inequality) -> str:
+    """Returns the source of an inequality; a reader of the page has no folder docs."""
+    return line.source.replace("docs/certificate.md", "documentation of palpate, page certificate")
+
+
+def _profile(device: DeviceProfile) -> list[str]:
+    """Returns the numbers of a device with their units."""
+    inertia, damping, force = mechanical_units(device.position_unit)
+    amounts = {
+        "inertia": (device.inertia, inertia),
+        "viscous damping b": (device.viscous_damping, damping),
+        "Coulomb friction f_c": (device.coulomb_friction, force),
+        "encoder step Delta": (device.encoder_step, device.position_unit),
+        "force step Delta_F": (device.force_step, force),
+        "force limit": (device.force_limit, force),
+        "delay t_d": (device.delay_s, "s"),
+        "jitter": (device.jitter_s, "s"),
+    }
+    return [f"{name}: {value:.4g} {unit}".replace("*", "·") for name, (value, unit) in amounts.items()]
 
 
 def _unit(kind: str, position: str) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -84,6 +85,10 @@ class Section:
         return sorted(found, key=lambda finding: -LEVELS.index(finding.level))
 
 
+_OPTION = re.compile(r"(?<!\S)--[a-zA-Z][\w-]*")
+"""Option of the command line in a sentence"""
+
+
 def bokeh(module: str) -> Any:
     """Imports a module of Bokeh, which draws the charts.
 
@@ -113,14 +118,21 @@ def html_of(title: str, subtitle: str, sections: Sequence[Section]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    markup = jinja2.utils.markupsafe
+
+    def unbroken(text: str) -> Any:
+        """Returns text as HTML in which a line does not break inside an option such as --inputs."""
+        return markup.Markup(_OPTION.sub(r'<span class="option">\g<0></span>', str(markup.escape(text))))
+
+    environment.filters["unbroken"] = unbroken
     inline = resources.Resources(mode="inline", components=["bokeh"])
     text: str = environment.get_template("page.html").render(
         title=title,
         subtitle=subtitle,
         sections=sections,
         colours=COLOURS,
-        library=jinja2.utils.markupsafe.Markup("\n".join(inline.js_raw)),
-        data=jinja2.utils.markupsafe.Markup(_script_json({"colours": COLOURS, "charts": items})),
+        library=markup.Markup("\n".join(inline.js_raw)),
+        data=markup.Markup(_script_json({"colours": COLOURS, "charts": items})),
     )
     return text
 

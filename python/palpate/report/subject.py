@@ -17,6 +17,7 @@ from ..arguments import instance_of, path_of
 from ..errors import InputError
 from ..model import Model, load_model
 from ..planning import DeviceProfile, ForceError, Plan, force_error, hand_for, judge, simulate
+from ..planning.plan import NO_CERTIFICATE
 from ..planning.search import plan as make_plan
 from ..recording import Recording
 from ..verdict import Verdict, no
@@ -131,7 +132,7 @@ class Subject:
         if self.refusal:
             return "the plan is refused"
         if self.plan.certificate is None:
-            return "the plan has no certificate, so its device is not known: make a plan with palpate plan"
+            return NO_CERTIFICATE
         if self.plan.certificate.refused:
             return "no structure can render the model on this device"
         try:

@@ -29,6 +29,11 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.3g} %"
 
 
+def counted(number: int, thing: str) -> str:
+    """Returns a number of things as text: "1 wavelet", "2 wavelets"."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
 def date_text(seconds: float) -> str:
     """Returns seconds since 1970 as date and time."""
     return f"{datetime.fromtimestamp(seconds, timezone.utc):%Y-%m-%d %H:%M} UTC"

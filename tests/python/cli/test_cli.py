@@ -43,7 +43,12 @@ def test_help_ends_with_one_example_and_the_glossary(verb: str, capsys: pytest.C
     assert main([verb, "--help"]) == 0
     *_, example, terms = capsys.readouterr().out.strip().split("\n\n")
     assert " ".join(example.split()).startswith(f"Example: palpate {verb}")
-    assert terms.strip() == "Terms: docs/glossary.md"
+    assert terms.strip() == "Terms: palpate --glossary"
+
+
+def test_the_glossary_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--glossary"]) == 0
+    assert "| play radius |" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("verb", VERBS)

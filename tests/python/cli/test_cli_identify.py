@@ -302,3 +302,12 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(folder: Path) -> None:
     assert output == ""
     assert messages == "error: interrupted; nothing was written\n"
     assert [path.name for path in folder.iterdir()] == ["a.csv"]
+
+
+def test_an_output_that_is_not_a_model_file_is_refused(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sample_recording(1).write(folder / "a.csv")
+    assert main(["identify", "a.csv", "-o", "x.csv"]) == 2
+    assert "x.csv is not a model file: its name must end in .json" in capsys.readouterr().err
+    assert [path.name for path in folder.iterdir()] == ["a.csv"]

@@ -110,7 +110,7 @@ def test_encoder_step_of_a_certified_device_cannot_be_changed(
 
 def test_format_is_required(planned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(planned), "-o", str(tmp_path / "m.h")]) == 2
-    assert "one of --c, --fmu, --table, --schema" in capsys.readouterr().err
+    assert "one of --c, --fmu, --table, --schema, --mcap" in capsys.readouterr().err
 
 
 def test_failed_comparison_writes_nothing_and_exits_with_code_1(
@@ -156,3 +156,45 @@ def test_schema_needs_no_model(tmp_path: Path) -> None:
 def test_model_is_required_for_a_header(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", "--c", "-o", str(tmp_path / "m.h")]) == 2
     assert "no model is given" in capsys.readouterr().err
+
+
+def test_a_recording_is_exported_as_mcap_which_the_mcap_reader_reads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    reader = pytest.importorskip("mcap.reader")
+    monkeypatch.chdir(tmp_path)
+    rows = "\n".join(f"{k / 1000},{k / 10},{k / 5}" for k in range(20))
+    Path("press.csv").write_text(f"time_s,depth_mm,force_N\n{rows}\n")
+    assert main(["export", "press.csv", "--mcap", "-o", "press.mcap", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["format"], printed["rows"], printed["verdict"]) == ("mcap", 20, "good")
+    with Path("press.mcap").open("rb") as stream:
+        messages = [
+            (message.log_time, json.loads(message.data))
+            for _, _, message in reader.make_reader(stream).iter_messages()
+        ]
+    assert messages[3] == (3_000_000, {"time_s": 0.003, "position_m": 0.3e-3, "force_N": 0.6})
+    before = Path("press.mcap").read_bytes()
+    for words, sentence in (
+        (["press.csv", "--mcap", "-o", "press.mcap"], "press.mcap exists already"),
+        (["press.csv", "--mcap", "-o", "press.bin"], "its name must end in .mcap"),
+        (["--mcap", "-o", "other.mcap"], "no recording is given"),
+    ):
+        assert main(["export", *words]) == 2
+        assert sentence in capsys.readouterr().err
+    assert Path("press.mcap").read_bytes() == before
+
+
+def test_a_flight_record_is_exported_as_mcap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mcap.reader")
+    monkeypatch.chdir(tmp_path)
+    model_by_hand().save("m.json")
+    assert main(["simulate", "m.json", "--structure", "direct", "--duration-s", "0.1", "-o", "felt.csv"]) in (
+        0,
+        1,
+    )
+    assert main(["export", "felt.csv", "--mcap", "-o", "felt.mcap"]) == 0
+    csv, mcap = (palpate.read_recording(name) for name in ("felt.csv", "felt.mcap"))
+    np.testing.assert_array_equal(mcap.position, csv.position)
+    np.testing.assert_array_equal(mcap.force, csv.force)
+    assert list(mcap.columns) == list(csv.columns)

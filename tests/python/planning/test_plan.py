@@ -359,7 +359,9 @@ def test_force_error_of_a_soft_coupling_is_reported(here: Path, capsys: pytest.C
         1.0 / printed["steepest_slope"] + 1.0 / stiffness
     )
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3"]) == 0
-    assert f"slopes up to {printed['steepest_slope']:.4g} are felt as up to " in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert f"slopes up to {printed['steepest_slope']:.4g} are felt as up to " in shown
+    assert shown.split("are felt as up to ")[1].split("\n")[0].endswith(" N*m/rad")
 
 
 @pytest.mark.parametrize(
@@ -432,3 +434,23 @@ def test_the_examples_are_listed_with_their_sources(capsys: pytest.CaptureFixtur
 def test_the_locus_is_drawn(here: Path) -> None:
     assert main(["plan", "m.json", "--device", "knob.toml", "--mass", "1e-3", "--plot", "locus.png"]) == 0
     assert Path("locus.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_settings_of_a_plan_have_units() -> None:
+    scheme = Scheme(
+        structure="implicit", coupling_stiffness=70.0, coupling_damping=0.1, mass=1e-3, object_damping=0.5
+    )
+    rotary = Plan(model_by_hand(), scheme).settings()
+    assert rotary["coupling"] == "K_c = 70 N*m/rad, B_c = 0.1 N*m*s/rad"
+    assert rotary["object"] == "mass 0.001 kg*m^2, damping 0.5 N*m*s/rad"
+    linear = Plan(keyswitch_by_hand(), Scheme(structure="direct", play_radius=1e-4)).settings()
+    assert linear["play radius"] == "0.0001 m"
+    for samples, text in ((1, "the previous sample"), (4, "the previous 4 samples")):
+        ahead = Plan(model_by_hand(), Scheme(structure="direct", predict=samples)).settings()
+        assert ahead["prediction"] == f"half a sample ahead, from {text}"
+
+
+def test_a_refused_structure_names_units() -> None:
+    refused = plan(model_by_hand(), DeviceProfile(viscous_damping=0.0), mass=1e-3).refused
+    assert any("device damping is 0 N*m*s/rad: too small" in each for each in refused)
+    assert any("a mass of 0.001 kg*m^2" in each for each in refused)

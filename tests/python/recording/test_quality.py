@@ -2,6 +2,8 @@
 """Checks of a recording: each finding names value, cause and cure; clean recordings have no finding."""
 
 import json
+import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -234,3 +236,27 @@ def test_a_clipped_file_gets_the_verdict_usable_on_the_command_line(
     assert main(["identify", str(path), "-o", str(tmp_path / "press.json"), "--json"]) == 0
     verdict = json.loads(capsys.readouterr().out)["verdict"]
     assert verdict.startswith("usable: the largest force, 5 N*m, occurs in")
+
+
+def sign_sentence(force_of: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> str:
+    time = np.arange(8000) * 1e-3
+    position = 0.5 - 0.5 * np.cos(2.0 * np.pi * 0.5 * time)
+    force = force_of(time, position) + np.random.default_rng(0).normal(0.0, 0.002, len(time))
+    side = np.sign(np.sin(2.0 * np.pi * 0.5 * time))
+    units = {"position": "rad", "force": "N*m"}
+    recorded = palpate.Recording.from_arrays(position, force, time, side, units=units)
+    (sentence,) = (each for each in recorded.verdict.reasons if each.startswith("on average the force"))
+    return sentence
+
+
+def test_a_late_force_is_advised_to_be_moved_by_its_lag() -> None:
+    late = sign_sentence(lambda time, _: 1.0 - np.cos(2.0 * np.pi * 0.5 * (time - 0.025)))
+    advised = re.search(r"if the force was recorded late, --force-late-s (\S+);", late)
+    assert advised
+    assert float(advised[1]) == pytest.approx(0.025, rel=0.4)
+
+
+def test_a_friction_of_the_wrong_sign_is_not_advised_to_be_late() -> None:
+    driven = sign_sentence(lambda time, x: 0.2 * x - 0.5 * np.sign(np.sin(2.0 * np.pi * 0.5 * time)))
+    assert "--negate force" in driven
+    assert "--force-late-s" not in driven

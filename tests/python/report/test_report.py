@@ -14,8 +14,11 @@ import pytest
 import palpate
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import DeviceProfile, InputError, Model, Recording
+from palpate.planning import example_profiles
 from palpate.report import Subject, report_of, write_report
+from palpate.report.page import Section, html_of
 from palpate.report.report import sections_of
+from palpate.report.words import counted
 from palpate.verdict import Verdict, no, usable
 from parsed import Parsed
 
@@ -330,3 +333,34 @@ def test_residuals_without_time_are_in_the_order_of_position(
 ) -> None:
     page = parsed(planned, change(recording(model_by_hand(), seed=1)))
     assert "in the order of position" in page.text["whiteness"]
+
+
+def test_the_section_of_a_plan_states_the_profile_of_the_device() -> None:
+    subject = Subject.of(keyswitch_by_hand()).planned_on(DeviceProfile.load(example_profiles()["touch"][0]))
+    assert subject.plan is not None
+    assert subject.plan.verdict.level == "no"
+    text = Parsed(report_of(subject).html).text["certificate"]
+    for number in (
+        "viscous damping b: 0.05 N·s/m",
+        "Coulomb friction f_c: 0.13 N",
+        "encoder step Delta: 5.5e-05 m",
+        "force limit: 3.3 N",
+        "delay t_d: 0.001 s",
+    ):
+        assert number in text
+    assert "docs/certificate.md" not in text, "a reader of the page has no folder docs"
+    assert "reserve 0 N" not in " ".join(text.split())
+    assert "the plan limits the slopes of the force" in str(subject.verdict)
+
+
+def test_a_line_does_not_break_inside_an_option() -> None:
+    html = report_of(Subject.of(model_by_hand()).compared_with(recording(model_by_hand()))).html
+    html_of_finding = html_of(
+        "t", "s", [Section("verdict", "v", "e", ["s"], verdict=Verdict((usable("give --inputs <b>"),)))]
+    )
+    assert ".option { white-space: nowrap; }" in html
+    assert '<span class="option">--inputs</span> &lt;b&gt;' in html_of_finding
+
+
+def test_one_wavelet_is_not_plural() -> None:
+    assert (counted(1, "wavelet"), counted(2, "wavelet")) == ("1 wavelet", "2 wavelets")

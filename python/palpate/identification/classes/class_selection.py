@@ -22,7 +22,14 @@ from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
 from ..decision import in_words
 from ..network.basis import Basis
-from ..network.constraints import Bound, crossing, domain_bounds, impose, moved_to_bounds
+from ..network.constraints import (
+    Bound,
+    crosses_where_steep,
+    crossing,
+    domain_bounds,
+    impose,
+    moved_to_bounds,
+)
 from ..network.separable import SeparableProblem, Solution
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, Judge, Report, Samples, criterion_of
@@ -195,10 +202,13 @@ class ClassSelection:
         if above is None:
             return note
         lower, reach, position = float(self.data.lower[0]), float(self.data.reach[0]), self.data.position_unit
+        late = ""
+        if crosses_where_steep(free.problem, free.solution):
+            late = " The force may be recorded late: try --force-late-s."
         return (
             f"{note} Without this constraint release is up to {unit.text(above.height)} above press at "
             f"{position.interval(lower + reach * above.start, lower + reach * above.end)}; a passive "
-            "object cannot do that. The force may be recorded late: try --force-late-s."
+            f"object cannot do that.{late}"
         )
 
     def bounds(self, problem: SeparableProblem) -> list[Bound]:
