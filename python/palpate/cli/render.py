@@ -84,9 +84,9 @@ def render(
     """Render a model live on a device, tick by tick.
 
     The loop is that of palpate-control, with real-time priority where the system allows it. A real device
-    requires a plan with a certificate for it. A plan of palpate plan --on-device is rendered by the USB device
-    that contains it; this program then watches and records. Ctrl-C stops the loop: it sends zero force, closes
-    the device and the recording, and prints the summary.
+    requires a plan with a certificate for it. A plan of palpate plan --on-device is rendered by the USB
+    device that contains it; this program then watches and records. Ctrl-C stops the loop: it sends zero
+    force, closes the device and the recording, and prints the summary.
     """
     require_writable(record, inputs=(model_file,))
     if record is not None and not force:
