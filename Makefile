@@ -118,7 +118,7 @@ test-full-native: setup control test-packages
 	tools/system_packages.sh "$(PYTHON)" browser
 	$(python) -m pytest tests/browser
 	tools/system_packages.sh "$(PYTHON)" portable
-	$(python) -m pytest tests/python/export
+	$(python) -m pytest tests/python/export tests/firmware
 
 # The packages as users install them.
 test-packages: $(stamps)/core $(stamps)/control $(stamps)/test $(stamps)/package

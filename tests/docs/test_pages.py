@@ -98,6 +98,13 @@ def test_a_change_of_a_source_or_of_the_module_makes_kept_results_invalid(
     assert digests[0] == digests[2] != digests[1]
 
 
+def test_a_block_whose_programs_are_missing_is_not_run(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    for program, output in (("bash", "found\n"), ("bash no-such-program", "")):
+        page.write_text(f"<!-- needs: {program} -->\n```sh\necho found\n```\n", encoding="utf-8")
+        assert page_code.run_page(page, tmp_path / "folder") == [output]
+
+
 def test_outputs_are_shown_behind_their_blocks() -> None:
     source = ["```python\nprint(1)\n```\ntext\n```sh\ntrue\n```\nend\n"]
     page_code.show_outputs("page", source, {"page": ["1\n", ""]})

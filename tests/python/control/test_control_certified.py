@@ -163,8 +163,8 @@ def test_a_plan_for_the_motor_controller_is_not_rendered_from_the_host(tmp_path:
         completed = control(path, "--device", device)
         assert completed.returncode == 2
         assert completed.stderr == (
-            f"error: {path} is planned for the motor controller of knob at 20000 Hz: set device to "
-            "a USB device that contains the exported model, or make a plan for the host with 'palpate plan' "
+            f"error: {path} is planned for the motor controller of knob at 20000 Hz: set device to a "
+            "USB device that contains the exported model, or make a plan for the host with 'palpate plan' "
             "without on_device\n"
         )
     completed = control(path, "--uncertified", "--duration-s", 0.1, "--lowest-rate-share", 0)

@@ -149,7 +149,7 @@ def test_a_fault_of_the_device_ends_the_run_with_zero_torque(fault: str, tmp_pat
 
 
 def test_a_silent_host_ends_the_rendering_of_the_device(tmp_path: Path) -> None:
-    """After SIGTERM the host disables the device; after SIGKILL the device's watchdog sets zero torque."""
+    """After SIGTERM the host disables the device; after SIGKILL the watchdog sets zero torque."""
     for signal, enabled in (("KILL", True), ("TERM", False)):
         trace, out = tmp_path / f"{signal}-trace.csv", tmp_path / f"{signal}.csv"
         path = planned(tmp_path)

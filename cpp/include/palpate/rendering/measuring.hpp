@@ -10,7 +10,7 @@
 #include <tuple>
 
 #include "palpate/fields/field_table.hpp"
-#include "palpate/model/continuation.hpp"
+#include "palpate/model/parameters.hpp"
 #include "palpate/rendering/structure.hpp"
 
 // Structures that compute the device's force while a real object or the device itself is measured.
