@@ -184,7 +184,7 @@ def test_velocity_of_a_range_of_rows_is_formed_from_the_rows_around_it(tmp_path:
 def test_error_of_measured_joints_does_not_grow(data: Path) -> None:
     """Joints of da Vinci tools: a force of position alone has an NRMSE of 0.34 to 0.97 on held-out rows.
 
-    The short run takes one of both joints of each tool, in turn.
+    The short run takes one joint of each tool: back, front, back.
     """
     both = ("back", "front")
     for k, name in enumerate(
