@@ -37,13 +37,15 @@ export MPLCONFIGDIR ?= $(CURDIR)/build/matplotlib
 python := .venv/bin/python
 # Two runs of pip must not change one environment at the same time.
 pip := flock .venv/pip.lock $(python) -m pip
+# Two runs of apt-get must not overlap either.
+system_packages := flock Makefile tools/system_packages.sh "$(PYTHON)"
 stamps := .venv/stamps
 
 core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree contain absolute paths: they are created again after the folder was moved.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python test-packages bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python examples test-packages bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved
 
 help:
@@ -52,7 +54,7 @@ help:
 # ---------------------------------------------------------------------------------------------------------- set-up
 
 $(stamps)/build: pyproject.toml tools/constraints.txt tools/system_packages.sh $(moved)
-	tools/system_packages.sh "$(PYTHON)" build
+	$(system_packages) build
 	if [ "$$(cat .venv/folder 2>/dev/null)" != "$$(pwd -P)" ]; then rm -rf .venv build; "$(PYTHON)" -m venv .venv; fi
 	$(pip) install --quiet --upgrade pip
 	$(pip) install --quiet --group build
@@ -68,7 +70,7 @@ $(stamps)/core: $(stamps)/build $(core_sources)
 
 # The libraries of palpate-control and of the C++ tests.
 $(stamps)/control $(stamps)/test-cpp: $(stamps)/build
-	tools/system_packages.sh "$(PYTHON)" "$(@F)"
+	$(system_packages) "$(@F)"
 	touch $@
 
 # Tools by their group in pyproject.toml: tests, linters, tests of the packages.
@@ -78,7 +80,7 @@ $(stamps)/test $(stamps)/lint $(stamps)/package: $(stamps)/build
 
 # The programs that build the documentation site.
 $(stamps)/docs: $(stamps)/build
-	tools/system_packages.sh "$(PYTHON)" docs
+	$(system_packages) docs
 	$(pip) install --quiet --group docs
 	touch $@
 
@@ -89,19 +91,25 @@ setup: $(stamps)/core $(stamps)/control $(stamps)/test-cpp $(stamps)/test $(stam
 demo: $(stamps)/core
 	.venv/bin/palpate demo
 
-# The Python tests run last, so that their summary is at the end of the output.
-test: lint test-cpp | setup
+# The Python tests run last, so that their summary is at the end of the output. With `make --jobs` the linters and the
+# compilers share the processors; the C++ and the Python tests, many of which wait for a clock, do not overlap.
+test: lint control test-cpp | setup
 	$(MAKE) --no-print-directory test-python
 
 # One process more than the number of processors, because many tests wait for a clock. Files keep their order, because
 # the longest ones contain few tests and would start last.
-test-python: setup control
+test-python: setup control examples
 	$(python) -m pytest --numprocesses "$$(($(CMAKE_BUILD_PARALLEL_LEVEL) + 1))" --dist loadfile --no-loadscope-reorder
 
 # The real-time program; the build tool detects changed sources.
 control: $(stamps)/control
 	cmake --preset control >/dev/null
 	cmake --build --preset control
+
+# The examples in C++, which the Python tests run.
+examples: setup
+	cmake --preset dev >/dev/null
+	cmake --build --preset dev --target example_programs
 
 test-cpp: setup
 	tools/cpp_tests.sh dev
@@ -115,9 +123,9 @@ test-full-native: setup control test-packages
 	tools/cpp_tests.sh release
 	for preset in asan tsan; do tools/cpp_tests.sh $$preset; done
 	$(python) -m pytest tests/usb
-	tools/system_packages.sh "$(PYTHON)" browser
+	$(system_packages) browser
 	$(python) -m pytest tests/browser
-	tools/system_packages.sh "$(PYTHON)" portable
+	$(system_packages) portable
 	$(python) -m pytest tests/python/export tests/firmware
 
 # The packages as users install them.
