@@ -91,9 +91,10 @@ setup: $(stamps)/core $(stamps)/control $(stamps)/test-cpp $(stamps)/test $(stam
 demo: $(stamps)/core
 	.venv/bin/palpate demo
 
-# The Python tests run last, so that their summary is at the end of the output. With `make --jobs` the linters and the
-# compilers share the processors; the C++ and the Python tests, many of which wait for a clock, do not overlap.
-test: lint control test-cpp | setup
+# The linters and the compilers share the processors. The C++ and the Python tests, many of which wait for a clock, do
+# not overlap. The Python tests run last, so that their summary is at the end of the output.
+test: | setup
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control test-cpp
 	$(MAKE) --no-print-directory test-python
 
 # One process more than the number of processors, because many tests wait for a clock. Files keep their order, because

@@ -409,7 +409,7 @@ def test_unsuitable_device_is_refused_and_no_file_is_written(
         (["--device", "touch"], "position_unit of the device touch is m: must be rad"),
         (["--device", "m.json"], "m.json is not TOML"),
         ([], "Missing option '--device'"),
-        (["--device", "knob.toml", "-o", "knob.toml"], "is also an input"),
+        (["--device", "knob.toml", "-o", "knob.toml"], "knob.toml is not a model file"),
         (["--device", "knob.toml", "--plot", "locus.txt"], "locus.txt is not a figure file"),
         (["--device", "knob.toml", "--coupling-stiffness", "-1"], "coupling_stiffness is -1"),
     ],
