@@ -35,26 +35,33 @@ for source in bench/solvers/bench_*.cpp; do
         exit 1
     fi
 done
-study() {
-    echo
-    .venv/bin/python "bench/$1.py" "${@:2}"
-}
-study solvers/python_calls build/bench/bench_python_calls.json
-study solvers/model_error build/bench/bench_model_error.json
-study solvers/ratios build/bench
-study solvers/speed build/bench --to "$to/figures"
-for name in compare_methods filters parsimony real_data dynamic; do
-    study "identification/$name" --json "build/bench/$name.json"
-done
-study identification/figures build/bench --to "$to"
 "build/release/bench/certificate_search" "$(awk -v scale="$scale" 'BEGIN { print int(2 + 63 * scale) }')" |
     tee build/bench/certificate_search.txt
-study limits/certificate_table build/bench/certificate_search.txt --to "$to"
-study limits/failure_maps --to "$to" --points "$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 9 }')"
-study limits/prediction --to "$to"
-study plans/on_device_stiffness --to "$to"
-study portable/cost --to "$to" --json build/bench/portable_cost.json
-study plans/plan_against_trial --to "$to" --grid "$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 0 : 4 }')"
+
+# Runs the studies of its input, one a line. A short run only tests them, two at a time; times are measured alone.
+at_once=$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 1 }')
+studies() { xargs -P "$at_once" -I STUDY bash -c 'echo; .venv/bin/python bench/STUDY'; }
+studies <<END
+solvers/python_calls.py build/bench/bench_python_calls.json
+solvers/model_error.py build/bench/bench_model_error.json
+identification/compare_methods.py --json build/bench/compare_methods.json
+identification/filters.py --json build/bench/filters.json
+identification/parsimony.py --json build/bench/parsimony.json
+identification/real_data.py --json build/bench/real_data.json
+identification/dynamic.py --json build/bench/dynamic.json
+limits/certificate_table.py build/bench/certificate_search.txt --to $to
+limits/failure_maps.py --to $to --points $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 9 }')
+limits/prediction.py --to $to
+plans/on_device_stiffness.py --to $to
+portable/cost.py --to $to --json build/bench/portable_cost.json
+plans/plan_against_trial.py --to $to --grid $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 0 : 4 }')
+END
+# These draw the results of the others.
+studies <<END
+solvers/ratios.py build/bench
+solvers/speed.py build/bench --to $to/figures
+identification/figures.py build/bench --to $to
+END
 echo "Results: build/bench/*.json; compare two runs with compare.py of Google Benchmark. Figures: $to/figures"
 
 echo "Lateness of the real-time loop compared with cyclictest"
