@@ -73,8 +73,8 @@ $(stamps)/control $(stamps)/test-cpp: $(stamps)/build
 	$(system_packages) "$(@F)"
 	touch $@
 
-# Tools by their group in pyproject.toml: tests, linters, tests of the packages.
-$(stamps)/test $(stamps)/lint $(stamps)/package: $(stamps)/build
+# Tools by their group in pyproject.toml: tests, linters, tests of the packages and of the MuJoCo plugin.
+$(stamps)/test $(stamps)/lint $(stamps)/package $(stamps)/simulators: $(stamps)/build
 	$(pip) install --quiet --group "$(@F)"
 	touch $@
 
@@ -120,10 +120,10 @@ test-full: test-full-native
 
 # Tests that `make test` does not run: sanitizers, the packages, a USB device below a kernel; reports in a browser and
 # exported models on a microcontroller, if Chromium or QEMU was not installed.
-test-full-native: setup control test-packages
+test-full-native: setup control test-packages $(stamps)/simulators
 	tools/cpp_tests.sh release
 	for preset in asan tsan; do tools/cpp_tests.sh $$preset; done
-	$(python) -m pytest tests/usb
+	$(python) -m pytest tests/usb tests/simulators
 	$(system_packages) browser
 	$(python) -m pytest tests/browser
 	$(system_packages) portable
