@@ -21,10 +21,11 @@ import palpate._core
 ROOT = Path(__file__).parents[2]
 SOURCES = (
     "python/palpate",
-    "cpp/include",
+    "cpp",
     "examples",
     "bench",
     "docs/builder",
+    "tests/usb",
     "build/control/palpate-control",
 )
 """Folders and files of the repository that the code of the site uses"""

@@ -87,7 +87,13 @@ def test_a_change_of_a_source_or_of_the_module_makes_kept_results_invalid(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     files = {str(file) for file in once.files()}
-    for used in (page_code.__file__, _core.__file__, ROOT / "python" / "palpate" / "cli" / "main.py"):
+    for used in (
+        page_code.__file__,
+        _core.__file__,
+        ROOT / "python" / "palpate" / "cli" / "main.py",
+        ROOT / "cpp" / "firmware" / "palpate_device.c",
+        ROOT / "tests" / "usb" / "run_emulated.py",
+    ):
         assert str(used) in files
     source = tmp_path / "source.py"
     monkeypatch.setattr(once, "files", lambda: [source])

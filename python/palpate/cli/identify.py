@@ -15,7 +15,6 @@ import click
 import numpy as np
 
 from ..baselines import Compared, compare
-from ..errors import InputError
 from ..identification import identify as identify_model
 from ..identification.classes.findings import error_findings
 from ..identification.identify_files import identify_files
@@ -59,6 +58,7 @@ from .verb import (
     options,
     plot_option,
     reading_options,
+    require_model_name,
     require_writable,
     verb,
     verbose_option,
@@ -189,8 +189,7 @@ def identify(
     RECORDING: CSV, Parquet, Excel, .npz, .mat or MCAP, with the unit in each column name: position_rad,
     "Force [gf]", "Force / N". The simplest model that fits is taken.
     """
-    if output.suffix.lower() != ".json":
-        raise InputError(f"{output} is not a model file: its name must end in .json")
+    require_model_name(output)
     require_writable(output, plot, inputs=recording_files)
     recordings: list[Recording] = []
     by_parts = out_of_core or jobs != 1 or scheduler is not None

@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from .._core.stability import Certificate
-from ..errors import InputError
 from ..model import load_model
 from ..model.model_file import certificate_record
 from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, profile_file
@@ -34,6 +33,7 @@ from .verb import (
     PATH,
     json_option,
     plot_option,
+    require_model_name,
     require_writable,
     sized,
     verb,
@@ -175,8 +175,8 @@ def plan(
     **given: Any,
 ) -> None:
     """Choose the structure that renders a model on a device, and certify it."""
-    if output is not None and output.suffix.lower() != ".json":
-        raise InputError(f"{output} is not a model file: its name must end in .json")
+    if output is not None:
+        require_model_name(output)
     profile_path = profile_file(device)
     require_writable(plot, inputs=(model_file, profile_path))
     require_writable(output, plot, inputs=(profile_path,))  # the output may be the model file

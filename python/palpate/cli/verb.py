@@ -8,18 +8,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial, wraps
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 
 from .._core.rendering import Scheme, most_prediction_taps, structure_names
 from ..arguments import first_sentence, parameter_texts
 from ..errors import InputError
-from ..model import Model
 from ..recording import Recording, read_recording
 from .completion import FIGURES, FileName
 from .exit_status import interrupted_at_once
 from .printing import TERMS, Option, Verb, set_quiet, talk
+
+if TYPE_CHECKING:
+    from ..model import Model
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -272,6 +274,18 @@ def plot_option(shows: str, name: str = "--plot") -> Callable[[F], F]:
     return click.option(
         name, type=PATH, metavar="PNG", default=None, callback=_figure_name, help=f"Draw {shows}."
     )
+
+
+def require_model_name(output: Path) -> None:
+    """Refuses an output file of a model without the ending .json, before anything is computed.
+
+    Raises
+    ------
+    InputError
+        The name has another ending.
+    """
+    if output.suffix.lower() != ".json":
+        raise InputError(f"{output} is not a model file: its name must end in .json")
 
 
 def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = ()) -> None:

@@ -274,59 +274,56 @@ FMU_EXPORT fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueRefer
     return fmi3OK;
 }
 
+static fmi3Status wrong_variable(const Instance *fmu, fmi3ValueReference only) {
+    return fail(fmu, only == POSITION ? "the only known of a derivative is the input position"
+                                      : "the only unknown of a derivative is the output force");
+}
+
+/* The force has one input and one output, so both derivatives multiply the sum of the seeds by the slope. Each seed
+ * belongs to a variable `from`, each product to a variable `to`. */
+static fmi3Status times_slope(const Instance *fmu, const fmi3ValueReference from[], size_t n_from,
+                              fmi3ValueReference only_from, const fmi3ValueReference to[], size_t n_to,
+                              const fmi3Float64 seed[], fmi3Float64 product[]) {
+    const fmi3ValueReference only_to = only_from == POSITION ? FORCE : POSITION;
+    double change = 0.0;
+    double slope;
+    size_t k;
+    for (k = 0; k < n_from; ++k) {
+        if (from[k] != only_from) {
+            return wrong_variable(fmu, only_from);
+        }
+        change += seed[k];
+    }
+    (void)palpate_model_force_slope_at(&fmu->state.model, fmu->state.position, &slope);
+    for (k = 0; k < n_to; ++k) {
+        if (to[k] != only_to) {
+            return wrong_variable(fmu, only_to);
+        }
+        product[k] = slope * change;
+    }
+    return fmi3OK;
+}
+
 FMU_EXPORT fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[],
                                                    size_t nUnknowns, const fmi3ValueReference knowns[],
                                                    size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
                                                    fmi3Float64 sensitivity[], size_t nSensitivity) {
     const Instance *fmu = (const Instance *)instance;
-    double change = 0.0;
-    double slope;
-    size_t k;
     if (nSeed != nKnowns || nSensitivity != nUnknowns) {
         return fail(fmu, "there must be one seed for each known and one sensitivity for each unknown");
     }
-    for (k = 0; k < nKnowns; ++k) {
-        if (knowns[k] != POSITION) {
-            return fail(fmu, "the only known of a derivative is the input position");
-        }
-        change += seed[k];
-    }
-    (void)palpate_model_force_slope_at(&fmu->state.model, fmu->state.position, &slope);
-    for (k = 0; k < nUnknowns; ++k) {
-        if (unknowns[k] != FORCE) {
-            return fail(fmu, "the only unknown of a derivative is the output force");
-        }
-        sensitivity[k] = slope * change;
-    }
-    return fmi3OK;
+    return times_slope(fmu, knowns, nKnowns, POSITION, unknowns, nUnknowns, seed, sensitivity);
 }
 
-/* The force has one input and one output, so both derivatives are the product with the slope. */
 FMU_EXPORT fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[],
                                                size_t nUnknowns, const fmi3ValueReference knowns[],
                                                size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
                                                fmi3Float64 sensitivity[], size_t nSensitivity) {
     const Instance *fmu = (const Instance *)instance;
-    double change = 0.0;
-    double slope;
-    size_t k;
     if (nSeed != nUnknowns || nSensitivity != nKnowns) {
         return fail(fmu, "there must be one seed for each unknown and one sensitivity for each known");
     }
-    for (k = 0; k < nUnknowns; ++k) {
-        if (unknowns[k] != FORCE) {
-            return fail(fmu, "the only unknown of a derivative is the output force");
-        }
-        change += seed[k];
-    }
-    (void)palpate_model_force_slope_at(&fmu->state.model, fmu->state.position, &slope);
-    for (k = 0; k < nKnowns; ++k) {
-        if (knowns[k] != POSITION) {
-            return fail(fmu, "the only known of a derivative is the input position");
-        }
-        sensitivity[k] = slope * change;
-    }
-    return fmi3OK;
+    return times_slope(fmu, unknowns, nUnknowns, FORCE, knowns, nKnowns, seed, sensitivity);
 }
 
 /* ------------------------------------------------------------------------------------------------------------- states */

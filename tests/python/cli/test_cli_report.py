@@ -87,7 +87,7 @@ def test_a_plan_on_a_device_replaces_the_plan_of_the_file(folder: Path) -> None:
         (["m.json"], "Missing option '-o'"),
         (["m.json", "-o", "report.pdf"], "report.pdf is not a page: its name must end in .html or .htm"),
         (
-            ["m.json", "--device", "nobody", "-o", "report.html"],
+            ["m.json", "--device", "no-profile", "-o", "report.html"],
             "for a model with positions in rad are bench-knob",
         ),
         (["m.json", "--device", "touch", "-o", "report.html"], "the example profiles in rad are bench-knob"),
