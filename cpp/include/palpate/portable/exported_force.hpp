@@ -325,7 +325,14 @@ class ExportedForce {
         return turns;
     }
 
-    [[nodiscard]] Place in_cell(const CellTable& table, double x) const noexcept {
+    /// A cell of a table and the place in it.
+    struct Cell {
+        std::size_t number;
+        std::uint32_t k;  ///< the cell is 2^k times narrower than a coarse cell
+        double t;         ///< distance from the middle of the cell, divided by the width of the cell
+    };
+
+    [[nodiscard]] static Cell cell_at(const CellTable& table, double x) noexcept {
         const CellGrid& grid = table.grid();
         const double along = (x - grid.start) * (1.0 / grid.coarse_width);
         auto coarse = static_cast<std::uint32_t>(along);
@@ -336,10 +343,15 @@ class ExportedForce {
         const double part = (along - static_cast<double>(coarse)) * static_cast<double>(1U << k);
         auto cell = static_cast<std::uint32_t>(part);
         cell = cell > (1U << k) - 1U ? (1U << k) - 1U : cell;
+        return {(split >> 4U) + cell, k, part - static_cast<double>(cell) - 0.5};
+    }
+
+    [[nodiscard]] Place in_cell(const CellTable& table, double x) const noexcept {
+        const Cell cell = cell_at(table, x);
         Place at;
-        at.cell = (split >> 4U) + cell;
-        at.t = static_cast<Real>(part - static_cast<double>(cell) - 0.5);
-        at.per_width = static_cast<Real>(1.0 / grid.width(k));
+        at.cell = cell.number;
+        at.t = static_cast<Real>(cell.t);
+        at.per_width = static_cast<Real>(1.0 / table.grid().width(cell.k));
         return at;
     }
 
@@ -398,20 +410,10 @@ class ExportedForce {
 
     void integrals_in_cell(std::size_t n, double x, double& first, double& second) const noexcept {
         const CellTable& table = model_.law();
-        const CellGrid& grid = table.grid();
-        const double along = (x - grid.start) * (1.0 / grid.coarse_width);
-        auto coarse = static_cast<std::uint32_t>(along);
-        const auto last = static_cast<std::uint32_t>(table.splits().size() - 1);
-        coarse = coarse > last ? last : coarse;
-        const std::uint32_t split = table.splits()[coarse];
-        const std::uint32_t k = split & 15U;
-        const double part = (along - static_cast<double>(coarse)) * static_cast<double>(1U << k);
-        auto cell = static_cast<std::uint32_t>(part);
-        cell = cell > (1U << k) - 1U ? (1U << k) - 1U : cell;
-        const double t = part - static_cast<double>(cell) - 0.5;
-        const double u = t * grid.width(k);
-        const std::size_t curves = table.curves().size();
-        const std::size_t row = ((split >> 4U) + cell) * curves + n;
+        const Cell cell = cell_at(table, x);
+        const double t = cell.t;
+        const double u = t * table.grid().width(cell.k);
+        const std::size_t row = cell.number * table.curves().size() + n;
         const double* c = table.coefficients().data() + row * CellTable::terms;
         const double* middle = table.integrals().data() + 2 * row;
         const double once =
