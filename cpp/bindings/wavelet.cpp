@@ -191,17 +191,34 @@ std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian
     return {std::move(value), std::move(by_alpha), std::move(by_beta)};
 }
 
-Columns wavelet_steps(const Array& x, const Array& alpha, const Array& beta) {
+using Mask = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+
+Columns wavelet_steps(const Array& x, const Array& alpha, const Array& beta, const Mask& used) {
     const Frame frame(x, alpha, beta);
-    auto result = columns(frame.samples, 2 * frame.dimension * frame.wavelets);
+    if (used.size() != alpha.size()) {
+        throw std::invalid_argument("used has " + std::to_string(used.size()) + " values, alpha has " +
+                                    std::to_string(alpha.size()) + ": must be equal");
+    }
+    std::vector<std::size_t> column(frame.dimension * frame.wavelets);
+    std::size_t count = 0;
+    for (std::size_t j = 0; j < frame.dimension; ++j) {
+        for (std::size_t i = 0; i < frame.wavelets; ++i) {
+            column[i * frame.dimension + j] = count;
+            count += used.data()[i * frame.dimension + j] ? 1 : 0;
+        }
+    }
+    auto result = columns(frame.samples, 2 * count);
     double* out = result.mutable_data();
+    double* by_shift = out + count * frame.samples;
+    const bool* taken = used.data();
     const py::gil_scoped_release unlocked;
-    const std::size_t input = frame.wavelets * frame.samples;
-    double* by_shift = out + frame.dimension * input;
     for (std::size_t i = 0; i < frame.wavelets; ++i) {
         frame.radial(i, [&](const Hats& hats) {
-            std::size_t at = i * frame.samples + hats.first;
-            for (std::size_t j = 0; j < frame.dimension; ++j, at += input) {
+            for (std::size_t j = 0; j < frame.dimension; ++j) {
+                if (!taken[i * frame.dimension + j]) {
+                    continue;
+                }
+                const std::size_t at = column[i * frame.dimension + j] * frame.samples + hats.first;
                 for (std::size_t k = 0; k < hats.size; ++k) {
                     const double u = frame.clamped(i, hats.first + k, j);
                     const double by_u = hats.at(k).gradient_over_u * u;
@@ -261,10 +278,10 @@ void bind_wavelet(py::module_& module) {
         "Returns the values of the wavelets (n, N), and their derivatives by the dilations alpha and by the\n"
         "translations beta, each as a list of d arrays (n, N): (value, by_alpha, by_beta).");
     module.def(
-        "wavelet_steps", &wavelet_steps, "x"_a, "alpha"_a, "beta"_a,
-        "Returns the derivatives of the wavelets' values by changes without a unit, d log(alpha) of the\n"
-        "dilations and alpha d(beta) of the translations: (n, 2 d N), columns ordered by quantity,\n"
-        "input, wavelet.");
+        "wavelet_steps", &wavelet_steps, "x"_a, "alpha"_a, "beta"_a, "used"_a,
+        "Returns the derivatives of the wavelets' values by changes without a unit: d log(alpha) of the\n"
+        "dilations and alpha d(beta) of the translations. They are those of the M inputs of wavelets which\n"
+        "`used` (N, d) marks with True: (n, 2 M), columns ordered by quantity, input, wavelet.");
     module.def(
         "wavelet_curvature_columns", &wavelet_curvature_columns, "x"_a, "alpha"_a, "beta"_a,
         "Returns the second derivatives of the wavelets' values by each input: a list of d arrays (n, N).");

@@ -177,9 +177,9 @@ def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.floa
     """
     Returns the derivatives d psi(alpha_i (x_k - beta_i)) / dx of wavelets of one input: (n, N).
     """
-def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], used: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Returns the derivatives of the wavelets' values by changes without a unit, d log(alpha) of the
-    dilations and alpha d(beta) of the translations: (n, 2 d N), columns ordered by quantity,
-    input, wavelet.
+    Returns the derivatives of the wavelets' values by changes without a unit: d log(alpha) of the
+    dilations and alpha d(beta) of the translations. They are those of the M inputs of wavelets which
+    `used` (N, d) marks with True: (n, 2 M), columns ordered by quantity, input, wavelet.
     """

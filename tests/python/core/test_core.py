@@ -79,7 +79,13 @@ def test_columns_and_jacobian_equal_finite_differences(dimension: int) -> None:
             assert derivative == pytest.approx(difference, abs=1e-8)
     inputs = range(dimension)
     steps = [alpha[:, j] * by_alpha[j] for j in inputs] + [by_beta[j] / alpha[:, j] for j in inputs]
-    assert wavelet_steps(x, alpha, beta) == pytest.approx(np.concatenate(steps, axis=1), abs=1e-13)
+    every, used = np.ones(alpha.shape, dtype=bool), np.arange(alpha.size).reshape(alpha.shape) % 3 != 1
+    all_steps = np.concatenate(steps, axis=1)
+    assert wavelet_steps(x, alpha, beta, every) == pytest.approx(all_steps, abs=1e-13)
+    some = np.concatenate([used.T.ravel(), used.T.ravel()])
+    assert wavelet_steps(x, alpha, beta, used) == pytest.approx(all_steps[:, some], abs=1e-13)
+    with pytest.raises(ValueError, match=r"used has 1 values, alpha has"):
+        wavelet_steps(x, alpha, beta, np.ones(1, dtype=bool))
 
 
 def test_columns_are_correct_for_extreme_positions_and_any_length() -> None:

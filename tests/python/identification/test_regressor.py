@@ -91,17 +91,26 @@ def test_row_with_zero_weight_does_not_change_the_fit() -> None:
     assert np.array_equal(network.predict(X), without.predict(X))
 
 
-def test_domain_extends_beyond_rows_by_the_margin_of_a_sample() -> None:
-    """The least of m values from 0 to 1 is 1/(m + 1) on average, and the edge of the domain is 0."""
-    random = np.random.default_rng(0)
-    edges = []
+def edges_beyond(inputs: int) -> np.ndarray:
+    """Returns how far the domain reaches beyond the true range 0 to 1 of 200 samples of 30 rows."""
+    random, edges = np.random.default_rng(0), []
     for _ in range(200):
-        X = random.uniform(size=(30, 2))
+        X = random.uniform(size=(30, inputs))
         model = WaveletNetworkRegressor(max_wavelets=0).fit(X, X[:, 0]).network_
         assert np.all(model.lower < X.min(axis=0))
         assert np.all(model.upper > X.max(axis=0))
-        edges.extend([*model.lower, *(1.0 - model.upper)])
-    assert abs(np.mean(edges)) < 0.2 / 31.0
+        edges.extend([*-model.lower, *(model.upper - 1.0)])
+    return np.asarray(edges)
+
+
+def test_domain_of_one_input_ends_at_the_true_range_on_average() -> None:
+    assert abs(np.mean(edges_beyond(1))) < 0.2 / 31.0
+
+
+def test_domain_of_several_inputs_contains_the_true_range() -> None:
+    beyond = edges_beyond(2)
+    assert 0.001 < np.mean(beyond < 0.0) < 0.02
+    assert np.max(beyond) < 5.0 / 29.0
 
 
 def test_repeated_rows_do_not_change_the_domain() -> None:

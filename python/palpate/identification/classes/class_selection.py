@@ -134,7 +134,7 @@ class ClassSelection:
     ) -> Candidate:
         """Returns the candidate model for a solution fitted to compressed rows; by default to rows without
         direction state."""
-        n_parameters = problem.n_parameters(len(solution.basis))
+        n_parameters = problem.n_parameters(solution.basis)
         if strokes is not None and strokes.play_radius is not None:
             n_parameters += 1
         rows = rows or self.rows
@@ -187,7 +187,7 @@ class ClassSelection:
             if self._judged_on(regrown.problem, trial) < self._judged_on(regrown.problem, kept):
                 kept = trial
         self.report.notes.append(self._cost_of(bounds, candidate, problem.rmse(kept)))
-        more = problem.n_parameters(len(kept.basis)) - problem.n_parameters(candidate.n_wavelets)
+        more = problem.n_parameters(kept.basis) - problem.n_parameters(candidate.solution.basis)
         return replace(candidate, solution=kept, n_parameters=candidate.n_parameters + more)
 
     def _cost_of(self, bounds: Sequence[Bound], free: Candidate, rmse: float) -> str:
@@ -263,7 +263,7 @@ class Linear(ModelClass):
 
     def better(self, below: Candidate) -> Candidate:
         selection = self._selection
-        if below.problem.n_parameters(0) >= below.problem.samples:
+        if below.problem.n_parameters(Basis.empty(below.problem.dimension)) >= below.problem.samples:
             return below
         return selection.judge.better(
             below, selection.recorded(selection.constrained(straight_line(selection)))
@@ -290,7 +290,7 @@ class Network(ModelClass):
         are tried.
         """
         size, errors = self._selection.options.max_wavelets, 1.0
-        if below.problem.n_parameters(1) >= below.problem.samples:
+        if below.problem.n_parameters(Basis.empty(below.problem.dimension), more=1) >= below.problem.samples:
             return below
         while size > 0:
             above = self._of_size(size)
@@ -324,7 +324,9 @@ def constant(selection: ClassSelection) -> Candidate:
     coefficients = np.zeros_like(straight.solution.coefficients)
     coefficients[0, 0] = float(np.average(rows.force, weights=rows.weight))
     level = problem.with_coefficients(straight.solution, coefficients)
-    reason = "data" if problem.n_parameters(0) >= problem.samples else straight.stop_reason
+    reason = (
+        "data" if problem.n_parameters(straight.solution.basis) >= problem.samples else straight.stop_reason
+    )
     return selection.recorded(
         replace(straight, model_class="constant", solution=level, n_parameters=1, stop_reason=reason)
     )

@@ -63,6 +63,10 @@ LEAST_HALF_CORE = 1.0 / 64.0
 """Least distance from the centre of a wavelet to its side lobe if position cannot explain most of the error
 [share of the travel]."""
 
+POSITION_FACTORS = (1, 2, 64)
+"""Largest number of distinct positions over that of one input, with one, two, and three or more inputs [-]. A
+regular grid over many inputs has few cells along each of them, so that the rows themselves are used there."""
+
 
 def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) -> ClassSelection:
     """Selects a model: first the model classes without velocity, mass and damping, then those with them.
@@ -75,7 +79,8 @@ def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) ->
     if robust:
         suspect = suspects(rows.box, rows.force, rows.side, given)
         rows = replace(rows, weight=np.where(suspect, 0.0, 1.0 if given is None else given))
-    cells = options.search.max_positions * 2 ** (rows.box.shape[1] - 1)
+    inputs = min(rows.box.shape[1], len(POSITION_FACTORS))
+    cells = options.search.max_positions * POSITION_FACTORS[inputs - 1]
     found = ClassSelection(rows, options, STATIC_CLASSES, cells, on_held_out=on_held_out)
     for _ in range(MOST_HALVINGS):
         if not found.best.cells_too_wide():

@@ -5,22 +5,34 @@ The members of a frame (paper section 2.4) are a0^(-m/2) psi_v(a0^(-m) x - k b0)
 with V voices psi_v(x) = 2^(-v/V) psi(2^(-v/V) x), v = 0 .. V - 1, all on the same step b0.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from ..._typing import Float1D, Float2D
 from ...arguments import number_of
 from ...errors import InputError
 from ..data.limits import distinct_rows
 
+UNUSED_DILATION = 2.0**-13
+"""Dilation of a wavelet along an input that it does not use [1/range of recorded positions]. Along this input
+the value of the wavelet changes by less than 1e-7 of its maximum."""
+
+UNUSED_TRANSLATION = 0.5
+"""Translation of a wavelet along an input that it does not use [range of recorded positions]."""
+
 
 @dataclass(frozen=True)
 class Basis:
-    """Wavelets without their weights: dilations alpha (N, d) > 0 and translations beta (N, d)."""
+    """Wavelets without their weights: dilations alpha (N, d) > 0 and translations beta (N, d).
+
+    A wavelet may use only some of several inputs. Along the others its dilation is `UNUSED_DILATION`.
+    """
 
     alpha: Float2D
     beta: Float2D
@@ -29,8 +41,26 @@ class Basis:
     def empty(dimension: int) -> "Basis":
         return Basis(np.zeros((0, dimension)), np.zeros((0, dimension)))
 
+    @staticmethod
+    def unused(count: int, dimension: int) -> "Basis":
+        """Returns wavelets that use no input."""
+        shape = (count, dimension)
+        return Basis(np.full(shape, UNUSED_DILATION), np.full(shape, UNUSED_TRANSLATION))
+
     def __len__(self) -> int:
         return len(self.alpha)
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """True (N, d) for the inputs that each wavelet uses."""
+        return np.asarray(self.alpha > UNUSED_DILATION)
+
+    def over(self, inputs: Sequence[int], dimension: int) -> "Basis":
+        """Returns these wavelets of some inputs as wavelets of `dimension` inputs, which do not use the
+        others."""
+        found = Basis.unused(len(self), dimension)
+        found.alpha[:, inputs], found.beta[:, inputs] = self.alpha, self.beta
+        return found
 
     def joined(self, other: "Basis") -> "Basis":
         return Basis(np.concatenate([self.alpha, other.alpha]), np.concatenate([self.beta, other.beta]))
@@ -38,27 +68,78 @@ class Basis:
     def without(self, index: int) -> "Basis":
         return Basis(np.delete(self.alpha, index, axis=0), np.delete(self.beta, index, axis=0))
 
+    def without_input(self, index: int, k: int) -> "Basis":
+        """Returns the wavelets with one that no longer uses input k."""
+        found = Basis(self.alpha.copy(), self.beta.copy())
+        found.alpha[index, k], found.beta[index, k] = UNUSED_DILATION, UNUSED_TRANSLATION
+        return found
+
 
 class Resolution:
     """Computes distances from a place to the nearest distinct positions of a set of positions (m, d)."""
 
     def __init__(self, positions: Float2D) -> None:
-        distinct = positions[distinct_rows(positions)[0]]
-        self._sorted = distinct[:, 0] if distinct.shape[1] == 1 else None
-        self._tree = cKDTree(distinct) if self._sorted is None else None
-        self._size = len(distinct)
+        self._positions = positions[distinct_rows(positions)[0]]
+        self._over: dict[int, _Neighbours] = {}
+        """Positions over each set of inputs, by the sum of 2^k over these inputs k"""
 
     def __len__(self) -> int:
-        return self._size
+        return len(self._positions)
+
+    def reach(self, basis: Basis, count: int) -> Float1D:
+        """Returns the radius (N,) around the translation of each of N wavelets that contains `count`
+        positions.
+
+        Distances and distinct positions are those over the inputs that the wavelet uses. The radius is
+        infinite if there are fewer positions.
+        """
+        bits = 1 << np.arange(basis.beta.shape[1])
+        subset, radius = basis.used @ bits, np.empty(len(basis))
+        for code in np.unique(subset):
+            inputs, those = np.flatnonzero(code & bits), subset == code
+            if (near := self._over.get(int(code))) is None:
+                near = self._over[int(code)] = _Neighbours(self._positions[:, inputs])
+            radius[those] = near.reach(basis.beta[those][:, inputs], count)
+        return radius
+
+
+MOST_TREE_INPUTS = 3
+"""Largest number of inputs for which a tree finds the nearest positions faster than a list of all
+distances."""
+
+MOST_DISTANCES = 4096
+"""Largest number of positions whose distances to a place are computed. Of more positions a random part is
+used."""
+
+
+class _Neighbours:
+    """Distinct positions of a set of positions (m, d), sorted or in a tree if there are few inputs."""
+
+    def __init__(self, positions: Float2D) -> None:
+        distinct = positions[distinct_rows(positions)[0]]
+        d = positions.shape[1]
+        self._share = 1.0 if d <= MOST_TREE_INPUTS else min(1.0, MOST_DISTANCES / len(distinct))
+        if self._share < 1.0:
+            distinct = np.random.default_rng(0).choice(distinct, MOST_DISTANCES, replace=False)
+        self._positions = distinct
+        self._sorted = distinct[:, 0] if d == 1 else None
+        self._tree = cKDTree(distinct) if 1 < d <= MOST_TREE_INPUTS else None
+        self._size = len(distinct)
 
     def reach(self, places: Float2D, count: int) -> Float1D:
-        """Returns the radius (N,) around each place (N, d) that contains `count` positions, 1 <= count <=
-        len."""
+        """Returns the radius (N,) around each place (N, d) that contains `count` positions; infinite if there
+        are fewer."""
+        if self._share < 1.0:
+            count = max(2, round(self._share * count))
+        if count > self._size:
+            return np.full(len(places), np.inf)
         if self._tree is not None:
             return np.asarray(self._tree.query(places, k=[count])[0])[:, 0]
+        if self._sorted is None:
+            square = cdist(places, self._positions, "sqeuclidean")
+            return np.asarray(np.sqrt(np.partition(square, count - 1, axis=1)[:, count - 1]))
         # On a line the nearest positions are neighbours in order: test all windows of `count` positions at
         # the place.
-        assert self._sorted is not None
         last = self._size - count
         first = np.searchsorted(self._sorted, places[:, 0])[:, None] - np.arange(count + 1)
         first = np.clip(first, 0, last)
@@ -69,8 +150,8 @@ class Resolution:
 COARSEST_CANDIDATE = 1.0
 """Dilation of the widest wavelets of the frame [1/range of recorded positions]."""
 
-MOST_LIBRARY_ENTRIES = 2**23
-"""Largest number of stored values of all candidate wavelets at all rows, 32 MiB for each channel of a row.
+MOST_LIBRARY_ENTRIES = 2**25
+"""Largest number of stored values of all candidate wavelets at all rows, 128 MiB for each channel of a row.
 Many rows allow fewer candidates."""
 
 NEGLIGIBLE_SHARE = 1e-14

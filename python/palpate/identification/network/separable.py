@@ -20,6 +20,7 @@ never worse than the start.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -177,6 +178,8 @@ class SeparableProblem:
     limits: RowLimits = NO_LIMITS
     """Limits of the information in the rows: share of independent rows, RMS error hidden by the resolution of
     the force, and noise of the position"""
+    every_input: bool = True
+    """True if each wavelet uses every input"""
     prior: float = 0.0
     """Penalty factor of a squared weight [-]; see :meth:`with_prior`"""
     resolutions: tuple[Resolution, ...] = ()
@@ -199,10 +202,14 @@ class SeparableProblem:
         """Number of channels (networks that are fitted together) of all blocks of rows."""
         return sum(block.n_channels for block in self.blocks)
 
-    def n_parameters(self, n_wavelets: int) -> int:
-        """Returns the number of fitted values: for each wavelet d dilations, d translations and a weight per
-        channel; for each channel d slopes and a bias."""
-        return 2 * self.dimension * n_wavelets + self.n_channels * (n_wavelets + 1 + self.dimension)
+    def n_parameters(self, basis: Basis, more: int = 0) -> int:
+        """Returns the number of fitted values with these wavelets and `more` wavelets of all inputs.
+
+        These are a dilation and a translation for each input that a wavelet uses, a weight per wavelet and
+        channel, and d slopes and a bias per channel.
+        """
+        used = int(basis.used.sum()) + more * self.dimension
+        return 2 * used + self.n_channels * (len(basis) + more + 1 + self.dimension)
 
     def total(self, rss: float) -> float:
         """Returns the sum of squared errors of all samples [force^2] for a criterion; at least the sum for
@@ -260,10 +267,27 @@ class SeparableProblem:
         """
         return replace(self, prior=self.total(rss) / self.samples / self.force_range**2)
 
-    def finest(self, beta: Float2D) -> Float2D:
-        """Returns the largest dilation (N, 1) that the positions around each translation resolve, on every
+    def part(self, most: int) -> SeparableProblem:
+        """Returns the problem of at most `most` random rows of each block, the same rows at each call.
+
+        It represents the samples of these rows only.
+        """
+        if all(len(block.target) <= most for block in self.blocks):
+            return self
+        random = np.random.default_rng(0)
+        blocks = []
+        for block in self.blocks:
+            rows = len(block.target)
+            chosen = np.sort(random.choice(rows, size=min(most, rows), replace=False))
+            blocks.append(Block(block.positions[chosen], block.target[chosen], block.channels[chosen]))
+        share = _weight(blocks) / _weight(self.blocks)
+        samples, within = share * self.samples, share * self.within
+        return replace(self, blocks=tuple(blocks), samples=samples, within=within, resolutions=())
+
+    def finest(self, basis: Basis) -> Float2D:
+        """Returns the largest dilation (N, 1) that the positions around each wavelet resolve, on every
         stroke [1/range of recorded positions]."""
-        reach = np.max([each.reach(beta, self.resolved_by) for each in self.resolutions], axis=0)
+        reach = np.max([each.reach(basis, self.resolved_by) for each in self.resolutions], axis=0)
         least = max(HALF_CORE_NOISE_RATIO * self.limits.position_noise, 1e-9)
         return np.asarray(CORE_RADIUS / np.maximum(reach, least))[:, None]
 
@@ -317,15 +341,16 @@ class SeparableProblem:
         wavelet).
         """
         basis = at.basis
-        size = 2 * self.dimension * len(basis)
+        wavelet = np.nonzero(basis.used.T)[1]
+        size = 2 * len(wavelet)
         matrix, gradient = np.zeros((size, size)), np.zeros(size)
         for block, design, gram, table, residual in zip(
             self.blocks, at.designs, at.grams, self._tables(at.coefficients), at.residuals, strict=True
         ):
-            jacobian = wavelet_steps(block.positions, basis.alpha, basis.beta)
-            slope = (table[:, 1 + self.dimension :].T @ block.channels.T)[None]
-            by_step = jacobian.T.reshape(2 * self.dimension, *slope.shape[1:])
-            np.multiply(by_step, slope, out=by_step)
+            jacobian = wavelet_steps(block.positions, basis.alpha, basis.beta, basis.used)
+            slope = table[:, 1 + self.dimension :].T @ block.channels.T
+            for column, i in zip(jacobian.T, (*wavelet, *wavelet), strict=True):
+                column *= slope[i]
             cross = design.T @ jacobian
             spanned = half_solved(gram, cross)
             matrix += jacobian.T @ jacobian - spanned.T @ spanned
@@ -352,6 +377,11 @@ class SeparableProblem:
         of_weights = np.einsum("ii->i", gram).reshape(block.n_channels, -1)[:, 1 + self.dimension :]
         of_weights += self.prior
         return np.asarray(gram)
+
+
+def _weight(blocks: Sequence[Block]) -> float:
+    """Returns the sum of the weights of all rows."""
+    return float(sum(block.channels[:, 0] @ block.channels[:, 0] for block in blocks))
 
 
 def problem_of(
@@ -414,7 +444,7 @@ def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance:
     best, linearised = start, None
     if len(start.basis) == 0:
         return best
-    step_damping, idle, finest = 1e-2, 0, problem.finest(best.basis.beta)
+    step_damping, idle, finest = 1e-2, 0, problem.finest(best.basis)
     for _ in range(steps):
         if linearised is not best:
             matrix, gradient = problem.normal_equations(best)
@@ -439,14 +469,18 @@ def _bounded_step(
     """Returns the Levenberg-Marquardt step of dilations and translations; a value at its bound does not move
     further."""
     d = basis.alpha.shape[1]
-    push_alpha, push_beta = gradient.reshape(2, d, len(basis)).transpose(0, 2, 1)
+    used = np.stack([basis.used.T, basis.used.T]).ravel()
+    push = np.zeros(len(used))
+    push[used] = gradient
+    push_alpha, push_beta = push.reshape(2, d, len(basis)).transpose(0, 2, 1)
     held_alpha = (push_alpha > 0) & (basis.alpha >= finest * (1 - 1e-9))
     held_alpha |= (push_alpha < 0) & (basis.alpha <= LEAST_DILATION * (1 + 1e-9))
     held_beta = (push_beta > 0) & (basis.beta >= 1 + LARGEST_OVERHANG) | (push_beta < 0) & (
         basis.beta <= -LARGEST_OVERHANG
     )
-    free = np.flatnonzero(~np.stack([held_alpha.T, held_beta.T]).ravel())
-    step = np.zeros(len(gradient))
+    moves = ~np.stack([held_alpha.T, held_beta.T]).ravel()
+    free = np.flatnonzero(moves[used])
+    step = np.zeros(len(used))
     if len(free) == 0:
         return step
     system = matrix[np.ix_(free, free)]
@@ -459,7 +493,7 @@ def _bounded_step(
         if not failed:
             break
         step_damping = 10.0 * step_damping + 1e-12
-    step[free] = dpotrs(factor, gradient[free], lower=1)[0]
+    step[np.flatnonzero(used)[free]] = dpotrs(factor, gradient[free], lower=1)[0]
     return np.clip(step, -LONGEST_STEP, LONGEST_STEP)
 
 
@@ -468,9 +502,11 @@ def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> tuple[Basi
     (N, 1)."""
     grow, shift = step.reshape(2, problem.dimension, len(basis)).transpose(0, 2, 1)
     beta = np.clip(basis.beta + shift / basis.alpha, -LARGEST_OVERHANG, 1 + LARGEST_OVERHANG)
-    finest = problem.finest(beta)
+    used = basis.used
+    moved = Basis(basis.alpha, np.where(used, beta, basis.beta))
+    finest = problem.finest(moved)
     alpha = np.clip(basis.alpha * np.exp(grow), LEAST_DILATION, np.maximum(finest, LEAST_DILATION))
-    return Basis(alpha, beta), finest
+    return Basis(np.where(used, alpha, basis.alpha), moved.beta), finest
 
 
 QUASI_NEWTON_STEPS = 10
@@ -511,14 +547,19 @@ def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolera
         )
         return value / size**2, slope / size**2
 
-    ceiling = np.broadcast_to(np.maximum(problem.finest(basis.beta), basis.alpha), basis.alpha.shape)
+    used, beta = basis.used, basis.beta
+    ceiling = np.maximum(problem.finest(basis), basis.alpha)
     free = np.full(coefficients, np.inf)
     low = [
         -free,
-        np.full(basis.alpha.size, np.log(LEAST_DILATION)),
-        (-LARGEST_OVERHANG * basis.alpha).ravel(),
+        np.log(np.where(used, LEAST_DILATION, basis.alpha)).ravel(),
+        (basis.alpha * np.where(used, -LARGEST_OVERHANG, beta)).ravel(),
     ]
-    high = [free, np.log(ceiling).ravel(), ((1.0 + LARGEST_OVERHANG) * basis.alpha).ravel()]
+    high = [
+        free,
+        np.log(np.where(used, ceiling, basis.alpha)).ravel(),
+        (basis.alpha * np.where(used, 1.0 + LARGEST_OVERHANG, beta)).ravel(),
+    ]
     begin = [
         (start.coefficients / scale).ravel(),
         np.log(basis.alpha).ravel(),
@@ -536,7 +577,8 @@ def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolera
         },
     )
     _, moved = apart(found.x)
-    resolved = np.maximum(problem.finest(moved.beta), LEAST_DILATION)
+    moved = Basis(np.where(used, moved.alpha, basis.alpha), np.where(used, moved.beta, beta))
+    resolved = np.maximum(problem.finest(moved), LEAST_DILATION)
     best = problem.solve(Basis(np.minimum(moved.alpha, resolved), moved.beta))
     return best if best.objective < start.objective else start
 

@@ -129,7 +129,7 @@ def criterion_of(
         if rows is None:
             raise InputError(f"criterion is {name!r}: needs held-out rows, and no rows are held out")
         return held_out_deviance(name, rows, problem.errors(solution, rows))
-    p = problem.n_parameters(len(solution.basis)) if n_parameters is None else n_parameters
+    p = problem.n_parameters(solution.basis) if n_parameters is None else n_parameters
     share = problem.limits.independent
     return deviance(name, share * problem.total(solution.rss), problem.independent, p)
 

@@ -8,6 +8,7 @@ removal raises the error least.
 """
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,14 @@ from ..._typing import Float1D
 from ..data.limits import FORCE_RESOLUTION
 from ..network.basis import COARSEST_CANDIDATE, MOST_LIBRARY_ENTRIES, Basis, truncated_frame
 from ..network.fitted import PathPoint
-from ..network.separable import SIGNIFICANT_CORRELATION, SeparableProblem, Solution, refine, refine_all
+from ..network.separable import (
+    LEAST_DILATION,
+    SIGNIFICANT_CORRELATION,
+    SeparableProblem,
+    Solution,
+    refine,
+    refine_all,
+)
 from ..options import IdentifyOptions
 from .evidence import CRITERIA, ON_HELD_OUT_ROWS, choice, criterion_of, enough, report
 from .selection import Library, orthogonal_gains, residual_gains, select_backward
@@ -47,6 +55,30 @@ core of each wavelet, the part between its side lobes [-]."""
 MOST_STRETCHED = 64
 """Largest number of wavelets of the frame that are also tried with a changed dilation along each of several
 inputs."""
+
+MOST_SMOOTH_ROWS = 1024
+"""With more rows over several inputs, wide wavelets alone are not tried: the rows are near enough to each
+other to show a wrong force between them."""
+
+MOST_LIBRARY_ROWS = 8192
+"""Largest number of rows over several inputs on which candidate wavelets are compared. Of more rows a random
+part is used."""
+
+LEAST_PART_ROWS = 8192
+"""Least number of rows over several inputs on which a network grows before it grows on more rows."""
+
+PART_SHARE = 0.25
+"""Share of the rows over several inputs on which a network grows first [-]."""
+
+MOST_CANDIDATE_INPUTS = 2
+"""Candidate wavelets use at most this number of several inputs, or all of them."""
+
+IDLE_DILATION = 1.001 * LEAST_DILATION
+"""Dilation below which a wavelet may not need an input [1/range of recorded positions]: at the lower bound of
+refinement, apart from rounding."""
+
+MOST_RESOLVED_PLACES = 512
+"""Largest number of positions over several inputs at which the narrowest candidate wavelets are looked up."""
 
 MOST_REFINED_CANDIDATES = 5
 """Largest number of candidate wavelets that are refined before one of them is chosen."""
@@ -116,9 +148,12 @@ class Growth:
         coarse = not search.refine or search.selection == "backward"
         free = self._single and not coarse and problem.n_channels == 1
         free = free and self._criterion not in ON_HELD_OUT_ROWS
-        wide = free and problem.dimension > 1
-        library = library or self.library(problem)
-        found = self._grown(problem, library, start, model_class, most, wide=wide)
+        several = problem.dimension > 1
+        wide = free and several
+        problem = replace(problem, every_input=not several or coarse)
+        found = self._grown(
+            problem, start, model_class, most, library=library, wide=wide, in_parts=several and not coarse
+        )
         problem = found.problem
         settled = wide and _below_resolution(problem, problem.rmse(found.solution))
         if not free or settled or len(found.solution.basis) == 0:
@@ -131,7 +166,7 @@ class Growth:
         if problem.resolved_by <= LEAST_CORE_POSITIONS or (is_even and not correlated):
             return found
         fine = replace(problem, resolved_by=LEAST_CORE_POSITIONS)
-        finer = self._grown(fine, self.library(fine), found.solution.basis, model_class, most)
+        finer = self._grown(fine, found.solution.basis, model_class, most)
         accepted = correlated and finer.criterion + search.evidence < found.criterion
         if accepted or problem.rmse(finer.solution) * FINER_ERROR_RATIO < problem.rmse(found.solution):
             return replace(finer, path=(*found.path[:-1], finer.path[-1]))
@@ -139,18 +174,31 @@ class Growth:
 
     def library(self, problem: SeparableProblem) -> Library:
         """Returns the candidate wavelets: the frame over the positions of a problem, down to the narrowest
-        wavelet that the positions resolve."""
-        search = self._search
+        wavelet that the positions resolve.
+
+        With several inputs there is a frame over each single input, over each pair and over all inputs. Most
+        forces are sums of functions of few inputs, and wavelets of few inputs are resolved by far fewer rows.
+        """
+        search, d = self._search, problem.dimension
         positions = np.concatenate([block.positions for block in problem.blocks])
-        frame = truncated_frame(
-            positions,
-            coarsest=COARSEST_CANDIDATE,
-            finest=float(problem.finest(positions).max()),
-            frame_scale=search.frame_scale,
-            frame_step=search.frame_step,
-            max_candidates=max(1, min(search.max_candidates, MOST_LIBRARY_ENTRIES // len(positions))),
-        )
-        return Library(problem, frame)
+        sizes = {d} if problem.every_input else {*range(1, min(d, MOST_CANDIDATE_INPUTS) + 1), d}
+        subsets = [inputs for size in sorted(sizes) for inputs in combinations(range(d), size)]
+        places = positions if d == 1 else positions[:: max(1, len(positions) // MOST_RESOLVED_PLACES)]
+        left = max(1, min(search.max_candidates, MOST_LIBRARY_ENTRIES // len(positions)))
+        candidates = Basis.empty(d)
+        for index, inputs in enumerate(subsets):
+            columns = list(inputs)
+            at_places = Basis(np.ones((len(places), len(inputs))), places[:, columns]).over(inputs, d)
+            frame = truncated_frame(
+                positions[:, columns],
+                coarsest=COARSEST_CANDIDATE,
+                finest=float(problem.finest(at_places).max()),
+                frame_scale=search.frame_scale,
+                frame_step=search.frame_step,
+                max_candidates=max(1, (left - len(candidates)) // (len(subsets) - index)),
+            )
+            candidates = candidates.joined(frame.over(inputs, d))
+        return Library(problem, candidates)
 
     def prune(self, problem: SeparableProblem, start: Solution) -> tuple[SeparableProblem, Solution]:
         """Removes wavelets while the refined remaining network has a smaller criterion.
@@ -178,13 +226,13 @@ class Growth:
     def _grown(
         self,
         problem: SeparableProblem,
-        library: Library,
         start: Basis,
         model_class: str,
         most: int,
         *,
-        starts: int = MOST_REFINED_CANDIDATES,
+        library: Library | None = None,
         wide: bool = False,
+        in_parts: bool = False,
     ) -> Grown:
         """Grows the network of `start` until the criterion stops growth, then prunes and refines the network.
 
@@ -192,9 +240,20 @@ class Growth:
         the largest network: a few surplus wavelets let refinement find a better arrangement. If the criterion
         uses held-out rows, it chooses the size and nothing is pruned. With `wide`, a network of wide wavelets
         alone is tried once, when the RMS error is below sqrt(`FORCE_RESOLUTION`) times the range of the
-        force.
+        force. It is taken if its error is small, or in the end not larger.
+
+        With `in_parts` the network grows on a part of many rows first, which shows most of its wavelets. On
+        all rows it then continues for `patience` wavelets only.
         """
         search, criterion = self._search, self._criterion
+        patience, begin, smooth = search.patience * problem.dimension, start, None
+        rows = max(len(block.target) for block in problem.blocks)
+        if in_parts and rows > LEAST_PART_ROWS:
+            part = problem.part(max(LEAST_PART_ROWS, int(PART_SHARE * rows)))
+            grown_there = self._grown(part, start, model_class, most, wide=wide, in_parts=True)
+            start, patience, wide = grown_there.solution.basis, search.patience, False
+        compared = problem if problem.dimension == 1 else problem.part(MOST_LIBRARY_ROWS)
+        library = library or self.library(compared)
         problem = problem.with_prior(problem.solve(start).rss)
         if search.selection == "backward":
             selected = select_backward(problem, library, max_wavelets=most, criterion=criterion)
@@ -208,10 +267,10 @@ class Growth:
                 stop_reason = criterion
                 break
             if wide and problem.rmse(current) <= np.sqrt(FORCE_RESOLUTION) * problem.force_range:
-                wide = False
-                if (smooth := self._smooth(problem, start, model_class, most)) is not None:
+                wide, smooth = False, self._smooth(problem, begin, model_class, most)
+                if smooth is not None and _below_resolution(problem, problem.rmse(smooth.solution)):
                     return smooth
-            added = self._with_candidate(problem, library, current, starts)
+            added = self._with_candidate(problem, compared, library, current)
             if added is None:
                 stop_reason = "data"
                 break
@@ -220,7 +279,7 @@ class Growth:
             grown.append(current)
             since = 0 if path[-1].criterion < best else since + 1
             best = min(best, path[-1].criterion)
-            if since >= search.patience * problem.dimension:
+            if since >= patience:
                 stop_reason = criterion
                 break
         if problem.held_out is not None and criterion in ON_HELD_OUT_ROWS:
@@ -229,62 +288,101 @@ class Growth:
         else:
             problem, pruned = self.prune(problem, current)
         problem, final = self._improved(problem, pruned, search.final_steps, FINAL_TOLERANCE)
+        if smooth is not None and problem.rmse(smooth.solution) <= problem.rmse(final):
+            return smooth
         path.append(self._point(problem, final, model_class))
         if len(final.basis) < most and stop_reason == "max_wavelets":
             stop_reason = criterion
         return Grown(problem, final, path[-1].criterion, stop_reason, tuple(path))
 
     def _smooth(self, problem: SeparableProblem, start: Basis, model_class: str, most: int) -> Grown | None:
-        """Returns a network of wide wavelets, or None if its error is not small.
+        """Returns a network of wide wavelets that use every input; None if there are many rows or much noise.
 
-        Over several inputs the rows are far apart. A narrow wavelet then corrects the force at a few rows,
+        Few rows over several inputs are far apart. A narrow wavelet then corrects the force at a few rows,
         and the network fits the rows well but has large errors between them. Wide wavelets avoid this. They
         are not tried if the forces inside one cell differ by more than the small error.
         """
-        if not _below_resolution(problem, np.sqrt(problem.within / problem.samples)):
+        rows = len(problem.blocks[0].positions)
+        if rows > MOST_SMOOTH_ROWS or not _below_resolution(
+            problem, np.sqrt(problem.within / problem.samples)
+        ):
             return None
-        held = max(problem.resolved_by, int(SMOOTH_CORE_SHARE * len(problem.blocks[0].positions)))
-        smooth = replace(problem, resolved_by=held)
-        found = self._grown(smooth, self.library(smooth), start, model_class, most, starts=1)
-        if not _below_resolution(problem, problem.rmse(found.solution)):
-            return None
-        return replace(found, problem=replace(found.problem, resolved_by=problem.resolved_by))
+        held = max(problem.resolved_by, int(SMOOTH_CORE_SHARE * rows))
+        smooth = replace(problem, resolved_by=held, every_input=True)
+        found = self._grown(smooth, start, model_class, most)
+        given = replace(found.problem, resolved_by=problem.resolved_by, every_input=problem.every_input)
+        return replace(found, problem=given)
 
     def _price(self, problem: SeparableProblem, solution: Solution) -> float:
         """Returns the increase of the penalty in the criterion by the last wavelet of the solution."""
         penalty, n = CRITERIA[self._criterion], len(solution.basis)
-        return penalty(problem.independent, problem.n_parameters(n)) - penalty(
-            problem.independent, problem.n_parameters(n - 1)
+        return penalty(problem.independent, problem.n_parameters(solution.basis)) - penalty(
+            problem.independent, problem.n_parameters(solution.basis.without(n - 1))
         )
 
     def _with_candidate(
-        self, problem: SeparableProblem, library: Library, current: Solution, starts: int
+        self, problem: SeparableProblem, compared: SeparableProblem, library: Library, current: Solution
     ) -> Solution | None:
-        """Returns the network with the candidate wavelet that reduces the error most; None if no wavelet can
-        be added.
+        """Returns the network with the candidate wavelet that improves it most; None if no wavelet can be
+        added.
 
-        A wavelet of the frame has one dilation for all inputs. With several inputs, wavelets with a changed
-        dilation along one input are tried as well. A few different candidates are refined by some steps
-        before one is taken, because the candidate that fits best before refinement often ends in a worse
-        minimum.
+        Candidates are compared on the rows of `compared`, a part of the problem. A wavelet of the frame has
+        one dilation for all inputs that it uses. With several inputs, wavelets with a changed dilation along
+        one input are tried as well. A few different candidates are refined by some steps before one is taken,
+        because the candidate that fits best before refinement often ends in a worse minimum.
         """
         search = self._search
-        if len(library) == 0 or problem.n_parameters(len(current.basis) + 1) >= problem.independent:
+        if len(library) == 0 or problem.n_parameters(current.basis, more=1) >= problem.independent:
             return None
-        measured = residual_gains if search.selection == "residual" else orthogonal_gains
-        gains = measured(library, current)
+        whole = compared.blocks is problem.blocks
+        compared = replace(compared, prior=problem.prior)
+        start = current if whole else compared.solve(current.basis)
         several = problem.dimension > 1 and search.refine
+        gains = self._gains(compared, library, start)
         if several:
-            library = library.stretched(problem, _falling(gains)[:MOST_STRETCHED])
-            gains = measured(library, current)
-        chosen = library.distinct(_falling(gains), starts if several else 1)
-        tried = [problem.solve(current.basis.joined(library.members([index]))) for index in chosen]
+            library = library.stretched(compared, _falling(gains)[:MOST_STRETCHED])
+            gains = self._gains(compared, library, start)
+        chosen = library.distinct(_falling(gains), MOST_REFINED_CANDIDATES if several else 1)
+        tried = [compared.solve(start.basis.joined(library.members([index]))) for index in chosen]
+        if not tried:
+            return None
         if len(tried) > 1:
             tried = [
-                self._refine(problem, each, steps=CANDIDATE_STEPS, tolerance=GROWING_TOLERANCE)
+                self._refine(compared, each, steps=CANDIDATE_STEPS, tolerance=GROWING_TOLERANCE)
                 for each in tried
             ]
-        return min(tried, key=lambda solution: solution.objective, default=None)
+        best = min(tried, key=lambda solution: self._criterion_of(compared, solution))
+        return best if whole else problem.solve(best.basis)
+
+    def _gains(self, problem: SeparableProblem, library: Library, current: Solution) -> Float1D:
+        """Returns a value (candidates,) that is larger for a better candidate, and 0 for a useless one.
+
+        If all candidates use the same number of inputs, the value is the decrease of the squared error.
+        Otherwise it is exp(-change of the criterion / n), because wavelets of more inputs have more
+        parameters.
+        """
+        measured = residual_gains if self._search.selection == "residual" else orthogonal_gains
+        gains = measured(library, current)
+        if problem.every_input or len(library) == 0:
+            return gains
+        penalty, n, p = CRITERIA[self._criterion], problem.independent, problem.n_parameters(current.basis)
+        price = [penalty(n, p + 2 * k + problem.n_channels) for k in range(problem.dimension + 1)]
+        more = np.array(price)[library.basis.used.sum(axis=1)] - penalty(n, p)
+        left = np.maximum(1.0 - gains / problem.total(current.rss), FORCE_RESOLUTION**2)
+        return np.where(gains > 0.0, np.exp(-more / n) / left, 0.0)
+
+    def _without_idle_inputs(self, problem: SeparableProblem, current: Solution) -> Solution:
+        """Returns the solution without each use of an input by a wavelet that the criterion does not need.
+
+        Refinement has made the wavelet as wide as allowed along such an input.
+        """
+        value = self._criterion_of(problem, current)
+        for index, k in np.argwhere(current.basis.used & (current.basis.alpha <= IDLE_DILATION)):
+            if np.count_nonzero(current.basis.used[index]) > 1:
+                trial = problem.solve(current.basis.without_input(int(index), int(k)))
+                if self._criterion_of(problem, trial) < value:
+                    current, value = trial, self._criterion_of(problem, trial)
+        return current
 
     def _improved(
         self, problem: SeparableProblem, solution: Solution, steps: int, tolerance: float = GROWING_TOLERANCE
@@ -292,6 +390,8 @@ class Growth:
         """Refines the solution, then sets the weight penalty of the problem from the remaining error."""
         if self._search.refine:
             solution = self._refine(problem, solution, steps=steps, tolerance=tolerance)
+        if not problem.every_input:
+            solution = self._without_idle_inputs(problem, solution)
         problem = problem.with_prior(solution.rss)
         return problem, problem.solve(solution.basis)
 

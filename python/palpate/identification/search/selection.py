@@ -46,7 +46,7 @@ class Library:
     """
 
     def __init__(self, problem: SeparableProblem, candidates: Basis) -> None:
-        resolved = np.all(candidates.alpha <= problem.finest(candidates.beta), axis=1)
+        resolved = np.all(candidates.alpha <= problem.finest(candidates), axis=1)
         self.basis = Basis(candidates.alpha[resolved], candidates.beta[resolved])
         self.columns: list[NDArray[np.float32]] = []
         """For each block of m rows (channels, candidates, m): values of each candidate wavelet times the
@@ -74,14 +74,15 @@ class Library:
 
     def stretched(self, problem: SeparableProblem, order: Sequence[int] | NDArray[np.intp]) -> "Library":
         """Returns the candidate wavelets with these indices, and copies with a changed dilation along one
-        input."""
-        chosen, d = self.members(order), problem.dimension
-        combinations = [(factor, k) for k in range(d) for factor in STRETCH_FACTORS]
-        factors = np.ones((1 + len(combinations), 1, d))
-        for place, (factor, k) in enumerate(combinations, start=1):
-            factors[place, :, k] = factor
-        alpha = np.maximum(chosen.alpha * factors, LEAST_DILATION).reshape(-1, d)
-        return Library(problem, Basis(alpha, np.tile(chosen.beta, (len(factors), 1))))
+        input that they use."""
+        found = chosen = self.members(order)
+        for k in range(problem.dimension):
+            using = chosen.used[:, k]
+            for factor in STRETCH_FACTORS:
+                changed = Basis(chosen.alpha[using], chosen.beta[using])
+                changed.alpha[:, k] = np.maximum(factor * changed.alpha[:, k], LEAST_DILATION)
+                found = found.joined(changed)
+        return Library(problem, found)
 
     def distinct(self, order: NDArray[np.intp], count: int) -> list[int]:
         """Returns at most `count` of the indices, the first ones, whose wavelets differ in place or
@@ -212,7 +213,10 @@ def select_forward(
     selection = OrthogonalSelection(library, start)
     order: list[int] = []
     totals = [problem.total(start.rss)]
-    while len(order) < max_wavelets and problem.n_parameters(len(order) + 1) < problem.independent:
+    while (
+        len(order) < max_wavelets
+        and problem.n_parameters(library.members(order), more=1) < problem.independent
+    ):
         gains = selection.gains()
         if len(gains) == 0 or gains.max() <= 0.0:
             break

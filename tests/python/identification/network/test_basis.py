@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from palpate import InputError, frame_bounds
-from palpate.identification.network.basis import Resolution, truncated_frame
+from palpate._core.model import wavelet_columns
+from palpate.identification.network.basis import MOST_DISTANCES, Basis, Resolution, truncated_frame
 
 # Unit-norm Mexican hat, a0 = 2: b0 -> (A, B) for 1, 2 and 4 voices; the frame table of section 2 of the
 # mathematics that the package implements (Daubechies 1990, table of the Mexican hat).
@@ -89,9 +90,44 @@ def test_reach_contains_the_given_number_of_positions(dimension: int, count: int
     random = np.random.default_rng(count)
     positions = random.normal(size=(40, dimension)).round(6)
     places = np.concatenate([random.normal(scale=2.0, size=(200, dimension)), positions[:5]])
+    at_places = Basis(np.ones_like(places), places)
     resolution = Resolution(np.repeat(positions, 2, axis=0))
     assert len(resolution) == 40
     distance = np.linalg.norm(places[:, None] - positions, axis=2)
     np.testing.assert_allclose(
-        resolution.reach(places, count), np.sort(distance, axis=1)[:, count - 1], atol=1e-12
+        resolution.reach(at_places, count), np.sort(distance, axis=1)[:, count - 1], atol=1e-12
     )
+
+
+def test_reach_counts_distinct_positions_over_the_used_inputs() -> None:
+    random = np.random.default_rng(3)
+    positions = np.column_stack([np.repeat([0.0, 0.5, 1.0], 40), random.uniform(size=(120, 4))])
+    resolution = Resolution(positions)
+    place = np.full((1, 5), 0.4)
+    first = Basis(np.ones((1, 1)), place[:, :1]).over([0], 5)
+    assert resolution.reach(first, 3) == pytest.approx([0.6])
+    assert resolution.reach(first, 4) == [np.inf]
+    for inputs in ([1], [1, 3], [0, 2, 4], [1, 2, 3, 4]):
+        distance = np.linalg.norm(positions[:, inputs] - place[:, inputs], axis=1)
+        some = Basis(np.ones((1, len(inputs))), place[:, inputs]).over(inputs, 5)
+        assert resolution.reach(some, 7) == pytest.approx([np.sort(distance)[6]])
+
+
+@pytest.mark.parametrize("rows", [MOST_DISTANCES, MOST_DISTANCES + 1, 5 * MOST_DISTANCES])
+def test_reach_among_many_positions_of_many_inputs_is_of_the_right_size(rows: int) -> None:
+    positions = np.random.default_rng(4).uniform(size=(rows, 5))
+    places = Basis(np.ones((50, 5)), positions[:50])
+    exact = np.sort(np.linalg.norm(positions[:50, None] - positions, axis=2), axis=1)[:, 6]
+    assert np.median(Resolution(positions).reach(places, 7) / exact) == pytest.approx(1.0, abs=0.35)
+
+
+def test_a_wavelet_does_not_change_along_an_unused_input() -> None:
+    one = Basis(np.array([[3.0]]), np.array([[0.3]])).over([1], 3)
+    x = np.random.default_rng(5).uniform(size=(1000, 3))
+    moved = x.copy()
+    moved[:, [0, 2]] = np.random.default_rng(6).uniform(size=(1000, 2))
+    values = wavelet_columns(x, one.alpha, one.beta)
+    assert np.abs(values - wavelet_columns(moved, one.alpha, one.beta)).max() < 1e-7 * np.abs(values).max()
+    assert np.array_equal(one.used, [[False, True, False]])
+    both = Basis(np.ones((1, 3)), np.zeros((1, 3))).without_input(0, 2)
+    assert np.array_equal(both.used, [[True, True, False]])

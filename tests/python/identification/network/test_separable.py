@@ -76,7 +76,7 @@ def test_refinement_is_never_worse_than_its_start_and_keeps_its_bounds(seed: int
     refined = descend(problem, start, steps=25, tolerance=0.0)
     assert refined.objective <= start.objective
     assert np.all(refined.basis.alpha >= LEAST_DILATION)
-    assert np.all(refined.basis.alpha <= np.maximum(problem.finest(refined.basis.beta), LEAST_DILATION))
+    assert np.all(refined.basis.alpha <= np.maximum(problem.finest(refined.basis), LEAST_DILATION))
     assert np.all((refined.basis.beta >= -LARGEST_OVERHANG) & (refined.basis.beta <= 1 + LARGEST_OVERHANG))
 
 
@@ -113,7 +113,7 @@ def test_dilations_stay_bounded_on_a_jump() -> None:
     problem = problem_from(x, np.where(x < 0.5, 0.0, 1.0))
     start = problem.solve(Basis(np.full((4, 1), 60.0), np.array([[0.48], [0.49], [0.51], [0.52]])))
     refined = refine(problem, start, steps=60, tolerance=0.0)
-    assert np.all(refined.basis.alpha <= problem.finest(refined.basis.beta))
+    assert np.all(refined.basis.alpha <= problem.finest(refined.basis))
     assert np.isfinite(refined.coefficients).all()
 
 
@@ -154,3 +154,18 @@ def test_stop_reason_is_max_wavelets_at_the_limit() -> None:
     grown = Growth(options).grow(problem, Basis.empty(1), "position", library=Library(problem, frame))
     assert (len(grown.solution.basis), grown.stop_reason) == (3, "max_wavelets")
     assert [point.n_wavelets for point in grown.path] == [0, 1, 2, 3, 3]
+
+
+@pytest.mark.parametrize("kind", ["one force", "two strokes", "play"])
+def test_a_part_represents_its_share_of_the_samples(kind: str) -> None:
+    problem = noisy_switch(1, kind)
+    part, again = problem.part(50), problem.part(50)
+    for block, whole, same in zip(part.blocks, problem.blocks, again.blocks, strict=True):
+        assert len(block.target) == 50 < len(whole.target)
+        assert set(block.positions[:, 0]) <= set(whole.positions[:, 0])
+        np.testing.assert_array_equal(block.positions, same.positions)
+    weights = [
+        sum(float(block.channels[:, 0] @ block.channels[:, 0]) for block in p.blocks) for p in (part, problem)
+    ]
+    assert part.samples / problem.samples == pytest.approx(weights[0] / weights[1])
+    assert problem.part(10_000) is problem

@@ -3,17 +3,25 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from palpate._core.model import wavelet_columns
-from palpate._typing import Float1D
+from palpate._typing import Float1D, Float2D
 from palpate.identification import IdentifyOptions
 from palpate.identification.data.compression import Compressor
 from palpate.identification.data.limits import FORCE_RESOLUTION
 from palpate.identification.network.basis import Basis
-from palpate.identification.network.separable import CORE_RADIUS, LEAST_DILATION, SeparableProblem, problem_of
+from palpate.identification.network.separable import (
+    CORE_RADIUS,
+    LEAST_DILATION,
+    SeparableProblem,
+    Solution,
+    problem_of,
+)
+from palpate.identification.search import growth
 from palpate.identification.search.growth import (
     FINER_ERROR_RATIO,
     LEAST_CORE_POSITIONS,
@@ -41,7 +49,7 @@ def grown(problem: SeparableProblem) -> Grown:
 
 def test_without_noise_wavelets_resolve_a_kink() -> None:
     problem = kinked(0.0)
-    coarse = problem.finest(np.array([[0.25]]))[0, 0]
+    coarse = problem.finest(Basis(np.ones((1, 1)), np.array([[0.25]])))[0, 0]
     found = grown(problem)
     assert found.problem.resolved_by == LEAST_CORE_POSITIONS
     assert found.solution.basis.alpha.max() > 1.05 * coarse
@@ -53,7 +61,7 @@ def test_noise_is_not_taken_for_structure(noise: float) -> None:
     problem = kinked(noise)
     found = grown(problem)
     assert found.problem.resolved_by == OPTIONS.search.resolved_by
-    assert np.all(found.solution.basis.alpha <= problem.finest(found.solution.basis.beta) * (1.0 + 1e-9))
+    assert np.all(found.solution.basis.alpha <= problem.finest(found.solution.basis) * (1.0 + 1e-9))
 
 
 def over_two_inputs(
@@ -88,7 +96,7 @@ def test_smooth_force_over_two_inputs_has_wide_wavelets(monkeypatch: pytest.Monk
     assert problem.rmse(found.solution) <= FINER_ERROR_RATIO * FORCE_RESOLUTION * problem.force_range
     assert found.problem.resolved_by == OPTIONS.search.resolved_by
     problem = replace(problem, resolved_by=int(SMOOTH_CORE_SHARE * 200))
-    widest = problem.finest(found.solution.basis.beta)
+    widest = problem.finest(found.solution.basis)
     assert np.all(found.solution.basis.alpha <= np.maximum(widest, LEAST_DILATION) * (1.0 + 1e-9))
     monkeypatch.setattr(Growth, "_smooth", lambda *_: None)
     narrow = grown(over_two_inputs(smooth, 200))
@@ -100,9 +108,17 @@ def test_force_with_a_kink_is_grown_as_without_wide_wavelets(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     tried, wide = [], Growth._smooth
-    monkeypatch.setattr(Growth, "_smooth", lambda *given: tried.append(wide(*given)))
-    found = grown(over_two_inputs(creased, 120))
-    assert tried == [None]
+
+    def noted(*given: Any) -> Grown | None:
+        tried.append(wide(*given))
+        return tried[-1]
+
+    monkeypatch.setattr(Growth, "_smooth", noted)
+    problem = over_two_inputs(creased, 120)
+    found = grown(problem)
+    (smooth,) = tried
+    assert smooth is not None
+    assert problem.rmse(smooth.solution) > problem.rmse(found.solution)
     monkeypatch.setattr(Growth, "_smooth", lambda *_: None)
     without = grown(over_two_inputs(creased, 120))
     assert np.array_equal(found.solution.coefficients, without.solution.coefficients)
@@ -140,3 +156,50 @@ def test_noise_has_no_neighbour_correlation(seed: int) -> None:
     problem = kinked(0.03, seed)
     assert problem.neighbour_correlation(grown(problem).solution) < 3.0
     assert problem.neighbour_correlation(problem.solve(Basis.empty(1))) > 10.0
+
+
+def sum_of_few_inputs(x: np.ndarray) -> Float1D:
+    return np.asarray(
+        np.tanh(6.0 * (x[:, 0] - 0.5)) + np.sin(3.0 * x[:, 1] * x[:, 3]) + 0.5 * np.sin(4.0 * x[:, 2])
+    )
+
+
+def over_four_inputs(n: int, noise: float) -> SeparableProblem:
+    random = np.random.default_rng(1)
+    x = random.uniform(size=(n, 4))
+    y = sum_of_few_inputs(x) + random.normal(0.0, noise, n)
+    return problem_of(Compressor(x, y, max_positions=n).rows(), resolved_by=OPTIONS.search.resolved_by)
+
+
+def error_on_fresh_rows(found: Grown) -> float:
+    fresh = np.random.default_rng(2).uniform(size=(4000, 4))
+    basis, (coefficients,) = found.solution.basis, found.solution.coefficients
+    columns = np.hstack([np.ones((len(fresh), 1)), fresh, wavelet_columns(fresh, basis.alpha, basis.beta)])
+    return float(np.sqrt(np.mean((columns @ coefficients - sum_of_few_inputs(fresh)) ** 2)))
+
+
+def test_wavelets_use_only_the_inputs_that_they_need() -> None:
+    problem = over_four_inputs(3000, 0.02)
+    found = grown(problem)
+    used = found.solution.basis.used
+    assert np.count_nonzero(used.sum(axis=1) <= 2) > 0.6 * len(used)
+    assert problem.n_parameters(found.solution.basis) == 2 * used.sum() + len(used) + 5
+    assert error_on_fresh_rows(found) < 0.008
+
+
+def test_growth_on_parts_of_many_rows_costs_less_at_the_same_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counts the rows of all refinement steps: they take most of the time."""
+    step, problem = SeparableProblem.normal_equations, over_four_inputs(20_000, 0.05)
+    monkeypatch.setattr(growth, "MOST_LIBRARY_ROWS", 1000)
+    rows, errors = [0, 0], []
+    for case, least in enumerate((1000, 20_000)):
+
+        def counted(at: SeparableProblem, solution: Solution, case: int = case) -> tuple[Float2D, Float1D]:
+            rows[case] += sum(len(block.target) for block in at.blocks)
+            return step(at, solution)
+
+        monkeypatch.setattr(SeparableProblem, "normal_equations", counted)
+        monkeypatch.setattr(growth, "LEAST_PART_ROWS", least)
+        errors.append(error_on_fresh_rows(grown(problem)))
+    assert rows[0] < 0.8 * rows[1]
+    assert errors[0] < max(1.5 * errors[1], 0.006)
