@@ -16,7 +16,7 @@ from .._core.stability import Certificate
 from ..errors import escaped
 from ..recording.files import replacing
 
-_MULTILINE_FIELDS = ("network", "fit", "plan", "certificate")
+_MULTILINE_FIELDS = ("network", "fit", "band", "plan", "certificate")
 """JSON objects of a model file that are written with each of their fields on its own line."""
 
 
