@@ -128,7 +128,6 @@ def identify(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify each one "
                 "separately"
             )
-    _require_distinct(recordings)
     recordings, isolated = without_isolated(recordings)
     for each in recordings:
         require_in_range("position", each.position)
@@ -162,22 +161,6 @@ def _groups(objects: object, inputs: Sequence[str]) -> list[list[Recording]]:
                 f"objects[{number}] is {shown(group)}: must be a list of recordings of one object"
             )
     return [recordings_from(group, inputs=inputs) for group in objects]
-
-
-def _require_distinct(recordings: Sequence[Recording]) -> None:
-    """Refuses two recordings with the same rows: they would show an object that repeats exactly.
-
-    Raises
-    ------
-    InputError
-        Two recordings are equal.
-    """
-    seen: dict[bytes, int] = {}
-    for number, each in enumerate(recordings):
-        first = seen.setdefault(each.position.tobytes() + each.force.tobytes(), number)
-        if first != number:
-            names = [", ".join(recordings[k].source.files) or f"recording {k + 1}" for k in (first, number)]
-            raise InputError(f"{names[1]} has the same rows as {names[0]}; give each recording once")
 
 
 def _show_options() -> None:

@@ -234,6 +234,16 @@ class Model(ForceModel):
         """Domain: least and largest value of each of the d inputs in the recording, as (lower, upper)."""
         return self.lower, self.upper
 
+    def band_half_width(self, position: npt.ArrayLike) -> Float1D | None:
+        """Returns the half width (n,) of the band about the force at positions [m or rad]; None without
+        band."""
+        if self.band is None:
+            return None
+        at = np.asarray(position, dtype=np.float64)
+        if self.period is not None:
+            at = self.lower[0] + np.mod(at - self.lower[0], self.period)
+        return self.band.half_width(at)
+
     @property
     def planned(self) -> Model:
         """Model that the plan renders: with the network stored in the plan, if any, else this model."""

@@ -278,10 +278,11 @@ def rows_of(
     else:
         forces, parts = [paper_target(part, options) for part in recordings], ()
     force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
+    first_equal = _first_equal(recordings)
     repeats = None
-    if len(recordings) > 1:
-        number = np.repeat(np.arange(len(recordings)), [np.count_nonzero(rows) for rows in kept])
-        repeats = Repeats(number, tuple(objects or (0,) * len(recordings)))
+    if len(set(first_equal)) > 1:
+        number = np.repeat(first_equal, [np.count_nonzero(rows) for rows in kept])
+        repeats = Repeats(number.astype(np.intp), tuple(objects or (0,) * len(recordings)))
     return Rows(
         names,
         np.concatenate(columns),
@@ -297,6 +298,16 @@ def rows_of(
         position_unit=recordings[0].file_unit("position"),
         force_unit=recordings[0].file_unit("force"),
     )
+
+
+def _first_equal(recordings: Sequence[Recording]) -> list[int]:
+    """Returns, for each recording, the number of the first one with the same positions and forces: a copy is
+    no repeat."""
+    seen: dict[bytes, int] = {}
+    return [
+        seen.setdefault(each.position.tobytes() + each.force.tobytes(), number)
+        for number, each in enumerate(recordings)
+    ]
 
 
 def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:
