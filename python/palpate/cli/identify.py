@@ -153,31 +153,27 @@ class _IdentifyVerb(Verb):
         return super().parse_args(ctx, kept)
 
 
-def _objects(ctx: click.Context, recordings: Sequence[Recording]) -> list[list[Recording]] | None:
-    """Returns the recordings of each object; None without the option --object.
-
-    Raises
-    ------
-    UsageError
-        An object has no file, or a file belongs to no object.
-    """
-    sizes = ctx.meta[_OBJECT_SIZES]
-    if not sizes:
-        return None
-    if min(sizes) == 0 or sum(sizes) != len(recordings):
+def _require_object_of_each(sizes: Sequence[int], files: int) -> None:
+    """Refuses an object without files, and files that belong to no object, if there are objects."""
+    if sizes and (min(sizes) == 0 or sum(sizes) != files):
         raise click.UsageError(
-            f"--object names {sum(sizes)} files of {len(sizes)} objects, and {len(recordings)} files are "
-            "given: give every file after an --object"
+            f"--object is followed by {' and '.join(map(str, sizes))} files, and {files} files are given: "
+            "give each file after an --object"
         )
+
+
+def _objects(sizes: Sequence[int], recordings: Sequence[Recording]) -> list[list[Recording]] | None:
+    """Returns the recordings of each object; None without the option --object."""
     following = iter(recordings)
-    return [[next(following) for _ in range(size)] for size in sizes]
+    return [[next(following) for _ in range(size)] for size in sizes] or None
 
 
 @verb("palpate identify press.csv -o press.json --hold-out-every 5 --plot press.png", cls=_IdentifyVerb)
 @click.argument("recording_files", metavar="RECORDING...", type=PATH, nargs=-1, required=True)
 @click.option("-o", "--output", type=PATH, metavar="MODEL.json", required=True, help="Model file to write.")
-@click.option(
+@expert_option(
     "--object",
+    group="Input",
     metavar="RECORDING...",
     multiple=True,
     expose_value=False,
@@ -222,9 +218,7 @@ def _objects(ctx: click.Context, recordings: Sequence[Recording]) -> list[list[R
 )
 @reading_options
 @options(*_IDENTIFY_OPTIONS)
-@click.pass_context
 def identify(
-    ctx: click.Context,
     recording_files: tuple[Path, ...],
     output: Path,
     hold_out_every: int | None,
@@ -247,16 +241,13 @@ def identify(
     require_model_name(output)
     require_writable(output, plot, inputs=recording_files)
     recordings: list[Recording] = []
+    sizes = click.get_current_context().meta[_OBJECT_SIZES]
+    _require_object_of_each(sizes, len(recording_files))
     by_parts = out_of_core or jobs != 1 or scheduler is not None
     if by_parts:
         left = {name: value for name, value in reading.options.items() if name not in _READ_BY_PARTS}
-        _require_unused(
-            object=ctx.meta[_OBJECT_SIZES],
-            hold_out_every=hold_out_every,
-            baselines=with_baselines,
-            plot=plot,
-            **left,
-        )
+        left |= {"object": sizes, "plot": plot, "baselines": with_baselines}
+        _require_unused(hold_out_every=hold_out_every, **left)
     else:
         columns = [name for name in settings["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
         recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
@@ -281,7 +272,7 @@ def identify(
                 **settings,
             )
         else:
-            objects = _objects(ctx, recordings)
+            objects = _objects(sizes, recordings)
             model = identify_model(recordings if objects is None else None, objects=objects, **settings)
     if by_parts:
         chosen_columns = ", ".join(f"{role} is {column}" for role, column in model.data.columns.items())
@@ -356,7 +347,7 @@ def _band_text(model: Model, recordings: Sequence[Recording]) -> dict[str, str]:
         return {}
     force = recordings[0].file_unit("force")
     inside = "" if band.coverage is None else f", {band.coverage:.1%} of its rows in the band"
-    error = f"RMS {force.text(band.unseen_error)} on a {band.left_out} left out of the fit{inside}"
+    error = f"RMS {force.text(band.unseen_error)} on each {band.left_out} left out of the fit{inside}"
     return {"repeats": error}
 
 

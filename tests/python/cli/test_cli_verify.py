@@ -15,8 +15,8 @@ from palpate import Recording, load_model, read_recording, verify
 from palpate.cli.figures import close_loops, picture_closed_loops, picture_verification
 from palpate.cli.main import main
 
-JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh", "extrapolated"]
-JSON_FIELDS += ["verdict", "units"]
+JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "within_band", "n", "fresh"]
+JSON_FIELDS += ["extrapolated", "verdict", "units"]
 UNITS = {"position": "rad", "force": "N*m"}
 
 

@@ -20,7 +20,7 @@ from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, RowError
 from .class_selection import ClassSelection
-from .repeats import band_with_check
+from .repeatability import band_with_check
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: the RMS error is then a tenth of the standard

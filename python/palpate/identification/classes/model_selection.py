@@ -25,7 +25,7 @@ from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
 from .class_selection import VELOCITY_INPUTS, ClassSelection, Linear, ModelClass, Network
 from .findings import USABLE_NRMSE, large_unexplained_share, unexplained_share
 from .hysteresis import Hysteresis
-from .repeats import no_finer_than_repeats
+from .repeatability import no_finer_than_repeats
 
 MOST_HALVINGS = 3
 """Largest number of times that position cells are halved because they are too wide for the force law."""
