@@ -299,7 +299,7 @@ def draw(path: Path, results: Sequence[Mapping[str, Any]]) -> None:
         figure = panels[0].figure
         figure.supylabel("force minus model [N]", fontsize=8.0)
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, frameon=False, loc="outside lower center", ncols=3)
+        figure.legend(handles, labels, frameon=False, loc="outside lower center", ncols=2)
 
 
 def main() -> None:
