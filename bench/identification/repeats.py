@@ -176,7 +176,7 @@ def repeatability(recordings: Sequence[Recording]) -> float:
 
 
 def residual_curves(samples: Mapping[str, Sequence[Recording]]) -> dict[str, Any]:
-    """Returns what the figure shows of the first sample: band, and the residual of every recording."""
+    """Returns the curves of the figure: band of the first sample, and the residual of every recording."""
     model = identify(samples[SAMPLES[0]])
     x = np.linspace(float(model.lower[0]), float(model.upper[0]), 81)
     half = model.band_half_width(x)

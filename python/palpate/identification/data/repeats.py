@@ -44,7 +44,7 @@ class Repeats:
 
     @property
     def groups(self) -> NDArray[np.intp]:
-        """(n,) number of what is left out in a check: of the object if there are several, else of the
+        """(n,) number of the group that a check leaves out: the object if there are several, else the
         recording."""
         return np.asarray(self.objects, dtype=np.intp)[self.recording] if self.several else self.recording
 
@@ -121,7 +121,7 @@ def band_of(
     """Returns the band of a further recording, without its check; None if no part of the travel has rows of
     two recordings, or of two objects if there are several.
 
-    Each recording counts once, whatever the number of its rows.
+    Each recording counts once, with few rows or many.
 
     Parameters
     ----------

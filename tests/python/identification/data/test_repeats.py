@@ -86,7 +86,7 @@ def test_rows_where_no_other_recording_has_rows_have_no_difference() -> None:
     assert np.isfinite(apart[150:300]).all()
 
 
-def test_noise_of_rows_is_found_beside_a_difference_of_the_whole_recording() -> None:
+def test_noise_of_rows_is_separated_from_a_difference_of_the_whole_recording() -> None:
     random = np.random.default_rng(3)
     residual = np.concatenate([5.0 + X, -5.0 - X]) + 0.1 * random.normal(size=600)
     recording = np.repeat([0, 1], 300)
