@@ -111,12 +111,13 @@ def identify(
     inputs = () if settings.inputs == "auto" else settings.inputs
     further = [name for name in inputs if name not in RESERVED_INPUTS]
     if objects is None:
-        if recording is None:
+        if recording is None and force is None:
             raise InputError("recording is missing: give a recording, a list of recordings, or objects")
-        recordings = recordings_from(recording, force, time, direction, inputs=further)
+        given: Any = recording
+        recordings = recordings_from(given, force, time, direction, inputs=further)
         object_of = [0] * len(recordings)
     else:
-        if recording is not None:
+        if any(each is not None for each in (recording, force, time, direction)):
             raise InputError("recording and objects are given; give all recordings in objects")
         groups = _groups(objects, further)
         recordings = [each for group in groups for each in group]

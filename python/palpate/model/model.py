@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,6 +147,7 @@ class Model(ForceModel):
         instance_of("units", units, Mapping, "the units of position and force")
         instance_of("fit", fit, Fit, "the result of the identification")
         instance_of("data", data, Source, "the source of the recordings")
+        instance_of("band", band, (Band, NoneType), "the band of several recordings")
         of_velocity = kind == "position_velocity" and len(inputs) == 2
         super().__init__(**network, below=below, above=above, of_velocity=of_velocity)
         self.kind = kind
