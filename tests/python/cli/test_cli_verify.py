@@ -49,6 +49,8 @@ def test_the_share_of_rows_in_the_band_is_printed(folder: Path, capsys: pytest.C
     printed = " ".join(capsys.readouterr().out.split())
     assert "95% band of a further recording of the same object: +- 0.01 to 0.03 N*m" in printed
     assert "RMS error 0.008 N*m, 93.8% of its rows in the band" in printed
+    main(["show", "band.json", "--json"])
+    assert json.loads(capsys.readouterr().out)["band"]["repeat"] == [0.01, 0.03]
     assert main(["report", "band.json", "b.csv", "-o", "b.html"]) == 0
     assert "The grey band should contain 95% of the rows of a further recording" in Path("b.html").read_text()
 

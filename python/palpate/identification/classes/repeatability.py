@@ -33,8 +33,8 @@ def no_finer_than_repeats(first: ClassSelection) -> ClassSelection:
 
     Rows of one recording differ from the mean of all recordings in a similar way. A criterion that counts
     rows therefore accepts wavelets that fit the differences between few recordings. Here errors below the
-    differences between the recordings do not count, and the largest number of wavelets is reduced while the
-    error stays there. A model with mass, damping or velocity is kept: the recordings may differ because
+    differences between the recordings do not count, and the smallest number of wavelets with such an error is
+    searched by bisection. A model with mass, damping or velocity is kept: the recordings may differ because
     their speeds do.
     """
     data, best, options = first.data, first.best, first.options
@@ -47,13 +47,22 @@ def no_finer_than_repeats(first: ClassSelection) -> ClassSelection:
     if least <= max(data.limits.force_error, best.rmse):
         return first  # the recordings repeat better than the model
     coarse = replace(data, limits=replace(data.limits, force_error=least))
-    on_held_out, smaller, size = first.judge.on_held_out, first, best.n_wavelets
-    while size > 0:
-        limited = replace(options, max_wavelets=size)
-        trial = ClassSelection(coarse, limited, first.classes, first.cells, on_held_out=on_held_out)
-        if trial.best.rmse > least or trial.best.n_parameters > best.n_parameters:
-            break
-        smaller, size = trial, trial.best.n_wavelets - 1
+    smaller, size, too_few = first, best.n_wavelets, -1
+    while size > too_few:
+        trial = ClassSelection(
+            coarse,
+            replace(options, max_wavelets=size),
+            first.classes,
+            first.cells,
+            on_held_out=first.judge.on_held_out,
+        )
+        if trial.best.rmse <= least and trial.best.n_parameters <= best.n_parameters:
+            smaller = trial
+        elif smaller is first:
+            return first
+        else:
+            too_few = size
+        size = (smaller.best.n_wavelets + too_few) // 2
     if smaller.best.n_parameters >= best.n_parameters:
         return first
     smaller.options = options
@@ -82,27 +91,30 @@ def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
     used = best.error.weight > 0.0
     band = None if _pure_error(best, repeats) is None else _band(best, best.residual, used, repeats)
     squares, rows, within, judged = 0.0, 0, 0, 0
-    group = repeats.groups
+    group, data = repeats.groups, best.data
+    force = data.force if best.moving is None else data.force - best.moving.force
+    compressor = Compressor(
+        data.box, force, weight=data.weight, max_positions=best.rows.cells, limits=data.limits
+    )
     for number in np.unique(group[used]) if band is not None else ():
         others = used & (group != number)
-        residual, left = _left_out(best, others, used & (group == number))
+        residual, left = _left_out(best, compressor, force, others, used & (group == number))
         squares += float(residual[left] @ residual[left])
         rows += int(np.count_nonzero(left))
         of_others = _band(best, residual, others, repeats)
         if of_others is not None and left.any():
-            half = of_others.half_width(best.data.domain[left, 0])
+            half = of_others.half_width(data.domain[left, 0])
             within += int(np.count_nonzero(np.abs(residual[left]) <= half))
             judged += len(half)
     if band is None or rows == 0:
         return None, (NO_BAND,)
     coverage = within / judged if judged else None
     band = replace(band, unseen_error=float(np.sqrt(squares / rows)), coverage=coverage)
-    share = "" if coverage is None else f", {coverage:.1%} of its rows in the band of the others"
-    error = best.data.force_unit.text(band.unseen_error)
-    return band, (
-        f"One {band.left_out} left out of the fit at a time: RMS error {error} on it{share} (expected "
-        f"{BAND_LEVEL:.0%}).",
-    )
+    share = ""
+    if coverage is not None:
+        share = f", {coverage:.1%} of its rows in the band of the others (expected {BAND_LEVEL:.0%})"
+    error = data.force_unit.text(band.unseen_error)
+    return band, (f"One {band.left_out} left out of the fit at a time: RMS error {error} on it{share}.",)
 
 
 def _pure_error(best: Candidate, repeats: Repeats) -> float | None:
@@ -120,12 +132,18 @@ def _band(best: Candidate, residual: Float1D, rows: NDArray[np.bool_], repeats: 
 
 
 def _left_out(
-    best: Candidate, fitted: NDArray[np.bool_], left: NDArray[np.bool_]
+    best: Candidate,
+    compressor: Compressor,
+    force: Float1D,
+    fitted: NDArray[np.bool_],
+    left: NDArray[np.bool_],
 ) -> tuple[Float1D, NDArray[np.bool_]]:
     """Returns the residual (n,) of the model fitted to some of the rows, and the left out rows (n,) within
-    the positions and directions of these rows."""
+    the positions and directions of these rows.
+
+    `force` (n,) is that without the forces of mass and damping, and the rows of the compressor have it.
+    """
     data = best.data
-    force = data.force if best.moving is None else data.force - best.moving.force
     if data.weight is not None:
         fitted = fitted & (data.weight > 0.0)
     left = left & inside(data.box, data.box[fitted])
@@ -135,9 +153,6 @@ def _left_out(
         return force, left
     if best.model_class == "constant":
         return force - float(np.mean(force[fitted])), left
-    compressor = Compressor(
-        data.box, force, weight=data.weight, max_positions=best.rows.cells, limits=data.limits
-    )
     rows = compressor.rows(best.side, fitted)
     problem = replace(problem_of(rows, resolved_by=best.problem.resolved_by), prior=best.problem.prior)
     solution = problem.solve(best.solution.basis)
