@@ -356,8 +356,8 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
         findings.append(
             usable(
                 f"only {found.within_band:.0%} of the rows lie in the band of the {of} that the model was "
-                f"identified on, which should contain {BAND_LEVEL:.0%}: the object, its zero position or the "
-                "device is another one"
+                f"identified on, which should contain {BAND_LEVEL:.0%}. Likely cause: another object, zero "
+                "position or device. Few repeats of one object differ this much"
             )
         )
     if found.nrmse > USABLE_NRMSE:
