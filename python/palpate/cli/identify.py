@@ -173,7 +173,6 @@ def _objects(sizes: Sequence[int], recordings: Sequence[Recording]) -> list[list
 @click.option("-o", "--output", type=PATH, metavar="MODEL.json", required=True, help="Model file to write.")
 @expert_option(
     "--object",
-    group="Input",
     metavar="RECORDING...",
     multiple=True,
     expose_value=False,
