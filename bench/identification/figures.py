@@ -3,7 +3,7 @@
 
 python bench/identification/figures.py build/bench --to docs
 
-Draws identification-parameters.png, identification-time.png and identification-filters.png to FOLDER/figures.
+Draws identification-parameters.png, -time.png, -filters.png and -repeats.png to FOLDER/figures.
 Writes the tables of FOLDER/identification.md if that page exists. A study that did not run keeps its table.
 """
 
@@ -26,6 +26,7 @@ from palpate.cli.printing import number
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from bench.identification import repeats
 from bench.studies import fill_tables, markdown_table
 
 from palpate.plotting.look import grid
@@ -235,8 +236,13 @@ TABLES: Mapping[str, Callable[[Any], str]] = {
     "parsimony": counts,
     "dynamic": dynamic,
     "filters": speeds,
+    "repeats": repeats.table,
+    "published": repeats.published_table,
 }
-"""Names of the tables whose studies may not have run; `crossing` is the second table of real_data."""
+"""Names of the tables whose studies may not have run"""
+
+SECOND_TABLES = {"crossing": "real_data", "published": "repeats"}
+"""Names of the tables that show further results of a study, and the study of each"""
 
 
 def draw_error_over(path: Path, rows: Sequence[Row], label: str, cost: Callable[[Row], float]) -> None:
@@ -353,11 +359,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     caption = f"median (least to largest) of up to {draws} draws"
     tables = {"compare_methods": f"{problems(rows)}\n{source}; {caption}\n"}
     for name, table in TABLES.items():
-        study = results_of(options.folder, "real_data" if name == "crossing" else name)
+        study = results_of(options.folder, SECOND_TABLES.get(name, name))
         if study is not None:
             tables[name] = f"{table(study[0])}\n{study[1]}\n"
             if name == "filters":
                 draw_over_speed(figures / "identification-filters.png", study[0])
+            if name == "repeats":
+                repeats.draw(figures / "identification-repeats.png", study[0])
     print(f"wrote the figures of identification to {figures}")
     fill_tables(options.to / "identification.md", tables)
 

@@ -81,6 +81,7 @@ CALLS: dict[str, tuple[Call, str, set[str]]] = {
     # name: (call with one test value, argument that the error message names, valid test values)
     "identify": (identify, "recording|frame", set()),
     "identify in a list": (lambda v: identify([RECORDING, v]), "recording|frame", set()),
+    "identify objects": (lambda v: identify(objects=v), "objects|recording", set()),
     "identify position": (lambda v: identify(v, X), "position|force", set()),
     "identify force": (lambda v: identify(X, v), "force|recording", set()),
     "identify time": (lambda v: identify(X, X, time=v), "time", {"none"}),

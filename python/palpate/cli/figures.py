@@ -192,7 +192,8 @@ def picture_verification(
 ) -> None:
     """Draws measured and modelled force over position, and their difference below them, for all recordings.
 
-    For the recordings from which the model was identified, it also draws the 95 % band of the model's force.
+    It also draws the band of the model, or else, for the recordings from which the model was identified, the
+    95 % band of the model's force by its standard error.
     """
     from ..plotting import draw_measured_and_modelled
 
@@ -210,6 +211,8 @@ def picture_verification(
         units=verified[0][0].units,
     )
     modelled = np.concatenate([verification.force for _, verification in verified])
+    bands = [verification.band for _, verification in verified]
+    band = None if model.band is None else np.concatenate([each for each in bands if each is not None])
     simulated = any(_is_simulated(recording) for recording, _ in verified)
     files = source_name(file for each, _ in verified for file in each.source.files)
     title = f"{files}\n{_error_text(recording.force, modelled)}"
@@ -221,7 +224,8 @@ def picture_verification(
             modelled,
             one_curve=one_curve,
             seen="simulated data" if simulated else "measured",
-            standard_error=_standard_error(model, identified_on, recording),
+            standard_error=_standard_error(model, identified_on, recording) if band is None else None,
+            band=band,
         )
 
 

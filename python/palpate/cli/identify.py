@@ -37,6 +37,7 @@ from .exit_status import end_with, finishing
 from .figures import drawing, picture_verification
 from .printing import (
     WIDEST,
+    Verb,
     number,
     print_details,
     print_json,
@@ -127,9 +128,56 @@ _IDENTIFY_OPTIONS = [
 ]
 
 
-@verb("palpate identify press.csv -o press.json --hold-out-every 5 --plot press.png")
+_OBJECT_SIZES = "palpate.object_sizes"
+"""Key of the context of the verb: numbers of files that follow each --object"""
+
+
+class _IdentifyVerb(Verb):
+    """The verb identify, whose option --object takes all files up to the next option."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Moves the files of each --object to the arguments, and notes how many belong to each object."""
+        kept: list[str] = []
+        sizes: list[int] = []
+        in_object = False
+        for word in args:
+            if word == "--object":
+                sizes.append(0)
+                in_object = True
+                continue
+            in_object = in_object and not word.startswith("-")
+            if in_object:
+                sizes[-1] += 1
+            kept.append(word)
+        ctx.meta[_OBJECT_SIZES] = sizes
+        return super().parse_args(ctx, kept)
+
+
+def _require_object_of_each(sizes: Sequence[int], files: int) -> None:
+    """Refuses an object without files, and files that belong to no object, if there are objects."""
+    if sizes and (min(sizes) == 0 or sum(sizes) != files):
+        raise click.UsageError(
+            f"--object is followed by {' and '.join(map(str, sizes))} files, and {files} files are given: "
+            "give each file after an --object"
+        )
+
+
+def _objects(sizes: Sequence[int], recordings: Sequence[Recording]) -> list[list[Recording]] | None:
+    """Returns the recordings of each object; None without the option --object."""
+    following = iter(recordings)
+    return [[next(following) for _ in range(size)] for size in sizes] or None
+
+
+@verb("palpate identify press.csv -o press.json --hold-out-every 5 --plot press.png", cls=_IdentifyVerb)
 @click.argument("recording_files", metavar="RECORDING...", type=PATH, nargs=-1, required=True)
 @click.option("-o", "--output", type=PATH, metavar="MODEL.json", required=True, help="Model file to write.")
+@expert_option(
+    "--object",
+    metavar="RECORDING...",
+    multiple=True,
+    expose_value=False,
+    help="Recordings of one object; repeat it for each of several objects of one kind.",
+)
 @click.option(
     "--hold-out-every",
     type=click.IntRange(min=2),
@@ -192,10 +240,13 @@ def identify(
     require_model_name(output)
     require_writable(output, plot, inputs=recording_files)
     recordings: list[Recording] = []
+    sizes = click.get_current_context().meta[_OBJECT_SIZES]
+    _require_object_of_each(sizes, len(recording_files))
     by_parts = out_of_core or jobs != 1 or scheduler is not None
     if by_parts:
         left = {name: value for name, value in reading.options.items() if name not in _READ_BY_PARTS}
-        _require_unused(hold_out_every=hold_out_every, baselines=with_baselines, plot=plot, **left)
+        left |= {"object": sizes, "plot": plot, "baselines": with_baselines}
+        _require_unused(hold_out_every=hold_out_every, **left)
     else:
         columns = [name for name in settings["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
         recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
@@ -220,7 +271,8 @@ def identify(
                 **settings,
             )
         else:
-            model = identify_model(recordings if len(recordings) > 1 else recordings[0], **settings)
+            objects = _objects(sizes, recordings)
+            model = identify_model(recordings if objects is None else None, objects=objects, **settings)
     if by_parts:
         chosen_columns = ", ".join(f"{role} is {column}" for role, column in model.data.columns.items())
         talk(f"read {model.data.rows} rows; {chosen_columns}")
@@ -246,6 +298,8 @@ def identify(
     }
     if hold_out_every is not None:
         result["held_out_rows"] = compared
+    if model.band is not None:
+        result["unseen_error"], result["band_coverage"] = model.band.unseen_error, model.band.coverage
     if with_baselines:
         result["baselines"] = [asdict(each) for each in others]
     rows = sum(len(recording) for recording in judged_on)
@@ -270,6 +324,7 @@ def identify(
                     "model": f"{output}: {model.fit.model_class}, {model.n_wavelets} wavelets, "
                     f"{model.n_parameters} parameters",
                     "error": f"{rms}NRMSE {number(nrmse)} on {judged}",
+                    **_band_text(model, recordings),
                     **dict(note.split(": ", 1) for note in model.notes["model_selection"][-_MOST_DECISIONS:]),
                     "time": f"{seconds:.2f} s",
                 }
@@ -282,6 +337,17 @@ def identify(
                 reason = f"growth of the network stopped by {model.stop_reason}"
                 print_details([reason, *model.notes["identification"]])
     end_with(verdict)
+
+
+def _band_text(model: Model, recordings: Sequence[Recording]) -> dict[str, str]:
+    """Returns the check of the band for the summary; empty without band."""
+    band = model.band
+    if band is None:
+        return {}
+    force = recordings[0].file_unit("force")
+    inside = "" if band.coverage is None else f", {band.coverage:.1%} of its rows in the band"
+    error = f"RMS {force.text(band.unseen_error)} on each {band.left_out} left out of the fit{inside}"
+    return {"repeats": error}
 
 
 def _print_sketch(model: Model, recordings: Sequence[Recording]) -> None:

@@ -28,7 +28,7 @@ from .show_recording import is_recording, show_recording
 from .verb import PATH, ReadingOptions, json_option, plot_option, reading_options, require_writable, verb
 
 _SHOWN = ("kind", "inputs", "units", "network", "play_radius", "mass", "damping", "domain", "continuation",
-          "slope_bounds", "data")  # fmt: skip
+          "slope_bounds", "data", "band")  # fmt: skip
 """Fields of a model file that `palpate show --json` prints unchanged."""
 
 
@@ -152,7 +152,7 @@ def _record(model: Model, file: Path) -> dict[str, Any]:
     return {
         "model": str(file),
         "verdict": str(model.verdict),
-        **{name: content[name] for name in _SHOWN},
+        **{name: content[name] for name in _SHOWN if name in content},
         "fit": fit,
         "plan": _plan_record(model),
     }

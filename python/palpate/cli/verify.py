@@ -108,8 +108,8 @@ def verify(
             print_json(
                 {
                     name: getattr(verification, name)
-                    for name in ("nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh",
-                                 "extrapolated")
+                    for name in ("nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "within_band", "n",
+                                 "fresh", "extrapolated")
                 }
                 | {"verdict": str(verification.verdict), "units": verification.units}
             )  # fmt: skip

@@ -14,10 +14,10 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from .._typing import Float1D, Float2D
-from ..arguments import parameter_texts
+from ..arguments import parameter_texts, shown
 from ..errors import InputError
 from ..model import Model
-from ..recording import Source, read_recording
+from ..recording import Recording, Source, read_recording
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
@@ -33,11 +33,12 @@ from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fie
 
 
 def identify(
-    recording: RecordingLike | Iterable[RecordingLike] | npt.ArrayLike,
+    recording: RecordingLike | Iterable[RecordingLike] | npt.ArrayLike | None = None,
     force: npt.ArrayLike | None = None,
     *,
     time: npt.ArrayLike | None = None,
     direction: npt.ArrayLike | None = None,
+    objects: Sequence[Iterable[RecordingLike]] | None = None,
     **options: Any,
 ) -> Model:
     """Identifies a model of force over position from recordings.
@@ -49,8 +50,9 @@ def identify(
     Parameters
     ----------
     recording : Recording, path, DataFrame, a list of these, or (n,) array_like
-        Several recordings of one object are identified together; their units must agree. With `force` it is
-        the array of positions [m or rad], which grow into the object.
+        Several recordings of one object are identified together; their units must agree. The network is then
+        only as large as the differences between them allow, and the model has a band. With `force` it is the
+        array of positions [m or rad], which grow into the object.
     force : (n,) array_like, optional
         Force of the object against the tool [N or N*m].
     time : (n,) array_like, optional
@@ -58,13 +60,17 @@ def identify(
     direction : (n,) array_like, optional
         +1 into the object, -1 out of it, 0 neither, for each position in an array. Where neither time nor
         direction is known, strokes are taken from the order of rows.
+    objects : sequence of lists of recordings, optional
+        Recordings of several objects of one kind, one list for each object, in place of `recording`. The
+        model is their mean, and its band contains a further object of this kind.
     {options}
     Returns
     -------
     Model
         ``model.verdict`` judges it. ``model.fit`` holds its class and why growth stopped, ``model.path``
         every network that was considered. ``model.notes["model_selection"]`` holds one line for each model
-        class, accepted or not; ``model.notes["identification"]`` sentences on unused rows and constraints.
+        class, accepted or not; ``model.notes["identification"]`` sentences on unused rows, constraints and
+        the check of the band. ``model.band`` is the range of force of a further recording.
 
     Raises
     ------
@@ -104,7 +110,18 @@ def identify(
     settings = options_from(options)
     inputs = () if settings.inputs == "auto" else settings.inputs
     further = [name for name in inputs if name not in RESERVED_INPUTS]
-    recordings = recordings_from(recording, force, time, direction, inputs=further)
+    if objects is None:
+        if recording is None and force is None:
+            raise InputError("recording is missing: give a recording, a list of recordings, or objects")
+        given: Any = recording
+        recordings = recordings_from(given, force, time, direction, inputs=further)
+        object_of = [0] * len(recordings)
+    else:
+        if any(each is not None for each in (recording, force, time, direction)):
+            raise InputError("recording and objects are given; give all recordings in objects")
+        groups = _groups(objects, further)
+        recordings = [each for group in groups for each in group]
+        object_of = [number for number, group in enumerate(groups) for _ in group]
     units = dict(recordings[0].units)
     for other in recordings[1:]:
         if dict(other.units) != units:
@@ -116,7 +133,7 @@ def identify(
     for each in recordings:
         require_in_range("position", each.position)
         require_in_range("force", each.force)
-    rows = rows_of(recordings, settings)
+    rows = rows_of(recordings, settings, object_of)
     # The matrices are small: several threads make the computation slower and change the last digits of the
     # result.
     with threadpool_limits(limits=1, user_api="blas"):
@@ -125,6 +142,26 @@ def identify(
     every_row = len(rows.force) == sum(map(len, recordings))
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
     return model_of(network, recordings[0].units, source, settings, verdict)
+
+
+def _groups(objects: object, inputs: Sequence[str]) -> list[list[Recording]]:
+    """Returns the recordings of each object.
+
+    Raises
+    ------
+    InputError
+        It is not a list of lists of recordings.
+    """
+    if not isinstance(objects, (list, tuple)) or not objects:
+        raise InputError(
+            f"objects is {shown(objects)}: must be a list with a list of recordings of each object"
+        )
+    for number, group in enumerate(objects):
+        if not isinstance(group, (list, tuple)) or not group:
+            raise InputError(
+                f"objects[{number}] is {shown(group)}: must be a list of recordings of one object"
+            )
+    return [recordings_from(group, inputs=inputs) for group in objects]
 
 
 def _show_options() -> None:
@@ -266,6 +303,7 @@ def model_of(
         if options.search.filters == "paper-explicit"
         else network.damping,
         fit=network.fit(),
+        band=network.band,
         data=source,
         notes={
             "model_selection": [str(decision) for decision in network.decisions],

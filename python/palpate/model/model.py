@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from ..errors import InputError
 from ..recording import Source
 from ..recording.files import require_file
 from ..verdict import Verdict
+from .band import Band
 from .model_display import frame_of, html_of
 from .model_file import Fit, PathStep, describe, write_json
 
@@ -74,6 +76,8 @@ class Model(ForceModel):
         Files, fingerprints and columns of the recordings.
     mass, damping : float, optional
         Mass and viscous damping of the object, fitted together with the force.
+    band : Band, optional
+        Range of force of a further recording, from several recordings.
     slope_bounds : (min, max), optional
         Bounds of df/dx over the domain; computed by default (d = 1).
     plan, certificate : mapping, optional
@@ -114,6 +118,7 @@ class Model(ForceModel):
         data: Source,
         mass: float | None = None,
         damping: float | None = None,
+        band: Band | None = None,
         slope_bounds: tuple[float, float] | None = None,
         plan: Mapping[str, Any] | None = None,
         certificate: Mapping[str, Any] | None = None,
@@ -142,6 +147,7 @@ class Model(ForceModel):
         instance_of("units", units, Mapping, "the units of position and force")
         instance_of("fit", fit, Fit, "the result of the identification")
         instance_of("data", data, Source, "the source of the recordings")
+        instance_of("band", band, (Band, NoneType), "the band of several recordings")
         of_velocity = kind == "position_velocity" and len(inputs) == 2
         super().__init__(**network, below=below, above=above, of_velocity=of_velocity)
         self.kind = kind
@@ -151,6 +157,7 @@ class Model(ForceModel):
         self.data = data
         self.mass = mass
         self.damping = damping
+        self.band = band
         if slope_bounds is None and self.dimension == 1:
             slope_bounds = self.slope_range()
         self.slope_bounds = slope_bounds
@@ -229,6 +236,16 @@ class Model(ForceModel):
         """Domain: least and largest value of each of the d inputs in the recording, as (lower, upper)."""
         return self.lower, self.upper
 
+    def band_half_width(self, position: npt.ArrayLike) -> Float1D | None:
+        """Returns the half width (n,) of the band about the force at positions [m or rad]; None without
+        band."""
+        if self.band is None:
+            return None
+        at = np.asarray(position, dtype=np.float64)
+        if self.period is not None:
+            at = self.lower[0] + np.mod(at - self.lower[0], self.period)
+        return self.band.half_width(at)
+
     @property
     def planned(self) -> Model:
         """Model that the plan renders: with the network stored in the plan, if any, else this model."""
@@ -249,6 +266,7 @@ class Model(ForceModel):
         content["fit"]["n_wavelets"] += added
         content["fit"]["n_parameters"] += added * (4 if self.hysteretic else 3)
         content.update(plan=None, certificate=None, slope_bounds=None)
+        content.pop("band", None)  # it is that of the recordings about the force of this model
         return Model.from_dict(content)
 
     def to_dict(self) -> dict[str, Any]:
@@ -293,6 +311,7 @@ class Model(ForceModel):
                 "columns": dict(self.data.columns),
             },
             "fit": self.fit.record(),
+            **({} if self.band is None else {"band": self.band.record()}),
             "plan": self.plan,
             "certificate": self.certificate,
             "notes": notes,
@@ -313,6 +332,7 @@ class Model(ForceModel):
             del file[part]
         network, domain, continuation = (file.pop(part) for part in ("network", "domain", "continuation"))
         bounds, fit, data = (file.pop(part) for part in ("slope_bounds", "fit", "data"))
+        band = file.pop("band", None)
         held_out_every = file.get("notes", {}).get(_HELD_OUT_KEY, 0)
         return cls(
             **file,
@@ -321,6 +341,7 @@ class Model(ForceModel):
             **continuation,
             slope_bounds=None if bounds is None else (bounds["min"], bounds["max"]),
             fit=Fit(**fit),
+            band=None if band is None else Band.from_record(band),
             data=Source(
                 files=tuple(data["files"]),
                 sha256=data["sha256"],

@@ -7,7 +7,7 @@ The core reads and checks model files; `model.schema.json` describes them.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any, TypedDict
 from .._core.stability import Certificate
 from ..errors import escaped
 from ..recording.files import replacing
+from ..recording.units import Unit
+from .band import BAND_LEVEL, Band
 
-_MULTILINE_FIELDS = ("network", "fit", "plan", "certificate")
+_MULTILINE_FIELDS = ("network", "fit", "band", "plan", "certificate")
 """JSON objects of a model file that are written with each of their fields on its own line."""
 
 
@@ -121,6 +123,8 @@ def describe(model: Model) -> str:
     if model.slope_bounds is not None:
         low, high = model.slope_bounds
         lines.append(f"  slope from {low:.4g} to {high:.4g} {force}/{position}")
+    if model.band is not None:
+        lines += _band_lines(model.band, model.units)
     if model.play_radius is not None:
         lines.append(f"  play radius {model.play_radius:.4g} {position}")
     if model.mass is not None:
@@ -129,6 +133,23 @@ def describe(model: Model) -> str:
         lines.append(f"  damping {model.damping:.4g}")
     lines += ["", *_terms(model, force)]
     return "\n".join(lines)
+
+
+def _band_lines(band: Band, units: Mapping[str, str]) -> list[str]:
+    """Returns the widths of the band and its check in sentences."""
+    force = Unit.of_si(units["force"])
+    widths = {"a further recording of the same object": band.repeat, "a further object": band.object}
+    lines = [
+        f"  {BAND_LEVEL:.0%} band of {name}: +- {force.interval(float(half.min()), float(half.max()))}"
+        for name, half in widths.items()
+        if half is not None
+    ]
+    inside = "" if band.coverage is None else f", {band.coverage:.1%} of its rows in the band"
+    lines.append(
+        f"  {band.recordings} recordings of {band.objects} object{'s' if band.objects > 1 else ''}; one "
+        f"{band.left_out} left out of the fit at a time: RMS error {force.text(band.unseen_error)}{inside}"
+    )
+    return lines
 
 
 def _terms(model: Model, force: str) -> list[str]:

@@ -24,6 +24,9 @@ _LINES = {"press": "solid", "release": (0, (4, 2)), "": "solid"}
 _CURVE: dict[str, Any] = {"color": "black", "linewidth": 1.1}
 """Look of a model's curve, except the line style of its stroke."""
 
+BAND_LABEL = "95 % of a further recording"
+"""Name of the band of a model in a legend."""
+
 _INPUT_LINES = ("dotted", "solid", "dashed")
 """Line style of each curve of a model with further inputs."""
 
@@ -43,6 +46,7 @@ def draw_measured_and_modelled(
     one_curve: bool = True,
     seen: str = "measured",
     standard_error: Float1D | None = None,
+    band: Float1D | None = None,
 ) -> None:
     """Draws measured and modelled force over position, residuals below; press and release are separate.
 
@@ -62,9 +66,11 @@ def draw_measured_and_modelled(
     standard_error : (n,) array, optional
         Standard error of the model's force at each row, drawn as a 95 % band about zero residual, in front of
         the dots.
+    band : (n,) array, optional
+        Half width of the band of the model at each row, drawn in grey about zero residual.
     """
     draw_forces(force_axes, recording, modelled, one_curve=one_curve, seen=seen)
-    draw_residual(residual_axes, recording, modelled, standard_error=standard_error)
+    draw_residual(residual_axes, recording, modelled, standard_error=standard_error, band=band)
     force_axes.set_xlabel("")
 
 
@@ -103,7 +109,12 @@ def draw_forces(
 
 
 def draw_residual(
-    axes: Axes, recording: Recording, modelled: Float1D, *, standard_error: Float1D | None = None
+    axes: Axes,
+    recording: Recording,
+    modelled: Float1D,
+    *,
+    standard_error: Float1D | None = None,
+    band: Float1D | None = None,
 ) -> None:
     """Draws measured minus modelled force over position, press and release with different dots.
 
@@ -111,13 +122,17 @@ def draw_residual(
     ----------
     axes : matplotlib.axes.Axes
         Target axes.
-    recording, modelled, standard_error
+    recording, modelled, standard_error, band
         As in :func:`draw_measured_and_modelled`.
     """
     residual = recording.force - modelled
     by_stroke = strokes(recording.direction, len(recording))
     x = scale_on(axes.xaxis, recording.units["position"], recording.position)
     z = scale_on(axes.yaxis, recording.units["force"], residual)
+    if band is not None:
+        order = np.argsort(recording.position, kind="stable")
+        at, half = recording.position[order] * x.factor, band[order] * z.factor
+        _fill_band(axes, at, np.zeros(len(at)), half)
     for name, rows in by_stroke:
         position, rest = thinned(recording.position[rows] * x.factor, residual[rows] * z.factor)
         shade = "0.45" if name != "release" else "0.7"
@@ -131,6 +146,15 @@ def draw_residual(
     axes.set_ylabel(z.label("residual"))
     if standard_error is not None:
         axes.set_title("lines: 95 % band of the model", loc="right", color="0.3")
+    elif band is not None:
+        axes.set_title(f"grey: {BAND_LABEL}", loc="right", color="0.3")
+
+
+def _fill_band(axes: Axes, position: Float1D, force: Float1D, half: Float1D) -> None:
+    """Fills the band of a model about its force over increasing positions."""
+    named = any(each.get_label() == BAND_LABEL for each in axes.collections)
+    label = "_" if named else BAND_LABEL
+    axes.fill_between(position, force - half, force + half, color="0.85", linewidth=0.0, label=label)
 
 
 def _draw_band(axes: Axes, position: Float1D, half: Float1D, line: Any) -> None:
@@ -170,7 +194,10 @@ def draw_model(axes: Axes, model: Model, *, label: str = "model", color: str = "
             curves[name] = (model.predict(inputs), line)
     x = scale_on(axes.xaxis, model.units["position"], position)
     y = scale_on(axes.yaxis, model.units["force"], *(force for force, _ in curves.values()))
+    half = model.band_half_width(position) if model.dimension == 1 else None
     for name, (force, line) in curves.items():
+        if half is not None:
+            _fill_band(axes, position * x.factor, force * y.factor, half * y.factor)
         look = _CURVE | {"color": color, "linestyle": line}
         axes.plot(position * x.factor, force * y.factor, **look, label=name)
     axes.set_xlabel(x.label(model.inputs[0]))

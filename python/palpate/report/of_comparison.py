@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._typing import Float1D
+from ..model.band import BAND_LEVEL, Band
 from ..plotting.look import Scale, scale_for, strokes, thinned
 from ..recording import Recording
 from ..verdict import FORCE_JND
@@ -55,8 +56,9 @@ class Curve:
     """press, release, or empty if the model does not distinguish them"""
     position: Float1D
     force: Float1D
-    error: Float1D | None
-    """Standard error of the force; None if it is not known"""
+    half_width: Float1D | None
+    """Half width of the band of a further recording, else of the 95 % band by the standard error; None if
+    both are unknown"""
 
     @property
     def suffix(self) -> str:
@@ -80,8 +82,10 @@ def curves_of(subject: Subject) -> list[Curve]:
     for stroke, side in (("press", 1.0), ("release", -1.0)) if model.hysteretic else (("", 1.0),):
         direction = np.full(len(x), side)
         force = model.force(x, direction=direction)
-        error = known.force(x, direction) if isinstance(known, Uncertainty) else None
-        curves.append(Curve(stroke, x, force, error))
+        half = model.band_half_width(x)
+        if half is None and isinstance(known, Uncertainty):
+            half = 2.0 * known.force(x, direction)
+        curves.append(Curve(stroke, x, force, half))
     return curves
 
 
@@ -164,7 +168,9 @@ def force_curve(subject: Subject) -> Section:
             f"inputs are {', '.join(subject.model.inputs)}"
             + (", with mass or damping." if subject.model.dimension == 1 else ".")
         )
-    if isinstance(subject.uncertainty, Uncertainty):
+    if (band := subject.model.band) is not None:
+        sentences.append(_band_sentence(band, compared))
+    elif isinstance(subject.uncertainty, Uncertainty):
         sentences.append(
             "The grey band contains the force with a probability of 95 %, as far as noise causes the error; "
             "it is often narrower than the line."
@@ -175,6 +181,23 @@ def force_curve(subject: Subject) -> Section:
     if compared is not None and not curves:
         charts.append(_modelled_over_recorded(compared))
     return Section(key, title, explanation, sentences, charts)
+
+
+def _band_sentence(band: Band, compared: Compared | None) -> str:
+    """Returns the meaning of the band, its check, and the share of the compared rows inside."""
+    further = "further object of this kind" if band.objects > 1 else "further recording of the object"
+    text = (
+        f"The grey band should contain {BAND_LEVEL:.0%} of the rows of a {further}. It is known from "
+        f"{band.recordings} recordings of {band.objects} object{'s' if band.objects > 1 else ''}."
+    )
+    if band.coverage is not None:
+        text += (
+            f" Of each {band.left_out} left out of the fit, {percent(band.coverage)} of the rows were inside "
+            "in the mean."
+        )
+    if compared is not None and compared.found.within_band is not None:
+        text += f" {percent(compared.found.within_band)} of the recorded rows are inside."
+    return text
 
 
 def _modelled_over_recorded(compared: Compared) -> Chart:
@@ -192,8 +215,7 @@ def _force_panel(subject: Subject, curves: list[Curve], compared: Compared | Non
     y = compared.y if compared else scale_for(units["force"], *(each.force for each in curves))
     panel = Panel(x.label("position"), y.label("force"), 340)
     for curve in curves:
-        if curve.error is not None:
-            half = 2.0 * curve.error
+        if (half := curve.half_width) is not None:
             low, high = y.factor * (curve.force - half), y.factor * (curve.force + half)
             panel.band(x.factor * curve.position, low, high, "95 % band")
     if compared is not None:
@@ -214,8 +236,8 @@ def _residual_panel(compared: Compared, curves: list[Curve], above: Panel) -> Pa
     x, z = compared.x, compared.z
     panel = Panel(x.label("position"), z.label("residual"), 210, above=above)
     for curve in curves:
-        if curve.error is not None:
-            half = 2.0 * z.factor * curve.error
+        if curve.half_width is not None:
+            half = z.factor * curve.half_width
             panel.band(x.factor * curve.position, -half, half)
     panel.level(0.0, "line")
     for name, rows in compared.strokes():

@@ -19,6 +19,7 @@ from ..html_table import Curve, html_table
 from ..identification.classes.findings import USABLE_NRMSE, error_findings
 from ..identification.data.rows import require_in_range
 from ..model import Model
+from ..model.band import BAND_LEVEL
 from ..recording import Recording, Source
 from ..recording.files import free_name
 from ..recording.reading import RecordingLike, recording_from
@@ -47,6 +48,11 @@ MOST_OUTSIDE = 0.5
 
 LEAST_COMPARED_SHARE = 0.5
 """Share of compared rows below which a comparison does not represent the recording [-]."""
+
+LEAST_SHARE_IN_BAND = 0.5
+"""Share of rows in the band of the model below which the recording is not one of the same object [-]. The
+rows of one recording differ from the model in a similar way, so that single repeats can have fewer than 95
+%."""
 
 LEAST_SHARE_WITHIN_JND = 0.5
 """Share of rows within the just noticeable difference below which a hand feels the error [-]."""
@@ -93,6 +99,8 @@ class Verification:
     """Force of the model at the evaluated rows"""
     residual: Float1D = field(repr=False, compare=False, kw_only=True)
     """(n,) force of the model minus the recorded one"""
+    band: Float1D | None = field(repr=False, compare=False, kw_only=True)
+    """(n,) half width of the band of the model about its force; None without band"""
     recording: Recording = field(repr=False, compare=False, kw_only=True)
     """The recording with which the model was compared, with all its rows"""
 
@@ -107,6 +115,12 @@ class Verification:
         return self.prediction.force
 
     @property
+    def within_band(self) -> float | None:
+        """Share of samples in the band of the model, which should contain 95 % of the rows of a further
+        recording of the object; None without band"""
+        return None if self.band is None else float(np.mean(np.abs(self.residual) <= self.band))
+
+    @property
     def compared(self) -> Recording:
         """The evaluated rows of the recording."""
         return self.recording.without(~self.rows)
@@ -117,10 +131,12 @@ class Verification:
         position_unit, force_unit = (recording.file_unit(role) for role in ("position", "force"))
         worst = int(np.argmax(np.abs(self.residual)))
         position = position_unit.text(float(recording.position[self.rows][worst]))
+        band = {} if self.within_band is None else {"band": f"{self.within_band:.1%} of the rows are inside"}
         return {
             "error": f"RMS {force_unit.text(self.rmse)}, NRMSE {self.nrmse:.4g}",
             "largest": f"{force_unit.text(self.worst)} at position {position}",
             "not felt": f"{100 * self.within_jnd:.3g} % of the rows have an error that a hand does not feel",
+            **band,
             "rows": f"{self.n} of {len(recording)} compared, {self.extrapolated} outside the model's domain",
             "recording": self._freshness,
         }
@@ -158,7 +174,7 @@ class Verification:
 
         axes, recording = axes_or_new(ax), self.compared
         if residual:
-            draw_residual(axes, recording, self.force)
+            draw_residual(axes, recording, self.force, band=self.band)
         else:
             one_curve = self.prediction.side is None or recording.direction is not None
             draw_forces(axes, recording, self.force, one_curve=one_curve)
@@ -244,6 +260,7 @@ def verify(
         notes=notes,
         prediction=prediction,
         residual=residual,
+        band=model.band_half_width(prediction.position),
         recording=recording,
     )
     return replace(found, verdict=Verdict(findings_of(model, recording, found)))
@@ -334,6 +351,15 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
 def _of_cause(model: Model, recording: Recording, found: Verification) -> list[Finding]:
     """Returns findings on the error: perceptible by a hand, and the likely cause of a large one."""
     findings = []
+    if found.within_band is not None and found.within_band < LEAST_SHARE_IN_BAND:
+        of = "objects" if model.band is not None and model.band.objects > 1 else "recordings"
+        findings.append(
+            usable(
+                f"only {found.within_band:.0%} of the rows lie in the band of the {of} that the model was "
+                f"identified on, which should contain {BAND_LEVEL:.0%}. Likely cause: another object, zero "
+                "position or device. Few repeats of one object differ this much"
+            )
+        )
     if found.nrmse > USABLE_NRMSE:
         known = {"velocity": model.of_velocity, "hysteresis": model.hysteretic}
         missing = ", ".join(name for name, has in known.items() if not has)

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from bench.identification.figures import main
+from bench.identification.repeats import SEVERAL
 
 PNG = b"\x89PNG"
 
@@ -76,6 +77,32 @@ def test_draws_figures_and_fills_tables_of_the_page(results_folder: Path) -> Non
     assert "old real_data" in text
     assert "old parsimony" not in text
     assert text.count("| matched |") == 1
+
+
+def test_fills_the_tables_of_repeats_and_of_published_fits(results_folder: Path) -> None:
+    draws = {"n_parameters": [11, 14, 17], "repeat": [1.0, 2.0, 3.0], "sample": [4.0, 5.0, 6.0]}
+    curve = [0.0, 1.0]
+    row = {
+        "silicone": "soft",
+        "methods": {
+            SEVERAL: {**draws, "coverage": [0.9, 1.0, 1.0], "seconds": [1.0] * 3},
+            "spline": {**draws, "coverage": [None] * 3, "seconds": [1.0] * 3},
+        },
+        "within_kPa": 0.5,
+        "both_kPa": 1.0,
+        "published_kPa": {"Yeoh_o3": 0.7, "Ogden_o1": 2.0},
+        "curves": {"position": [0.0, 0.02], "half_width": curve, "A": [curve], "B": [curve]},
+    }
+    write_results(results_folder, "repeats", [row])
+    page = results_folder / "identification.md"
+    names = ("compare_methods", "filters", "parsimony", "repeats", "published")
+    page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in names))
+    main([str(results_folder), "--to", str(results_folder)])
+    text = page.read_text(encoding="utf-8")
+    assert f"| soft, {SEVERAL} | 14 (11 to 17) | 2.00 (1.00 to 3.00) | 5.00 (4.00 to 6.00) | 96.7 % |" in text
+    assert "| soft, spline | 14 (11 to 17) | 2.00 (1.00 to 3.00) | 5.00 (4.00 to 6.00) |  | 1 |" in text
+    assert "| soft | 0.50 | 1.00 | Yeoh 3 0.70, Ogden 1 2.00 | 1 of 2 | Yeoh 3 |" in text
+    assert (results_folder / "figures" / "identification-repeats.png").read_bytes().startswith(PNG)
 
 
 def measured_row(nrmse: float, **fields: Any) -> dict[str, Any]:

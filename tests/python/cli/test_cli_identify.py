@@ -311,3 +311,41 @@ def test_an_output_that_is_not_a_model_file_is_refused(
     assert main(["identify", "a.csv", "-o", "x.csv"]) == 2
     assert "x.csv is not a model file: its name must end in .json" in capsys.readouterr().err
     assert [path.name for path in folder.iterdir()] == ["a.csv"]
+
+
+def test_recordings_of_objects_give_bands_of_repeats_and_of_objects(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for seed, name in enumerate(("a1", "a2", "b1", "b2", "c1")):
+        spring(folder / f"{name}.csv", seed=seed)
+    given = ["--object", "a1.csv", "a2.csv", "--object", "b1.csv", "b2.csv", "--object", "c1.csv"]
+    assert main(["identify", *given, "-o", "m.json", "--json"]) == 0
+    band = load_model("m.json").band
+    assert band is not None
+    assert (band.recordings, band.objects) == (5, 3)
+    assert band.repeat is not None
+    assert json.loads(capsys.readouterr().out)["unseen_error"] == band.unseen_error
+    main(["identify", "a1.csv", "a2.csv", "b1.csv", "-o", "one.json"])
+    assert "on each recording left out of the fit" in capsys.readouterr().out
+    model = load_model("one.json")
+    assert model.band is not None
+    assert model.band.objects == 1
+
+
+@pytest.mark.parametrize(
+    "given", [["a.csv", "--object", "b.csv"], ["--object", "a.csv", "--object"], ["--object"]]
+)
+def test_files_without_object_and_objects_without_files_are_refused(
+    folder: Path, capsys: pytest.CaptureFixture[str], given: list[str]
+) -> None:
+    spring(folder / "a.csv")
+    spring(folder / "b.csv", seed=1)
+    assert main(["identify", "-o", "m.json", *given]) == 2
+    assert "error: " in capsys.readouterr().err
+    assert not (folder / "m.json").exists()
+
+
+def test_a_file_read_by_parts_belongs_to_no_object(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    spring(folder / "a.csv")
+    assert main(["identify", "--object", "a.csv", "-o", "m.json", "--out-of-core"]) == 2
+    assert "--object needs all rows at once" in capsys.readouterr().err

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from conftest import ROOT
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import Recording, load_model, read_recording, verify
 from palpate.cli.figures import close_loops, picture_closed_loops, picture_verification
 from palpate.cli.main import main
 
-JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "n", "fresh", "extrapolated"]
-JSON_FIELDS += ["verdict", "units"]
+JSON_FIELDS = ["nrmse", "rmse", "mse", "r2", "worst", "within_jnd", "within_band", "n", "fresh"]
+JSON_FIELDS += ["extrapolated", "verdict", "units"]
 UNITS = {"position": "rad", "force": "N*m"}
 
 
@@ -32,6 +33,26 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     force = model.force(position) + random.normal(0.0, 0.01, time.size)
     Recording.from_arrays(position, force, time, units=UNITS).write("a.csv")
     return tmp_path
+
+
+def test_the_share_of_rows_in_the_band_is_printed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    load_model(ROOT / "tests" / "models" / "good" / "band.json").save("band.json")
+    model = load_model("band.json")
+    position = np.linspace(0.0, 0.6, 200)
+    offset = np.where(position < 0.3, 0.0, 0.1)
+    Recording.from_arrays(position, model.force(position) + offset, units=UNITS).write("b.csv")
+    main(["verify", "band.json", "b.csv", "--plot", "b.png"])
+    assert "band" in capsys.readouterr().out
+    main(["verify", "band.json", "b.csv", "--json"])
+    assert json.loads(capsys.readouterr().out)["within_band"] == 0.5
+    main(["show", "band.json"])
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "95% band of a further recording of the same object: +- 0.01 to 0.03 N*m" in printed
+    assert "RMS error 0.008 N*m, 93.8% of its rows in the band" in printed
+    main(["show", "band.json", "--json"])
+    assert json.loads(capsys.readouterr().out)["band"]["repeat"] == [0.01, 0.03]
+    assert main(["report", "band.json", "b.csv", "-o", "b.html"]) == 0
+    assert "The grey band should contain 95% of the rows of a further recording" in Path("b.html").read_text()
 
 
 def test_numbers_go_to_standard_output_and_progress_to_standard_error(

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -73,6 +75,34 @@ inline void check_data(const JsonField& data) {
     data["columns"].require_object();
     for (const auto& column : data["columns"].value().items()) {
         (void)data["columns"][column.key()].string();
+    }
+}
+
+/// Checks the value of the key `band` of a model file: the range of force of a further recording.
+inline void check_band(const JsonField& band) {
+    band.require_keys({"position", "repeat", "object", "recordings", "objects", "unseen_error", "coverage"});
+    const std::vector<double> position = band["position"].numbers();
+    const bool increases =
+        std::adjacent_find(position.begin(), position.end(), std::greater_equal<>{}) == position.end();
+    band["position"].require(!position.empty() && increases, "a list of increasing positions");
+    const bool several = band["objects"].count(1) > 1;
+    (void)band["recordings"].count(2);
+    for (const char* name : {"repeat", "object"}) {
+        const JsonField half = band[name];
+        const bool needed = (name == std::string("object")) == several;
+        half.require(!half.is_null() || !needed, "given in the band of this number of objects");
+        if (half.is_null()) {
+            continue;
+        }
+        half.require_length(position.size(), "one for each position");
+        for (const JsonField& each : half.items()) {
+            (void)each.positive();
+        }
+    }
+    band["object"].require(several || band["object"].is_null(), "null in the band of one object");
+    (void)band["unseen_error"].not_negative();
+    if (const JsonField share = band["coverage"]; !share.is_null()) {
+        share.require(share.not_negative() <= 1.0, "at most 1");
     }
 }
 
@@ -176,10 +206,10 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     const detail::JsonField version = file["version"];
     version.require(version.value().is_number_integer() && version.number() == 1.0,
                     "1, the version that this palpate reads");
-    file.require_keys(
-        {"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius", "mass",
-         "damping", "domain", "continuation", "slope_bounds", "data", "fit", "plan", "certificate", "notes"},
-        "; put keys of your own under notes");
+    file.require_keys({"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius",
+                       "mass", "damping", "domain", "continuation", "slope_bounds", "data", "fit", "band",
+                       "plan", "certificate", "notes"},
+                      "; put keys of your own under notes");
     (void)file["format"].one_of({"palpate-model"});
     (void)file["created_by"].string();
     const detail::JsonField units = file["units"];
@@ -205,6 +235,9 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     }
     detail::check_data(file["data"]);
     detail::check_fit(file["fit"], read.model.parameters().weight.size());
+    if (content.contains("band")) {
+        detail::check_band(file["band"]);
+    }
     read.plan = detail::read_plan(file["plan"]);
     read.limited = detail::read_limited(file);
     read.certificate =

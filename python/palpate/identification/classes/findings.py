@@ -20,6 +20,7 @@ from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, RowError
 from .class_selection import ClassSelection
+from .repeatability import band_with_check
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: the RMS error is then a tenth of the standard
@@ -435,6 +436,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         findings += explained_findings(
             position, data.force[rows], best.residual[rows], side, error.nrmse, data.force_unit
         )
+    band, checked = band_with_check(best)
     near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(data.force[data.reported])))
     left_there = single and abs(best.at_lower) <= near_zero and data.period is None
     return replace(
@@ -444,6 +446,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         nrmse=error.nrmse,
         path=tuple(report.path),
         decisions=decisions,
-        notes=(*notes, *report.notes, *(f"Replaced decision: {decision}." for decision in replaced)),
+        notes=(*notes, *report.notes, *checked, *(f"Replaced decision: {each}." for each in replaced)),
         findings=tuple(findings),
+        band=band,
     )

@@ -25,6 +25,7 @@ from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
 from .class_selection import VELOCITY_INPUTS, ClassSelection, Linear, ModelClass, Network
 from .findings import USABLE_NRMSE, large_unexplained_share, unexplained_share
 from .hysteresis import Hysteresis
+from .repeatability import no_finer_than_repeats
 
 MOST_HALVINGS = 3
 """Largest number of times that position cells are halved because they are too wide for the force law."""
@@ -98,7 +99,7 @@ def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) ->
     for revised in REVISIONS:
         found = revised(found)
     found.try_classes(DYNAMIC_CLASSES)
-    return found
+    return no_finer_than_repeats(found)
 
 
 def correlated_noise(first: ClassSelection) -> ClassSelection:
@@ -241,6 +242,7 @@ class Velocity(ModelClass):
             decisions=data.decisions,
             notes=data.notes,
             findings=data.findings,
+            repeats=None if data.repeats is None else data.repeats.only(rows),
             position_unit=data.position_unit,
             force_unit=data.force_unit,
         )

@@ -76,7 +76,8 @@ class RowLimits:
     independent: float = 1.0
     """Share of the rows that are independent (0, 1]"""
     force_error: float = 0.0
-    """RMS error that the force step hides [force]; a criterion does not count smaller errors"""
+    """RMS error that the force step or the differences between repeats hide [force]; a criterion does not
+    count smaller errors"""
     position_noise: float = 0.0
     """Standard deviation of the noise of the position, as a share of the range of recorded positions [-]"""
 

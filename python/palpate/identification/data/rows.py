@@ -24,6 +24,7 @@ from ..options import IdentifyOptions
 from .compression import HELD_OUT_EVERY, held_out_rows
 from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, position_noise, repeated
 from .outliers import Robust
+from .repeats import Repeats
 from .strokes import strokes_of
 
 LARGEST_MAGNITUDE = 1e100
@@ -84,6 +85,8 @@ class Rows:
     the force, and noise of the position"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) smallest and largest position of the unit box; None: those of the rows"""
+    repeats: Repeats | None = None
+    """Recording and object of each row; None for one recording"""
     position_unit: Unit = UNSTATED_UNIT
     """Unit of position in messages"""
     force_unit: Unit = UNSTATED_UNIT
@@ -149,6 +152,7 @@ class Rows:
             weight=weight,
             within=self.within * float(share),
             parts=(),
+            repeats=None if self.repeats is None else self.repeats.only(rows),
         )
 
     def scaled(self, scale: ForceScale) -> Rows:
@@ -228,8 +232,12 @@ def require_usable(rows: Rows, options: IdentifyOptions) -> None:
         raise InputError(f"the inputs are {', '.join(names)}: period needs position as the only input")
 
 
-def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
+def rows_of(
+    recordings: Sequence[Recording], options: IdentifyOptions, objects: Sequence[int] | None = None
+) -> Rows:
     """Returns the rows of recordings with the inputs that the options require.
+
+    `objects` holds the number of the object of each recording; by default all are of one object.
 
     Raises
     ------
@@ -270,6 +278,11 @@ def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
     else:
         forces, parts = [paper_target(part, options) for part in recordings], ()
     force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
+    first_equal = _first_equal(recordings)
+    repeats = None
+    if len(set(first_equal)) > 1:
+        number = np.repeat(first_equal, [np.count_nonzero(rows) for rows in kept])
+        repeats = Repeats(number.astype(np.intp), tuple(objects or (0,) * len(recordings)))
     return Rows(
         names,
         np.concatenate(columns),
@@ -281,9 +294,20 @@ def rows_of(recordings: Sequence[Recording], options: IdentifyOptions) -> Rows:
         decisions=decisions,
         notes=notes,
         findings=findings,
+        repeats=repeats,
         position_unit=recordings[0].file_unit("position"),
         force_unit=recordings[0].file_unit("force"),
     )
+
+
+def _first_equal(recordings: Sequence[Recording]) -> list[int]:
+    """Returns, for each recording, the number of the first one with the same positions and forces: a copy is
+    no repeat."""
+    seen: dict[bytes, int] = {}
+    return [
+        seen.setdefault(each.position.tobytes() + each.force.tobytes(), number)
+        for number, each in enumerate(recordings)
+    ]
 
 
 def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) -> tuple[int, ...]:

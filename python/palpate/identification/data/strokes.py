@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,11 @@ recording with the higher force is taken as press, the other one as release [-].
 LEAST_MEAN_DIFFERENCE = 0.05
 """Least mean force difference of two recordings for press and release [standard deviations of the force].
 Repeated measurements of one stroke differ by at most 0.02."""
+
+LEAST_GROUP_GAP = 3.0
+"""Least mean force difference between the recordings of press and of release, divided by the largest one
+between recordings of the same stroke [-]. Repeats of one stroke also form two groups by chance, but close
+ones."""
 
 WINDOW_ROWS = 16
 """Number of rows of a window; the rows are neighbours in position and are divided into two groups by
@@ -179,13 +184,18 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
     if len(recordings) < 2 or any(recording.direction is not None for recording in recordings):
         return None
 
-    def above(one: Recording, other: Recording) -> int:
-        """Returns +1 if the force of `one` is above that of `other` in most cells, -1 if below, else 0."""
+    def apart_from(one: Recording, other: Recording) -> tuple[Float1D, float]:
+        """Returns the force of `one` minus that of `other` in the cells of the travel, and the standard
+        deviation of all forces."""
         position = np.concatenate([one.position, other.position])
         force = np.concatenate([one.force, other.force])
         side = np.repeat([1.0, -1.0], [len(one), len(other)])
-        apart = _Cells.of(position, force, side).difference
-        if len(apart) < TRAVEL_CELLS // 2 or abs(apart.mean()) < LEAST_MEAN_DIFFERENCE * force.std():
+        return _Cells.of(position, force, side).difference, float(force.std())
+
+    def above(one: Recording, other: Recording) -> int:
+        """Returns +1 if the force of `one` is above that of `other` in most cells, -1 if below, else 0."""
+        apart, deviation = apart_from(one, other)
+        if len(apart) < TRAVEL_CELLS // 2 or abs(apart.mean()) < LEAST_MEAN_DIFFERENCE * deviation:
             return 0
         sign = int(np.sign(apart.mean()))
         return sign if np.mean(np.sign(apart) == sign) >= LEAST_CONSISTENT_SHARE else 0
@@ -197,6 +207,15 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
     press_files = [recording for recording, up in zip(recordings, high, strict=True) if up]
     release_files = [recording for recording, up in zip(recordings, high, strict=True) if not up]
     if not all(above(one, other) > 0 for one, other in product(press_files, release_files)):
+        return None
+
+    def mean_apart(pair: tuple[Recording, Recording]) -> float:
+        apart = apart_from(*pair)[0]
+        return abs(float(apart.mean())) if len(apart) else 0.0
+
+    between = min(map(mean_apart, product(press_files, release_files)))
+    same = (*combinations(press_files, 2), *combinations(release_files, 2))
+    if between < LEAST_GROUP_GAP * max(map(mean_apart, same), default=0.0):
         return None
     return np.where(high, 1.0, -1.0)
 

@@ -12,6 +12,7 @@ import numpy as np
 from ..._core.model import ForceModel
 from ..._typing import Float1D, Float2D
 from ...model import Fit, PathStep
+from ...model.band import Band
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding
 from ..data.limits import ForceScale
@@ -67,8 +68,8 @@ class FittedNetwork:
     model_class: str = ""
     """Name of the accepted model class"""
     stop_reason: str = ""
-    """Reason why growth stopped: name of the criterion, "max_wavelets", "held-out rows", or "data" if no
-    wavelet could be added"""
+    """Reason why growth stopped: name of the criterion, "max_wavelets", "held-out rows", "repeats" if the
+    recordings do not repeat better, or "data" if no wavelet could be added"""
     n_parameters: int = 0
     """Number of fitted values, including play radius, mass and damping"""
     rmse: float = 0.0
@@ -86,6 +87,8 @@ class FittedNetwork:
     correlated"""
     findings: tuple[Finding, ...] = ()
     """Findings that can lower the verdict"""
+    band: Band | None = None
+    """Band of a further recording; None for one recording"""
 
     def parameters(self) -> dict[str, Any]:
         """Returns network and domain as keyword arguments of :class:`ForceModel`."""
@@ -144,6 +147,7 @@ class FittedNetwork:
             bias=self.bias / factor + scale.offset,
             path=tuple(replace(point, rmse=point.rmse / factor) for point in self.path),
             notes=notes,
+            band=None if self.band is None else self.band.scaled(1.0 / factor),
             **values,
         )
 

@@ -66,6 +66,12 @@ def test_one_file_for_each_stroke_is_not_taken_for_two_objects(stated: bool) -> 
         assert "probably belong to two objects" in str(identify([both, other]).verdict)
 
 
+def test_repeats_of_one_stroke_that_scatter_are_not_taken_for_press_and_release() -> None:
+    x = np.linspace(0.0, 1.0, 200)
+    made = [Recording.from_arrays(x, factor * x**2) for factor in (1.0, 0.97, 0.94, 0.85)]
+    assert identify(made).kind == "position"
+
+
 def test_two_files_parted_by_their_force_are_not_taken_for_two_objects() -> None:
     recordings = [bare(PRESS, loop(h=1.0)), bare(RELEASE[::-1], loop(h=1.0))]
     assert "recording 1 is taken as press and recording 2 as release" in str(identify(recordings).verdict)

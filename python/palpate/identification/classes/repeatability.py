@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several recordings of one object: growth ends where the model is as good as the object repeats, and a check
+with one recording left out at a time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._typing import Float1D
+from ...model.band import BAND_LEVEL, Band
+from ..data.compression import Compressor, HeldOutRows, inside
+from ..data.repeats import Repeats, band_of, pure_error
+from ..network.separable import problem_of
+from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
+from .class_selection import ClassSelection
+
+MOST_EXCESS = 1.02
+"""Ratio of the RMS error of a model to that of the mean of all recordings, up to which a smaller network is
+taken [-]. The error on a further recording then grows by less than 2 %."""
+
+STOPPED_BY_REPEATS = "repeats"
+"""Reason why growth stopped, if the model is as good as the object repeats."""
+
+NO_BAND = "The recordings have few common positions, so that the model has no band."
+"""Note on several recordings that cannot be compared."""
+
+
+def no_finer_than_repeats(first: ClassSelection) -> ClassSelection:
+    """Selects the smallest network that is as good as the recordings repeat.
+
+    Rows of one recording differ from the mean of all recordings in a similar way. A criterion that counts
+    rows therefore accepts wavelets that fit the differences between few recordings. Here errors below the
+    differences between the recordings do not count, and the smallest number of wavelets with such an error is
+    searched by bisection. A model with mass, damping or velocity is kept: the recordings may differ because
+    their speeds do.
+    """
+    data, best, options = first.data, first.best, first.options
+    if data.repeats is None or best.data is not data or best.moving is not None or best.n_wavelets == 0:
+        return first
+    if options.criterion in ON_HELD_OUT_ROWS or len(data.names) > 1:
+        return first
+    apart = _pure_error(best, data.repeats) or 0.0
+    least = MOST_EXCESS * apart
+    if least <= max(data.limits.force_error, best.rmse):
+        return first  # the recordings repeat better than the model
+    coarse = replace(data, limits=replace(data.limits, force_error=least))
+    smaller, size, too_few = first, best.n_wavelets, -1
+    while size > too_few:
+        trial = ClassSelection(
+            coarse,
+            replace(options, max_wavelets=size),
+            first.classes,
+            first.cells,
+            on_held_out=first.judge.on_held_out,
+        )
+        if trial.best.rmse <= least and trial.best.n_parameters <= best.n_parameters:
+            smaller = trial
+        elif smaller is first:
+            return first
+        else:
+            too_few = size
+        size = (smaller.best.n_wavelets + too_few) // 2
+    if smaller.best.n_parameters >= best.n_parameters:
+        return first
+    smaller.options = options
+    smaller.best = replace(smaller.best, stop_reason=STOPPED_BY_REPEATS)
+    tested = {decision.model_class for decision in smaller.report.decisions}
+    smaller.report.decisions += [each for each in first.report.decisions if each.model_class not in tested]
+    smaller.report.replaces(
+        first.report,
+        f"The recordings differ from their mean by {data.force_unit.text(apart)} RMS, so that "
+        f"{best.n_wavelets - smaller.best.n_wavelets} of {best.n_wavelets} wavelets were not needed.",
+    )
+    return smaller
+
+
+def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
+    """Returns the band of a model and a note on its check; no band if the recordings cannot be compared, and
+    no note for one recording.
+
+    The check leaves out one recording at a time, or one object if there are several. Weights, slopes and bias
+    are fitted to the others with the wavelets of the model, and give a band. The RMS error and the share of
+    rows in this band are those of the rows that were left out.
+    """
+    repeats = best.data.repeats
+    if repeats is None:
+        return None, ()
+    used = best.error.weight > 0.0
+    band = None if _pure_error(best, repeats) is None else _band(best, best.residual, used, repeats)
+    squares, rows, within, judged = 0.0, 0, 0, 0
+    group, data = repeats.groups, best.data
+    force = data.force if best.moving is None else data.force - best.moving.force
+    compressor = Compressor(
+        data.box, force, weight=data.weight, max_positions=best.rows.cells, limits=data.limits
+    )
+    for number in np.unique(group[used]) if band is not None else ():
+        others = used & (group != number)
+        residual, left = _left_out(best, compressor, force, others, used & (group == number))
+        squares += float(residual[left] @ residual[left])
+        rows += int(np.count_nonzero(left))
+        of_others = _band(best, residual, others, repeats)
+        if of_others is not None and left.any():
+            half = of_others.half_width(data.domain[left, 0])
+            within += int(np.count_nonzero(np.abs(residual[left]) <= half))
+            judged += len(half)
+    if band is None or rows == 0:
+        return None, (NO_BAND,)
+    coverage = within / judged if judged else None
+    band = replace(band, unseen_error=float(np.sqrt(squares / rows)), coverage=coverage)
+    share = ""
+    if coverage is not None:
+        share = f", {coverage:.1%} of its rows in the band of the others (expected {BAND_LEVEL:.0%})"
+    error = data.force_unit.text(band.unseen_error)
+    return band, (f"One {band.left_out} left out of the fit at a time: RMS error {error} on it{share}.",)
+
+
+def _pure_error(best: Candidate, repeats: Repeats) -> float | None:
+    rows, data = best.error.weight > 0.0, best.data
+    side = None if best.side is None else best.side[rows]
+    return pure_error(data.domain[rows, 0], side, best.residual[rows], repeats.recording[rows])
+
+
+def _band(best: Candidate, residual: Float1D, rows: NDArray[np.bool_], repeats: Repeats) -> Band | None:
+    data = best.data
+    side = None if best.side is None else best.side[rows]
+    ends = float(data.lower[0]), float(data.lower[0] + data.reach[0])
+    reach = float(np.ptp(data.force))
+    return band_of(data.domain[rows, 0], side, residual[rows], repeats.only(rows), ends, reach)
+
+
+def _left_out(
+    best: Candidate,
+    compressor: Compressor,
+    force: Float1D,
+    fitted: NDArray[np.bool_],
+    left: NDArray[np.bool_],
+) -> tuple[Float1D, NDArray[np.bool_]]:
+    """Returns the residual (n,) of the model fitted to some of the rows, and the left out rows (n,) within
+    the positions and directions of these rows.
+
+    `force` (n,) is that without the forces of mass and damping, and the rows of the compressor have it.
+    """
+    data = best.data
+    if data.weight is not None:
+        fitted = fitted & (data.weight > 0.0)
+    left = left & inside(data.box, data.box[fitted])
+    if best.side is not None:
+        left &= np.isin(np.sign(best.side), np.sign(best.side[fitted]))
+    if not left.any():
+        return force, left
+    if best.model_class == "constant":
+        return force - float(np.mean(force[fitted])), left
+    rows = compressor.rows(best.side, fitted)
+    problem = replace(problem_of(rows, resolved_by=best.problem.resolved_by), prior=best.problem.prior)
+    solution = problem.solve(best.solution.basis)
+    return problem.errors(solution, HeldOutRows(np.ascontiguousarray(data.box), force, best.side)), left
