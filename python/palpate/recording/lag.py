@@ -22,6 +22,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,6 +59,12 @@ used."""
 LEAST_ROWS = 100
 """Least number of rows for the regression of strokes."""
 
+LEAST_CERTAINTY = 10.0
+"""Least certainty of the derivative of the force over the lag [-]: the usual bound of weak instruments"""
+
+NO_BEND = "the force bends too little for its noise, so that a lag looks like damping"
+"""Text of the reason that strokes at different speeds do not determine the lag."""
+
 NORMAL_QUANTILE = 1.96
 """Half width of the 95 % confidence interval of a normal variable [standard deviations]."""
 
@@ -70,20 +77,19 @@ FIRST_LAGS = 13
 FIRST_INTERVALS = (32, 4, 4)
 """Number of intervals of the splines f, h and B during the search of the first lag."""
 
-INTERVALS = ((4, 8, 16, 32, 64), (2, 4, 8, 16), (4, 8))
+INTERVALS = ((4, 8, 16, 32, 64), (2, 4, 8, 16), (4, 8, 16))
 """Numbers of intervals of the splines f, h and B, from which the Bayesian information criterion chooses."""
 
-PLAY_RADII = (0.001, 0.003, 0.01, 0.03)
-"""Play radii of the direction state that are tried first [share of the travel]."""
-
-LEAST_RADIUS_DEVIANCE = 10.0
-"""Least difference of the deviance n ln(RSS) between play radii, below which hysteresis is not searched further
-[-]"""
+PLAY_RADII = (0.001, 0.004, 0.015, 0.06)
+"""Play radii of the direction state that are tried first; the radius stays between the first and the last [share of the travel]."""
 
 TINY = 1e-300
 
-RADIUS_STEPS = 4
-"""Number of refinements of the play radius, each with half the step of the one before."""
+MOST_RADIUS_RATIO = 2.0
+"""Largest change of the play radius in one Gauss-Newton step, as a ratio [-]."""
+
+LEAST_STEP_SHARE = 0.01
+"""Share of a Gauss-Newton step at which shorter steps are not tried [-]."""
 
 MOST_STEPS = 12
 """Largest number of Gauss-Newton steps of the lag."""
@@ -91,10 +97,13 @@ MOST_STEPS = 12
 KNOT_BINS = 400
 """Number of position cells from whose mean force the knots of the splines are placed."""
 
-HALF_WINDOWS = (0, 3, 6, 12, 25, 50)
+DEGREE = 5
+"""Degree of the polynomial that smooths a noisy position: a lower degree makes fast motions slower."""
+
+HALF_WINDOWS = (0, 4, 6, 8, 12, 18, 25, 50)
 """Half widths of the window that smooths a noisy position [rows]; 0 for an exact position."""
 
-SMOOTH_NOISE = 0.02
+SMOOTH_NOISE = 0.005
 """Largest standard deviation of the noise of a position step, after smoothing [share of the RMS step]."""
 
 TURN_ROWS = 8
@@ -216,24 +225,38 @@ class _Motion:
         return float(np.median(np.diff(self.time)))
 
     @cached_property
-    def smooth(self) -> Float1D:
-        """Position without the noise of a coarse or noisy sensor."""
-        from scipy.signal import savgol_filter
+    def _half_window(self) -> int:
+        """Half width of the window that smooths the position [rows]; 0 for an exact position."""
+        from scipy.signal import savgol_coeffs
 
         x = self.position
         noise = float(np.median(np.abs(np.diff(x, 3)))) / (0.6745 * math.sqrt(20.0))
         limit = SMOOTH_NOISE * float(np.sqrt(np.mean(np.diff(x) ** 2)))
         for half in HALF_WINDOWS:
-            # standard deviation of the slope of a parabola in the window
-            passed = 1.0 if half == 0 else math.sqrt(3.0 / (half * (half + 1) * (2 * half + 1)))
-            if noise * passed <= limit:
+            if 2 * half + 1 > len(x) // 2:
                 break
-        half = min(half, (len(x) - 1) // 4)
-        return x if half == 0 else np.asarray(savgol_filter(x, 2 * half + 1, min(3, 2 * half)))
+            passed = 1.0 if half == 0 else float(np.linalg.norm(savgol_coeffs(2 * half + 1, DEGREE, deriv=1)))
+            if noise * passed <= limit:
+                return half
+        return HALF_WINDOWS[-1] if 4 * HALF_WINDOWS[-1] < len(x) else 0
+
+    def _smoothed(self, derivative: int) -> Float1D:
+        from scipy.signal import savgol_filter
+
+        return np.asarray(
+            savgol_filter(
+                self.position, 2 * self._half_window + 1, DEGREE, deriv=derivative, delta=self.period
+            )
+        )
+
+    @cached_property
+    def smooth(self) -> Float1D:
+        """Position without the noise of a coarse or noisy sensor."""
+        return self._smoothed(0) if self._half_window else self.position
 
     @cached_property
     def velocity(self) -> Float1D:
-        return np.gradient(self.smooth, self.time)
+        return self._smoothed(1) if self._half_window else np.gradient(self.position, self.time)
 
     @cached_property
     def acceleration(self) -> Float1D:
@@ -319,18 +342,19 @@ class _Strokes:
         if len(strokes._force) < LEAST_ROWS:
             return unknown(f"fewer than {LEAST_ROWS} rows are in motions longer than {LONGEST_LAG_S:g} s")
         lags = np.linspace(-LONGEST_LEAD_S, LONGEST_LAG_S, FIRST_LAGS)
-        intervals, radius = FIRST_INTERVALS, PLAY_RADII[1]
-        late = min(lags.tolist(), key=lambda lag: few._fit(lag, radius, intervals).rss)
-        late = few._refined(late, radius, intervals)
-        radius = few._best_radius(late, intervals)
-        late = few._refined(late, radius, intervals)
+        intervals = FIRST_INTERVALS
+        late, radius = min(
+            product(lags.tolist(), PLAY_RADII), key=lambda tried: few._fit(*tried, intervals).rss
+        )
+        late, radius = few._refined(late, radius, intervals)
         intervals = strokes._best_intervals(late, radius)
-        late = strokes._refined(late, radius, intervals)
-        radius = strokes._best_radius(late, intervals)
-        late = strokes._refined(late, radius, intervals)
-        error = strokes._standard_error(late, radius, intervals)
+        late, radius = strokes._refined(late, radius, intervals)
+        error, certainty = strokes._error(late, radius, intervals)
         half = NORMAL_QUANTILE * math.hypot(error, SAMPLING_ERROR * strokes._sample_period)
-        return ForceLag(late, late - half, late + half, "strokes at different speeds")
+        found = ForceLag(late, late - half, late + half, "strokes at different speeds")
+        if certainty < LEAST_CERTAINTY:
+            return replace(found, reason=NO_BEND)
+        return found
 
     def _inputs(self, late: float, radius: float) -> tuple[Float1D, tuple[Float1D, ...], Float1D]:
         """Returns position, the factors of the splines f, h and B, and acceleration at the rows, a lag
@@ -398,57 +422,44 @@ class _Strokes:
             self._states[id(part), radius] = s
         return self._states[id(part), radius]
 
-    def _best_radius(self, late: float, intervals: tuple[int, ...]) -> float:
-        def rss(radius: float) -> float:
-            return self._fit(late, radius, intervals).rss
-
-        found = {radius: rss(radius) for radius in PLAY_RADII}
-        worst, best = max(found.values()), min(found.values())
-        ratio = math.sqrt(PLAY_RADII[1] / PLAY_RADII[0])
-        if len(self._force) * math.log(worst / max(best, TINY)) < LEAST_RADIUS_DEVIANCE:
-            return PLAY_RADII[0]
-        for _ in range(RADIUS_STEPS):
-            middle = min(found, key=lambda radius: found[radius])
-            for radius in (middle / ratio, middle * ratio):
-                found[radius] = rss(radius)
-            ratio = math.sqrt(ratio)
-        return min(found, key=lambda radius: found[radius])
-
-    def _refined(self, late: float, radius: float, intervals: tuple[int, ...]) -> float:
-        """Returns the lag of the least residual near a first lag, by Gauss-Newton steps."""
+    def _refined(self, late: float, radius: float, intervals: tuple[int, ...]) -> tuple[float, float]:
+        """Returns the lag and the play radius of the least residual near the given ones, by Gauss-Newton
+        steps."""
         fit = self._fit(late, radius, intervals)
-        most = (LONGEST_LAG_S + LONGEST_LEAD_S) / (FIRST_LAGS - 1)
+        most = np.array([(LONGEST_LAG_S + LONGEST_LEAD_S) / (FIRST_LAGS - 1), math.log(MOST_RADIUS_RATIO)])
         for _ in range(MOST_STEPS):
-            over_lag = self._sensitivity(late, radius, intervals, fit)
-            power = float(over_lag @ over_lag)
-            if power == 0.0:
-                break
-            step = min(max(float(over_lag @ fit.residual) / power, -most), most)
-            while abs(step) > 1e-3 * self._sample_period:
-                to = min(max(late + step, -LONGEST_LEAD_S), LONGEST_LAG_S)
-                trial = self._fit(to, radius, intervals)
+            over = np.column_stack(self._derivatives(late, radius, intervals, fit))
+            step = np.clip(np.linalg.lstsq(over, fit.residual, rcond=1e-8)[0], -most, most)
+            share = 1.0
+            while share > LEAST_STEP_SHARE:
+                to = min(max(late + share * step[0], -LONGEST_LEAD_S), LONGEST_LAG_S)
+                wide = min(max(radius * math.exp(share * step[1]), PLAY_RADII[0]), PLAY_RADII[-1])
+                trial = self._fit(to, wide, intervals)
                 if trial.rss < fit.rss:
-                    late, fit = to, trial
                     break
-                step /= 2.0
+                share /= 2.0
             else:
                 break
-        return late
+            small = abs(to - late) < 1e-3 * self._sample_period and fit.rss - trial.rss < 1e-6 * fit.rss
+            late, radius, fit = to, wide, trial
+            if small:
+                break
+        return late, radius
 
-    def _sensitivity(
+    def _derivatives(
         self, late: float, radius: float, intervals: tuple[int, ...], fit: _Fit
-    ) -> Float1D:
-        """Returns the derivative (n,) of the fitted force over the lag that no other term of the fit can
-        replace."""
-        step = 0.25 * self._sample_period
+    ) -> tuple[Float1D, Float1D]:
+        """Returns the derivatives (n,) of the fitted force over the lag and over the logarithm of the play
+        radius, without the parts that the splines can replace."""
+        step, ratio = 0.25 * self._sample_period, 1.02
         ahead, behind = (
             self._force_of(fit, late + side * step, radius, intervals) for side in (1.0, -1.0)
         )
-        over_lag = fit.without_columns((ahead - behind) / (2.0 * step))
-        wide, narrow = (self._force_of(fit, late, radius * ratio, intervals) for ratio in (1.05, 1.0 / 1.05))
-        over_radius = fit.without_columns(wide - narrow)
-        power = float(over_radius @ over_radius)
-        return over_lag - over_radius * float(over_radius @ over_lag) / power if power > 0.0 else over_lag
+        wide, narrow = (self._force_of(fit, late, radius * each, intervals) for each in (ratio, 1.0 / ratio))
+        return (
+            fit.without_columns((ahead - behind) / (2.0 * step)),
+            fit.without_columns((wide - narrow) / (2.0 * math.log(ratio))),
+        )
 
     def _best_intervals(self, late: float, radius: float) -> tuple[int, ...]:
         """Returns the numbers of intervals with the least Bayesian information criterion, one spline after the
@@ -464,18 +475,32 @@ class _Strokes:
             chosen[spline] = tried[int(np.argmin(values))]
         return tuple(chosen)
 
-    def _standard_error(self, late: float, radius: float, intervals: tuple[int, ...]) -> float:
-        """Returns the standard error of the lag for correlated residuals of any size [s]."""
+    def _error(self, late: float, radius: float, intervals: tuple[int, ...]) -> tuple[float, float]:
+        """Returns the standard error of the lag for correlated residuals of any size [s], and the certainty of
+        the derivative of the force over the lag.
+
+        The certainty is the sum of squares of this derivative divided by the part that noise in the fitted
+        splines adds to it. A lag with a small certainty can be anything (weak instruments, Staiger and Stock
+        1997).
+        """
         fit = self._fit(late, radius, intervals)
-        over_lag = self._sensitivity(late, radius, intervals, fit)
+        over_lag, over_radius = self._derivatives(late, radius, intervals, fit)
+        if (power := float(over_radius @ over_radius)) > 0.0:
+            over_lag = over_lag - over_radius * float(over_radius @ over_lag) / power
         information = float(over_lag @ over_lag)
         if information == 0.0:
-            return math.inf
-        n = len(fit.residual)
+            return math.inf, 0.0
+        n, step = len(fit.residual), 0.25 * self._sample_period
         freedom = max(n - len(fit.gram) - 2, 1)
         score = over_lag * fit.residual
         variance = max(_long_run(score), _long_run_of_product(over_lag, fit.residual)) * n / freedom
-        return math.sqrt(variance) / information
+        ahead, behind = (self._design(late + side * step, radius, intervals) for side in (1.0, -1.0))
+        change = (ahead - behind) / (2.0 * step)
+        crossed = (fit.columns.T @ change).toarray()
+        rest = (change.T @ change).toarray() - crossed.T @ np.linalg.solve(fit.gram, crossed)
+        noise = fit.rss / freedom / _independent_share(fit.residual)
+        by_noise = noise * float(np.trace(np.linalg.solve(fit.gram, rest)))
+        return math.sqrt(variance) / information, information / max(by_noise, TINY)
 
 
 def _arc_length(x: Float1D, force: Float1D, lower: float, upper: float) -> tuple[Float1D, Float1D]:
