@@ -131,15 +131,15 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=count(DRAWS))
     parser.add_argument("--json", type=Path, default=None)
     options = parser.parse_args()
-    print(f"{'straight line with':36}{'draws':>6}{'0 wavelets':>11}{'no hyst.':>9}{'no velocity':>12}", flush=True)
+    print(
+        f"{'straight line with':36}{'draws':>6}{'0 wavelets':>11}{'no hyst.':>9}{'no velocity':>12}",
+        flush=True,
+    )
     results = []
     for case in CASES:
         row = measure(case, options.draws)
-        print(
-            f"{case:36}{row['draws']:6d}{row['no_wavelet']:11d}{row['no_hysteresis']:9d}{row['no_velocity']:12d}"
-            f"  wrong in {row['wrong_draws']}",
-            flush=True,
-        )
+        numbers = [row[key] for key in ("draws", "no_wavelet", "no_hysteresis", "no_velocity")]
+        print(f"{case:36}" + "".join(f"{each:14}" for each in numbers) + f"  wrong in {row['wrong_draws']}")
         results.append(row)
     write_results(options.json, results)
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields
 from itertools import chain
 from pathlib import Path
@@ -244,6 +244,8 @@ def identify(
         "verdict": str(verdict),
         "seconds": seconds,
     }
+    if (lag := model.notes.get("force_lag")) is not None:
+        result["force_lag"] = lag
     if hold_out_every is not None:
         result["held_out_rows"] = compared
     if with_baselines:
@@ -271,6 +273,7 @@ def identify(
                     f"{model.n_parameters} parameters",
                     "error": f"{rms}NRMSE {number(nrmse)} on {judged}",
                     **dict(note.split(": ", 1) for note in model.notes["model_selection"][-_MOST_DECISIONS:]),
+                    **_lag_line(lag, max((part.corrected_lag_s for part in recordings), default=0.0)),
                     "time": f"{seconds:.2f} s",
                 }
             )
@@ -295,6 +298,18 @@ def _print_sketch(model: Model, recordings: Sequence[Recording]) -> None:
         print_line()
         for line in lines:
             print_line(line)
+
+
+def _lag_line(lag: Mapping[str, Any] | None, corrected_s: float) -> dict[str, str]:
+    """Returns the line of the summary on the lag of the force; empty if it was not examined."""
+    if lag is None:
+        return {}
+    text = str(lag["text"])
+    if corrected_s:
+        text = f"{1e3 * corrected_s:.3g} ms corrected; then {text}"
+    elif (lag["lower_s"] or 0.0) > 0.0:
+        text += f"; not corrected: --force-late-s auto or {lag['late_s']:.3g}"
+    return {"force lag": text}
 
 
 def _require_unused(**others: Any) -> None:

@@ -18,6 +18,7 @@ from ..arguments import parameter_texts
 from ..errors import InputError
 from ..model import Model
 from ..recording import Source, read_recording
+from ..recording.lag import ForceLag, lag_of
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
@@ -124,7 +125,9 @@ def identify(
     source = Source.merged(part.source for part in recordings)
     every_row = len(rows.force) == sum(map(len, recordings))
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
-    return model_of(network, recordings[0].units, source, settings, verdict)
+    with threadpool_limits(limits=1, user_api="blas"):
+        lag = lag_of(recordings)
+    return model_of(network, recordings[0].units, source, settings, verdict, lag)
 
 
 def _show_options() -> None:
@@ -250,8 +253,9 @@ def model_of(
     source: Source,
     options: IdentifyOptions,
     verdict: Verdict,
+    lag: ForceLag | None = None,
 ) -> Model:
-    """Returns the model of an identified network, with its verdict."""
+    """Returns the model of an identified network, with its verdict and the lag of the force."""
     return Model(
         kind=_kind(network),
         inputs=network.inputs,
@@ -271,6 +275,7 @@ def model_of(
             "model_selection": [str(decision) for decision in network.decisions],
             "identification": list(network.notes),
             "verdict": verdict.record(),
+            **({} if lag is None else {"force_lag": lag.record()}),
         },
     )
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lag of a recorded force behind its position, with a 95 % confidence interval.
 
-A force that is late by tau is the force at the position of tau earlier: F(t) = f(x(t - tau)). At speed v it
-differs by about -tau v f'(x) from the force at x(t). Hysteresis h and damping B of the object differ between
-the strokes too, by s h(x), with the direction state s, and by v B(x). Where f bends sharply, f' changes within
-a short distance, and h and B do not. The regression therefore fits, for each tried tau,
+A force that is late by tau belongs to the position of the time tau earlier: F(t) = f(x(t - tau)). At speed v
+it differs by about -tau v f'(x) from the force at x(t). Hysteresis and damping of the object change the force
+too, by s h(x), with the direction state s, and by v B(x). Where f bends sharply, f' changes within a short
+distance, and B does not. The regression therefore fits, for each tried tau,
 
     F(t) = f(x) + s h(x) + v B(x) + m a,   all at the time t - tau,
 
@@ -13,7 +13,8 @@ with splines f, h and B. It needs different speeds: at one speed, s h and v B ar
 At one speed only the turns count. After a turn a late force still follows the previous stroke for the time
 tau. Around each turn, force over position is a polynomial for each of the two strokes.
 
-The residuals are correlated in time. The interval uses this correlation (Newey and West 1987).
+The residuals are correlated in time, for example those of a force that an instrument averages. The interval
+uses this correlation (Newey and West 1987).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
+from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,6 +43,9 @@ LONGEST_LEAD_S = 0.02
 """Longest time by which a force may be ahead of its position in the search [s]. A lag near 0 then has an
 interval on both sides of 0."""
 
+LAG_DIGITS = 5
+"""Number of decimals to which a lag in seconds is rounded before it is corrected: 10 microseconds."""
+
 LARGEST_ERROR_S = 0.01
 """Largest half width of the confidence interval of a lag that counts as known [s]."""
 
@@ -52,9 +56,15 @@ turns of a recording are used."""
 MOST_ROWS = 5000
 """Largest number of rows in the regression of strokes; of more rows an evenly spread part is used."""
 
+MOST_MOTION_ROWS = 100_000
+"""Largest number of rows of motions that are used; later motions are left out."""
+
+MOST_STATES = 8
+"""Largest number of kept direction states of all rows."""
+
 MOST_FIRST_ROWS = 1500
-"""Largest number of rows in the search of the first lag and play radius; of more rows an evenly spread part is
-used."""
+"""Largest number of rows in the search of the first lag and play radius; of more rows an evenly spread part
+is used."""
 
 LEAST_ROWS = 100
 """Least number of rows for the regression of strokes."""
@@ -81,9 +91,8 @@ INTERVALS = ((4, 8, 16, 32, 64), (2, 4, 8, 16), (4, 8, 16))
 """Numbers of intervals of the splines f, h and B, from which the Bayesian information criterion chooses."""
 
 PLAY_RADII = (0.001, 0.004, 0.015, 0.06)
-"""Play radii of the direction state that are tried first; the radius stays between the first and the last [share of the travel]."""
-
-TINY = 1e-300
+"""Play radii of the direction state that are tried first [share of the travel]. The play radius stays between
+the first and the last."""
 
 MOST_RADIUS_RATIO = 2.0
 """Largest change of the play radius in one Gauss-Newton step, as a ratio [-]."""
@@ -122,10 +131,10 @@ TURN_STEP_S = 5e-4
 """Step of the lags that are tried at turns [s]."""
 
 UNKNOWN_CURE = (
-    "record slow and fast strokes of an object with a sharp bend, such as a key switch, on the same stand, or "
-    "give the lag as a number"
+    "record slow and fast strokes of an object with a sharp bend, such as a key switch, on the same stand, "
+    "and give its lag as a number"
 )
-"""Text of the cure if the lag of a force cannot be found."""
+"""Text of the cure if a recording does not determine the lag of its force."""
 
 
 @dataclass(frozen=True)
@@ -151,9 +160,15 @@ class ForceLag:
         """True if the lag is known and the whole interval is above 0."""
         return self.known and self.lower_s > 0.0
 
+    def record(self) -> dict[str, Any]:
+        """Returns the lag as numbers and text for a model file and for --json."""
+        numbers = (self.late_s, self.lower_s, self.upper_s)
+        late, lower, upper = (number if self.known else None for number in numbers)
+        return {"late_s": late, "lower_s": lower, "upper_s": upper, "text": str(self)}
+
     def __str__(self) -> str:
         if not self.known:
-            return f"cannot tell: {self.reason}"
+            return f"not known: {self.reason}"
         interval = f"95 %: {1e3 * self.lower_s:.3g} to {1e3 * self.upper_s:.3g} ms, from {self.source}"
         if self.late_s < 0.0:
             return f"the force is {-1e3 * self.late_s:.3g} ms ahead of the position ({interval})"
@@ -166,12 +181,17 @@ def unknown(reason: str) -> ForceLag:
 
 
 def lag_of(recordings: Sequence[Recording]) -> ForceLag:
-    """Returns the lag of the force in recordings of one object on one test stand."""
+    """Returns the lag of the force in recordings of one object on one test stand.
+
+    The lag of a recording that is already corrected is the remaining lag.
+    """
     if any(recording.time is None for recording in recordings):
         return unknown("the recording has no time")
     if any(recording.input_names for recording in recordings):
         return unknown("the force depends on further inputs")
-    parts = [part for recording in recordings for part in _motions(recording)]
+    parts: list[_Motion] = []
+    for recording in recordings:
+        parts += _motions(recording, MOST_MOTION_ROWS - sum(len(part.time) for part in parts))
     if not parts:
         return unknown("the motion between gaps of time is too short")
     position, force = (
@@ -186,21 +206,13 @@ def lag_of(recordings: Sequence[Recording]) -> ForceLag:
 
 def _checked(found: ForceLag) -> ForceLag:
     """Returns a lag as unknown if its interval is too wide or leaves the range of the search."""
-    if not found.known:
+    lower, upper = max(found.lower_s, -LONGEST_LEAD_S), min(found.upper_s, LONGEST_LAG_S)
+    if not found.known or (
+        (lower, upper) == (found.lower_s, found.upper_s) and upper - lower <= 2.0 * LARGEST_ERROR_S
+    ):
         return found
-    if found.lower_s < -LONGEST_LEAD_S or found.upper_s > LONGEST_LAG_S:
-        return replace(
-            found,
-            reason=f"{found.source} allow any lag from {1e3 * max(found.lower_s, -LONGEST_LEAD_S):.3g} to "
-            f"{1e3 * min(found.upper_s, LONGEST_LAG_S):.3g} ms",
-        )
-    if found.upper_s - found.lower_s > 2.0 * LARGEST_ERROR_S:
-        return replace(
-            found,
-            reason=f"{found.source} allow any lag from {1e3 * found.lower_s:.3g} to "
-            f"{1e3 * found.upper_s:.3g} ms",
-        )
-    return found
+    allowed = f"any lag from {1e3 * lower:.3g} to {1e3 * upper:.3g} ms fits the {found.source}"
+    return replace(found, lower_s=lower, upper_s=upper, reason=allowed)
 
 
 @dataclass(frozen=True)
@@ -267,19 +279,20 @@ class _Motion:
         return np.interp(self.time[rows] - late_s, self.time, values)
 
 
-def _motions(recording: Recording) -> list[_Motion]:
-    """Returns the motions of a recording that are long enough for the longest lag."""
+def _motions(recording: Recording, most: int) -> list[_Motion]:
+    """Returns the motions of a recording that are long enough for the longest lag, with at most `most`
+    rows."""
     motion = recording.motion
     assert motion.time is not None
-    time, position = motion.time, motion.position
-    force = np.full(len(time), np.nan)
+    force = np.full(len(motion.time), np.nan)
     force[motion.rows] = recording.force
+    time, position, force = motion.time[:most], motion.position[:most], force[:most]
     steps = np.diff(time)
     if not len(steps):
         return []
     edges = [0, *(np.flatnonzero(steps > GAP_RATIO * np.median(steps)) + 1).tolist(), len(time)]
     found = []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in pairwise(edges):
         t = time[start:stop]
         inside = (t >= t[0] + LONGEST_LAG_S) & (t <= t[-1] - LONGEST_LEAD_S)
         rows = np.flatnonzero(inside & np.isfinite(force[start:stop]))
@@ -342,11 +355,11 @@ class _Strokes:
         if len(strokes._force) < LEAST_ROWS:
             return unknown(f"fewer than {LEAST_ROWS} rows are in motions longer than {LONGEST_LAG_S:g} s")
         lags = np.linspace(-LONGEST_LEAD_S, LONGEST_LAG_S, FIRST_LAGS)
-        intervals = FIRST_INTERVALS
         late, radius = min(
-            product(lags.tolist(), PLAY_RADII), key=lambda tried: few._fit(*tried, intervals).rss
+            product(lags.tolist(), PLAY_RADII),
+            key=lambda tried: few._fit(tried[0], tried[1], FIRST_INTERVALS).rss,
         )
-        late, radius = few._refined(late, radius, intervals)
+        late, radius = few._refined(late, radius, FIRST_INTERVALS)
         intervals = strokes._best_intervals(late, radius)
         late, radius = strokes._refined(late, radius, intervals)
         error, certainty = strokes._error(late, radius, intervals)
@@ -396,7 +409,7 @@ class _Strokes:
             count = len(knots) - 4
             total += factor * BSpline(knots, fit.coefficients[first : first + count], 3)(x)
             first += count
-        return total
+        return np.asarray(total)
 
     def _fit(self, late: float, radius: float, intervals: tuple[int, ...]) -> _Fit:
         columns = self._design(late, radius, intervals)
@@ -416,6 +429,8 @@ class _Strokes:
     def _state(self, part: _Motion, radius: float) -> Float1D:
         """Returns the direction state of the play operator, whose radius is a share of the travel."""
         if (id(part), radius) not in self._states:
+            if len(self._states) >= MOST_STATES * len(self._parts):
+                self._states.clear()
             length = radius * (self._upper - self._lower)
             x = np.ascontiguousarray(part.smooth)
             s = np.clip((x - _core.model.play(x, length, start=float(x[0]))) / length, -1.0, 1.0)
@@ -452,9 +467,7 @@ class _Strokes:
         """Returns the derivatives (n,) of the fitted force over the lag and over the logarithm of the play
         radius, without the parts that the splines can replace."""
         step, ratio = 0.25 * self._sample_period, 1.02
-        ahead, behind = (
-            self._force_of(fit, late + side * step, radius, intervals) for side in (1.0, -1.0)
-        )
+        ahead, behind = (self._force_of(fit, late + side * step, radius, intervals) for side in (1.0, -1.0))
         wide, narrow = (self._force_of(fit, late, radius * each, intervals) for each in (ratio, 1.0 / ratio))
         return (
             fit.without_columns((ahead - behind) / (2.0 * step)),
@@ -462,8 +475,8 @@ class _Strokes:
         )
 
     def _best_intervals(self, late: float, radius: float) -> tuple[int, ...]:
-        """Returns the numbers of intervals with the least Bayesian information criterion, one spline after the
-        other."""
+        """Returns the numbers of intervals with the least Bayesian information criterion, one spline after
+        the other."""
         chosen = list(FIRST_INTERVALS)
         n = len(self._force)
         samples = n * _independent_share(self._fit(late, radius, FIRST_INTERVALS).residual)
@@ -476,8 +489,8 @@ class _Strokes:
         return tuple(chosen)
 
     def _error(self, late: float, radius: float, intervals: tuple[int, ...]) -> tuple[float, float]:
-        """Returns the standard error of the lag for correlated residuals of any size [s], and the certainty of
-        the derivative of the force over the lag.
+        """Returns the standard error of the lag for correlated residuals of any size [s], and the certainty
+        of the derivative of the force over the lag.
 
         The certainty is the sum of squares of this derivative divided by the part that noise in the fitted
         splines adds to it. A lag with a small certainty can be anything (weak instruments, Staiger and Stock
@@ -500,7 +513,7 @@ class _Strokes:
         rest = (change.T @ change).toarray() - crossed.T @ np.linalg.solve(fit.gram, crossed)
         noise = fit.rss / freedom / _independent_share(fit.residual)
         by_noise = noise * float(np.trace(np.linalg.solve(fit.gram, rest)))
-        return math.sqrt(variance) / information, information / max(by_noise, TINY)
+        return math.sqrt(variance) / information, information / max(by_noise, np.finfo(float).tiny)
 
 
 def _arc_length(x: Float1D, force: Float1D, lower: float, upper: float) -> tuple[Float1D, Float1D]:
