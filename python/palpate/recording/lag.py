@@ -28,6 +28,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.signal import savgol_coeffs, savgol_filter
+from scipy.sparse import csr_array
+from scipy.special import fdtri
 
 from .. import _core
 from .._typing import Float1D, Float2D
@@ -75,11 +79,21 @@ LEAST_CERTAINTY = 10.0
 NO_BEND = "the force bends too little for its noise, so that a lag looks like damping"
 """Text of the reason that strokes at different speeds do not determine the lag."""
 
+LEAST_TURN_CERTAINTY = 40.0
+"""Least F statistic of the best lag against the median lag around turns [-]. Several play radii and lags are
+tried, and noise favours the best of them."""
+
+NO_BEND_AT_TURNS = "the force changes too little around the turns for its noise"
+"""Text of the reason that the turns of a motion do not determine the lag."""
+
 NORMAL_QUANTILE = 1.96
 """Half width of the 95 % confidence interval of a normal variable [standard deviations]."""
 
 SAMPLING_ERROR = 0.03
 """Standard error of a lag from positions between two samples, which are interpolated [sample periods]."""
+
+MISSED_TURN_ERROR = 0.3
+"""Standard error of the time of a turn between two samples [sample periods], as of a uniform error."""
 
 FIRST_LAGS = 13
 """Number of lags, evenly spread over the search, of which the best one starts the refinement."""
@@ -123,6 +137,12 @@ TURN_S = 0.15
 
 TURN_DEGREES = (3, 2)
 """Degrees of the polynomials of force and hysteresis over position around a turn."""
+
+TURN_RADII = (0.0, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032)
+"""Play radii of the direction state that are tried around turns [share of the travel]."""
+
+STATE_ROWS = 1000
+"""Number of rows before a turn from which its direction state is computed."""
 
 MOST_TURNS = 50
 """Largest number of turns that are used; of more turns an evenly spread part is used."""
@@ -239,8 +259,6 @@ class _Motion:
     @cached_property
     def _half_window(self) -> int:
         """Half width of the window that smooths the position [rows]; 0 for an exact position."""
-        from scipy.signal import savgol_coeffs
-
         x = self.position
         noise = float(np.median(np.abs(np.diff(x, 3)))) / (0.6745 * math.sqrt(20.0))
         limit = SMOOTH_NOISE * float(np.sqrt(np.mean(np.diff(x) ** 2)))
@@ -253,8 +271,6 @@ class _Motion:
         return HALF_WINDOWS[-1] if 4 * HALF_WINDOWS[-1] < len(x) else 0
 
     def _smoothed(self, derivative: int) -> Float1D:
-        from scipy.signal import savgol_filter
-
         return np.asarray(
             savgol_filter(
                 self.position, 2 * self._half_window + 1, DEGREE, deriv=derivative, delta=self.period
@@ -383,9 +399,6 @@ class _Strokes:
 
     def _design(self, late: float, radius: float, intervals: tuple[int, ...]) -> Any:
         """Returns the columns (n, p) of the regression."""
-        from scipy.interpolate import BSpline
-        from scipy.sparse import csr_array
-
         x, factors, a = self._inputs(late, radius)
         splines = [BSpline.design_matrix(x, knots, 3) for knots in self._knots(intervals)]
         first = np.cumsum([0, *(spline.shape[1] for spline in splines)])
@@ -401,8 +414,6 @@ class _Strokes:
 
     def _force_of(self, fit: _Fit, late: float, radius: float, intervals: tuple[int, ...]) -> Float1D:
         """Returns the force (n,) of fitted coefficients for another lag or play radius."""
-        from scipy.interpolate import BSpline
-
         x, factors, a = self._inputs(late, radius)
         total, first = a * fit.coefficients[-1], 0
         for factor, knots in zip(factors, self._knots(intervals), strict=True):
@@ -531,10 +542,14 @@ def _arc_length(x: Float1D, force: Float1D, lower: float, upper: float) -> tuple
     return at, np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def _independent_share(residual: Float1D) -> float:
-    """Returns the share of independent residuals from the correlation of neighbours."""
+def _independent_share(residual: Float1D, n_parameters: int = 0) -> float:
+    """Returns the share of independent residuals (n,) from the correlation of neighbours.
+
+    A fit of many parameters to few rows lowers this correlation; the lost part is about n_parameters / n.
+    """
     power = float(residual @ residual)
     rho = float(residual[1:] @ residual[:-1]) / power if power > 0.0 else 0.0
+    rho += n_parameters / len(residual)
     rho = min(max(rho, 0.0), 0.99)
     return (1.0 - rho) / (1.0 + rho)
 
@@ -577,31 +592,73 @@ def _of_turns(parts: Sequence[_Motion]) -> ForceLag:
     if not turns:
         return unknown("the speed is nearly constant, and no turn is recorded without a gap of time")
     lags = np.arange(-LONGEST_LEAD_S, LONGEST_LAG_S + TURN_STEP_S / 2, TURN_STEP_S)
-    fits = [[_around_turn(part, turn, rows, late) for part, turn, rows in turns] for late in lags.tolist()]
-    rss = np.array([sum(float(residual @ residual) for residual in each) for each in fits])
-    best = int(np.argmin(rss))
-    n = sum(map(len, fits[best]))
-    freedom = n - len(turns) * (sum(TURN_DEGREES) + 2) - 1
-    if freedom < 2 or not rss[best] > 0.0:
+    travel = float(np.ptp(np.concatenate([part.position for part in parts])))
+    fits = [[turn.residuals(lags, radius * travel) for turn in turns] for radius in TURN_RADII]
+    rss = np.array([sum(np.sum(residual**2, axis=1) for residual in each) for each in fits])
+    best_radius, best = (int(each) for each in np.unravel_index(int(np.argmin(rss)), rss.shape))
+    found = [residual[best] for residual in fits[best_radius]]
+    freedom = sum(map(len, found)) - len(turns) * (sum(TURN_DEGREES) + 2) - 2
+    least = float(rss[best_radius, best])
+    if freedom < 2 or not least > 0.0:
         return unknown("too few rows are recorded around the turns")
-    share = np.mean([_independent_share(residual) for residual in fits[best]])
-    allowed = rss <= rss[best] * (1.0 + _f_quantile(freedom) / (share * freedom))
-    period = min(part.period for part, _, _ in turns)
-    extra = NORMAL_QUANTILE * SAMPLING_ERROR * period
+    share = float(np.mean([_independent_share(residual, sum(TURN_DEGREES) + 2) for residual in found]))
+    allowed = rss.min(axis=0) <= least * (1.0 + _f_quantile(freedom) / (share * freedom))
+    period = max(turn.part.period for turn in turns)
+    missed = math.sqrt(sum(not turn.is_held for turn in turns)) / len(turns)
+    extra = NORMAL_QUANTILE * period * math.hypot(SAMPLING_ERROR, MISSED_TURN_ERROR * missed)
     name = f"{len(turns)} turn{'s' * (len(turns) > 1)}"
     lower, upper = float(lags[allowed].min()) - extra, float(lags[allowed].max()) + extra
-    return ForceLag(float(lags[best]), lower, upper, name)
+    certainty = (float(np.median(rss.min(axis=0))) / least - 1.0) * share * freedom
+    reason = "" if certainty >= LEAST_TURN_CERTAINTY else NO_BEND_AT_TURNS
+    return ForceLag(float(lags[best]), lower, upper, name, reason)
 
 
 def _f_quantile(freedom: float) -> float:
     """Returns the 95 % quantile of the F distribution with 1 and `freedom` degrees of freedom."""
-    from scipy.stats import f
-
-    return float(f.ppf(0.95, 1, freedom))
+    return float(fdtri(1.0, freedom, 0.95))
 
 
-def _turns(part: _Motion) -> list[tuple[_Motion, int, NDArray[np.intp]]]:
-    """Returns the last row before each turn of a motion, with the rows around the turn."""
+@dataclass(frozen=True)
+class _Turn:
+    """Turn of a motion, with the rows around it."""
+
+    part: _Motion
+    row: int
+    """Last row before the position changes in the new direction"""
+    rows: NDArray[np.intp]
+
+    @property
+    def is_held(self) -> bool:
+        """True if two rows have the position of the turn, so that its time is known."""
+        x = self.part.position
+        return bool(self.row > 0 and x[self.row - 1] == x[self.row])
+
+    def residuals(self, lags: Float1D, radius: float) -> Float2D:
+        """Returns the residuals (lags, rows) of force and hysteresis as polynomials of the position, for each
+        lag and one play radius [position]; the direction state changes at once for radius 0."""
+        part, rows = self.part, self.rows
+        at = part.time[rows] - lags[:, None]
+        x = np.interp(at, part.time, part.position) - part.position[self.row]
+        x = x / (float(np.ptp(part.position[rows])) or 1.0)
+        s = np.where(at <= part.time[self.row], 1.0, -1.0)
+        if radius:
+            around = slice(max(0, int(rows[0]) - STATE_ROWS), int(rows[-1]) + 1)
+            position = np.ascontiguousarray(part.position[around])
+            state = (position - _core.model.play(position, radius, start=float(position[0]))) / radius
+            s = np.interp(at, part.time[around], np.clip(state, -1.0, 1.0))
+        degree_f, degree_h = TURN_DEGREES
+        columns = np.stack(
+            [x**power for power in range(degree_f + 1)] + [s * x**power for power in range(degree_h + 1)],
+            axis=-1,
+        )
+        orthogonal = np.linalg.qr(columns).Q
+        force = part.force[rows]
+        fitted = orthogonal @ (np.swapaxes(orthogonal, 1, 2) @ force)[:, :, None]
+        return np.asarray(force - fitted[:, :, 0])
+
+
+def _turns(part: _Motion) -> list[_Turn]:
+    """Returns the turns of a motion with enough rows on both sides."""
     direction = strokes_from_order(part.position)
     if direction is None:
         return []
@@ -617,18 +674,5 @@ def _turns(part: _Motion) -> list[tuple[_Motion, int, NDArray[np.intp]]]:
             end = first - 1
             while end + 1 < len(part.position) and part.position[end + 1] == part.position[last]:
                 end += 1
-            found.append((part, end, rows))
+            found.append(_Turn(part, end, rows))
     return found
-
-
-def _around_turn(part: _Motion, turn: int, rows: NDArray[np.intp], late: float) -> Float1D:
-    """Returns the residual of the polynomials of both strokes around a turn for one lag."""
-    x = part.at(late, part.position, rows) - part.position[turn]
-    x = x / (float(np.ptp(part.position[rows])) or 1.0)
-    s = np.where(part.time[rows] - late <= part.time[turn], 1.0, -1.0)
-    degree_f, degree_h = TURN_DEGREES
-    columns = np.column_stack(
-        [x**power for power in range(degree_f + 1)] + [s * x**power for power in range(degree_h + 1)]
-    )
-    force = part.force[rows]
-    return np.asarray(force - columns @ np.linalg.lstsq(columns, force, rcond=None)[0])
