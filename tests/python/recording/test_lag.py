@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from bench.identification.force_lag import CASES, estimated, simulated, summary
 
-
 from palpate import InputError, Recording, identify, read_recording
 from palpate.recording.lag import LARGEST_ERROR_S, lag_of
 
