@@ -142,8 +142,6 @@ class Dynamics:
         self._data, self._evidence = data, options.search.evidence
         self._criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
         self._step = max(1, int(1.0 / (SAMPLES_PER_TIME_CONSTANT * self._low_pass.cutoff * parts[0].period)))
-        self.gains_energy = False
-        """True if the damping was not accepted because it is negative: on average motion adds energy"""
         self._fixed = [self._filtered(part, np.column_stack(_moving(part))) for part in self._parts]
 
     def accepted(self, basis: Basis, side: Float1D | None) -> tuple[dict[str, float], list[Decision]]:
@@ -195,7 +193,6 @@ class Dynamics:
             names = tuple(other for other in names if other != name)
             reason = f"{measured}, must lower it by more than {100 * error:.2g} %"
             if not found > 0.0:
-                self.gains_energy |= name == "damping"
                 reason = f"the fitted {name} is {found:.4g} {self._unit_of(name)}, a passive object has > 0"
             decisions.append(decided(name, False, f"{reason}; {change}"))
         return regression.solved(use, names), decisions

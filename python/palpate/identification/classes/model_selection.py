@@ -18,7 +18,7 @@ from ..data.limits import (
 )
 from ..data.outliers import robust_weights, suspects
 from ..data.rows import Rows
-from ..decision import Decision, decided, in_words, lowered
+from ..decision import decided, in_words, lowered
 from ..network.separable import HALF_CORE_NOISE_RATIO
 from ..options import IdentifyOptions
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
@@ -44,12 +44,6 @@ velocity."""
 LEAST_GAIN_OVER_HYSTERESIS = 0.75
 """Least relative decrease of the squared error for velocity as an input if hysteresis was accepted, but not
 constant damping without mass [-]: hysteresis is easier to render and certify."""
-
-NEGATIVE_DAMPING = (
-    "the fitted damping is negative, so that the object would add energy; the force may be late: try "
-    "--force-late-s auto"
-)
-"""Reason why velocity as an input is not tested if the fitted damping is negative."""
 
 MOST_CORRELATION_ESTIMATES = 5
 """Largest number of times that the correlation of the noise of successive rows is estimated."""
@@ -224,9 +218,6 @@ class Velocity(ModelClass):
         assert motion is not None
         damped = moving is not None and moving.mass is None
         if not (damped or below.error.nrmse > USABLE_NRMSE):
-            return below
-        if motion.gains_energy:
-            report.decisions.append(Decision(in_words("velocity"), "not tested", NEGATIVE_DAMPING))
             return below
         residual = (data.force if moving is None else data.force - moving.force) - below.force_at()
         least_share = LEAST_GAIN_OVER_DAMPING if damped else LEAST_GAIN_WITHOUT_DAMPING
