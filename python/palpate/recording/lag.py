@@ -123,8 +123,19 @@ KNOT_BINS = 400
 DEGREE = 5
 """Degree of the polynomial that smooths a noisy position: a lower degree makes fast motions slower."""
 
-HALF_WINDOWS = (0, 4, 6, 8, 12, 18, 25, 50)
-"""Half widths of the window that smooths a noisy position [rows]; 0 for an exact position."""
+HALF_WINDOWS = (4, 6, 8, 12, 18, 25, 50)
+"""Half widths of the window that smooths a coarse position [rows]."""
+
+MOST_ROUNDING_ERROR = 1.5
+"""Largest noise of the position that counts as rounding error [standard deviations of a rounding error]."""
+
+MOST_SMOOTHED = 1.5
+"""Largest standard deviation of what a smoothing window removes from the position [standard deviations of the
+noise]. A window that removes more removes motion."""
+
+NOISY_SAMPLING_ERROR = 0.3
+"""Standard error of a lag from noisy positions between two samples, which are interpolated [sample
+periods]."""
 
 SMOOTH_NOISE = 0.005
 """Largest standard deviation of the noise of a position step, after smoothing [share of the RMS step]."""
@@ -257,18 +268,36 @@ class _Motion:
         return float(np.median(np.diff(self.time)))
 
     @cached_property
+    def noise(self) -> float:
+        """Standard deviation of the noise of the position, from its third differences."""
+        return float(np.median(np.abs(np.diff(self.position, 3)))) / (0.6745 * math.sqrt(20.0))
+
+    @cached_property
+    def is_coarse(self) -> bool:
+        """True if the noise of the position is a rounding error. Other noise can be motion."""
+        steps = np.abs(np.diff(self.position))
+        step = float(np.min(steps, where=steps > 0.0, initial=np.inf))
+        return self.noise <= MOST_ROUNDING_ERROR * step / math.sqrt(12.0)
+
+    @cached_property
     def _half_window(self) -> int:
-        """Half width of the window that smooths the position [rows]; 0 for an exact position."""
+        """Half width of the window that smooths a coarse position [rows]; 0 for an exact or noisy one."""
         x = self.position
-        noise = float(np.median(np.abs(np.diff(x, 3)))) / (0.6745 * math.sqrt(20.0))
         limit = SMOOTH_NOISE * float(np.sqrt(np.mean(np.diff(x) ** 2)))
+        if self.noise <= limit or not self.is_coarse:
+            return 0
+        chosen = 0
         for half in HALF_WINDOWS:
-            if 2 * half + 1 > len(x) // 2:
+            window = 2 * half + 1
+            if (
+                2 * window > len(x)
+                or np.std(x - savgol_filter(x, window, DEGREE)) > MOST_SMOOTHED * self.noise
+            ):
                 break
-            passed = 1.0 if half == 0 else float(np.linalg.norm(savgol_coeffs(2 * half + 1, DEGREE, deriv=1)))
-            if noise * passed <= limit:
-                return half
-        return HALF_WINDOWS[-1] if 4 * HALF_WINDOWS[-1] < len(x) else 0
+            chosen = half
+            if self.noise * float(np.linalg.norm(savgol_coeffs(window, DEGREE, deriv=1))) <= limit:
+                break
+        return chosen
 
     def _smoothed(self, derivative: int) -> Float1D:
         return np.asarray(
@@ -379,7 +408,9 @@ class _Strokes:
         intervals = strokes._best_intervals(late, radius)
         late, radius = strokes._refined(late, radius, intervals)
         error, certainty = strokes._error(late, radius, intervals)
-        half = NORMAL_QUANTILE * math.hypot(error, SAMPLING_ERROR * strokes._sample_period)
+        exact = all(part.is_coarse or part.noise == 0.0 for part in parts)
+        sampling = (SAMPLING_ERROR if exact else NOISY_SAMPLING_ERROR) * strokes._sample_period
+        half = NORMAL_QUANTILE * math.hypot(error, sampling)
         found = ForceLag(late, late - half, late + half, "strokes at different speeds")
         if certainty < LEAST_CERTAINTY:
             return replace(found, reason=NO_BEND)
@@ -522,8 +553,13 @@ class _Strokes:
         change = (ahead - behind) / (2.0 * step)
         crossed = (fit.columns.T @ change).toarray()
         rest = (change.T @ change).toarray() - crossed.T @ np.linalg.solve(fit.gram, crossed)
-        noise = fit.rss / freedom / _independent_share(fit.residual)
-        by_noise = noise * float(np.trace(np.linalg.solve(fit.gram, rest)))
+        # covariance of the coefficients for noise of one size, and for noise that depends on the row
+        even = fit.rss / freedom * fit.gram
+        uneven = (fit.columns.T @ (fit.columns * (fit.residual**2 * n / freedom)[:, None])).toarray()
+        by_noise = max(
+            float(np.trace(np.linalg.solve(fit.gram, np.linalg.solve(fit.gram, each).T) @ rest))
+            for each in (even, uneven)
+        ) / _independent_share(fit.residual)
         return math.sqrt(variance) / information, information / max(by_noise, np.finfo(float).tiny)
 
 

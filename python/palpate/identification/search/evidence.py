@@ -543,11 +543,12 @@ class Judge:
         """Returns the decrease of the criterion from the simpler candidate `below` to the more complex
         candidate `above`, on the rows that both candidates can use.
 
-        If the noise is larger where the candidates differ, the decrease of the error counts less.
+        If the noise is larger where two single-valued candidates differ, the decrease of the error counts
+        less. The residuals of a hysteresis are not noise, because its reversals are not fitted exactly.
         """
         known = self._samples.on_known_rows(below, above)
         falls = known.criterion(self.criterion) - above.criterion(self.criterion)
-        if self.criterion in ON_HELD_OUT_ROWS:
+        if self.criterion in ON_HELD_OUT_ROWS or above.strokes is not None:
             return falls
         penalty, n = CRITERIA[self.criterion], above.problem.independent
         cost = penalty(n, above.n_parameters) - penalty(n, below.n_parameters)
