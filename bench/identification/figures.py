@@ -367,7 +367,7 @@ def draw_lags(path: Path, results: Mapping[str, Sequence[Row]]) -> None:
     draws, domes = [row for row in results["draws"] if row["known"]], results["domes"]
     with figure_file(path, height_inches=3.2, columns=2) as (simulated, measured):
         for level, (marker, color) in zip(
-            sorted({row["noise"] for row in draws}), METHOD_STYLES, strict=False
+            sorted({row["noise"] for row in draws}), METHOD_STYLES[::2], strict=False
         ):
             rows = [row for row in draws if row["noise"] == level]
             true = [1e3 * row["true_s"] for row in rows]
@@ -391,7 +391,6 @@ def draw_lags(path: Path, results: Mapping[str, Sequence[Row]]) -> None:
         simulated.set_xlabel("true lag [ms]")
         simulated.set_ylabel("estimated minus true lag [ms]")
         grid(simulated)
-        simulated.legend(frameon=False, fontsize=6.0)
         for place, row in enumerate(row for row in domes if not math.isnan(row["late_s"])):
             lower, late, upper = (1e3 * row[key] for key in ("lower_s", "late_s", "upper_s"))
             measured.plot([lower, upper], [place, place], color="0.6", linewidth=1.0)
@@ -399,8 +398,9 @@ def draw_lags(path: Path, results: Mapping[str, Sequence[Row]]) -> None:
             measured.plot(late, place, "ko", markersize=3.0, markerfacecolor=face, markeredgewidth=0.6)
         measured.set_yticks([])
         measured.set_ylabel("rubber domes; top: all together")
-        measured.set_xlabel("lag and 95 % interval [ms]")
+        measured.set_xlabel("lag [ms]")
         grid(measured)
+        simulated.figure.legend(frameon=False, loc="outside lower center", ncols=3, fontsize=6.0)
 
 
 def decades(values: Iterable[float]) -> tuple[float, float]:

@@ -4,8 +4,8 @@
 python bench/identification/force_lag.py [--draws 200] [--json FILE]
 
 Each draw has one object, one of three noise levels and a lag of 0 to 60 ms. The noise of every second draw is
-autoregressive with a correlation of 0.9 of neighbouring rows. A hand moves most objects. A test stand presses
-at one speed, so that only the turns of the motion count.
+autoregressive with a correlation of 0.9 of neighbouring rows. A hand moves most objects. A test machine
+presses at one speed, so that only the turns of the motion count.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ ENCODER_STEP = 5e-4
 HAND_ROWS, HAND_PERIOD_S = 10_000, 1e-3
 """Rows and sample period of a recording of a hand [s]."""
 
-STAND_ROWS, STAND_PERIOD_S, STAND_STROKES = 4000, 0.01, 8
-"""Rows, sample period [s] and strokes of a recording of a test stand."""
+MACHINE_ROWS, MACHINE_PERIOD_S, MACHINE_STROKES = 4000, 0.01, 8
+"""Rows, sample period [s] and strokes of a recording of a test machine."""
 
 
 def detents(x: Array) -> Array:
@@ -85,7 +85,7 @@ CASES: Mapping[str, Case] = {
     "viscous, detents": Case(lambda x, v: detents(x) + 0.02 * v),
     "Hunt-Crossley contact": Case(lambda x, v: x**1.5 * (1.0 + 0.1 * v)),
     "soft spring": Case(lambda x, v: x + x**3),
-    "hysteretic switch on a stand": Case(lambda x, v: switch(x) + 0.03 * play(x, 0.01), by_hand=False),
+    "hysteretic switch, one speed": Case(lambda x, v: switch(x) + 0.03 * play(x, 0.01), by_hand=False),
 }
 """Name of a simulated object -> its force and its motion."""
 
@@ -98,9 +98,9 @@ def hand(random: np.random.Generator, time: Array) -> Array:
     return np.asarray(0.5 - 0.5 * amplitude * np.cos(phase + random.uniform(0.0, 2.0 * np.pi)))
 
 
-def stand(random: np.random.Generator, time: Array) -> Array:
+def machine(random: np.random.Generator, time: Array) -> Array:
     """Returns positions from 0 to 1 of strokes at one speed."""
-    place = STAND_STROKES * time / time[-1] + random.uniform(0.0, 0.5)
+    place = MACHINE_STROKES * time / time[-1] + random.uniform(0.0, 0.5)
     return np.asarray(1.0 - np.abs(place % 2.0 - 1.0))
 
 
@@ -109,10 +109,10 @@ def simulated(draw: int) -> tuple[str, float, float, Recording]:
     random = np.random.default_rng([5, draw])
     name = list(CASES)[draw % len(CASES)]
     level = NOISE_LEVELS[draw // len(CASES) % len(NOISE_LEVELS)]
-    rows, period = (HAND_ROWS, HAND_PERIOD_S) if CASES[name].by_hand else (STAND_ROWS, STAND_PERIOD_S)
+    rows, period = (HAND_ROWS, HAND_PERIOD_S) if CASES[name].by_hand else (MACHINE_ROWS, MACHINE_PERIOD_S)
     before = math.ceil(LONGEST_S / period)
     time: Array = period * np.arange(rows + before)
-    x = (hand if CASES[name].by_hand else stand)(random, time)
+    x = (hand if CASES[name].by_hand else machine)(random, time)
     force = CASES[name].force(x, np.gradient(x, period))
     late = random.uniform(0.0, LONGEST_S)
     noise = random.normal(0.0, 1.0, len(x))
@@ -160,7 +160,7 @@ def summary(estimates: Sequence[Estimate]) -> dict[str, float]:
 
 
 def domes() -> list[Estimate]:
-    """Returns the estimates of all domes of one test stand with a time column, and last of all together."""
+    """Returns the estimates of all domes of one test machine with a time column, and last of all together."""
     if (data := measured_data()) is None:
         return []
     files = sorted((data / "rubber_domes").glob("*.csv"))[: count(100)]

@@ -130,8 +130,8 @@ MOST_ROUNDING_ERROR = 1.5
 """Largest noise of the position that counts as rounding error [standard deviations of a rounding error]."""
 
 MOST_SMOOTHED = 1.5
-"""Largest standard deviation of what a smoothing window removes from the position [standard deviations of the
-noise]. A window that removes more removes motion."""
+"""Largest standard deviation of the part of the position that a smoothing window removes [standard deviations
+of the noise]. A larger part is motion."""
 
 NOISY_SAMPLING_ERROR = 0.3
 """Standard error of a lag from noisy positions between two samples, which are interpolated [sample
@@ -162,7 +162,7 @@ TURN_STEP_S = 5e-4
 """Step of the lags that are tried at turns [s]."""
 
 UNKNOWN_CURE = (
-    "record slow and fast strokes of an object with a sharp bend, such as a key switch, on the same stand, "
+    "record slow and fast strokes of an object with a sharp bend, such as a key switch, on the same machine, "
     "and give its lag as a number"
 )
 """Text of the cure if a recording does not determine the lag of its force."""
@@ -212,7 +212,7 @@ def unknown(reason: str) -> ForceLag:
 
 
 def lag_of(recordings: Sequence[Recording]) -> ForceLag:
-    """Returns the lag of the force in recordings of one object on one test stand.
+    """Returns the lag of the force in recordings of one object on one test machine.
 
     The lag of a recording that is already corrected is the remaining lag.
     """

@@ -61,7 +61,7 @@ def test_lag_needs_time_one_input_and_motion() -> None:
 
 
 def test_wide_interval_counts_as_unknown() -> None:
-    estimates = [estimated(draw_of("hysteretic switch on a stand", draw)) for draw in range(9)]
+    estimates = [estimated(draw_of("hysteretic switch, one speed", draw)) for draw in range(9)]
     widths = {each.known: each.upper_s - each.lower_s for each in estimates}
     assert widths[True] <= 2.0 * LARGEST_ERROR_S
 
