@@ -244,8 +244,6 @@ def identify(
         "verdict": str(verdict),
         "seconds": seconds,
     }
-    if (lag := model.notes.get("force_lag")) is not None:
-        result["force_lag"] = lag
     if hold_out_every is not None:
         result["held_out_rows"] = compared
     if with_baselines:
@@ -273,7 +271,10 @@ def identify(
                     f"{model.n_parameters} parameters",
                     "error": f"{rms}NRMSE {number(nrmse)} on {judged}",
                     **dict(note.split(": ", 1) for note in model.notes["model_selection"][-_MOST_DECISIONS:]),
-                    **_lag_line(lag, max((part.corrected_lag_s for part in recordings), default=0.0)),
+                    **_lag_line(
+                        model.notes.get("force_lag"),
+                        max((part.corrected_lag_s for part in recordings), default=0.0),
+                    ),
                     "time": f"{seconds:.2f} s",
                 }
             )

@@ -192,7 +192,7 @@ class ForceLag:
         return self.known and self.lower_s > 0.0
 
     def record(self) -> dict[str, Any]:
-        """Returns the lag as numbers and text for a model file and for --json."""
+        """Returns the lag as numbers and text for a model file."""
         numbers = (self.late_s, self.lower_s, self.upper_s)
         late, lower, upper = (number if self.known else None for number in numbers)
         return {"late_s": late, "lower_s": lower, "upper_s": upper, "text": str(self)}
