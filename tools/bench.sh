@@ -47,6 +47,8 @@ solvers/model_error.py build/bench/bench_model_error.json
 identification/compare_methods.py --json build/bench/compare_methods.json
 identification/filters.py --json build/bench/filters.json
 identification/parsimony.py --json build/bench/parsimony.json
+identification/noise.py --json build/bench/noise.json
+identification/force_lag.py --json build/bench/force_lag.json
 identification/real_data.py --json build/bench/real_data.json
 identification/dynamic.py --json build/bench/dynamic.json
 identification/repeats.py --json build/bench/repeats.json

@@ -102,6 +102,15 @@ def _row_range(
         raise click.BadParameter(message, ctx, param) from None
 
 
+def _lag(ctx: click.Context, param: click.Parameter, value: str) -> float | str:
+    """Parses a number of seconds, or the word auto."""
+    try:
+        return value if value == "auto" else float(value)
+    except ValueError:
+        message = f"{value!r} must be a number of seconds, such as 0.025, or auto"
+        raise click.BadParameter(message, ctx, param) from None
+
+
 @dataclass(frozen=True)
 class ReadingOptions:
     """Options for reading the recordings of one run."""
@@ -148,7 +157,9 @@ _READING = options(
         multiple=True,
         help=_about("units"),
     ),
-    expert_option("--force-late-s", metavar="SECONDS", type=float, default=0.0, help=_about("force_late_s")),
+    expert_option(
+        "--force-late-s", metavar="SECONDS", callback=_lag, default="0.0", help=_about("force_late_s")
+    ),
     _column("--time", help=_about("time")),
     _column("--direction", help=_about("direction")),
     expert_option("--negate", metavar="COLUMN", multiple=True, help=f"{_about('negate')} Repeatable."),

@@ -18,6 +18,7 @@ from ..arguments import parameter_texts, shown
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording, Source, read_recording
+from ..recording.lag import ForceLag, lag_of
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
@@ -141,7 +142,9 @@ def identify(
     source = Source.merged(part.source for part in recordings)
     every_row = len(rows.force) == sum(map(len, recordings))
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
-    return model_of(network, recordings[0].units, source, settings, verdict)
+    with threadpool_limits(limits=1, user_api="blas"):
+        lag = lag_of(recordings)
+    return model_of(network, recordings[0].units, source, settings, verdict, lag)
 
 
 def _groups(objects: object, inputs: Sequence[str]) -> list[list[Recording]]:
@@ -287,8 +290,9 @@ def model_of(
     source: Source,
     options: IdentifyOptions,
     verdict: Verdict,
+    lag: ForceLag | None = None,
 ) -> Model:
-    """Returns the model of an identified network, with its verdict."""
+    """Returns the model of an identified network, with its verdict and the lag of the force."""
     return Model(
         kind=_kind(network),
         inputs=network.inputs,
@@ -309,6 +313,7 @@ def model_of(
             "model_selection": [str(decision) for decision in network.decisions],
             "identification": list(network.notes),
             "verdict": verdict.record(),
+            **({} if lag is None else {"force_lag": lag.record()}),
         },
     )
 

@@ -17,6 +17,7 @@ from .._typing import Float1D
 from ..verdict import Finding, usable
 from .comparison import CellRows, Travel, cell_rows, merged_findings, scale_findings, sides
 from .conversion import MIN_ROWS, mirror_notes
+from .lag import LONGEST_LAG_S
 from .motion import GAP_RATIO
 
 if TYPE_CHECKING:
@@ -42,9 +43,6 @@ LEAST_LOOP_SHARE = 0.02
 
 LEAST_LOOP_ERRORS = 5.0
 """Least mean of press minus release force that is hysteresis, divided by the standard error of this mean."""
-
-LONGEST_LAG_S = 0.1
-"""Longest lag of a force sensor that is advised to be corrected [s]"""
 
 LEAST_CLIPPED_ROWS = 5
 """Least number of rows at the largest or least force (or position) that are reported as a clipped sensor."""

@@ -44,7 +44,7 @@ def read_recording(
     negate: Sequence[str] = (),
     rows: tuple[int | None, int | None] | None = None,
     zero: tuple[int | None, int | None] | None = None,
-    force_late_s: float = 0.0,
+    force_late_s: float | Literal["auto"] = 0.0,
     invalid: Literal["refuse", "drop"] = "refuse",
 ) -> Recording:
     """Reads a recording from a file.
@@ -82,9 +82,10 @@ def read_recording(
         Use only these rows, counted from 0. The range excludes stop; None leaves an end open.
     zero : (start, stop), optional
         Rows without contact; their mean force is subtracted. The range is counted as `rows`.
-    force_late_s : float
-        Delay of the recorded force [s]; needs time. Every force is moved to its position, for example if the
-        converter of a load cell averages.
+    force_late_s : float or "auto"
+        Delay of the recorded force [s], or auto; needs time. Every force is moved to its position, for
+        example if the converter of a load cell averages. "auto" finds the delay in the recording
+        (:attr:`palpate.Recording.force_lag`) and refuses a recording that does not determine it.
     invalid : {"refuse", "drop"}
         Refuse the file, or drop rows without a number. An infinite number, a missing direction, or a time
         that does not increase is treated in the same way. The error names the row; dropped rows are counted.
@@ -122,7 +123,12 @@ def read_recording(
         drop=invalid == "drop",
     )
     recording = Recording(**fields)
-    return recording.with_force_earlier(force_late_s) if force_late_s else recording
+    if not force_late_s:
+        return recording
+    try:
+        return recording.with_force_earlier(force_late_s)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def recording_from(

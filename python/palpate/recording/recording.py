@@ -20,6 +20,7 @@ from ..verdict import Verdict
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
 from .display import columns_of, html_of
 from .files import write_csv
+from .lag import LAG_DIGITS, UNKNOWN_CURE, ForceLag, lag_of
 from .mcap_file import write_mcap
 from .quality import quality_findings
 from .table import FRAME, Cells, FrameTable, python_arguments
@@ -62,6 +63,8 @@ class Recording:
     """All rows of the motion of which the recording is a part; None if the recording contains all rows"""
     file_units: Mapping[str, Unit] = field(default_factory=dict, repr=False)
     """Units of "position" and "force" in the file, for messages; a missing one is taken from `units`"""
+    corrected_lag_s: float = 0.0
+    """Lag of the force that :meth:`with_force_earlier` corrected [s]"""
 
     def __post_init__(self) -> None:
         n = len(self.position)
@@ -290,20 +293,30 @@ class Recording:
         """Returns a copy of the recording without the rows that `rows` (n,) marks with True."""
         return self._rows(~rows)
 
-    def with_force_earlier(self, late_s: float) -> Recording:
+    @property
+    def force_lag(self) -> ForceLag:
+        """Lag of the force behind its position, with a 95 % confidence interval, from strokes at different
+        speeds or from turns"""
+        return lag_of([self])
+
+    def with_force_earlier(self, late_s: float | Literal["auto"]) -> Recording:
         """Returns the recording corrected for a force that was recorded late_s [s] after its position.
 
         At a reversal on a steep force, a late force is larger in the release than in the press, which a
         passive object cannot do. Positions, directions and further inputs are shifted by late_s; the first
-        rows, whose shifted position was not recorded, are removed.
+        rows, whose shifted position was not recorded, are removed. "auto" uses :attr:`force_lag`. A lag whose
+        confidence interval contains 0 is not corrected.
 
         Raises
         ------
         InputError
-            The recording has no time, or late_s is negative or longer than the recording.
+            The recording has no time, late_s is negative or longer than the recording, or "auto" is given and
+            the recording does not determine the lag.
         """
         if self.time is None:
             raise InputError("late_s needs a recording with a column of time (--time NAME)")
+        if isinstance(late_s, str):
+            return self._with_found_lag(late_s)
         time = self.time
         late_s = real_of("late_s", late_s)
         shifted_time = time - late_s
@@ -325,8 +338,20 @@ class Recording:
             inputs=np.column_stack([*map(at_shifted_time, self.inputs.T), np.empty((len(self), 0))]),
             notes=(*self.notes, f"each force belongs to the position {late_s:g} s before"),
             part_of=None,
+            corrected_lag_s=self.corrected_lag_s + late_s,
         )
         return shifted._rows(rows)
+
+    def _with_found_lag(self, word: str) -> Recording:
+        if word != "auto":
+            raise InputError(f"late_s is {word!r}; it must be a number of seconds or 'auto'")
+        found = self.force_lag
+        if not found.known:
+            raise InputError(f"the lag of the force is not known: {found.reason}; {UNKNOWN_CURE}")
+        if not found.is_late:
+            return replace(self, notes=(*self.notes, f"{found}: not corrected"))
+        noted = replace(self, notes=(*self.notes, str(found)))
+        return noted.with_force_earlier(round(found.late_s, LAG_DIGITS))
 
     def write(self, path: str | os.PathLike[str], *, replace: bool = True) -> Path:
         """Writes the recording as CSV, or as MCAP if the name ends in ``.mcap``.

@@ -349,3 +349,28 @@ def test_a_file_read_by_parts_belongs_to_no_object(folder: Path, capsys: pytest.
     spring(folder / "a.csv")
     assert main(["identify", "--object", "a.csv", "-o", "m.json", "--out-of-core"]) == 2
     assert "--object needs all rows at once" in capsys.readouterr().err
+
+
+def test_the_lag_of_the_force_is_printed_and_corrected_only_on_request(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    time = 1e-3 * np.arange(4000)
+
+    def position(at: np.ndarray) -> np.ndarray:
+        return 0.5 - 0.4 * np.cos(2.0 * np.pi * (0.5 * at + 0.15 * at**2))
+
+    late = position(time - 0.02)
+    force = 0.3 * late + 0.1 * np.sin(12.0 * np.pi * late)
+    force = force + np.random.default_rng(1).normal(0.0, 2e-3, len(force))
+    Recording.from_arrays(position(time), force, time).write(folder / "a.csv")
+    settings = ["-o", "m.json", "--inputs", "position", "--max-wavelets", "8"]
+    main(["identify", "a.csv", *settings])
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "force lag the force is 20 ms late (95 %: " in printed
+    assert "not corrected: --force-late-s auto or 0.02" in printed
+    main(["identify", "a.csv", *settings, "--force-late-s", "auto"])
+    captured = capsys.readouterr()
+    assert "the force is 20 ms late (95 %: " in captured.err
+    assert "force lag 20 ms corrected; then the force is " in " ".join(captured.out.split())
+    assert main(["identify", "a.csv", *settings, "--force-late-s", "soon"]) == 2
+    assert "must be a number of seconds, such as 0.025, or auto" in capsys.readouterr().err

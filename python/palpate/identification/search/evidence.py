@@ -57,6 +57,10 @@ the full mean decreases by at most its standard error [-]."""
 LEAST_HELD_OUT = 20
 """Least number of held-out rows that can refuse a model class. The error on fewer rows is too uncertain."""
 
+MOST_NOISE_ROWS = 50_000
+"""Largest number of rows from which the noise where two models differ is computed; of more rows an evenly
+spread part is used."""
+
 ALL_ROWS = slice(None)
 """Every row."""
 
@@ -469,6 +473,25 @@ class Samples:
         return trimmed if trimmed[0] > max(trimmed[1], LEAST_TRIMMED_GAIN) else (share, error)
 
 
+def local_noise_ratio(below: Candidate, above: Candidate) -> float:
+    """Returns the mean squared residual where two candidates differ divided by that of all rows, at least 1.
+
+    The rows are weighted by the squared difference of the two forces. A criterion with one noise level for
+    all rows overestimates the evidence for structure by this ratio.
+    """
+    data = above.data
+    rows = slice(None, None, max(1, len(data.force) // MOST_NOISE_ROWS))
+    force = above.force_at(rows)
+    weight = (force - below.force_at(rows)) ** 2
+    if data.weight is not None:
+        weight = weight * data.weight[rows]
+    squares = (data.force[rows] - force) ** 2
+    used = weight > 0.0
+    if not used.any() or not (mean := float(squares[used].mean())) > 0.0:
+        return 1.0
+    return max(1.0, float(np.average(squares, weights=weight)) / mean)
+
+
 @dataclass(frozen=True)
 class Judgement:
     """Result of the comparison of a simpler candidate (lower) with a more complex candidate (upper)."""
@@ -518,9 +541,18 @@ class Judge:
 
     def fall(self, below: Candidate, above: Candidate) -> float:
         """Returns the decrease of the criterion from the simpler candidate `below` to the more complex
-        candidate `above`, on the rows that both candidates can use."""
-        below = self._samples.on_known_rows(below, above)
-        return below.criterion(self.criterion) - above.criterion(self.criterion)
+        candidate `above`, on the rows that both candidates can use.
+
+        If the noise is larger where two single-valued candidates differ, the decrease of the error counts
+        less. The residuals of a hysteresis are not noise, because its reversals are not fitted exactly.
+        """
+        known = self._samples.on_known_rows(below, above)
+        falls = known.criterion(self.criterion) - above.criterion(self.criterion)
+        if self.criterion in ON_HELD_OUT_ROWS or above.strokes is not None:
+            return falls
+        penalty, n = CRITERIA[self.criterion], above.problem.independent
+        cost = penalty(n, above.n_parameters) - penalty(n, below.n_parameters)
+        return (falls + cost) / local_noise_ratio(below, above) - cost
 
     def compared(self, below: Candidate, above: Candidate, *, errors: float = 1.0) -> Judgement:
         """Compares the upper candidate with the lower one.
