@@ -45,6 +45,7 @@ studies <<END
 solvers/python_calls.py build/bench/bench_python_calls.json
 solvers/model_error.py build/bench/bench_model_error.json
 identification/compare_methods.py --json build/bench/compare_methods.json
+identification/several_inputs.py --json build/bench/several_inputs.json
 identification/filters.py --json build/bench/filters.json
 identification/parsimony.py --json build/bench/parsimony.json
 identification/noise.py --json build/bench/noise.json

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -43,17 +43,20 @@ def reason_to_skip(method: Method, rows: Problem) -> str | None:
     return None
 
 
-def measure(name: str, n_draws: int, methods: Sequence[Method]) -> list[dict[str, Any]]:
-    """Returns medians and ranges of each method's results in all draws, or why the method was skipped."""
+def measure(draws: Iterable[Problem], methods: Sequence[Method]) -> list[dict[str, Any]]:
+    """Returns medians and ranges of each method's results in all draws of a problem, or why the method was
+    skipped."""
     results: dict[str, list[tuple[float, Fitted]]] = {method.name: [] for method in methods}
     reasons: dict[str, str] = {}
-    for draw in range(n_draws):
-        rows = problem(name, draw)
+    name = ""
+    for rows in draws:
+        name = rows.name
         for method in methods:
             if (reason := reasons.get(method.name) or reason_to_skip(method, rows)) is not None:
                 reasons[method.name] = reason
                 continue
-            if is_skipped_as_slow(results[method.name], results.get(PALPATE)):
+            done = results[method.name]
+            if len(done) >= method.most_draws or is_skipped_as_slow(done, results.get(PALPATE)):
                 continue
             try:
                 fitted = method.fit(rows.X, rows.y)
@@ -105,6 +108,13 @@ def _medians(
     }
 
 
+def header() -> str:
+    return (
+        f"{'':28}{'nrmse':>10}{'range':>23}{'wavelets':>16}{'parameters':>16}{'fit s':>9}"
+        f"{'tuning s':>10}{'over palpate':>13}{'draws':>7}  setting"
+    )
+
+
 def line(row: dict[str, Any]) -> str:
     if "skipped" in row:
         return f"{row['method']:28}  {row['skipped']}"
@@ -136,13 +146,8 @@ def main() -> None:
     results = []
     with threadpool_limits(limits=1):
         for name in options.problems:
-            print(f"\n{name}: {TITLES[name]}")
-            print(
-                f"{'':28}{'nrmse':>10}{'range':>23}{'wavelets':>16}{'parameters':>16}{'fit s':>9}"
-                f"{'tuning s':>10}{'over palpate':>13}{'draws':>7}  setting",
-                flush=True,
-            )
-            rows = measure(name, options.draws, methods)
+            print(f"\n{name}: {TITLES[name]}\n{header()}", flush=True)
+            rows = measure((problem(name, draw) for draw in range(options.draws)), methods)
             results.extend(rows)
             print("\n".join(map(line, rows)), flush=True)
             write_results(options.json, results)

@@ -47,12 +47,13 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Method:
-    """An identification method, and the numbers of inputs and rows for which the method is run."""
+    """An identification method, and the numbers of inputs, rows and draws for which the method is run."""
 
     name: str
     fit: Callable[[Array, Array], Fitted]
     inputs: tuple[int, ...] = (1, 2)
     most_rows: int = 10**9
+    most_draws: int = 10**9
 
 
 def palpate_with(**options: Any) -> Callable[[Array, Array], Fitted]:
@@ -67,7 +68,7 @@ def palpate_with(**options: Any) -> Callable[[Array, Array], Fitted]:
     return fit
 
 
-def _tuned(
+def tuned(
     fit: Callable[[Any, Array, Array], tuple[Predict, int]], settings: Iterable[Any], X: Array, y: Array
 ) -> Fitted:
     """Fits each setting without every fifth row, and fits all rows with the setting of least error there."""
@@ -100,7 +101,7 @@ def lsq_spline(X: Array, y: Array) -> Fitted:
         spline = make_lsq_spline(x, force, knots, k=3)
         return lambda x_new: spline(np.clip(x_new[:, 0], x[0], x[-1])), len(spline.c)
 
-    return _tuned(fit, (8, 16, 24, 32, 41, 50, 64, 80, 100, 130), X, y)
+    return tuned(fit, (8, 16, 24, 32, 41, 50, 64, 80, 100, 130), X, y)
 
 
 def univariate_spline(X: Array, y: Array) -> Fitted:
@@ -118,7 +119,7 @@ def univariate_spline(X: Array, y: Array) -> Fitted:
 
     # 1e-6 makes the spline pass through rows without noise; with many rows this would take minutes
     shares = (0.98, 0.99, 1.0, 1.005, 1.01, 1.02, 1.05, 1.1)
-    return _tuned(fit, (1e-6, *shares) if len(y) <= 1_000 else shares, X, y)
+    return tuned(fit, (1e-6, *shares) if len(y) <= 1_000 else shares, X, y)
 
 
 def spline_ridge(X: Array, y: Array) -> Fitted:
@@ -144,7 +145,7 @@ def spline_ridge(X: Array, y: Array) -> Fitted:
         return lambda x_new: ridge.predict(products(x_new)), len(ridge.coef_)
 
     knots = (25, 50, 100, 150) if X.shape[1] == 1 else (5, 8, 12, 18)
-    return _tuned(fit, [(k, a) for k in knots for a in (1e-8, 1e-4, 1e-2)], X, y)
+    return tuned(fit, [(k, a) for k in knots for a in (1e-8, 1e-4, 1e-2)], X, y)
 
 
 def frame_pursuit(X: Array, y: Array) -> Fitted:
@@ -198,7 +199,7 @@ def kernel_ridge(X: Array, y: Array) -> Fitted:
         )
         return pipeline.predict, len(y)
 
-    return _tuned(
+    return tuned(
         fit, [(g, a) for g in (1.0, 3.0, 10.0, 30.0, 100.0) for a in (1e-12, 1e-10, 1e-8, 1e-5)], X, y
     )
 
@@ -227,7 +228,7 @@ def polynomial_ridge(X: Array, y: Array) -> Fitted:
         pipeline.fit(X, y)
         return pipeline.predict, len(pipeline[-1].coef_)
 
-    return _tuned(fit, (3, 5, 7, 9, 12), X, y)
+    return tuned(fit, (3, 5, 7, 9, 12), X, y)
 
 
 def mars(X: Array, y: Array) -> Fitted:

@@ -27,7 +27,7 @@ def test_draws_without_noise_keep_the_ends_of_the_grid() -> None:
 
 
 def test_measured_row_has_median_and_range_over_the_draws() -> None:
-    (row,) = measure("P4", 3, METHODS[:1])
+    (row,) = measure((problem("P4", draw) for draw in range(3)), METHODS[:1])
     lower, upper = row["nrmse_range"]
     assert lower < row["nrmse"] < upper
     assert row["n_wavelets_range"][0] <= row["n_wavelets"] <= row["n_wavelets_range"][1]
