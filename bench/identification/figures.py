@@ -3,7 +3,8 @@
 
 python bench/identification/figures.py build/bench --to docs
 
-Draws identification-parameters.png, -time.png, -filters.png, -lag.png and -repeats.png to FOLDER/figures.
+Draws identification-parameters.png, -time.png, -filters.png, -several.png, -lag.png and -repeats.png to
+FOLDER/figures.
 Writes the tables of FOLDER/identification.md if that page exists. A study that did not run keeps its table.
 """
 
@@ -26,7 +27,7 @@ from palpate.cli.printing import number
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.identification import repeats
+from bench.identification import repeats, several_inputs
 from bench.studies import fill_tables, markdown_table
 
 from palpate.plotting.look import grid
@@ -275,6 +276,7 @@ TABLES: Mapping[str, Callable[[Any], str]] = {
     "filters": speeds,
     "repeats": repeats.table,
     "published": repeats.published_table,
+    "several_inputs": several_inputs.table,
     "noise": noise,
     "force_lag": lags,
 }
@@ -444,6 +446,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             tables[name] = f"{table(study[0])}\n{study[1]}\n"
             if name == "filters":
                 draw_over_speed(figures / "identification-filters.png", study[0])
+            if name == "several_inputs":
+                several_inputs.draw(figures / "identification-several.png", study[0])
             if name == "repeats":
                 repeats.draw(figures / "identification-repeats.png", study[0])
             if name == "force_lag":

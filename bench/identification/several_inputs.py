@@ -12,10 +12,11 @@ time and its error do not depend on the number of rows.
 from __future__ import annotations
 
 import argparse
+import ast
 import sys
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +32,13 @@ from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.identification.compare_methods import header, line, measure
+from bench.identification.compare_methods import PALPATE, header, line, measure
 from bench.identification.methods import Array, Fitted, Method, Predict, palpate_with, tuned
 from bench.identification.problems import Problem
-from bench.studies import SCALE, count, write_results
+from bench.studies import SCALE, count, markdown_table, write_results
+
+from palpate.cli.figures import figure_file
+from palpate.plotting.look import grid
 
 INPUTS = (2, 3, 6)
 
@@ -45,7 +49,7 @@ NOISE = 0.02
 
 TEST_ROWS = 5_000
 
-MOST_TUNING_ROWS = 10_000
+MOST_TUNING_ROWS = 4_000
 """The settings of the Nystrom method are tuned on at most this number of rows"""
 
 GAUSSIAN_PROCESS_ROWS = 2_000
@@ -100,14 +104,15 @@ def several(force: str, inputs: int, rows: int, draw: int) -> Problem:
 
 
 def boosted_trees(X: Array, y: Array) -> Fitted:
-    """Fits trees of at most 31 leaves; the number of parameters is the largest number of leaves."""
-
-    def fit(setting: tuple[float, int], X: Array, y: Array) -> tuple[Predict, int]:
-        rate, trees = setting
-        model = HistGradientBoostingRegressor(learning_rate=rate, max_iter=trees, early_stopping=False)
-        return model.fit(X, y).predict, 31 * trees
-
-    return tuned(fit, ((0.1, 300), (0.05, 1000)), X, y)
+    """Fits trees of at most 31 leaves until a tenth of the rows shows no progress; the number of parameters
+    is the number of leaves."""
+    start = time.perf_counter()
+    model = HistGradientBoostingRegressor(
+        learning_rate=0.05, max_iter=1000, early_stopping=True, n_iter_no_change=20, random_state=0
+    )
+    model.fit(X, y)
+    seconds = time.perf_counter() - start
+    return Fitted(model.predict, 31 * model.n_iter_, seconds, 0.0, f"{model.n_iter_} trees")
 
 
 def nystrom(X: Array, y: Array) -> Fitted:
@@ -118,12 +123,12 @@ def nystrom(X: Array, y: Array) -> Fitted:
         features = Nystroem(gamma=gamma, n_components=min(1000, len(y) // 2), random_state=0)
         return make_pipeline(features, Ridge(penalty)).fit(X, y).predict, features.n_components
 
-    settings = [(gamma, penalty) for gamma in (0.1, 0.3, 1.0, 3.0, 10.0) for penalty in (1e-6, 1e-3, 1e-1)]
+    settings = [(gamma, penalty) for gamma in (0.1, 0.3, 1.0, 3.0, 10.0) for penalty in (1e-6, 1e-3)]
     found = tuned(fit, settings, X[:MOST_TUNING_ROWS], y[:MOST_TUNING_ROWS])
     if len(y) <= MOST_TUNING_ROWS:
         return found
     start = time.perf_counter()
-    gamma, penalty = (float(each) for each in found.setting.strip("()").split(","))
+    gamma, penalty = ast.literal_eval(found.setting)
     predict, size = fit((gamma, penalty), X, y)
     return Fitted(predict, size, time.perf_counter() - start, found.seconds, found.setting)
 
@@ -144,11 +149,71 @@ def gaussian_process(X: Array, y: Array) -> Fitted:
 
 
 METHODS = (
-    Method("palpate", palpate_with(), inputs=INPUTS),
+    Method(PALPATE, palpate_with(), inputs=INPUTS),
     Method("HistGradientBoosting", boosted_trees, inputs=INPUTS),
     Method("Nystrom + Ridge", nystrom, inputs=INPUTS),
     Method("Gaussian process", gaussian_process, inputs=INPUTS, most_draws=3),
 )
+
+MARKERS = (("o", "black"), ("^", "white"), ("s", "0.6"), ("D", "white"))
+"""Marker and its color for each method"""
+
+
+def table(results: Sequence[Mapping[str, Any]]) -> str:
+    """Returns a table row for each force, number of inputs and number of rows: median and range of NRMSE, and
+    median time of each method."""
+    lines = []
+    for problem in dict.fromkeys(row["problem"] for row in results):
+        of = {row["method"]: row for row in results if row["problem"] == problem}
+        found = [of[method.name] for method in METHODS if method.name in of]
+        lines.append(
+            (
+                f"{problem} ({of[PALPATE]['draws']} draws)",
+                *(
+                    f"{row['nrmse']:.1e} ({row['nrmse_range'][0]:.1e} to {row['nrmse_range'][1]:.1e})"
+                    for row in found
+                ),
+                str(of[PALPATE]["n_parameters"]),
+                *(f"{row['fit_s'] + row['tuning_s']:.2g}" for row in found),
+            )
+        )
+    names = [method.name for method in METHODS]
+    errors, times = [f"NRMSE, {name}" for name in names], [f"{name} [s]" for name in names]
+    return markdown_table(("problem", *errors, "parameters of palpate", *times), lines)
+
+
+def draw(path: Path, results: Sequence[Mapping[str, Any]]) -> None:
+    """Draws error over time of all methods, a panel for each number of inputs; larger marks: more rows."""
+    measured = [each for each in INPUTS if any(f", {each} inputs, " in row["problem"] for row in results)]
+    with figure_file(path, height_inches=3.2, columns=len(measured)) as panels:
+        for axes, inputs in zip(panels, measured, strict=True):
+            for method, (marker, color) in zip(METHODS, MARKERS, strict=True):
+                rows = [
+                    row
+                    for row in results
+                    if row["method"] == method.name and f", {inputs} inputs, " in row["problem"]
+                ]
+                axes.scatter(
+                    [row["fit_s"] + row["tuning_s"] for row in rows],
+                    [row["nrmse"] for row in rows],
+                    [5.0 * (1 + ROWS.index(int(row["problem"].split()[-2]))) ** 1.5 for row in rows],
+                    marker=marker,
+                    facecolor=color,
+                    edgecolor="black",
+                    linewidth=0.6,
+                    label=method.name,
+                    zorder=3 if method.name == PALPATE else 2,
+                )
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            grid(axes)
+            axes.set_title(f"{inputs} inputs", fontsize=7.0)
+            axes.set_xlabel("fit and tuning [s]")
+        panels[0].set_ylabel("NRMSE")
+        handles, names = panels[0].get_legend_handles_labels()
+        panels[0].figure.legend(
+            handles, names, frameon=False, loc="outside lower center", ncols=4, fontsize=6.0
+        )
 
 
 def main() -> None:

@@ -84,8 +84,10 @@ def identify(
     ``identify(read_recording("press.csv", force_late_s=0.025))``. Its arguments are:
 
     {reading}
-    The other options of ``palpate identify`` are these functions and attributes:
+    The other options of ``palpate identify`` are these functions, arguments and attributes:
 
+    ``--object`` : the argument `objects`
+        Recordings of one of several objects.
     ``--output`` : :meth:`palpate.Model.save`
         Model file to write.
     ``--plot`` : :meth:`palpate.Verification.plot`

@@ -105,6 +105,27 @@ def test_fills_the_tables_of_repeats_and_of_published_fits(results_folder: Path)
     assert (results_folder / "figures" / "identification-repeats.png").read_bytes().startswith(PNG)
 
 
+def test_fills_the_table_of_several_inputs(results_folder: Path) -> None:
+    problem = "contact, 6 inputs, 20000 rows"
+    rows = [
+        result_row(problem, "palpate", 2e-3, 71),
+        result_row(problem, "HistGradientBoosting", 3e-2, 900),
+        result_row(problem, "Nystrom + Ridge", 4e-3, 1000),
+        result_row(problem, "Gaussian process", 1e-3, 2000),
+    ]
+    write_results(results_folder, "several_inputs", rows)
+    page = results_folder / "identification.md"
+    names = ("compare_methods", "filters", "parsimony", "several_inputs")
+    page.write_text("".join(f"<!-- {name} -->\n<!-- end -->\n" for name in names))
+    main([str(results_folder), "--to", str(results_folder)])
+    (line,) = [each for each in page.read_text(encoding="utf-8").splitlines() if problem in each]
+    cells = [cell.strip() for cell in line.strip("|").split("|")]
+    assert cells[:2] == [f"{problem} (12 draws)", "2.0e-03 (1.0e-03 to 4.0e-03)"]
+    assert cells[4:7] == ["1.0e-03 (5.0e-04 to 2.0e-03)", "71", "0.75"]
+    figure = results_folder / "figures" / "identification-several.png"
+    assert figure.read_bytes().startswith(PNG)
+
+
 def measured_row(nrmse: float, **fields: Any) -> dict[str, Any]:
     splines = {"nrmse": 0.01, "n_parameters": 200, "seconds": 0.1}
     row = {"file": "dome", "nrmse": nrmse, "n_parameters": 100, "seconds": 1.0, "finite": True}

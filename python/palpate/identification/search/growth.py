@@ -52,6 +52,10 @@ SMOOTH_CORE_SHARE = 0.25
 """While only wide wavelets are tried for several inputs, at least this share of all positions must lie in the
 core of each wavelet, the part between its side lobes [-]."""
 
+SMOOTH_PATIENCE = 3
+"""While only wide wavelets are tried, growth continues for this factor times as many wavelets. The force has
+no noise then, and a network that stops early has a large error outside the recorded positions."""
+
 MOST_STRETCHED = 64
 """Largest number of wavelets of the frame that are also tried with a changed dilation along each of several
 inputs."""
@@ -231,22 +235,24 @@ class Growth:
         most: int,
         *,
         library: Library | None = None,
+        patience: int | None = None,
         wide: bool = False,
         in_parts: bool = False,
     ) -> Grown:
         """Grows the network of `start` until the criterion stops growth, then prunes and refines the network.
 
-        Growth continues for `patience` wavelets per input after the best criterion, and pruning starts from
-        the largest network: a few surplus wavelets let refinement find a better arrangement. If the criterion
-        uses held-out rows, it chooses the size and nothing is pruned. With `wide`, a network of wide wavelets
-        alone is tried once, when the RMS error is below sqrt(`FORCE_RESOLUTION`) times the range of the
-        force. It is taken if its error is small, or in the end not larger.
+        Growth continues for `patience` wavelets after the best criterion, by default for those of the options
+        per input. Pruning starts from the largest network: a few surplus wavelets let refinement find a
+        better arrangement. If the criterion uses held-out rows, it chooses the size and nothing is pruned.
+        With `wide`, a network of wide wavelets alone is tried once, when the RMS error is below
+        sqrt(`FORCE_RESOLUTION`) times the range of the force. It is taken if its error is small, or in the
+        end not larger.
 
         With `in_parts` the network grows on a part of many rows first, which shows most of its wavelets. On
         all rows it then continues for `patience` wavelets only.
         """
         search, criterion = self._search, self._criterion
-        patience, begin, smooth = search.patience * problem.dimension, start, None
+        patience, begin, smooth = patience or search.patience * problem.dimension, start, None
         rows = max(len(block.target) for block in problem.blocks)
         if in_parts and rows > LEAST_PART_ROWS:
             part = problem.part(max(LEAST_PART_ROWS, int(PART_SHARE * rows)))
@@ -309,7 +315,8 @@ class Growth:
             return None
         held = max(problem.resolved_by, int(SMOOTH_CORE_SHARE * rows))
         smooth = replace(problem, resolved_by=held, every_input=True)
-        found = self._grown(smooth, start, model_class, most)
+        patience = SMOOTH_PATIENCE * self._search.patience * problem.dimension
+        found = self._grown(smooth, start, model_class, most, patience=patience)
         given = replace(found.problem, resolved_by=problem.resolved_by, every_input=problem.every_input)
         return replace(found, problem=given)
 
