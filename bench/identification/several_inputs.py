@@ -137,7 +137,7 @@ def gaussian_process(X: Array, y: Array) -> Fitted:
     """Fits a Gaussian process with a length scale for each input to 2000 rows."""
     start = time.perf_counter()
     kernel = ConstantKernel(1.0, (1e-3, 1e6)) * RBF(np.ones(X.shape[1]), (1e-2, 1e2)) + WhiteKernel(1e-3)
-    few = GaussianProcessRegressor(kernel, normalize_y=True, random_state=0)
+    few = GaussianProcessRegressor(kernel, normalize_y=True, n_restarts_optimizer=2, random_state=0)
     with warnings.catch_warnings():
         # a length scale reaches its bound if the force does not depend on the input
         warnings.simplefilter("ignore", ConvergenceWarning)
