@@ -148,7 +148,7 @@ def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any]) -> Plan:
     if all(value is None or value is False for value in scheme.values()):
         if model.plan is not None:
             return Plan.of(model)
-        if not model.of_velocity:
+        if not model.of_velocity and model.memory is None:
             talk(
                 "the model has no plan: the default coupling makes it softer; "
                 "'palpate plan' finds a rendering without this error"

@@ -229,6 +229,8 @@ def force_range(plan: Plan) -> float:
     if plan.model.of_velocity:
         axes = [np.linspace(low, high, _GRID) for low, high in zip(lower, upper, strict=True)]
         force = plan.model.predict(np.stack([axis.ravel() for axis in np.meshgrid(*axes)], axis=1))
+    elif plan.model.memory is not None:
+        force = plan.model.force(np.linspace(lower[0], upper[0], _GRID))
     else:
         sweep = np.linspace(lower[0], upper[0], _GRID)
         force = force_at(plan, np.concatenate([sweep, sweep[::-1]]))
@@ -324,15 +326,18 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
     position : (n,) array
         Positions of a motion, in order of time [rad or m].
     period_s : float, optional
-        Time between positions [s]; only a force that depends on velocity needs it.
+        Time between positions [s]; only a force that depends on velocity or has a
+        memory needs it.
 
     Returns
     -------
     (n,) array
         Force [N*m or N].
     """
-    if period_s is None and plan.model.of_velocity:
-        raise InputError("period_s is None: must be given for a force that depends on velocity")
+    if period_s is None and (plan.model.of_velocity or plan.model.memory is not None):
+        raise InputError(
+            "period_s is None: must be given for a force that depends on velocity or has a memory"
+        )
     exact = Scheme(structure="direct", play_radius=plan.scheme.play_radius)
     force: Float1D = motion_driven(plan.model, exact, position, period_s or 1.0)["force"]
     return force

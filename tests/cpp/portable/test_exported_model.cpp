@@ -222,6 +222,9 @@ TEST(ExportedModel, OtherStructuresAndModelsAreRefusedWithTheCure) {
                                                       {{0.0, -1.0}, {1.0, 1.0}, {}, {}, std::nullopt});
     EXPECT_NE(refusal(moving, with(StructureKind::Direct), target).find("--inputs position"),
               std::string::npos);
+    const ForceModel soft_tissue = position.with_memory({.stiffness = {1.0}, .time_constant_s = {0.5}});
+    EXPECT_NE(refusal(soft_tissue, with(StructureKind::Direct), target).find("memory, which is not exported"),
+              std::string::npos);
     // A force that falls more steeply than the load line has several solutions
     const ForceModel falling{NetworkParameters{1, {10.0}, {0.5}, {-1.0}, {0.0}, 0.0}, test::unit_domain()};
     Scheme soft;

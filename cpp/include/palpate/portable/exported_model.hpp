@@ -125,6 +125,10 @@ class ExportedModel {
                 "the force depends on velocity, which is not exported: identify the model with --inputs "
                 "position");
         }
+        if (model.memory() != nullptr) {
+            refuse(
+                "the force has a memory, which is not exported: identify the model with --inputs position");
+        }
         if (model.radial() != nullptr) {
             refuse("the model has " + std::to_string(model.parameters().dimension) +
                    " inputs: only a force of position is exported");

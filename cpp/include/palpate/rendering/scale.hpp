@@ -131,7 +131,8 @@ inline constexpr auto fields_of<SchemeChoices> =
 [[nodiscard]] inline Scheme scheme_for(const ForceModel& model, const ModelScale& scale,
                                        const DeviceProfile& device, const SchemeChoices& chosen = {}) {
     const Scheme standard;
-    const bool is_direct = model.velocity() != nullptr || chosen.predict.value_or(0) > 0;
+    const bool is_direct =
+        model.velocity() != nullptr || model.memory() != nullptr || chosen.predict.value_or(0) > 0;
     return {chosen.structure.value_or(is_direct ? StructureKind::Direct : standard.structure),
             {chosen.coupling_stiffness.value_or(standard.coupling.stiffness * scale.stiffness()),
              chosen.coupling_damping.value_or(standard.coupling.damping * scale.stiffness())},
