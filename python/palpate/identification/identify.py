@@ -23,6 +23,7 @@ from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
 from .classes.findings import identified, verdict_of
+from .classes.memory import Resting, better_with_memory
 from .classes.model_selection import select
 from .data.limits import ForceScale
 from .data.outliers import without_isolated
@@ -121,6 +122,7 @@ def identify(
     # result.
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_rows(replace(rows, findings=(*isolated, *rows.findings)), settings)
+        network = better_with_memory(network, recordings, settings, _resting(rows, settings))
     source = Source.merged(part.source for part in recordings)
     every_row = len(rows.force) == sum(map(len, recordings))
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
@@ -244,6 +246,17 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     )
 
 
+def _resting(rows: Rows, options: IdentifyOptions) -> Resting:
+    """Returns the identification of a force at rest, a force of position alone."""
+    alone = replace(options, inputs=("position",))
+    units = {"position": rows.position_unit, "force": rows.force_unit}
+
+    def identified_at_rest(position: Float1D, force: Float1D) -> FittedNetwork:
+        return fit_environment(position[:, None], force, options=alone, units=units)
+
+    return identified_at_rest
+
+
 def model_of(
     network: FittedNetwork,
     units: Mapping[str, str],
@@ -260,6 +273,7 @@ def model_of(
         below=network.below,
         above="linear",
         period=options.period,
+        memory=None if network.memory is None else network.memory.memory(),
         play_radius=network.play_radius,
         mass=network.mass if options.search.filters == "matched" else options.search.assumed_mass,
         damping=options.search.assumed_damping
@@ -276,6 +290,8 @@ def model_of(
 
 
 def _kind(network: FittedNetwork) -> str:
+    if network.memory is not None:
+        return "memory"
     if len(network.inputs) == 1:
         return "hysteresis" if network.weight_hysteresis is not None else "position"
     return "position_velocity" if network.inputs == VELOCITY_INPUTS else "general"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._core.model import ForceModel
+from ..._core.model import ForceModel, Memory
 from ..._typing import Float1D, Float2D
 from ...model import Fit, PathStep
 from ...recording.units import UNSTATED_UNIT, Unit
@@ -28,6 +28,30 @@ class PathPoint:
     n_wavelets: int
     rmse: float
     criterion: float
+
+
+@dataclass(frozen=True)
+class FittedMemory:
+    """Identified branches that relax, and the ratio p of their coordinate to the position."""
+
+    alpha: Float1D
+    """(m,) dilations of the wavelets of the ratio [1/position]"""
+    beta: Float1D
+    """(m,) translations [position]"""
+    weight: Float1D
+    """(m,) weights [-]"""
+    linear: float
+    """Slope of the ratio [1/position]"""
+    bias: float
+    """Constant of the ratio [-]"""
+    stiffness: Float1D
+    """(J,) stiffness of each branch [force/position]"""
+    time_constant_s: Float1D
+    """(J,) time constant of each branch [s]"""
+
+    def memory(self) -> Memory:
+        """Returns the memory of a model."""
+        return Memory(**vars(self))
 
 
 @dataclass(frozen=True)
@@ -64,6 +88,8 @@ class FittedNetwork:
     """Object mass m of F = m a + B v + f, if it was fitted [force s^2/position]"""
     damping: float | None = None
     """Object damping B of F = m a + B v + f, if it was fitted [force s/position]"""
+    memory: FittedMemory | None = None
+    """Branches that relax, in addition to the force at rest g; None for a force without memory"""
     model_class: str = ""
     """Name of the accepted model class"""
     stop_reason: str = ""

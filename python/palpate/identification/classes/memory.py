@@ -1,0 +1,539 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Model class memory: a force at rest and branches that relax, fitted over the time of the recordings.
+
+f = g(x) + p(x) sum_j k_j e_j, de_j/dt = p(x) dx/dt - e_j / tau_j, with the force at rest g, the ratio p, and
+branches of stiffness k_j >= 0 and time constant tau_j. For given p and tau the force is linear in g and k_j:
+they follow from least squares with k_j >= 0. Branches and wavelets of p are added one at a time while the
+criterion decreases, and p and tau are refined after each. Then g is identified as any force of position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.optimize import least_squares, nnls
+
+from ..._core.model import ForceModel, stretches, wavelet_columns
+from ..._typing import Float1D, Float2D
+from ...recording import Recording
+from ..data.limits import FORCE_RESOLUTION, correlation, independent_share
+from ..decision import Decision, decided, squared_error_change
+from ..network.fitted import FittedMemory, FittedNetwork
+from ..options import IdentifyOptions
+from ..search.evidence import CRITERIA, ON_HELD_OUT_ROWS
+
+MOST_ROWS = 12_000
+"""Largest number of rows from which branches and ratio are chosen; of more rows an evenly spread part is
+used."""
+
+SPLINES = 10
+"""Number of B-splines of the force at rest while branches and ratio are chosen."""
+
+MOST_BRANCHES = 6
+"""Largest number of branches; the core allows 8."""
+
+MOST_RATIO_WAVELETS = 4
+"""Largest number of wavelets in the ratio."""
+
+GRID_PER_DECADE = 3
+"""Number of time constants in a decade that are tried for a new branch."""
+
+STEPS = 12
+"""Largest number of refinement steps after each added branch or wavelet."""
+
+LEAST_RATIO = 0.02
+"""Smallest ratio over the domain, as a share of its mean [-]."""
+
+RATIO_POINTS = 201
+"""Number of positions at which the least ratio is computed."""
+
+LEAST_INDEPENDENT_SHARE = 0.02
+"""Least share of the rows that count as independent [-]."""
+
+RESOLVED_RATIO = 1.5
+"""Least ratio of the largest time constant to the smallest one that the recordings resolve [-]. Faster
+branches cannot be distinguished from damping."""
+
+LEAST_NRMSE = 0.01
+"""NRMSE of the model without memory below which a memory is not tested [-]."""
+
+LEAST_GAIN = 0.25
+"""Least relative decrease of the squared error by a memory over a force of position or velocity [-]."""
+
+LEAST_GAIN_OVER_HYSTERESIS = 0.5
+"""Least relative decrease of the squared error by a memory over hysteresis [-]: at one rate both fit the same
+recording."""
+
+SECTION_ROWS = 10
+"""Number of successive rows in a section; each fifth section is held out."""
+
+UNDETERMINED = 0.03
+"""Singular value, as a share of the largest one, below which rows do not determine a combination of
+coefficients [-]."""
+
+PULLING_ROWS = 0.01
+"""If more than this share of the rows pulls the tool, the tool cannot leave the object [-]."""
+
+FOLDS = 5
+"""Number of times that the model is fitted without some sections."""
+
+CONTACT_SHARE = 0.02
+"""Share of the force range below which a tool that can leave the object has left it, after it was in contact
+[-]."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Rows of one recording, as shares of the travel and of the spread of the force."""
+
+    time: Float1D
+    position: Float1D
+    force: Float1D
+    used: NDArray[np.bool_]
+    """(n,) False after the tool has left the object"""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Time constants of the branches and parameters of the ratio p = 1 + c (x - 1/2) + sum_i w_i psi(...)."""
+
+    log_tau: Float1D
+    slope: float = 0.0
+    wavelets: Float2D = field(default_factory=lambda: np.zeros((0, 3)))
+    """(m, 3) weight, translation and logarithm of the dilation of each wavelet"""
+    sloped: bool = False
+    """True if the slope c is fitted"""
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of fitted values, stiffnesses included."""
+        return 2 * len(self.log_tau) + int(self.sloped) + self.wavelets.size
+
+    def vector(self) -> Float1D:
+        slope = [self.slope] if self.sloped else []
+        return np.concatenate([self.log_tau, slope, self.wavelets.ravel()])
+
+    def at(self, vector: Float1D) -> Shape:
+        """Returns the shape with the parameters of `vector`."""
+        branches, rest = len(self.log_tau), vector[len(self.log_tau) :]
+        slope = float(rest[0]) if self.sloped else 0.0
+        return replace(
+            self, log_tau=vector[:branches], slope=slope, wavelets=rest[int(self.sloped) :].reshape(-1, 3)
+        )
+
+    def bounds(self, log_tau: tuple[float, float]) -> tuple[Float1D, Float1D]:
+        """Returns the smallest and the largest values of `vector`."""
+        branches, wavelets = len(self.log_tau), len(self.wavelets)
+        slope = int(self.sloped)
+        low = [log_tau[0]] * branches + [-10.0] * slope + [-20.0, -0.3, 0.0] * wavelets
+        high = [log_tau[1]] * branches + [10.0] * slope + [20.0, 1.3, 3.5] * wavelets
+        return np.array(low), np.array(high)
+
+    @cached_property
+    def ratio(self) -> Ratio:
+        """Network of the ratio over the unit box as arguments of :class:`ForceModel`; its least value is
+        positive."""
+        weight, beta, log_alpha = self.wavelets.T
+        free = Ratio(np.exp(log_alpha), beta, weight, self.slope, 1.0 - 0.5 * self.slope)
+        values = np.asarray(free.network.force(np.linspace(0.0, 1.0, RATIO_POINTS)))
+        lift = max(0.0, LEAST_RATIO * max(float(values.mean()), LEAST_RATIO) - float(values.min()))
+        largest = float(values.max()) + lift
+        return Ratio(free.alpha, beta, weight / largest, self.slope / largest, (free.bias + lift) / largest)
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Network of the ratio p over the unit box, at most 1."""
+
+    alpha: Float1D
+    beta: Float1D
+    weight: Float1D
+    linear: float
+    bias: float
+
+    @cached_property
+    def network(self) -> ForceModel:
+        """The ratio as a force; its energy is the coordinate u."""
+        return ForceModel(
+            alpha=self.alpha[:, None],
+            beta=self.beta[:, None],
+            weight=self.weight,
+            linear=[self.linear],
+            bias=self.bias,
+            lower=[0.0],
+            upper=[1.0],
+        )
+
+
+class MemoryFit:
+    """Least-squares fits of memories to motions, with fixed columns for the force at rest.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+    resting : sequence of (n, m) array
+        Columns of the force at rest at the rows of each motion.
+    least : float
+        Smallest mean squared error that the force sensor resolves.
+    """
+
+    def __init__(self, motions: Sequence[Motion], resting: Sequence[Float2D], least: float) -> None:
+        self.motions, self.least = motions, least
+        self.factors: list[Float1D | None] = [None] * len(motions)
+        """Factors of the stretches of each motion; None: 1"""
+        self._resting = np.concatenate([g[m.used] for m, g in zip(motions, resting, strict=True)])
+        self._force = np.concatenate([m.force[m.used] for m in motions])
+        self._space = np.linalg.qr(self._resting)[0]
+        self._target = self._free(self._force[:, None])[:, 0]
+
+    def _free(self, columns: Float2D) -> Float2D:
+        """Returns columns without the part that the force at rest can fit."""
+        return columns - self._space @ (self._space.T @ columns)
+
+    def columns(self, shape: Shape) -> Float2D:
+        """Returns the force of each branch at stiffness 1, at the used rows of all motions."""
+        ratio = shape.ratio.network
+        tau = np.exp(shape.log_tau)
+        parts = []
+        for motion, factor in zip(self.motions, self.factors, strict=True):
+            coordinate = np.asarray(ratio.energy(motion.position))[:, None]
+            found = stretches(motion.time, coordinate, tau, factor)[motion.used, 0]
+            parts.append(np.asarray(ratio.force(motion.position[motion.used]))[:, None] * found)
+        return np.concatenate(parts)
+
+    def residual(self, shape: Shape) -> Float1D:
+        """Returns force minus fitted force at the used rows."""
+        free = self._free(self.columns(shape))
+        return self._target - free @ _nonnegative(free, self._target)
+
+    def solved(self, shape: Shape) -> tuple[Float1D, Float1D]:
+        """Returns the coefficients of the force at rest and the stiffnesses of the branches."""
+        columns = self.columns(shape)
+        stiffness = _nonnegative(self._free(columns), self._target)
+        resting = np.linalg.lstsq(self._resting, self._force - columns @ stiffness, rcond=None)[0]
+        return resting, stiffness
+
+    def refined(self, shape: Shape, log_tau: tuple[float, float], steps: int = STEPS) -> Shape:
+        """Returns the shape with refined time constants and ratio, of no larger error."""
+        low, high = shape.bounds(log_tau)
+        start = np.clip(shape.vector(), low + 1e-6, high - 1e-6)
+
+        def residual(vector: Float1D) -> Float1D:
+            return self.residual(shape.at(vector))
+
+        found = least_squares(
+            residual,
+            start,
+            bounds=(low, high),
+            diff_step=[1e-4],
+            max_nfev=steps,
+            x_scale=np.maximum(0.1, np.abs(start)),
+        )
+        better = shape.at(found.x)
+        return better if self.rss(better) < self.rss(shape) else shape
+
+    def rss(self, shape: Shape) -> float:
+        """Returns the residual sum of squares."""
+        residual = self.residual(shape)
+        return float(residual @ residual)
+
+    def static_rss(self) -> float:
+        """Returns the residual sum of squares without branches."""
+        return float(self._target @ self._target)
+
+    def independent(self, shape: Shape | None) -> float:
+        """Returns the number of independent rows of a residual; that without branches for None."""
+        residual = self._target if shape is None else self.residual(shape)
+        share = max(independent_share(correlation(residual)), LEAST_INDEPENDENT_SHARE)
+        return max(30.0, share * len(residual))
+
+    def value(self, rss: float, n_parameters: int, rows: float, criterion: str) -> float:
+        """Returns the criterion of a memory."""
+        mean = max(rss / len(self._target), self.least)
+        p = min(n_parameters + self._resting.shape[1], int(rows) - 2)
+        return rows * float(np.log(mean)) + CRITERIA[criterion](rows, p)
+
+    def held_out_errors(self, shape: Shape) -> Float1D:
+        """Returns the mean squared error on each held-out fifth of the sections, fitted without it.
+
+        Coefficients that the other sections do not determine keep their values: in a relaxation test each
+        position is visited once.
+        """
+        columns = np.concatenate([self._resting, self.columns(shape)], axis=1)
+        columns /= np.linalg.norm(columns, axis=0) + np.finfo(float).tiny
+        section = np.concatenate(
+            [(np.arange(len(m.time)) // SECTION_ROWS % FOLDS)[m.used] for m in self.motions]
+        )
+        residual = self.residual(shape)
+        errors = []
+        for fold in np.unique(section):
+            out = section == fold
+            change = np.linalg.lstsq(columns[~out], residual[~out], rcond=UNDETERMINED)[0]
+            errors.append(float(np.mean((residual[out] - columns[out] @ change) ** 2)))
+        return np.array(errors)
+
+
+def _nonnegative(columns: Float2D, target: Float1D) -> Float1D:
+    """Returns the least-squares coefficients >= 0 of columns."""
+    triangle = np.asarray(np.linalg.qr(np.column_stack([columns, target]), mode="r"))
+    table, right = triangle[:, :-1], triangle[:, -1]
+    size = np.linalg.norm(table, axis=0)
+    size[size == 0.0] = 1.0
+    return np.asarray(nnls(table / size, right)[0] / size)
+
+
+def grown(fit: MemoryFit, log_tau: tuple[float, float], options: IdentifyOptions) -> Shape | None:
+    """Returns the memory with the branches and the ratio that the criterion accepts; None without one."""
+    criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
+    shape: Shape | None = None
+    rss = fit.static_rss()
+    while True:
+        rows = fit.independent(shape)
+        used = 0 if shape is None else shape.n_parameters
+        value = fit.value(rss, used, rows, criterion) - options.search.evidence
+        best: Shape | None = None
+        for trial in _larger(fit, shape, log_tau):
+            refined = fit.refined(trial, log_tau)
+            found = fit.rss(refined)
+            now = fit.value(found, refined.n_parameters, rows, criterion)
+            if now < value:
+                value, best, rss = now, refined, found
+        if best is None:
+            break
+        shape = best
+    return None if shape is None else _without_idle(fit, fit.refined(shape, log_tau, 3 * STEPS))
+
+
+def _without_idle(fit: MemoryFit, shape: Shape) -> Shape | None:
+    """Returns the shape without branches of stiffness 0."""
+    kept = fit.solved(shape)[1] > 0.0
+    return replace(shape, log_tau=shape.log_tau[kept]) if kept.any() else None
+
+
+def _larger(fit: MemoryFit, shape: Shape | None, log_tau: tuple[float, float]) -> Iterator[Shape]:
+    """Yields memories with one more branch or one more term of the ratio, before refinement."""
+    branches = 0 if shape is None else len(shape.log_tau)
+    if branches < MOST_BRANCHES:
+        count = max(2, 1 + round((log_tau[1] - log_tau[0]) / np.log(10.0) * GRID_PER_DECADE))
+        grid = np.linspace(*log_tau, count)
+        base = Shape(np.empty(0)) if shape is None else shape
+        yield min(
+            (replace(base, log_tau=np.append(base.log_tau, at)) for at in grid),
+            key=fit.rss,
+        )
+    if shape is None:
+        return
+    if not shape.sloped and not len(shape.wavelets):
+        yield min((replace(shape, sloped=True, slope=c) for c in (-1.0, 1.0)), key=fit.rss)
+    if len(shape.wavelets) < MOST_RATIO_WAVELETS:
+        trials = [
+            replace(shape, wavelets=np.vstack([shape.wavelets, [weight, beta, np.log(alpha)]]))
+            for weight in (-0.5, 0.5)
+            for beta in (0.0, 0.25, 0.5, 0.75, 1.0)
+            for alpha in (1.5, 4.0, 10.0)
+        ]
+        yield min(trials, key=fit.rss)
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Recordings of one object, as shares of travel and spread."""
+
+    recordings: Sequence[Recording]
+    lower: float
+    travel: float
+    spread: float
+    contact: bool
+    """True if the tool can leave the object"""
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording], found: FittedNetwork) -> Recorded:
+        force = np.concatenate([part.force for part in recordings])
+        position = np.concatenate([part.position for part in recordings])
+        lower, travel = float(position.min()), float(np.ptp(position))
+        pulls = float(np.quantile(force, PULLING_ROWS)) < -CONTACT_SHARE * float(np.ptp(force))
+        contact = found.below == "free" and not pulls
+        return cls(recordings, lower, travel, float(np.std(force)), contact)
+
+    @cached_property
+    def motions(self) -> tuple[Motion, ...]:
+        """Rows of the recordings; of many rows an evenly spread part."""
+        step = max(1, -(-sum(map(len, self.recordings)) // MOST_ROWS))
+        return tuple(self._motion(part, step) for part in self.recordings)
+
+    def _motion(self, part: Recording, step: int) -> Motion:
+        assert part.time is not None
+        time, position, force = part.time[::step], part.position[::step], part.force[::step]
+        used = np.ones(len(force), dtype=bool)
+        if self.contact:
+            level = CONTACT_SHARE * float(np.ptp(force))
+            touched = np.maximum.accumulate(force > 2.0 * level)
+            used = ~(touched & (force < level))
+        box = np.clip((position - self.lower) / self.travel, 0.0, 1.0)
+        return Motion(time, box, force / self.spread, used)
+
+    @cached_property
+    def log_tau(self) -> tuple[float, float]:
+        """Logarithms of the smallest and the largest time constant that the recordings can resolve [s]."""
+        steps = np.concatenate(
+            [
+                np.diff(part.time)[np.abs(np.diff(part.position)) > 1e-4 * self.travel]
+                for part in self.recordings
+                if part.time is not None
+            ]
+        )
+        longest = max(float(np.ptp(part.time)) for part in self.recordings if part.time is not None)
+        shortest = 2.0 * float(np.median(steps)) if len(steps) else 0.01 * longest
+        return float(np.log(min(shortest, 0.1 * longest))), float(np.log(longest))
+
+    def splines(self) -> list[Float2D]:
+        """Returns columns of B-splines for the force at rest."""
+        knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, SPLINES - 2), np.ones(3)]
+        return [BSpline.design_matrix(m.position, knots, 3).toarray() for m in self.motions]
+
+    def wavelets(self, network: FittedNetwork) -> list[Float2D]:
+        """Returns the columns of a network for the force at rest: wavelets, slope and constant."""
+        columns = []
+        for motion in self.motions:
+            x = self.lower + self.travel * motion.position[:, None]
+            wavelets = wavelet_columns(x, network.alpha, network.beta)
+            columns.append(np.column_stack([wavelets, motion.position, np.ones(len(x))]))
+        return columns
+
+    def memory(self, shape: Shape, stiffness: Float1D) -> FittedMemory:
+        """Returns a memory in the units of the recordings, with its branches in order of time constant."""
+        order = np.argsort(shape.log_tau)
+        ratio = shape.ratio
+        linear = ratio.linear / self.travel
+        return FittedMemory(
+            alpha=ratio.alpha / self.travel,
+            beta=self.lower + self.travel * ratio.beta,
+            weight=ratio.weight,
+            linear=linear,
+            bias=ratio.bias - linear * self.lower,
+            stiffness=stiffness[order] * self.spread / self.travel,
+            time_constant_s=np.exp(shape.log_tau[order]),
+        )
+
+
+def untested(found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> str | None:
+    """Returns the reason why a memory is not tested; an empty text if no decision is reported; None if it is
+    tested."""
+    automatic = options.inputs == "auto" and options.period is None and options.search.filters == "matched"
+    if len(found.lower) > 1 and found.inputs[1:] != ("velocity",):
+        return ""
+    if not automatic or any(part.time is None or len(part.input_names) for part in recordings):
+        return ""
+    if found.nrmse < LEAST_NRMSE:
+        return f"the model without memory has an NRMSE of {found.nrmse:.2g}, below {LEAST_NRMSE:g}"
+    if options.slope_limits is not None or options.fixed_force is not None:
+        return "constraints of the slope or of a force are not imposed on a memory"
+    if options.loss != "squares":
+        return "the loss huber is not defined for a memory"
+    return None
+
+
+def better_with_memory(
+    found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions, resting: Resting
+) -> FittedNetwork:
+    """Returns the model with memory if the recordings support it, else the model found without memory.
+
+    `resting` identifies the force at rest from positions and forces.
+    """
+    reason = untested(found, recordings, options)
+    if reason is not None:
+        decision = Decision("memory", "not tested", reason)
+        return replace(found, decisions=(*found.decisions, decision)) if reason else found
+    recorded = Recorded.of(recordings, found)
+    force = np.concatenate([m.force for m in recorded.motions])
+    least = (FORCE_RESOLUTION * float(np.ptp(force))) ** 2 + np.finfo(float).tiny
+    fit = MemoryFit(recorded.motions, recorded.splines(), least)
+    shape = grown(fit, recorded.log_tau, options)
+    if shape is None:
+        return _refused(found, "no branch lowers the criterion")
+    least_gain = LEAST_GAIN if found.weight_hysteresis is None else LEAST_GAIN_OVER_HYSTERESIS
+    before = found.nrmse**2
+    if 1.0 - fit.rss(shape) / len(force) / before < least_gain:
+        return _refused(found, _gain_text(1.0 - fit.rss(shape) / len(force) / before, 0.0, least_gain))
+    at_rest = _at_rest(recorded, fit, shape, resting)
+    fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), least)
+    refined = _without_idle(fit, fit.refined(shape, recorded.log_tau, 3 * STEPS))
+    if refined is None:
+        return _refused(found, "no branch lowers the criterion")
+    shortest, longest = np.exp(recorded.log_tau)
+    if np.exp(refined.log_tau.max()) < RESOLVED_RATIO * shortest:
+        return _refused(found, f"the branches relax within {shortest:.2g} s, which the rows do not resolve")
+    coefficients, stiffness = fit.solved(refined)
+    network = replace(
+        at_rest,
+        weight=recorded.spread * coefficients[:-2],
+        linear=recorded.spread / recorded.travel * coefficients[-2:-1],
+        bias=recorded.spread * float(coefficients[-1] - coefficients[-2] * recorded.lower / recorded.travel),
+        memory=recorded.memory(refined, stiffness),
+        below="free" if recorded.contact else "linear",
+    )
+    error = _error(network, recordings)
+    nrmse = error / recorded.spread
+    held_out = fit.held_out_errors(refined)
+    gain = 1.0 - max(nrmse**2, float(held_out.mean())) / before
+    scatter = float(held_out.std(ddof=1)) / before / np.sqrt(len(held_out)) if len(held_out) > 1 else 0.0
+    text = _gain_text(gain, scatter, least_gain)
+    if gain - scatter < least_gain:
+        return _refused(found, text)
+    decision = decided("memory", True, text)
+    return replace(
+        network,
+        model_class="memory",
+        n_parameters=network.n_parameters + refined.n_parameters,
+        rmse=error,
+        nrmse=nrmse,
+        path=found.path + network.path,
+        decisions=(*found.decisions, decision),
+        notes=(
+            *found.notes,
+            f"Time constants between {shortest:.2g} and {longest:.2g} s are resolved by the recordings; "
+            f"found: {', '.join(f'{tau:.3g}' for tau in np.sort(np.exp(refined.log_tau)))} s.",
+        ),
+    )
+
+
+def _refused(found: FittedNetwork, reason: str) -> FittedNetwork:
+    return replace(found, decisions=(*found.decisions, decided("memory", False, reason)))
+
+
+def _gain_text(gain: float, error: float, least: float) -> str:
+    change = squared_error_change(gain, error, "held-out sections")
+    return f"{change}, must lower it by at least {100.0 * least:g} %"
+
+
+Resting = Callable[[Float1D, Float1D], FittedNetwork]
+"""Identifies a force of position from positions (n,) and forces (n,)"""
+
+
+def _at_rest(recorded: Recorded, fit: MemoryFit, shape: Shape, resting: Resting) -> FittedNetwork:
+    """Returns the identified force at rest: the recorded force minus the force of the branches."""
+    used = np.concatenate([m.used for m in recorded.motions])
+    position = np.concatenate([m.position for m in recorded.motions])[used]
+    force = np.concatenate([m.force for m in recorded.motions])[used]
+    stiffness = fit.solved(shape)[1]
+    at_rest = force - fit.columns(shape) @ stiffness
+    return resting(recorded.lower + recorded.travel * position, recorded.spread * at_rest)
+
+
+def _error(network: FittedNetwork, recordings: Sequence[Recording]) -> float:
+    """Returns the RMS error of a model with memory on all rows of recordings [force]."""
+    assert network.memory is not None
+    model = ForceModel(
+        **network.parameters(), below=network.below, above="linear", memory=network.memory.memory()
+    )
+    errors = [
+        model.force_over_time(part.time, part.position)[0] - part.force
+        for part in recordings
+        if part.time is not None
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
