@@ -23,7 +23,7 @@ from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
 from .classes.findings import identified, verdict_of
-from .classes.memory import Resting, better_with_memory
+from .classes.memory import IdentifyRest, better_with_memory
 from .classes.model_selection import select
 from .data.limits import ForceScale
 from .data.outliers import without_isolated
@@ -246,13 +246,14 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     )
 
 
-def _resting(rows: Rows, options: IdentifyOptions) -> Resting:
+def _resting(rows: Rows, options: IdentifyOptions) -> IdentifyRest:
     """Returns the identification of a force at rest, a force of position alone."""
     alone = replace(options, inputs=("position",))
     units = {"position": rows.position_unit, "force": rows.force_unit}
 
-    def identified_at_rest(position: Float1D, force: Float1D) -> FittedNetwork:
-        return fit_environment(position[:, None], force, options=alone, units=units)
+    def identified_at_rest(position: Float1D, force: Float1D, most_wavelets: int) -> FittedNetwork:
+        fewer = replace(alone, max_wavelets=min(alone.max_wavelets, most_wavelets))
+        return fit_environment(position[:, None], force, options=fewer, units=units)
 
     return identified_at_rest
 

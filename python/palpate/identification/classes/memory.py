@@ -9,7 +9,7 @@ criterion decreases, and p and tau are refined after each. Then g is identified 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from scipy.optimize import least_squares, nnls
 from ..._core.model import ForceModel, stretches, wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
-from ..data.limits import FORCE_RESOLUTION, correlation, independent_share
+from ..data.limits import FORCE_RESOLUTION, independent_share
 from ..decision import Decision, decided, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
@@ -31,8 +31,18 @@ MOST_ROWS = 12_000
 """Largest number of rows from which branches and ratio are chosen; of more rows an evenly spread part is
 used."""
 
-SPLINES = 10
-"""Number of B-splines of the force at rest while branches and ratio are chosen."""
+SPLINES = (4, 6, 8, 11, 15, 20, 28)
+"""Numbers of B-splines of the force at rest that are tried while branches and ratio are chosen. Few rows of a
+relaxation test determine the force at rest between its positions."""
+
+ROUGHNESS = 1e-3
+"""Weight of the curvature of the force at rest [spread of the force for a curvature of 1 in the unit box]."""
+
+ROUGHNESS_POINTS = 33
+"""Number of positions at which the curvature of the force at rest is computed."""
+
+CURVE_POINTS = 257
+"""Number of positions at which the force at rest is passed on to its identification."""
 
 MOST_BRANCHES = 6
 """Largest number of branches; the core allows 8."""
@@ -54,6 +64,9 @@ RATIO_POINTS = 201
 
 LEAST_INDEPENDENT_SHARE = 0.02
 """Least share of the rows that count as independent [-]."""
+
+LEAST_INDEPENDENT = 30.0
+"""Least number of rows that count as independent."""
 
 RESOLVED_RATIO = 1.5
 """Least ratio of the largest time constant to the smallest one that the recordings resolve [-]. Faster
@@ -130,8 +143,8 @@ class Shape:
         """Returns the smallest and the largest values of `vector`."""
         branches, wavelets = len(self.log_tau), len(self.wavelets)
         slope = int(self.sloped)
-        low = [log_tau[0]] * branches + [-10.0] * slope + [-20.0, -0.3, 0.0] * wavelets
-        high = [log_tau[1]] * branches + [10.0] * slope + [20.0, 1.3, 3.5] * wavelets
+        low = [log_tau[0]] * branches + [-10.0] * slope + [-5.0, -0.3, 0.0] * wavelets
+        high = [log_tau[1]] * branches + [10.0] * slope + [5.0, 1.3, 2.5] * wavelets
         return np.array(low), np.array(high)
 
     @cached_property
@@ -170,44 +183,59 @@ class Ratio:
         )
 
 
+Resting = Callable[[Float1D], Float2D]
+"""Returns the columns (n, m) of the force at rest at positions (n,) in the unit box"""
+
+
 class MemoryFit:
     """Least-squares fits of memories to motions, with fixed columns for the force at rest.
 
     Parameters
     ----------
     motions : sequence of Motion
-    resting : sequence of (n, m) array
-        Columns of the force at rest at the rows of each motion.
+    resting : function
+        Columns of the force at rest. A small weight on its curvature decides where the rows do not: the ramps
+        of a relaxation test determine only the sum of the force at rest and of the branches.
     least : float
         Smallest mean squared error that the force sensor resolves.
     """
 
-    def __init__(self, motions: Sequence[Motion], resting: Sequence[Float2D], least: float) -> None:
+    def __init__(self, motions: Sequence[Motion], resting: Resting, least: float) -> None:
         self.motions, self.least = motions, least
-        self.factors: list[Float1D | None] = [None] * len(motions)
-        """Factors of the stretches of each motion; None: 1"""
-        self._resting = np.concatenate([g[m.used] for m, g in zip(motions, resting, strict=True)])
+        columns = np.concatenate([resting(m.position[m.used]) for m in motions])
         self._force = np.concatenate([m.force[m.used] for m in motions])
+        self.n_rows = len(self._force)
+        bends = (
+            np.diff(resting(np.linspace(0.0, 1.0, ROUGHNESS_POINTS)), 2, axis=0) * (ROUGHNESS_POINTS - 1) ** 2
+        )
+        bends *= ROUGHNESS * np.sqrt(self.n_rows / len(bends))
+        self._resting = np.concatenate([columns, bends])
         self._space = np.linalg.qr(self._resting)[0]
         self._target = self._free(self._force[:, None])[:, 0]
 
+    def _padded(self, columns: Float2D) -> Float2D:
+        """Returns columns (n, m) with zeros in the rows of the curvature."""
+        return np.concatenate([columns, np.zeros((len(self._resting) - len(columns), columns.shape[1]))])
+
     def _free(self, columns: Float2D) -> Float2D:
         """Returns columns without the part that the force at rest can fit."""
-        return columns - self._space @ (self._space.T @ columns)
+        padded = self._padded(columns)
+        return padded - self._space @ (self._space.T @ padded)
 
     def columns(self, shape: Shape) -> Float2D:
         """Returns the force of each branch at stiffness 1, at the used rows of all motions."""
         ratio = shape.ratio.network
         tau = np.exp(shape.log_tau)
         parts = []
-        for motion, factor in zip(self.motions, self.factors, strict=True):
+        for motion in self.motions:
             coordinate = np.asarray(ratio.energy(motion.position))[:, None]
-            found = stretches(motion.time, coordinate, tau, factor)[motion.used, 0]
+            found = stretches(motion.time, coordinate, tau)[motion.used, 0]
             parts.append(np.asarray(ratio.force(motion.position[motion.used]))[:, None] * found)
         return np.concatenate(parts)
 
     def residual(self, shape: Shape) -> Float1D:
-        """Returns force minus fitted force at the used rows."""
+        """Returns force minus fitted force at the used rows, then the weighted curvature of the fitted force
+        at rest."""
         free = self._free(self.columns(shape))
         return self._target - free @ _nonnegative(free, self._target)
 
@@ -215,8 +243,8 @@ class MemoryFit:
         """Returns the coefficients of the force at rest and the stiffnesses of the branches."""
         columns = self.columns(shape)
         stiffness = _nonnegative(self._free(columns), self._target)
-        resting = np.linalg.lstsq(self._resting, self._force - columns @ stiffness, rcond=None)[0]
-        return resting, stiffness
+        target = self._padded((self._force - columns @ stiffness)[:, None])[:, 0]
+        return np.linalg.lstsq(self._resting, target, rcond=None)[0], stiffness
 
     def refined(self, shape: Shape, log_tau: tuple[float, float], steps: int = STEPS) -> Shape:
         """Returns the shape with refined time constants and ratio, of no larger error."""
@@ -248,13 +276,16 @@ class MemoryFit:
 
     def independent(self, shape: Shape | None) -> float:
         """Returns the number of independent rows of a residual; that without branches for None."""
-        residual = self._target if shape is None else self.residual(shape)
-        share = max(independent_share(correlation(residual)), LEAST_INDEPENDENT_SHARE)
-        return max(30.0, share * len(residual))
+        residual = (self._target if shape is None else self.residual(shape))[: self.n_rows]
+        power = float(residual @ residual) + np.finfo(float).tiny
+        rho = max(0.0, float(residual[1:] @ residual[:-1]) / power)
+        return max(
+            LEAST_INDEPENDENT, LEAST_INDEPENDENT_SHARE * len(residual), independent_share(rho) * len(residual)
+        )
 
     def value(self, rss: float, n_parameters: int, rows: float, criterion: str) -> float:
         """Returns the criterion of a memory."""
-        mean = max(rss / len(self._target), self.least)
+        mean = max(rss / self.n_rows, self.least)
         p = min(n_parameters + self._resting.shape[1], int(rows) - 2)
         return rows * float(np.log(mean)) + CRITERIA[criterion](rows, p)
 
@@ -264,12 +295,12 @@ class MemoryFit:
         Coefficients that the other sections do not determine keep their values: in a relaxation test each
         position is visited once.
         """
-        columns = np.concatenate([self._resting, self.columns(shape)], axis=1)
+        columns = np.concatenate([self._resting[: self.n_rows], self.columns(shape)], axis=1)
         columns /= np.linalg.norm(columns, axis=0) + np.finfo(float).tiny
         section = np.concatenate(
             [(np.arange(len(m.time)) // SECTION_ROWS % FOLDS)[m.used] for m in self.motions]
         )
-        residual = self.residual(shape)
+        residual = self.residual(shape)[: self.n_rows]
         errors = []
         for fold in np.unique(section):
             out = section == fold
@@ -287,26 +318,40 @@ def _nonnegative(columns: Float2D, target: Float1D) -> Float1D:
     return np.asarray(nnls(table / size, right)[0] / size)
 
 
-def grown(fit: MemoryFit, log_tau: tuple[float, float], options: IdentifyOptions) -> Shape | None:
-    """Returns the memory with the branches and the ratio that the criterion accepts; None without one."""
-    criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
+@dataclass(frozen=True)
+class Choice:
+    """Fit with a number of splines for the force at rest, and the memory; None without branches."""
+
+    splines: int
+    """Index in SPLINES"""
+    fit: MemoryFit
     shape: Shape | None = None
-    rss = fit.static_rss()
+
+    def rss(self) -> float:
+        return self.fit.static_rss() if self.shape is None else self.fit.rss(self.shape)
+
+    def value(self, rows: float, criterion: str) -> float:
+        used = 0 if self.shape is None else self.shape.n_parameters
+        return self.fit.value(self.rss(), used, rows, criterion)
+
+
+def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
+    """Returns the branches, the ratio and the number of splines that the criterion accepts."""
+    criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
+    best = Choice(0, recorded.fit(0))
     while True:
-        rows = fit.independent(shape)
-        used = 0 if shape is None else shape.n_parameters
-        value = fit.value(rss, used, rows, criterion) - options.search.evidence
-        best: Shape | None = None
-        for trial in _larger(fit, shape, log_tau):
-            refined = fit.refined(trial, log_tau)
-            found = fit.rss(refined)
-            now = fit.value(found, refined.n_parameters, rows, criterion)
+        current, rows = best, best.fit.independent(best.shape)
+        value = current.value(rows, criterion) - options.search.evidence
+        for trial in _larger(current, recorded):
+            now = trial.value(rows, criterion)
             if now < value:
-                value, best, rss = now, refined, found
-        if best is None:
+                value, best = now, trial
+        if best is current:
             break
-        shape = best
-    return None if shape is None else _without_idle(fit, fit.refined(shape, log_tau, 3 * STEPS))
+    if best.shape is None:
+        return best
+    refined = best.fit.refined(best.shape, recorded.log_tau, 3 * STEPS)
+    return replace(best, shape=_without_idle(best.fit, refined))
 
 
 def _without_idle(fit: MemoryFit, shape: Shape) -> Shape | None:
@@ -315,29 +360,38 @@ def _without_idle(fit: MemoryFit, shape: Shape) -> Shape | None:
     return replace(shape, log_tau=shape.log_tau[kept]) if kept.any() else None
 
 
-def _larger(fit: MemoryFit, shape: Shape | None, log_tau: tuple[float, float]) -> Iterator[Shape]:
-    """Yields memories with one more branch or one more term of the ratio, before refinement."""
-    branches = 0 if shape is None else len(shape.log_tau)
-    if branches < MOST_BRANCHES:
+def _larger(now: Choice, recorded: Recorded) -> Iterator[Choice]:
+    """Yields refined memories with one more branch, one more term of the ratio, or more splines."""
+    fit, shape, log_tau = now.fit, now.shape, recorded.log_tau
+
+    def best(trials: Iterable[Shape]) -> Choice:
+        return replace(now, shape=fit.refined(min(trials, key=fit.rss), log_tau))
+
+    if now.splines + 1 < len(SPLINES):
+        finer = Choice(now.splines + 1, recorded.fit(now.splines + 1), shape)
+        yield finer if shape is None else replace(finer, shape=finer.fit.refined(shape, log_tau))
+    base = Shape(np.empty(0)) if shape is None else shape
+    if len(base.log_tau) < MOST_BRANCHES:
         count = max(2, 1 + round((log_tau[1] - log_tau[0]) / np.log(10.0) * GRID_PER_DECADE))
         grid = np.linspace(*log_tau, count)
-        base = Shape(np.empty(0)) if shape is None else shape
-        yield min(
-            (replace(base, log_tau=np.append(base.log_tau, at)) for at in grid),
-            key=fit.rss,
-        )
+        yield best(replace(base, log_tau=np.append(base.log_tau, at)) for at in grid)
     if shape is None:
         return
     if not shape.sloped and not len(shape.wavelets):
-        yield min((replace(shape, sloped=True, slope=c) for c in (-1.0, 1.0)), key=fit.rss)
+        yield best(replace(shape, sloped=True, slope=c) for c in (-1.0, 1.0))
     if len(shape.wavelets) < MOST_RATIO_WAVELETS:
-        trials = [
+        yield best(
             replace(shape, wavelets=np.vstack([shape.wavelets, [weight, beta, np.log(alpha)]]))
             for weight in (-0.5, 0.5)
             for beta in (0.0, 0.25, 0.5, 0.75, 1.0)
             for alpha in (1.5, 4.0, 10.0)
-        ]
-        yield min(trials, key=fit.rss)
+        )
+
+
+def _splines(position: Float1D, count: int) -> Float2D:
+    """Returns the columns (n, count) of cubic B-splines at positions (n,) in the unit box."""
+    knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, count - 2), np.ones(3)]
+    return np.asarray(BSpline.design_matrix(position, knots, 3).toarray())
 
 
 @dataclass(frozen=True)
@@ -391,18 +445,31 @@ class Recorded:
         shortest = 2.0 * float(np.median(steps)) if len(steps) else 0.01 * longest
         return float(np.log(min(shortest, 0.1 * longest))), float(np.log(longest))
 
-    def splines(self) -> list[Float2D]:
-        """Returns columns of B-splines for the force at rest."""
-        knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, SPLINES - 2), np.ones(3)]
-        return [BSpline.design_matrix(m.position, knots, 3).toarray() for m in self.motions]
+    @cached_property
+    def least(self) -> float:
+        """Smallest mean squared error that the force sensor resolves."""
+        force = np.concatenate([motion.force for motion in self.motions])
+        return float((FORCE_RESOLUTION * np.ptp(force)) ** 2 + np.finfo(float).tiny)
 
-    def wavelets(self, network: FittedNetwork) -> list[Float2D]:
+    def fit(self, splines: int) -> MemoryFit:
+        """Returns a fit with B-splines for the force at rest."""
+        return MemoryFit(self.motions, lambda box: _splines(box, SPLINES[splines]), self.least)
+
+    def at_rest(self, choice: Choice, identify_rest: IdentifyRest) -> FittedNetwork:
+        """Returns the force at rest as an identified network."""
+        assert choice.shape is not None
+        box = np.linspace(0.0, 1.0, CURVE_POINTS)
+        count = SPLINES[choice.splines]
+        curve = _splines(box, count) @ choice.fit.solved(choice.shape)[0]
+        return identify_rest(self.lower + self.travel * box, self.spread * curve, count)
+
+    def wavelets(self, network: FittedNetwork) -> Resting:
         """Returns the columns of a network for the force at rest: wavelets, slope and constant."""
-        columns = []
-        for motion in self.motions:
-            x = self.lower + self.travel * motion.position[:, None]
-            wavelets = wavelet_columns(x, network.alpha, network.beta)
-            columns.append(np.column_stack([wavelets, motion.position, np.ones(len(x))]))
+
+        def columns(box: Float1D) -> Float2D:
+            x = self.lower + self.travel * box[:, None]
+            return np.column_stack([wavelet_columns(x, network.alpha, network.beta), box, np.ones(len(x))])
+
         return columns
 
     def memory(self, shape: Shape, stiffness: Float1D) -> FittedMemory:
@@ -439,30 +506,31 @@ def untested(found: FittedNetwork, recordings: Sequence[Recording], options: Ide
 
 
 def better_with_memory(
-    found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions, resting: Resting
+    found: FittedNetwork,
+    recordings: Sequence[Recording],
+    options: IdentifyOptions,
+    identify_rest: IdentifyRest,
 ) -> FittedNetwork:
     """Returns the model with memory if the recordings support it, else the model found without memory.
 
-    `resting` identifies the force at rest from positions and forces.
+    `identify_rest` identifies the force at rest from positions and forces.
     """
     reason = untested(found, recordings, options)
     if reason is not None:
         decision = Decision("memory", "not tested", reason)
         return replace(found, decisions=(*found.decisions, decision)) if reason else found
     recorded = Recorded.of(recordings, found)
-    force = np.concatenate([m.force for m in recorded.motions])
-    least = (FORCE_RESOLUTION * float(np.ptp(force))) ** 2 + np.finfo(float).tiny
-    fit = MemoryFit(recorded.motions, recorded.splines(), least)
-    shape = grown(fit, recorded.log_tau, options)
-    if shape is None:
+    choice = grown(recorded, options)
+    if choice.shape is None:
         return _refused(found, "no branch lowers the criterion")
     least_gain = LEAST_GAIN if found.weight_hysteresis is None else LEAST_GAIN_OVER_HYSTERESIS
     before = found.nrmse**2
-    if 1.0 - fit.rss(shape) / len(force) / before < least_gain:
-        return _refused(found, _gain_text(1.0 - fit.rss(shape) / len(force) / before, 0.0, least_gain))
-    at_rest = _at_rest(recorded, fit, shape, resting)
-    fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), least)
-    refined = _without_idle(fit, fit.refined(shape, recorded.log_tau, 3 * STEPS))
+    in_sample = 1.0 - choice.rss() / choice.fit.n_rows / before
+    if in_sample < least_gain:
+        return _refused(found, _gain_text(in_sample, 0.0, least_gain))
+    at_rest = recorded.at_rest(choice, identify_rest)
+    fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least)
+    refined = _without_idle(fit, fit.refined(choice.shape, recorded.log_tau, 3 * STEPS))
     if refined is None:
         return _refused(found, "no branch lowers the criterion")
     shortest, longest = np.exp(recorded.log_tau)
@@ -511,18 +579,8 @@ def _gain_text(gain: float, error: float, least: float) -> str:
     return f"{change}, must lower it by at least {100.0 * least:g} %"
 
 
-Resting = Callable[[Float1D, Float1D], FittedNetwork]
-"""Identifies a force of position from positions (n,) and forces (n,)"""
-
-
-def _at_rest(recorded: Recorded, fit: MemoryFit, shape: Shape, resting: Resting) -> FittedNetwork:
-    """Returns the identified force at rest: the recorded force minus the force of the branches."""
-    used = np.concatenate([m.used for m in recorded.motions])
-    position = np.concatenate([m.position for m in recorded.motions])[used]
-    force = np.concatenate([m.force for m in recorded.motions])[used]
-    stiffness = fit.solved(shape)[1]
-    at_rest = force - fit.columns(shape) @ stiffness
-    return resting(recorded.lower + recorded.travel * position, recorded.spread * at_rest)
+IdentifyRest = Callable[[Float1D, Float1D, int], FittedNetwork]
+"""Identifies a force of position from positions (n,) and forces (n,), with a largest number of wavelets"""
 
 
 def _error(network: FittedNetwork, recordings: Sequence[Recording]) -> float:

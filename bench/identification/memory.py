@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measures the model class memory on known objects and on measured relaxation, beside usual methods.
+
+python bench/identification/memory.py [truths] [controls] [relaxation] [others]    PALPATE_DATA names the folder
+
+truths: objects of 1 to 3 branches at three noise levels; share with the right number of branches and with all
+time constants within 10 %. controls: static, hysteretic and viscous objects, which have no branch. relaxation:
+the elastomer VHB 4910, in sample, without one stretch and without one rate. others: measured files with and
+without memory.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import nnls
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.studies import count, measured_data
+
+import palpate
+from palpate import Model, Recording, read_recording
+from palpate._core.model import Memory, play, stretches
+from palpate.baselines.methods import HuntCrossley
+
+Array = NDArray[np.float64]
+
+NOISES = (0.003, 0.01, 0.03)
+"""Standard deviation of the force noise divided by that of the force"""
+
+CLOSEST = 4.0
+"""Least ratio of two time constants of a random object"""
+
+QLV_TERMS = 12
+"""Number of time constants of the Prony series"""
+
+NARX_STEP_S = 0.2
+"""Sample time of the difference equation [s]"""
+
+SLACK = 0.02
+"""Force over the largest force below which the specimen is slack after a stroke"""
+
+
+def random_motion(random: np.random.Generator) -> tuple[Array, Array]:
+    """Returns time and position of 40 s of ramps at 0.3 to 6 travels a second, each followed by a hold."""
+    time = np.arange(0.0, 40.0, 0.02)
+    knots, places = [0.0], [0.0]
+    for rate in np.exp(random.uniform(np.log(0.3), np.log(6.0), 12)):
+        place = random.uniform(0.05, 1.0)
+        knots.append(knots[-1] + abs(place - places[-1]) / rate)
+        knots.append(knots[-1] + np.exp(random.uniform(np.log(0.3), np.log(8.0))))
+        places += [place, place]
+    return time, np.interp(time, knots, places)
+
+
+def random_object(random: np.random.Generator, branches: int) -> Model:
+    """Returns an object whose time constants of 0.1 to 8 s differ at least by the factor CLOSEST."""
+    stiffness = random.uniform(0.5, 3.0, branches)
+    tau = np.ones(branches)
+    while branches > 1 and (tau[1:] / tau[:-1]).min() < CLOSEST or (tau == 1.0).all():
+        tau = np.sort(np.exp(random.uniform(np.log(0.1), np.log(8.0), branches)))
+    memory = Memory(
+        alpha=[], beta=[], weight=[], linear=0.0, bias=1.0, stiffness=stiffness, time_constant_s=tau
+    )
+    return Model.from_network(
+        alpha=[[random.uniform(2.0, 5.0)]],
+        beta=[[random.uniform(0.0, 1.0)]],
+        weight=[random.uniform(-0.3, 0.3)],
+        linear=[random.uniform(1.0, 3.0)],
+        lower=[0.0],
+        upper=[1.0],
+        memory=memory,
+    )
+
+
+def noisy(random: np.random.Generator, force: Array, noise: float) -> Array:
+    return force + noise * force.std() * random.standard_normal(len(force))
+
+
+def truths(draws: int) -> None:
+    print("branches  noise  right number  all time constants within 10 %  median error")
+    for branches in (1, 2, 3):
+        for noise in NOISES:
+            right, close, errors = 0, 0, []
+            for draw in range(draws):
+                random = np.random.default_rng(draw)
+                time, position = random_motion(random)
+                model = random_object(random, branches)
+                force = noisy(random, model.force_over_time(time, position)[0], noise)
+                found = palpate.identify(position, force, time=time).memory
+                assert model.memory is not None
+                if found is None or len(found.time_constant_s) != branches:
+                    continue
+                right += 1
+                error = np.abs(found.time_constant_s / model.memory.time_constant_s - 1.0).max()
+                errors.append(error)
+                close += error <= 0.1
+            median = float(np.median(errors)) if errors else np.nan
+            print(
+                f"{branches:8d}  {noise:5g}  {right:5d} of {draws:3d}  {close:5d} of {draws:3d}  {median:.3f}",
+                flush=True,
+            )
+
+
+def controls(draws: int) -> None:
+    def static(x: Array, _t: Array, _size: float) -> Array:
+        return 2.0 * x + 0.3 * np.sin(5.0 * x)
+
+    def hysteretic(x: Array, t: Array, size: float) -> Array:
+        radius = 0.01
+        return static(x, t, size) + size * (x - play(x, radius)) / radius
+
+    def viscous(x: Array, t: Array, size: float) -> Array:
+        return static(x, t, size) + size * np.gradient(x, t)
+
+    for name, law in (("static", static), ("hysteretic", hysteretic), ("viscous", viscous)):
+        without = 0
+        for draw in range(draws):
+            random = np.random.default_rng(1000 + draw)
+            time, position = random_motion(random)
+            position = gaussian_filter1d(position, 5)
+            force = law(position, time, random.uniform(0.05, 0.3))
+            found = palpate.identify(position, noisy(random, force, NOISES[draw % len(NOISES)]), time=time)
+            without += found.memory is None
+        print(f"{name}: 0 branches in {without} of {draws}", flush=True)
+
+
+def nrmse(recording: Recording, force: Array, used: NDArray[np.bool_]) -> float:
+    difference = force[used] - recording.force[used]
+    return float(np.sqrt(np.mean(difference**2)) / recording.force[used].std())
+
+
+def taut(recording: Recording) -> NDArray[np.bool_]:
+    """Returns True for rows before the specimen is slack; a slack specimen has no force to predict."""
+    low = recording.force < SLACK * recording.force.max()
+    after = np.arange(len(recording)) > int(np.argmax(recording.position))
+    slack = np.flatnonzero(low & after)
+    return np.arange(len(recording)) < (slack[0] if len(slack) else len(recording))
+
+
+Method = Callable[[Sequence[Recording]], Callable[[Recording], Array]]
+"""Fits recordings and returns a prediction of the force over a recording"""
+
+
+def with_memory(recordings: Sequence[Recording]) -> Callable[[Recording], Array]:
+    model = palpate.identify(recordings)
+    return lambda recording: palpate.verify(model, recording).force
+
+
+def of_position(recordings: Sequence[Recording]) -> Callable[[Recording], Array]:
+    model = palpate.identify(recordings, inputs=("position",))
+    return lambda recording: np.asarray(model.force(recording.position))
+
+
+def hunt_crossley(recordings: Sequence[Recording]) -> Callable[[Recording], Array]:
+    def inputs(recording: Recording) -> Array:
+        return np.column_stack([recording.position, np.gradient(recording.position, recording.time)])
+
+    rows = [taut(part) for part in recordings]
+    X = np.concatenate([inputs(part)[used] for part, used in zip(recordings, rows, strict=True)])
+    y = np.concatenate([part.force[used] for part, used in zip(recordings, rows, strict=True)])
+    found = HuntCrossley().fit(X, y)
+    return lambda recording: found.predict(inputs(recording))
+
+
+def prony(recordings: Sequence[Recording]) -> Callable[[Recording], Array]:
+    """Linear spring with a Prony series, whose coefficients are >= 0."""
+    longest = max(float(part.time[-1]) for part in recordings if part.time is not None)
+    tau = np.geomspace(0.05, longest, QLV_TERMS)
+
+    def columns(recording: Recording) -> Array:
+        x = recording.position[:, None]
+        return np.column_stack([x, stretches(recording.time, x, tau)[:, 0]])
+
+    rows = [taut(part) for part in recordings]
+    table = np.concatenate([columns(part)[used] for part, used in zip(recordings, rows, strict=True)])
+    force = np.concatenate([part.force[used] for part, used in zip(recordings, rows, strict=True)])
+    found = nnls(table, force)[0]
+    return lambda recording: columns(recording) @ found
+
+
+def narx(recordings: Sequence[Recording]) -> Callable[[Recording], Array]:
+    """Polynomial difference equation of two past forces, in free run."""
+    travel = max(float(np.ptp(part.position)) for part in recordings)
+    size = max(float(part.force.max()) for part in recordings)
+
+    def lags(x: Array, before: Array, f1: Array, f2: Array) -> Array:
+        moved = x - before
+        return np.stack(
+            [np.ones_like(x), x, x**2, x**3, moved, x * moved, moved**2, f1, f2, x * f1, f1**2], axis=-1
+        )
+
+    def even(recording: Recording, values: Array) -> Array:
+        assert recording.time is not None
+        grid = np.arange(recording.time[0], recording.time[-1], NARX_STEP_S)
+        return np.interp(grid, recording.time, values)
+
+    tables, targets = [], []
+    for part in recordings:
+        x, f = even(part, part.position) / travel, even(part, part.force) / size
+        tables.append(lags(x[2:], x[1:-1], f[1:-1], f[:-2]))
+        targets.append(f[2:])
+    found = np.linalg.lstsq(np.concatenate(tables), np.concatenate(targets), rcond=1e-10)[0]
+
+    def predict(recording: Recording) -> Array:
+        x, f = even(recording, recording.position) / travel, even(recording, recording.force) / size
+        for k in range(2, len(x)):
+            f[k] = np.clip(lags(x[k], x[k - 1], f[k - 1], f[k - 2]) @ found, -3.0, 3.0)
+        assert recording.time is not None
+        grid = np.arange(recording.time[0], recording.time[-1], NARX_STEP_S)
+        return size * np.interp(recording.time, grid, f)
+
+    return predict
+
+
+METHODS: dict[str, Method] = {
+    "memory": with_memory,
+    "position": of_position,
+    "Hunt-Crossley": hunt_crossley,
+    "QLV": prony,
+    "NARX": narx,
+}
+
+
+def compare(title: str, splits: Iterable[tuple[Sequence[Recording], Sequence[Recording]]]) -> None:
+    """Prints the median NRMSE of each method on the second recordings of each split."""
+    splits = list(splits)
+    print(title)
+    for name, method in METHODS.items():
+        errors = []
+        for fitted, tested in splits:
+            predict = method(fitted)
+            errors.append(np.median([nrmse(part, predict(part), taut(part)) for part in tested]))
+        listed = " ".join(f"{error:.3f}" for error in errors)
+        print(f"  {name:14s} median {np.median(errors):.3f}   {listed}", flush=True)
+
+
+def relaxation(folder: Path) -> None:
+    files = sorted((folder / "vhb4910_viscoelastic").glob("*.csv"))
+    held = {path.stem: read_recording(path) for path in files if path.stem.startswith("relax")}
+    cycled = {path.stem: read_recording(path) for path in files if path.stem.startswith("load")}
+    compare("in sample, one model for all relaxation files", [([*held.values()], [*held.values()])])
+    compare("in sample, each relaxation file", [([part], [part]) for part in held.values()])
+    compare("in sample, one model for all cycles", [([*cycled.values()], [*cycled.values()])])
+
+    def without(parts: dict[str, Recording], word: int) -> Iterable[tuple[list[Recording], list[Recording]]]:
+        for group in sorted({name.split("_")[word] for name in parts}):
+            kept = [part for name, part in parts.items() if name.split("_")[word] != group]
+            yield kept, [part for name, part in parts.items() if name.split("_")[word] == group]
+
+    compare("relaxation without one stretch", without(held, 2))
+    compare("cycles without one stretch", without(cycled, 3))
+    compare("cycles without one rate", without(cycled, 2))
+
+
+def others(folder: Path) -> None:
+    print("file: NRMSE without and with memory, model class")
+    names = [*(folder / "afm_indentation").glob("*.csv"), *(folder / "organ_probing").glob("*.csv")]
+    for path in sorted(names):
+        try:
+            recording = read_recording(path)
+            found = palpate.identify(recording)
+        except palpate.InputError as error:
+            print(f"  {path.stem}: refused ({error})")
+            continue
+        plain = palpate.identify(recording, inputs=("position",))
+        print(
+            f"  {path.stem}: {plain.fit.nrmse:.4f} {found.fit.nrmse:.4f} {found.fit.model_class}", flush=True
+        )
+
+
+def main(parts: Sequence[str]) -> None:
+    warnings.simplefilter("ignore")
+    chosen = parts or ("truths", "controls", "relaxation", "others")
+    if "truths" in chosen:
+        truths(count(50))
+    if "controls" in chosen:
+        controls(count(100))
+    if {"relaxation", "others"} & set(chosen) and (folder := measured_data()):
+        if "relaxation" in chosen:
+            relaxation(folder)
+        if "others" in chosen:
+            others(folder)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
