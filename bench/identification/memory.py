@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the model class memory on known objects and on measured relaxation, beside usual methods.
+"""Measures the model class memory and usual methods on known objects and on measured relaxation.
 
-python bench/identification/memory.py [truths] [controls] [relaxation] [others]    PALPATE_DATA names the folder
+python bench/identification/memory.py [PART ...]     PALPATE_DATA names the folder of recordings
 
-truths: objects of 1 to 3 branches at three noise levels; share with the right number of branches and with all
-time constants within 10 %. controls: static, hysteretic and viscous objects, which have no branch. relaxation:
-the elastomer VHB 4910, in sample, without one stretch and without one rate. others: measured files with and
-without memory.
+Parts: truths (objects of 1 to 3 branches at three noise levels), controls (static, hysteretic and viscous
+objects, which have no branch), relaxation (the elastomer VHB 4910, in sample, without one stretch and without
+one rate), others (measured files with and without memory). By default all parts are run.
 """
 
 from __future__ import annotations
@@ -64,7 +63,7 @@ def random_object(random: np.random.Generator, branches: int) -> Model:
     """Returns an object whose time constants of 0.1 to 8 s differ at least by the factor CLOSEST."""
     stiffness = random.uniform(0.5, 3.0, branches)
     tau = np.ones(branches)
-    while branches > 1 and (tau[1:] / tau[:-1]).min() < CLOSEST or (tau == 1.0).all():
+    while (tau == 1.0).all() or (branches > 1 and (tau[1:] / tau[:-1]).min() < CLOSEST):
         tau = np.sort(np.exp(random.uniform(np.log(0.1), np.log(8.0), branches)))
     memory = Memory(
         alpha=[], beta=[], weight=[], linear=0.0, bias=1.0, stiffness=stiffness, time_constant_s=tau
@@ -103,10 +102,8 @@ def truths(draws: int) -> None:
                 errors.append(error)
                 close += error <= 0.1
             median = float(np.median(errors)) if errors else np.nan
-            print(
-                f"{branches:8d}  {noise:5g}  {right:5d} of {draws:3d}  {close:5d} of {draws:3d}  {median:.3f}",
-                flush=True,
-            )
+            shares = f"{right:5d} of {draws:3d}  {close:5d} of {draws:3d}"
+            print(f"{branches:8d}  {noise:5g}  {shares}  {median:.3f}", flush=True)
 
 
 def controls(draws: int) -> None:

@@ -44,8 +44,8 @@ def identify(
     """Identifies a model of force over position from recordings.
 
     Tries the model classes constant, linear, position and hysteresis, and takes the simplest that the data
-    supports; with time, mass, damping and velocity too. A recording with further inputs gives a force over
-    all of them (constant, linear, network).
+    supports; with time, mass, damping, velocity and memory too. A recording with further inputs gives a force
+    over all of them (constant, linear, network).
 
     Parameters
     ----------
@@ -251,9 +251,14 @@ def _resting(rows: Rows, options: IdentifyOptions) -> IdentifyRest:
     alone = replace(options, inputs=("position",))
     units = {"position": rows.position_unit, "force": rows.force_unit}
 
-    def identified_at_rest(position: Float1D, force: Float1D, most_wavelets: int) -> FittedNetwork:
+    def identified_at_rest(
+        position: Float1D, force: Float1D, rows: float, within: float, most_wavelets: int
+    ) -> FittedNetwork:
         fewer = replace(alone, max_wavelets=min(alone.max_wavelets, most_wavelets))
-        return fit_environment(position[:, None], force, options=fewer, units=units)
+        weight = np.full(len(position), rows)
+        return fit_environment(
+            position[:, None], force, options=fewer, weight=weight, within=within, units=units
+        )
 
     return identified_at_rest
 

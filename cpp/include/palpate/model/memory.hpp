@@ -160,6 +160,7 @@ class MemoryForce {
             stiffness_[j] = memory.parameters().stiffness[j];
             time_constant_s_[j] = memory.parameters().time_constant_s[j];
             kept_[j] = 1.0 / (1.0 + period_s / time_constant_s_[j]);
+            sudden_stiffness_ += stiffness_[j] * kept_[j];
         }
     }
 
@@ -179,13 +180,11 @@ class MemoryForce {
         const double moved = p.integral - state.coordinate;
         state.coordinate = p.integral;
         double force = 0.0;
-        double stiffness = 0.0;
         for (std::size_t j = 0; j < branches_; ++j) {
             state.stretch[j] = limited(kept_[j] * (state.stretch[j] + moved));
             force += stiffness_[j] * state.stretch[j];
-            stiffness += stiffness_[j] * kept_[j];
         }
-        return relaxed(x, p, force, stiffness, state).sample;
+        return relaxed(x, p, force, sudden_stiffness_, state).sample;
     }
 
     /// Force of the recorded motion at one row, and the factor by which the stretches were reduced [-].
@@ -246,7 +245,8 @@ class MemoryForce {
     std::array<double, most_branches> stiffness_{};
     std::array<double, most_branches> time_constant_s_{};
     std::array<double, most_branches>
-        kept_{};  ///< share of a stretch that is left after a period at rest [-]
+        kept_{};                     ///< share of a stretch that is left after a period at rest [-]
+    double sudden_stiffness_ = 0.0;  ///< slope of the branches for a motion within one period [N/m]
     std::size_t branches_;
     bool contact_;
     double force_limit_;

@@ -154,8 +154,11 @@ auto with_structure(const ForceModel& given, const Scheme& scheme, double period
         return visit(DirectVelocity{*force, period_s});
     }
     if (const MemoryNetwork* memory = given.memory()) {
-        return visit(Direct{MemoryForce{CompiledCurve{given.network()->curve()},
-                                        CompiledCurve{memory->ratio()}, *memory, period_s, force_limit}});
+        // Also a constant ratio gets a table, which is faster than the exact continuation
+        const CompileOptions always{.fewest_wavelets = 0};
+        return visit(
+            Direct{MemoryForce{CompiledCurve{given.network()->curve(), always},
+                               CompiledCurve{memory->ratio(), always}, *memory, period_s, force_limit}});
     }
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
     const StructureNumbers numbers{scheme.coupling, scheme.inertia, scheme.predict,

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model class memory: a force at rest and branches that relax, fitted over the time of the recordings.
 
-f = g(x) + p(x) sum_j k_j e_j, de_j/dt = p(x) dx/dt - e_j / tau_j, with the force at rest g, the ratio p, and
-branches of stiffness k_j >= 0 and time constant tau_j. For given p and tau the force is linear in g and k_j:
+The force is f = g(x) + p(x) sum_j k_j e_j, with de_j/dt = p(x) dx/dt - e_j / tau_j. g is the force at rest, p
+the ratio. Each branch has a stiffness k_j >= 0 and a time constant tau_j. For given p and tau the force is linear in g and k_j:
 they follow from least squares with k_j >= 0. Branches and wavelets of p are added one at a time while the
 criterion decreases, and p and tau are refined after each. Then g is identified as any force of position.
 """
@@ -89,7 +89,7 @@ UNDETERMINED = 0.03
 """Singular value, as a share of the largest one, below which rows do not determine a combination of
 coefficients [-]."""
 
-PULLING_ROWS = 0.01
+PULLING_ROWS = 0.002
 """If more than this share of the rows pulls the tool, the tool cannot leave the object [-]."""
 
 FOLDS = 5
@@ -461,7 +461,9 @@ class Recorded:
         box = np.linspace(0.0, 1.0, CURVE_POINTS)
         count = SPLINES[choice.splines]
         curve = _splines(box, count) @ choice.fit.solved(choice.shape)[0]
-        return identify_rest(self.lower + self.travel * box, self.spread * curve, count)
+        share = choice.fit.n_rows / CURVE_POINTS
+        within = self.spread**2 * choice.rss()
+        return identify_rest(self.lower + self.travel * box, self.spread * curve, share, within, count)
 
     def wavelets(self, network: FittedNetwork) -> Resting:
         """Returns the columns of a network for the force at rest: wavelets, slope and constant."""
@@ -513,7 +515,7 @@ def better_with_memory(
 ) -> FittedNetwork:
     """Returns the model with memory if the recordings support it, else the model found without memory.
 
-    `identify_rest` identifies the force at rest from positions and forces.
+    `identify_rest` identifies the force at rest.
     """
     reason = untested(found, recordings, options)
     if reason is not None:
@@ -546,6 +548,8 @@ def better_with_memory(
         below="free" if recorded.contact else "linear",
     )
     error = _error(network, recordings)
+    if recorded.contact and (other := _error(linear := replace(network, below="linear"), recordings)) < error:
+        network, error = linear, other
     nrmse = error / recorded.spread
     held_out = fit.held_out_errors(refined)
     gain = 1.0 - max(nrmse**2, float(held_out.mean())) / before
@@ -579,8 +583,9 @@ def _gain_text(gain: float, error: float, least: float) -> str:
     return f"{change}, must lower it by at least {100.0 * least:g} %"
 
 
-IdentifyRest = Callable[[Float1D, Float1D, int], FittedNetwork]
-"""Identifies a force of position from positions (n,) and forces (n,), with a largest number of wavelets"""
+IdentifyRest = Callable[[Float1D, Float1D, float, float, int], FittedNetwork]
+"""Identifies a force of position from positions (n,), forces (n,), the number of rows that each represents,
+the sum of their squared errors, and the largest number of wavelets"""
 
 
 def _error(network: FittedNetwork, recordings: Sequence[Recording]) -> float:
