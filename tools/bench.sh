@@ -49,6 +49,7 @@ identification/filters.py --json build/bench/filters.json
 identification/parsimony.py --json build/bench/parsimony.json
 identification/real_data.py --json build/bench/real_data.json
 identification/dynamic.py --json build/bench/dynamic.json
+identification/memory.py
 limits/certificate_table.py build/bench/certificate_search.txt --to $to
 limits/failure_maps.py --to $to --points $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 9 }')
 limits/prediction.py --to $to

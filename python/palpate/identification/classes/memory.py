@@ -2,8 +2,8 @@
 """Model class memory: a force at rest and branches that relax, fitted over the time of the recordings.
 
 The force is f = g(x) + p(x) sum_j k_j e_j, with de_j/dt = p(x) dx/dt - e_j / tau_j. g is the force at rest, p
-the ratio. Each branch has a stiffness k_j >= 0 and a time constant tau_j. For given p and tau the force is linear in g and k_j:
-they follow from least squares with k_j >= 0. Branches and wavelets of p are added one at a time while the
+the ratio. Each branch has a stiffness k_j >= 0 and a time constant tau_j. For given p and tau the force is
+linear in g and k_j: they follow from least squares with k_j >= 0. Branches and wavelets of p are added one at a time while the
 criterion decreases, and p and tau are refined after each. Then g is identified as any force of position.
 """
 
@@ -35,8 +35,13 @@ SPLINES = (4, 6, 8, 11, 15, 20, 28)
 """Numbers of B-splines of the force at rest that are tried while branches and ratio are chosen. Few rows of a
 relaxation test determine the force at rest between its positions."""
 
-ROUGHNESS = 1e-3
-"""Weight of the curvature of the force at rest [spread of the force for a curvature of 1 in the unit box]."""
+MOST_ROUGHNESS = 1e-3
+"""Largest weight of the curvature of the force at rest [spread of the force for a curvature of 1 in the unit
+box]."""
+
+ROUGHNESS_SHARE = 0.04
+"""Weight of the curvature of the force at rest, divided by the RMS error of the memory [-]. A larger weight
+would bias the time constants."""
 
 ROUGHNESS_POINTS = 33
 """Number of positions at which the curvature of the force at rest is computed."""
@@ -198,9 +203,13 @@ class MemoryFit:
         of a relaxation test determine only the sum of the force at rest and of the branches.
     least : float
         Smallest mean squared error that the force sensor resolves.
+    rms : float
+        Expected RMS error, which determines the weight of the curvature.
     """
 
-    def __init__(self, motions: Sequence[Motion], resting: Resting, least: float) -> None:
+    def __init__(
+        self, motions: Sequence[Motion], resting: Resting, least: float, rms: float = np.inf
+    ) -> None:
         self.motions, self.least = motions, least
         columns = np.concatenate([resting(m.position[m.used]) for m in motions])
         self._force = np.concatenate([m.force[m.used] for m in motions])
@@ -208,7 +217,7 @@ class MemoryFit:
         bends = (
             np.diff(resting(np.linspace(0.0, 1.0, ROUGHNESS_POINTS)), 2, axis=0) * (ROUGHNESS_POINTS - 1) ** 2
         )
-        bends *= ROUGHNESS * np.sqrt(self.n_rows / len(bends))
+        bends *= min(MOST_ROUGHNESS, ROUGHNESS_SHARE * rms) * np.sqrt(self.n_rows / len(bends))
         self._resting = np.concatenate([columns, bends])
         self._space = np.linalg.qr(self._resting)[0]
         self._target = self._free(self._force[:, None])[:, 0]
@@ -330,6 +339,9 @@ class Choice:
     def rss(self) -> float:
         return self.fit.static_rss() if self.shape is None else self.fit.rss(self.shape)
 
+    def rms(self) -> float:
+        return float(np.sqrt(self.rss() / self.fit.n_rows))
+
     def value(self, rows: float, criterion: str) -> float:
         used = 0 if self.shape is None else self.shape.n_parameters
         return self.fit.value(self.rss(), used, rows, criterion)
@@ -340,7 +352,8 @@ def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
     criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
     best = Choice(0, recorded.fit(0))
     while True:
-        current, rows = best, best.fit.independent(best.shape)
+        current = replace(best, fit=recorded.fit(best.splines, best.rms()))
+        best, rows = current, current.fit.independent(current.shape)
         value = current.value(rows, criterion) - options.search.evidence
         for trial in _larger(current, recorded):
             now = trial.value(rows, criterion)
@@ -368,7 +381,7 @@ def _larger(now: Choice, recorded: Recorded) -> Iterator[Choice]:
         return replace(now, shape=fit.refined(min(trials, key=fit.rss), log_tau))
 
     if now.splines + 1 < len(SPLINES):
-        finer = Choice(now.splines + 1, recorded.fit(now.splines + 1), shape)
+        finer = Choice(now.splines + 1, recorded.fit(now.splines + 1, now.rms()), shape)
         yield finer if shape is None else replace(finer, shape=finer.fit.refined(shape, log_tau))
     base = Shape(np.empty(0)) if shape is None else shape
     if len(base.log_tau) < MOST_BRANCHES:
@@ -451,9 +464,9 @@ class Recorded:
         force = np.concatenate([motion.force for motion in self.motions])
         return float((FORCE_RESOLUTION * np.ptp(force)) ** 2 + np.finfo(float).tiny)
 
-    def fit(self, splines: int) -> MemoryFit:
-        """Returns a fit with B-splines for the force at rest."""
-        return MemoryFit(self.motions, lambda box: _splines(box, SPLINES[splines]), self.least)
+    def fit(self, splines: int, rms: float = np.inf) -> MemoryFit:
+        """Returns a fit with B-splines for the force at rest, for an expected RMS error."""
+        return MemoryFit(self.motions, lambda box: _splines(box, SPLINES[splines]), self.least, rms)
 
     def at_rest(self, choice: Choice, identify_rest: IdentifyRest) -> FittedNetwork:
         """Returns the force at rest as an identified network."""
@@ -531,7 +544,7 @@ def better_with_memory(
     if in_sample < least_gain:
         return _refused(found, _gain_text(in_sample, 0.0, least_gain))
     at_rest = recorded.at_rest(choice, identify_rest)
-    fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least)
+    fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least, choice.rms())
     refined = _without_idle(fit, fit.refined(choice.shape, recorded.log_tau, 3 * STEPS))
     if refined is None:
         return _refused(found, "no branch lowers the criterion")
