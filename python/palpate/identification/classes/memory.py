@@ -3,8 +3,9 @@
 
 The force is f = g(x) + p(x) sum_j k_j e_j, with de_j/dt = p(x) dx/dt - e_j / tau_j. g is the force at rest, p
 the ratio. Each branch has a stiffness k_j >= 0 and a time constant tau_j. For given p and tau the force is
-linear in g and k_j: they follow from least squares with k_j >= 0. Branches and wavelets of p are added one at a time while the
-criterion decreases, and p and tau are refined after each. Then g is identified as any force of position.
+linear in g and k_j: they follow from least squares with k_j >= 0. Branches and wavelets of p are added one at a
+time while the criterion decreases, and p and tau are refined after each. Then g is identified as any force of
+position.
 """
 
 from __future__ import annotations
