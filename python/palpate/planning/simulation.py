@@ -93,6 +93,20 @@ def hand_for(plan: Plan, device: DeviceProfile) -> Hand:
     )
 
 
+def holding_hand(plan: Plan, position: float) -> Hand:
+    """Returns a simulated hand that pulls the handle to a position and then does not move.
+
+    After the object has relaxed, the handle is at this position.
+    """
+    low, high = plan.model.lower[0], plan.model.upper[0]
+    if not low <= position <= high:
+        raise InputError(f"the held position is {position:g}: must be from {low:g} to {high:g}, the domain")
+    usual = rig_for(plan.model).hand
+    x, _, at_rest = plan.forces_at_rest()
+    target = position + float(np.interp(position, x, at_rest[0])) / usual.stiffness
+    return Hand(stiffness=usual.stiffness, damping=usual.damping, lower=target, upper=target)
+
+
 def simulate(
     plan: Plan,
     device: DeviceProfile,

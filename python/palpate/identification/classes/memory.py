@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model class memory: a force at rest and branches that relax, fitted over the time of the recordings.
 
-The force is f = g(x) + p(x) sum_j k_j e_j, with de_j/dt = p(x) dx/dt - e_j / tau_j. g is the force at rest, p
-the ratio. Each branch has a stiffness k_j >= 0 and a time constant tau_j. For given p and tau the force is
-linear in g and k_j: they follow from least squares with k_j >= 0. Branches and wavelets of p are added one at a
-time while the criterion decreases, and p and tau are refined after each. Then g is identified as any force of
-position.
+The force is f = g(x) + p(x) sum_j k_j e_j, with de_j/dt = p(x) dx/dt - e_j / tau_j. g is the force at rest,
+p the ratio. Each branch has a stiffness k_j >= 0 and a time constant tau_j. For given p and tau the force is
+linear in g and k_j: they follow from least squares with k_j >= 0. Branches and wavelets of p are added one at
+a time while the criterion decreases, and p and tau are refined after each. Then g is identified as any force
+of position.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ RESOLVED_RATIO = 1.5
 """Least ratio of the largest time constant to the smallest one that the recordings resolve [-]. Faster
 branches cannot be distinguished from damping."""
 
-LEAST_NRMSE = 0.01
+LEAST_NRMSE = 0.005
 """NRMSE of the model without memory below which a memory is not tested [-]."""
 
 LEAST_GAIN = 0.25

@@ -10,6 +10,8 @@ from scipy.ndimage import gaussian_filter1d
 import palpate
 from palpate import Model, Recording
 from palpate._core.model import Memory, play
+from palpate.planning import hand_for, rig_for
+from palpate.planning.simulation import holding_hand
 
 
 def ramps_and_holds(seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -84,6 +86,19 @@ def test_irregular_times_and_several_recordings_are_one_object() -> None:
     model = palpate.identify(recordings)
     assert model.memory is not None
     np.testing.assert_allclose(model.memory.time_constant_s, [0.7], rtol=0.05)
+
+
+def test_a_rendered_memory_is_identified_again_within_a_just_noticeable_difference() -> None:
+    truth = relaxing([2.0, 1.5], [0.3, 2.0])
+    device = rig_for(truth).device
+    plan = palpate.plan(truth, device)
+    hands = [hand_for(plan, device), holding_hand(plan, 0.3), holding_hand(plan, 0.9)]
+    found = palpate.identify([palpate.simulate(plan, device, hand, 8.0) for hand in hands])
+    assert found.memory is not None
+    np.testing.assert_allclose(found.memory.time_constant_s[:2], [0.3, 2.0], rtol=0.1)
+    fresh = palpate.simulate(plan, device, holding_hand(plan, 0.6), 8.0)
+    assert fresh.force[1000] > 1.3 * fresh.force[-1], "the rendered object relaxes"
+    assert palpate.verify(found, fresh).within_jnd == 1.0
 
 
 @pytest.mark.parametrize("kind", ["static", "hysteretic", "viscous"])
