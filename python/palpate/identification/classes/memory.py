@@ -44,6 +44,10 @@ ROUGHNESS_SHARE = 0.04
 """Weight of the curvature of the force at rest, divided by the RMS error of the memory [-]. A larger weight
 would bias the time constants."""
 
+SETTLED = 0.8
+"""RMS error with a new weight of the curvature, divided by the error before, above which the weight is
+kept [-]."""
+
 ROUGHNESS_POINTS = 33
 """Number of positions at which the curvature of the force at rest is computed."""
 
@@ -284,9 +288,13 @@ class MemoryFit:
         """Returns the residual sum of squares without branches."""
         return float(self._target @ self._target)
 
+    def error(self, shape: Shape | None) -> Float1D:
+        """Returns force minus fitted force at the used rows; without branches for None."""
+        return (self._target if shape is None else self.residual(shape))[: self.n_rows]
+
     def independent(self, shape: Shape | None) -> float:
         """Returns the number of independent rows of a residual; that without branches for None."""
-        residual = (self._target if shape is None else self.residual(shape))[: self.n_rows]
+        residual = self.error(shape)
         power = float(residual @ residual) + np.finfo(float).tiny
         rho = max(0.0, float(residual[1:] @ residual[:-1]) / power)
         return max(
@@ -310,7 +318,7 @@ class MemoryFit:
         section = np.concatenate(
             [(np.arange(len(m.time)) // SECTION_ROWS % FOLDS)[m.used] for m in self.motions]
         )
-        residual = self.residual(shape)[: self.n_rows]
+        residual = self.error(shape)
         errors = []
         for fold in np.unique(section):
             out = section == fold
@@ -341,7 +349,8 @@ class Choice:
         return self.fit.static_rss() if self.shape is None else self.fit.rss(self.shape)
 
     def rms(self) -> float:
-        return float(np.sqrt(self.rss() / self.fit.n_rows))
+        """Returns the RMS error of the force, without the weighted curvature."""
+        return float(np.sqrt(np.mean(self.fit.error(self.shape) ** 2)))
 
     def value(self, rows: float, criterion: str) -> float:
         used = 0 if self.shape is None else self.shape.n_parameters
@@ -353,14 +362,15 @@ def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
     criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
     best = Choice(0, recorded.fit(0))
     while True:
-        current = replace(best, fit=recorded.fit(best.splines, best.rms()))
+        expected = best.rms()
+        current = replace(best, fit=recorded.fit(best.splines, expected))
         best, rows = current, current.fit.independent(current.shape)
         value = current.value(rows, criterion) - options.search.evidence
         for trial in _larger(current, recorded):
             now = trial.value(rows, criterion)
             if now < value:
                 value, best = now, trial
-        if best is current:
+        if best is current and current.rms() > SETTLED * expected:
             break
     if best.shape is None:
         return best
@@ -381,8 +391,8 @@ def _larger(now: Choice, recorded: Recorded) -> Iterator[Choice]:
     def best(trials: Iterable[Shape]) -> Choice:
         return replace(now, shape=fit.refined(min(trials, key=fit.rss), log_tau))
 
-    if now.splines + 1 < len(SPLINES):
-        finer = Choice(now.splines + 1, recorded.fit(now.splines + 1, now.rms()), shape)
+    for splines in range(now.splines + 1, len(SPLINES))[::2]:
+        finer = Choice(splines, recorded.fit(splines, now.rms()), shape)
         yield finer if shape is None else replace(finer, shape=finer.fit.refined(shape, log_tau))
     base = Shape(np.empty(0)) if shape is None else shape
     if len(base.log_tau) < MOST_BRANCHES:
@@ -476,7 +486,7 @@ class Recorded:
         count = SPLINES[choice.splines]
         curve = _splines(box, count) @ choice.fit.solved(choice.shape)[0]
         share = choice.fit.n_rows / CURVE_POINTS
-        within = self.spread**2 * choice.rss()
+        within = self.spread**2 * choice.fit.n_rows * choice.rms() ** 2
         return identify_rest(self.lower + self.travel * box, self.spread * curve, share, within, count)
 
     def wavelets(self, network: FittedNetwork) -> Resting:
@@ -541,7 +551,7 @@ def better_with_memory(
         return _refused(found, "no branch lowers the criterion")
     least_gain = LEAST_GAIN if found.weight_hysteresis is None else LEAST_GAIN_OVER_HYSTERESIS
     before = found.nrmse**2
-    in_sample = 1.0 - choice.rss() / choice.fit.n_rows / before
+    in_sample = 1.0 - choice.rms() ** 2 / before
     if in_sample < least_gain:
         return _refused(found, _gain_text(in_sample, 0.0, least_gain))
     at_rest = recorded.at_rest(choice, identify_rest)
