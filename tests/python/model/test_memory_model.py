@@ -10,6 +10,11 @@ import palpate
 from models_by_hand import relaxing_by_hand
 from palpate import DeviceProfile, InputError
 from palpate._core.model import Memory, stretches
+from palpate._core.portable import ExportedModel
+from palpate._core.rendering import Scheme
+from palpate._core.simulation import motion_driven
+from palpate.export import fmu
+from palpate.export.request import Request
 from palpate.export.table import table_of
 from palpate.planning.simulation import force_at
 
@@ -98,6 +103,24 @@ def test_other_renderings_are_refused_in_one_sentence(arguments: dict[str, objec
 def test_a_table_of_a_memory_is_refused() -> None:
     with pytest.raises(InputError, match="has a memory, which a table cannot contain"):
         table_of(relaxing_by_hand())
+
+
+def test_an_fmu_of_a_memory_is_refused(tmp_path: Path) -> None:
+    relaxing_by_hand().save(tmp_path / "soft.json")
+    with pytest.raises(InputError, match="has a memory, which an FMU does not contain"):
+        fmu.write(Request(tmp_path / "soft.fmu", tmp_path / "soft.json"))
+
+
+def test_exported_steps_are_the_rendered_forces() -> None:
+    model, direct, encoder_step = relaxing_by_hand(below="free"), Scheme(structure="direct"), 1e-4
+    tables = ExportedModel(model, direct, encoder_step=encoder_step, period_s=1e-3)
+    assert tables.check().passed
+    time = np.arange(3000)
+    counts = np.where(time < 200, 35 * time, np.where(time < 2000, 7000, 3000)).astype(np.int32)
+    rendered = motion_driven(model, direct, counts * encoder_step, 1e-3)["force"]
+    np.testing.assert_allclose(tables.steps(counts), rendered, atol=10.0 * tables.step_error)
+    assert rendered[2000] == 0.0, "a tool that can leave is not pulled"
+    assert rendered[200] > 1.5 * rendered[1999]
 
 
 def test_verify_uses_the_time_of_the_recording() -> None:
