@@ -267,6 +267,7 @@ METHODS: dict[str, Method] = {
 def compare(title: str, splits: Iterable[tuple[Sequence[Recording], Sequence[Recording]]]) -> None:
     """Prints the median NRMSE of each method on the second recordings of each split."""
     splits = list(splits)
+    splits = splits[: count(len(splits))]
     print(title)
     for name, method in METHODS.items():
         errors = []
@@ -296,19 +297,25 @@ def relaxation(folder: Path) -> None:
 
 
 def others(folder: Path) -> None:
-    print("file: NRMSE without and with memory, model class")
-    names = [*(folder / "afm_indentation").glob("*.csv"), *(folder / "organ_probing").glob("*.csv")]
-    for path in sorted(names):
-        try:
-            recording = read_recording(path)
-            found = palpate.identify(recording)
-        except palpate.InputError as error:
-            print(f"  {path.stem}: refused ({error})")
-            continue
-        plain = palpate.identify(recording, inputs=("position",))
-        print(
-            f"  {path.stem}: {plain.fit.nrmse:.4f} {found.fit.nrmse:.4f} {found.fit.model_class}", flush=True
-        )
+    """Compares a force of position and the found model on measured files.
+
+    The position of the force microscopes falls during the press, so it is negated.
+    """
+    print("file: NRMSE of position alone; of the found model, its class; decision on memory")
+    for name, negate in (("afm_indentation", ("position",)), ("organ_probing", ())):
+        paths = sorted((folder / name).glob("*.csv"))
+        for path in paths[: count(len(paths))]:
+            try:
+                recording = read_recording(path, negate=negate)
+                found = palpate.identify(recording)
+            except palpate.InputError as error:
+                print(f"  {path.stem}: refused ({error})")
+                continue
+            plain = palpate.identify(recording, inputs=("position",)).fit.nrmse
+            decision = [line for line in found.notes["model_selection"] if line.startswith("memory")]
+            reason = decision[0] if decision else "memory: not tested (the recording has no time)"
+            print(f"  {path.stem}: {plain:.4f}; {found.fit.nrmse:.4f} {found.fit.model_class}; {reason}")
+            sys.stdout.flush()
 
 
 def rendered(draws: int) -> None:
