@@ -60,6 +60,26 @@ def test_known_branches_are_found(tau: list[float]) -> None:
     assert any("s are resolved by the recordings" in line for line in model.notes["identification"])
 
 
+def test_a_curved_force_at_rest_does_not_hide_a_branch() -> None:
+    time, position = ramps_and_holds(21)
+    memory = Memory(
+        alpha=[], beta=[], weight=[], linear=0.0, bias=1.0, stiffness=[1.0], time_constant_s=[0.21]
+    )
+    truth = Model.from_network(
+        alpha=[[3.92]],
+        beta=[[0.276]],
+        weight=[-0.291],
+        linear=[1.385],
+        lower=[0.0],
+        upper=[1.0],
+        memory=memory,
+    )
+    force = with_noise(truth.force_over_time(time, position)[0], 0.003)
+    model = palpate.identify(position, force, time=time)
+    assert model.memory is not None
+    np.testing.assert_allclose(model.memory.time_constant_s, [0.21], rtol=0.02)
+
+
 def test_a_ratio_that_depends_on_the_position_is_found() -> None:
     time, position = ramps_and_holds(2)
     truth = relaxing([2.0, 1.5], [0.3, 4.0], ratio=1.0)
