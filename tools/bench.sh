@@ -53,6 +53,7 @@ identification/force_lag.py --json build/bench/force_lag.json
 identification/real_data.py --json build/bench/real_data.json
 identification/dynamic.py --json build/bench/dynamic.json
 identification/repeats.py --json build/bench/repeats.json
+identification/memory.py
 limits/certificate_table.py build/bench/certificate_search.txt --to $to
 limits/failure_maps.py --to $to --points $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 9 }')
 limits/prediction.py --to $to

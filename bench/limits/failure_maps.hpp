@@ -27,6 +27,7 @@ inline constexpr auto failure_maps = std::to_array<NamedFailureMap>({
     {"period", period_map},
     {"encoder", encoder_map},
     {"play", play_map},
+    {"memory", memory_map},
     {"coupling", coupling_map},
     {"falling", falling_map},
     {"limit", limit_map},

@@ -11,7 +11,10 @@
 #include "hands.hpp"
 #include "palpate/device/device_profile.hpp"
 #include "palpate/fields/readable.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/model/memory.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/stability/direct_inequalities.hpp"
 #include "palpate/stability/held_force.hpp"
 #include "palpate/stability/predicted_force.hpp"
 #include "trials.hpp"
@@ -124,6 +127,41 @@ template <class Limit, class Fails>
             [&](double radius, double hysteresis) {
                 const ConstantHysteresis object{{spring, 0.0}, {0.0, hysteresis}, radius};
                 return generates_energy([&] { return Direct{object}; }, device, 0.5 * radius);
+            }));
+    }
+    return map;
+}
+
+/// Returns an object of no force at rest, with one branch of this stiffness and time constant.
+[[nodiscard]] inline ForceModel relaxing_branch(double stiffness, double time_constant_s) {
+    MemoryParameters memory;
+    memory.stiffness = {stiffness};
+    memory.time_constant_s = {time_constant_s};
+    const Domain domain{{-1.0}, {1.0}, {}, {}, std::nullopt};
+    return ForceModel{{1, {}, {}, {}, {0.0}, 0.0}, domain}.with_memory(memory);
+}
+
+/// Stiffness of the stiffest branch that is certified for a device without encoder steps. The required damping is
+/// proportional to the stiffness.
+[[nodiscard]] inline double memory_limit(const DeviceProfile& device, double time_constant_s) {
+    const ForceBounds bounds = force_bounds(relaxing_branch(1.0, time_constant_s));
+    return device.viscous_damping / memory_inequalities(bounds, device).front().right;
+}
+
+/// Failure map: largest stiffness of a branch as a function of its time constant.
+[[nodiscard]] inline FailureMap memory_map(int points) {
+    FailureMap map{"memory", "time constant [s]", "stiffness K [N*m/rad]", {}};
+    for (int delay = 0; delay <= 2; ++delay) {
+        DeviceProfile device = smooth_knob();
+        device.delay_s = delay * device.period_s;
+        map.lines.push_back(failure_line(
+            "delay " + std::to_string(delay), logarithmic(1e-3, 1.0, points),
+            [&](double time_constant_s) { return memory_limit(device, time_constant_s); },
+            [&](double time_constant_s, double stiffness) {
+                const ForceModel model = relaxing_branch(stiffness, time_constant_s);
+                const MemoryForce<NetworkCurve> object{model.network()->curve(), model.memory()->ratio(),
+                                                       *model.memory(), device.period_s};
+                return generates_energy([&] { return Direct{object}; }, device, 0.01);
             }));
     }
     return map;

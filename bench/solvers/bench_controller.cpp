@@ -106,9 +106,18 @@ palpate::ForceModel with_hysteresis() {
     return {network.parameters(), {std::vector<double>(16, 0.002), 0.0, 0.2}, network.domain(), 0.005};
 }
 
+palpate::ForceModel with_memory() {
+    palpate::MemoryParameters memory;
+    memory.ratio = palpate::NetworkParameters{1, {3.0, 5.0}, {0.2, 0.7}, {0.2, -0.2}, {0.0}, 1.0};
+    memory.stiffness = {1.0, 2.0, 1.0, 0.5};
+    memory.time_constant_s = {0.1, 0.5, 2.0, 10.0};
+    return spring_wall().with_memory(memory);
+}
+
 }  // namespace
 
 BENCHMARK_CAPTURE(tick, direct, spring_wall(), palpate::StructureKind::Direct);
+BENCHMARK_CAPTURE(tick, direct_memory, with_memory(), palpate::StructureKind::Direct);
 BENCHMARK_CAPTURE(tick, massless, spring_wall(), palpate::StructureKind::Massless);
 BENCHMARK_CAPTURE(tick, massless_compensated, spring_wall(), palpate::StructureKind::Massless, true);
 BENCHMARK_CAPTURE(tick, implicit, spring_wall(), palpate::StructureKind::Implicit);

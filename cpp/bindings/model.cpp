@@ -144,7 +144,8 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
                       const std::optional<Array>& linear_hysteresis, std::optional<double> bias_hysteresis,
                       const Array& lower, const Array& upper, const std::string& below,
                       const std::string& above, std::optional<double> period,
-                      std::optional<double> play_radius, bool of_velocity) {
+                      std::optional<double> play_radius, bool of_velocity,
+                      const std::optional<MemoryParameters>& memory) {
     NetworkParameters network{static_cast<std::size_t>(lower.size()),
                               copied(alpha),
                               copied(beta),
@@ -160,14 +161,98 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
         "weight_hysteresis, linear_hysteresis and bias_hysteresis must be given together or not at all");
     if (given == 0) {
         detail::require(!play_radius, "play_radius is given, but the model has no hysteresis: leave it out");
+        if (memory) {
+            detail::require(!of_velocity && network.dimension == 1,
+                            "memory is given, but the model has several inputs: leave it out");
+            return ForceModel{std::move(network), std::move(domain)}.with_memory(*memory);
+        }
         return of_velocity ? ForceModel::of_velocity(std::move(network), std::move(domain))
                            : ForceModel{std::move(network), std::move(domain)};
     }
+    detail::require(!memory, "memory is given, but the model has hysteresis: leave one of them out");
     detail::require_size(copied(*linear_hysteresis), 1, "linear_hysteresis");
     return {network,
             {copied(*weight_hysteresis), linear_hysteresis->data()[0], *bias_hysteresis},
             domain,
             play_radius};
+}
+
+/// Makes the memory of a model from the arguments of its Python constructor.
+MemoryParameters make_memory(const Array& alpha, const Array& beta, const Array& weight, double linear,
+                             double bias, const Array& stiffness, const Array& time_constant_s) {
+    return {{1, copied(alpha), copied(beta), copied(weight), {linear}, bias},
+            copied(stiffness),
+            copied(time_constant_s)};
+}
+
+/// Throws unless time and position of a motion have the same size, and the time increases.
+void require_motion(const Array& time, py::ssize_t rows, const char* name) {
+    require_vector(time, "time");
+    detail::require(time.size() == rows, "time has " + std::to_string(time.size()) + " values, must have " +
+                                             std::to_string(rows) + " as " + name);
+    for (py::ssize_t k = 1; k < rows; ++k) {
+        detail::require(time.data()[k] > time.data()[k - 1],
+                        "time[" + std::to_string(k) + "] is not above time[" + std::to_string(k - 1) + "]");
+    }
+}
+
+/// Returns the force of a model with memory along a recorded motion, and the factors of its stretches.
+std::pair<py::array_t<double>, py::array_t<double>> force_over_time(const ForceModel& model,
+                                                                    const ArrayLike& given_time,
+                                                                    const ArrayLike& given_position) {
+    detail::require(model.memory() != nullptr, "the model has no memory: call force(position)");
+    const Array time = numbers(given_time, "time");
+    const Array position = numbers(given_position, "position");
+    require_vector(position, "position");
+    require_motion(time, position.size(), "position");
+    py::array_t<double> force(position.size());
+    py::array_t<double> factor(position.size());
+    const MemoryForce<NetworkCurve> object{model.network()->curve(), model.memory()->ratio(), *model.memory(),
+                                           0.0};
+    auto state = object.start(position.size() > 0 ? position.data()[0] : 0.0);
+    for (py::ssize_t k = 0; k < position.size(); ++k) {
+        const double seconds = k > 0 ? time.data()[k] - time.data()[k - 1] : 0.0;
+        const auto recorded = object.move_for(position.data()[k], seconds, state);
+        force.mutable_data()[k] = recorded.sample.force;
+        factor.mutable_data()[k] = recorded.factor;
+    }
+    return {force, factor};
+}
+
+/// Returns the stretches of branches along recorded coordinates, shape (n, m, J).
+py::array_t<double> stretches(const ArrayLike& given_time, const ArrayLike& given_coordinate,
+                              const ArrayLike& given_time_constant,
+                              const std::optional<ArrayLike>& given_factor) {
+    const Array time = numbers(given_time, "time");
+    const Array coordinate = numbers(given_coordinate, "coordinate");
+    const Array tau = numbers(given_time_constant, "time_constant_s");
+    detail::require(coordinate.ndim() == 2,
+                    "coordinate has shape " + shape_of(coordinate) + ", must be (n, m)");
+    require_vector(tau, "time_constant_s");
+    const py::ssize_t rows = coordinate.shape(0);
+    const py::ssize_t columns = coordinate.shape(1);
+    require_motion(time, rows, "rows of coordinate");
+    const std::optional<Array> factor =
+        given_factor ? std::optional(numbers(*given_factor, "factor")) : std::nullopt;
+    const Broadcast factors(factor, rows, "factor");
+    py::array_t<double> result({rows, columns, tau.size()});
+    double* out = result.mutable_data();
+    const double* u = coordinate.data();
+    const py::ssize_t step = columns * tau.size();
+    const py::gil_scoped_release unlocked;
+    std::fill(out, out + (rows > 0 ? step : 0), 0.0);
+    for (py::ssize_t k = 1; k < rows; ++k) {
+        const double kept = factors[k].value_or(1.0);
+        for (py::ssize_t j = 0; j < tau.size(); ++j) {
+            const BranchStep share{time.data()[k] - time.data()[k - 1], tau.data()[j]};
+            for (py::ssize_t i = 0; i < columns; ++i) {
+                double* at = out + k * step + i * tau.size() + j;
+                const double moved = u[k * columns + i] - u[(k - 1) * columns + i];
+                *at = kept * (share.kept * at[-step] + share.moved * moved);
+            }
+        }
+    }
+    return result;
 }
 
 Array table(const std::vector<double>& values, std::size_t dimension) {
@@ -291,6 +376,26 @@ py::array_t<double> cell_derivative_bounds(const Array& alpha, const Array& beta
 }  // namespace
 
 void bind_model(py::module_& module) {
+    py::class_<MemoryParameters> memory(
+        module, "Memory",
+        "Memory of a relaxing object: J springs of stiffness k_j in series with dashpots (branches).\n\n"
+        "f = g(x) + p(x) sum_j k_j e_j, de_j/dt = p(x) dx/dt - e_j / tau_j. The ratio p is a network of one\n"
+        "input with the wavelets alpha, beta, weight, the slope `linear` and the constant `bias`.");
+    memory.def(py::init(&make_memory), py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a, "bias"_a,
+               "stiffness"_a, "time_constant_s"_a,
+               "Makes the memory. The model that gets it checks the values.");
+    memory.def_property_readonly("alpha", [](const MemoryParameters& m) { return row(m.ratio.alpha); });
+    memory.def_property_readonly("beta", [](const MemoryParameters& m) { return row(m.ratio.beta); });
+    memory.def_property_readonly("weight", [](const MemoryParameters& m) { return row(m.ratio.weight); });
+    memory.def_property_readonly("linear", [](const MemoryParameters& m) { return m.ratio.linear[0]; });
+    memory.def_property_readonly("bias", [](const MemoryParameters& m) { return m.ratio.bias; });
+    memory.def_property_readonly(
+        "stiffness", [](const MemoryParameters& m) { return row(m.stiffness); },
+        "Stiffness k_j of each branch [N/m or N*m/rad].");
+    memory.def_property_readonly(
+        "time_constant_s", [](const MemoryParameters& m) { return row(m.time_constant_s); },
+        "Time constant tau_j of each branch [s].");
+
     py::class_<ForceModel> type(
         module, "ForceModel",
         "A force law of d inputs x, with its domain and the continuation of the force outside the\n"
@@ -303,9 +408,10 @@ void bind_model(py::module_& module) {
         "weight_hysteresis"_a = py::none(), "linear_hysteresis"_a = py::none(),
         "bias_hysteresis"_a = py::none(), "lower"_a, "upper"_a, "below"_a = "linear", "above"_a = "linear",
         "period"_a = py::none(), "play_radius"_a = py::none(), "of_velocity"_a = false,
+        "memory"_a = py::none(),
         "Makes the model of N wavelets and d inputs: alpha, beta (N, d); weight (N,); linear, lower,\n"
-        "upper (d,). of_velocity is true if the second of two inputs is the velocity. Raises ValueError\n"
-        "with the wrong field.");
+        "upper (d,). of_velocity is true if the second of two inputs is the velocity. With a memory, the\n"
+        "network is the force at rest. Raises ValueError with the wrong field.");
 
     bind_quantity<&EnvironmentSample::force>(
         type, "force",
@@ -345,6 +451,17 @@ void bind_model(py::module_& module) {
         "and in release. Without hysteresis they are wider than the true range by at most 1 % of the\n"
         "steepest slope. With a play radius r they include the slope h / r (hysteresis h), with which\n"
         "the force of a hysteresis model changes after a reversal.");
+
+    type.def("force_over_time", &force_over_time, "time"_a, "position"_a,
+             "Returns the force (n,) of a model with memory along a recorded motion that starts at rest:\n"
+             "positions (n,) at increasing times (n,) [s]. The second result (n,) is below 1 where the\n"
+             "stretches were reduced, because the tool left the object.");
+    type.def_property_readonly(
+        "memory",
+        [](const ForceModel& m) -> std::optional<MemoryParameters> {
+            return m.memory() ? std::optional(m.memory()->parameters()) : std::nullopt;
+        },
+        "Memory of the model; None for a force without memory.");
 
     type.def_property_readonly("dimension", [](const ForceModel& m) { return m.parameters().dimension; });
     type.def_property_readonly("n_wavelets",
@@ -387,6 +504,11 @@ void bind_model(py::module_& module) {
         "play_k = min(x_k + r, max(x_k - r, play_{k-1})). Without `start` the first state is the first\n"
         "position.");
 
+    module.def("stretches", &stretches, "time"_a, "coordinate"_a, "time_constant_s"_a,
+               "factor"_a = py::none(),
+               "Returns the stretches (n, m, J) of branches with the J time constants along m recorded\n"
+               "coordinates (n, m) at increasing times (n,), from rest: e <- factor (kept e + share du).\n"
+               "`factor` (n,) reduces the stretches at each row; by default 1.");
     module.def(
         "slope_bounds", &network_slope_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a, "linear"_a,
         "bias"_a, "lower"_a, "upper"_a, "relative"_a = 0.01,

@@ -81,6 +81,14 @@ void bind_lines(py::module_& module) {
     py::class_<ExportedLag>(module, "ExportedLag", "Numbers of the massless structure.")
         .def_readonly("memory", &ExportedLag::memory)
         .def_readonly("compliance", &ExportedLag::compliance);
+    py::class_<ExportedMemory>(module, "ExportedMemory",
+                               "Branches of a model with memory. The ratio is in units of force.")
+        .def_readonly("stiffness", &ExportedMemory::stiffness)
+        .def_readonly("kept", &ExportedMemory::kept,
+                      "Share of a stretch that is left after a period at rest.")
+        .def_readonly("largest_stretch", &ExportedMemory::largest_stretch)
+        .def_readonly("sudden", &ExportedMemory::sudden, "Stiffness for a motion within one period.")
+        .def_readonly("contact", &ExportedMemory::contact, "True if the branches do not pull the tool.");
     py::class_<EdgeLine>(module, "EdgeLine",
                          "End of the domain, with force, slope and antiderivatives of the line beyond it.")
         .def_readonly("edge", &EdgeLine::edge)
@@ -162,6 +170,7 @@ void bind_exported_model(py::module_& module) {
                                "Lines (below, above) of each curve of the force law.")
         .def_property_readonly("response_lines", &ExportedModel::response_lines)
         .def_property_readonly("lag", &ExportedModel::lag)
+        .def_property_readonly("memory", &ExportedModel::memory, "Branches; None without memory.")
         .def_property_readonly(
             "edges",
             [](const ExportedModel& model) {

@@ -198,7 +198,7 @@ class ModelOnJoint {
         if (const HysteresisNetwork* both = model.hysteresis()) {
             return JointForce{CompiledHysteresis{*both}, std::min(width, 2.0 * both->play_radius())};
         }
-        detail::require(model.network() != nullptr,
+        detail::require(model.network() != nullptr && model.memory() == nullptr,
                         "the force depends on more than the position, must be a force of position, with or "
                         "without hysteresis");
         return JointForce{CompiledNetwork{*model.network()}, width};

@@ -13,6 +13,7 @@
 #include "palpate/model/bounds.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/model/hysteresis.hpp"
+#include "palpate/model/memory.hpp"
 #include "palpate/model/network.hpp"
 #include "palpate/solver/piecewise_force.hpp"
 
@@ -49,6 +50,21 @@ inline NetworkParameters random_network(Random& random, std::size_t size, std::s
     }
     network.bias = uniform(random, -0.5, 0.5);
     return network;
+}
+
+/// Returns a memory of one to four branches over [0, 1]. The ratio may have any sign; in half of the cases it is 1.
+inline MemoryParameters random_memory(Random& random) {
+    MemoryParameters memory;
+    if (random() % 2 == 0) {
+        memory.ratio = random_network(random, random() % 3);
+        memory.ratio.bias += 1.0;
+    }
+    const std::size_t branches = 1 + random() % 4;
+    for (std::size_t j = 0; j < branches; ++j) {
+        memory.stiffness.push_back(std::exp(uniform(random, -2.0, 3.0)));
+        memory.time_constant_s.push_back(std::exp(uniform(random, -7.0, 3.0)));
+    }
+    return memory;
 }
 
 inline Domain unit_domain(Continuation below = Continuation::Linear,

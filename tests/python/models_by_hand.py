@@ -3,7 +3,10 @@
 
 from typing import Any
 
+import numpy as np
+
 from palpate import Model
+from palpate._core.model import Memory
 
 
 def model_by_hand(**changes: Any) -> Model:
@@ -38,3 +41,21 @@ def keyswitch_by_hand(**changes: Any) -> Model:
             **changes,
         }
     )
+
+
+def relaxing_by_hand(**changes: Any) -> Model:
+    """Returns a spring of 2 N/m at rest with one branch of 3 N/m that relaxes in 0.5 s, over 0 to 1 m."""
+    memory = Memory(
+        alpha=[], beta=[], weight=[], linear=0.0, bias=1.0, stiffness=[3.0], time_constant_s=[0.5]
+    )
+    arguments: dict[str, Any] = {
+        "units": {"position": "m", "force": "N"},
+        "alpha": np.zeros((0, 1)),
+        "beta": np.zeros((0, 1)),
+        "weight": [],
+        "linear": [2.0],
+        "lower": [0.0],
+        "upper": [1.0],
+        "memory": memory,
+    }
+    return Model.from_network(**{**arguments, **changes})

@@ -6,7 +6,43 @@ from __future__ import annotations
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['ForceModel', 'derivative_bounds', 'fingerprint', 'play', 'slope_bounds', 'wavelet_columns', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_slope_columns', 'wavelet_steps']
+__all__: list[str] = ['ForceModel', 'Memory', 'derivative_bounds', 'fingerprint', 'play', 'slope_bounds', 'stretches', 'wavelet_columns', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_slope_columns', 'wavelet_steps']
+class Memory:
+    """
+    Memory of a relaxing object: J springs of stiffness k_j in series with dashpots (branches).
+    
+    f = g(x) + p(x) sum_j k_j e_j, de_j/dt = p(x) dx/dt - e_j / tau_j. The ratio p is a network of one
+    input with the wavelets alpha, beta, weight, the slope `linear` and the constant `bias`.
+    """
+    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], time_constant_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Makes the memory. The model that gets it checks the values.
+        """
+    @property
+    def alpha(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def beta(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
+    @property
+    def bias(self) -> float:
+        ...
+    @property
+    def linear(self) -> float:
+        ...
+    @property
+    def stiffness(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Stiffness k_j of each branch [N/m or N*m/rad].
+        """
+    @property
+    def time_constant_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Time constant tau_j of each branch [s].
+        """
+    @property
+    def weight(self) -> numpy.typing.NDArray[numpy.float64]:
+        ...
 class ForceModel:
     """
     A force law of d inputs x, with its domain and the continuation of the force outside the
@@ -16,11 +52,11 @@ class ForceModel:
     is f(x, s) = g(x) + s h(x), with the mean force g of press and release, the direction state s
     from -1 to 1, and the hysteresis h, which has separate weights for the same wavelets.
     """
-    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.SupportsFloat | typing.SupportsIndex, weight_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, linear_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, bias_hysteresis: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], below: str = 'linear', above: str = 'linear', period: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, of_velocity: bool = False) -> None:
+    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.SupportsFloat | typing.SupportsIndex, weight_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, linear_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, bias_hysteresis: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], below: str = 'linear', above: str = 'linear', period: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, of_velocity: bool = False, memory: Memory | None = None) -> None:
         """
         Makes the model of N wavelets and d inputs: alpha, beta (N, d); weight (N,); linear, lower,
-        upper (d,). of_velocity is true if the second of two inputs is the velocity. Raises ValueError
-        with the wrong field.
+        upper (d,). of_velocity is true if the second of two inputs is the velocity. With a memory, the
+        network is the force at rest. Raises ValueError with the wrong field.
         """
     @typing.overload
     def energy(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
@@ -53,6 +89,12 @@ class ForceModel:
     def force(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, play: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
         The same method for an array of positions of any shape; returns an array of this shape.
+        """
+    def force_over_time(self, time: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Returns the force (n,) of a model with memory along a recorded motion that starts at rest:
+        positions (n,) at increasing times (n,) [s]. The second result (n,) is below 1 where the
+        stretches were reduced, because the tool left the object.
         """
     def play(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], start: typing.SupportsFloat | typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -115,6 +157,11 @@ class ForceModel:
     def lower(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property
+    def memory(self) -> Memory | None:
+        """
+        Memory of the model; None for a force without memory.
+        """
+    @property
     def n_wavelets(self) -> int:
         ...
     @property
@@ -156,6 +203,12 @@ def slope_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float6
     """
     Returns proved bounds (smallest, largest) of the slope f' of a network of one input from lower
     to upper. They are wider than the true range by at most `relative` times the largest |f'|.
+    """
+def stretches(time: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], coordinate: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], time_constant_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], factor: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Returns the stretches (n, m, J) of branches with the J time constants along m recorded
+    coordinates (n, m) at increasing times (n,), from rest: e <- factor (kept e + share du).
+    `factor` (n,) reduces the stretches at each row; by default 1.
     """
 def wavelet_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
     """

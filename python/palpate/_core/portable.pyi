@@ -9,7 +9,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['CellGrid', 'CellTable', 'EdgeLine', 'ExportCheck', 'ExportedLag', 'ExportedLine', 'ExportedModel', 'profile_checksum']
+__all__: list[str] = ['CellGrid', 'CellTable', 'EdgeLine', 'ExportCheck', 'ExportedLag', 'ExportedLine', 'ExportedMemory', 'ExportedModel', 'profile_checksum']
 class CellGrid:
     """
     Positions of the cells of an exported table.
@@ -131,6 +131,31 @@ class ExportedLag:
     @property
     def memory(self) -> float:
         ...
+class ExportedMemory:
+    """
+    Branches of a model with memory. The ratio is in units of force.
+    """
+    @property
+    def contact(self) -> bool:
+        """
+        True if the branches do not pull the tool.
+        """
+    @property
+    def kept(self) -> list[float]:
+        """
+        Share of a stretch that is left after a period at rest.
+        """
+    @property
+    def largest_stretch(self) -> float:
+        ...
+    @property
+    def stiffness(self) -> list[float]:
+        ...
+    @property
+    def sudden(self) -> float:
+        """
+        Stiffness for a motion within one period.
+        """
 class EdgeLine:
     """
     End of the domain, with force, slope and antiderivatives of the line beyond it.
@@ -243,6 +268,11 @@ class ExportedModel:
     @property
     def massless(self) -> bool:
         ...
+    @property
+    def memory(self) -> ExportedMemory | None:
+        """
+        Branches; None without memory.
+        """
     @property
     def outside_share(self) -> float:
         ...

@@ -14,7 +14,7 @@ from .._core.simulation import TestRig
 from ..model import Model, load_model
 from ..planning import Plan, force_error, force_range, hand_for, judge, rig_for
 from ..planning import simulate as render
-from ..planning.simulation import covered_text
+from ..planning.simulation import covered_text, holding_hand
 from ..recording.files import require_absent
 from .exit_status import end_with, finishing
 from .figures import drawing, picture_rendering
@@ -51,6 +51,12 @@ def _refuse_device(ctx: click.Context, param: click.Parameter, device: str | Non
 )
 @click.option("--duration-s", type=float, default=4.0, help="Simulated time [s].")
 @click.option(
+    "--hold-at",
+    type=float,
+    default=None,
+    help="Position at which the hand holds the handle, in SI units.  [default: (it sweeps)]",
+)
+@click.option(
     "-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Recording of the rendering to write."
 )
 @click.option("--force", is_flag=True, help="Replace an existing recording.")
@@ -59,6 +65,7 @@ def _refuse_device(ctx: click.Context, param: click.Parameter, device: str | Non
 def simulate(
     model_file: Path,
     duration_s: float,
+    hold_at: float | None,
     output: Path | None,
     force: bool,
     plot: Path | None,
@@ -81,12 +88,13 @@ def simulate(
     plan = _chosen_plan(model, rig, scheme)
     device = rig.device if plan.certificate is None else plan.certificate.device
     talk(f"read {model_file}: {sized(model)}; rendering on the simulated device {device.id}")
+    hand = hand_for(plan, device) if hold_at is None else holding_hand(plan, hold_at)
     ticks = max(duration_s / device.period_s, 1.0)
     with progress("simulating") as shown:
         rendered = render(
             plan,
             device,
-            hand_for(plan, device),
+            hand,
             duration_s,
             lambda tick: shown(f"{100 * tick / ticks:.1f} %"),
         )
@@ -148,7 +156,7 @@ def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any]) -> Plan:
     if all(value is None or value is False for value in scheme.values()):
         if model.plan is not None:
             return Plan.of(model)
-        if not model.of_velocity:
+        if not model.of_velocity and model.memory is None:
             talk(
                 "the model has no plan: the default coupling makes it softer; "
                 "'palpate plan' finds a rendering without this error"

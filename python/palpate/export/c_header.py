@@ -14,7 +14,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from .._core.portable import CellTable, ExportedLine
+from .._core.portable import CellTable, ExportedLine, ExportedMemory
 from .exported import Exported
 from .request import Request, Written
 from .template import filled
@@ -67,11 +67,12 @@ def header_text(exported: Exported) -> str:
         "single": model.single,
         "periodic": model.periodic,
         "hysteretic": model.hysteretic,
-        "direct": not between,
+        "memory": model.memory is not None,
+        "direct": not between and model.memory is None,
         "predicted": predicted,
         "massless": model.massless,
         "between": between and model.single,
-        "stateless": not (between or model.hysteretic),
+        "stateless": not (between or model.hysteretic or model.memory is not None),
         "limited": not np.isinf(model.force_limit),
         "law_between": predicted,
         "response_between": True,
@@ -165,11 +166,25 @@ class _Numbers:
             yield _define("TAPS", f"{taps}u", "past positions of the prediction")
             yield _define("PARTS", f"{taps * (taps + 1)}")
             yield _define("PER_PART", self.real(1.0 / (taps * (taps + 1))))
+        if model.memory is not None:
+            yield from self.branches(model.memory)
         if model.massless:
             yield _define("MEMORY", self.real(model.lag.memory), "part of the lag that is kept for each tick")
             unit = "counts" if self.single else position
             text = f"lag for each force [{unit}/{self.exported.force_unit}]"
             yield _define("COMPLIANCE", self.real(model.lag.compliance), text)
+
+    def branches(self, memory: ExportedMemory) -> Iterator[str]:
+        """Yields the numbers of the branches. Their coordinate has a unit in which the ratio is a force."""
+        yield _define("BRANCHES", len(memory.stiffness), "springs in series with dashpots")
+        yield _define("CONTACT", int(memory.contact), "1: the branches do not pull the tool")
+        yield _define("MOST_FORCE", _double(self.model.force_limit), f"[{self.exported.force_unit}]")
+        yield _define("MOST_STRETCH", _double(memory.largest_stretch), "largest stretch of a branch")
+        yield _define("SUDDEN", _double(memory.sudden), "stiffness of all branches within a tick")
+        yield "/* Stiffness of each branch, and share of its stretch that is left after a tick at rest. */"
+        for name, values in (("stiffness", memory.stiffness), ("kept", memory.kept)):
+            yield f"static const double NAME_{name}[NAME_BRANCHES] = {{{', '.join(map(_double, values))}}};"
+        yield ""
 
     def table(self, name: str, table: CellTable, lines: Sequence[ExportedLine]) -> Iterator[str]:
         """Yields the constants and arrays of a table."""
@@ -183,7 +198,11 @@ class _Numbers:
         yield "\n/* First cell of each coarse cell, times 16, plus k: the coarse cell has 2^k cells. */"
         yield f"static const {kind} NAME_{name}_splits[{len(table.splits)}] = {{"
         yield f"{_filled(map(str, table.splits.tolist()))}\n}};\n"
-        curves = "mean force and of the hysteresis" if name == "law" and self.model.hysteretic else "force"
+        curves = "force"
+        if name == "law" and self.model.hysteretic:
+            curves = "mean force and of the hysteresis"
+        elif name == "law" and self.model.memory is not None:
+            curves = "force at rest and of the ratio"
         yield f"/* Polynomial coefficients of the {curves} in each cell, the lowest power first. */"
         yield from self.rows(f"NAME_real NAME_{name}_cells", table.coefficients, self.real)
         if name == "law":

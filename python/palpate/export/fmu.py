@@ -19,6 +19,7 @@ from .. import _core
 from .._core.model import fingerprint
 from .._core.portable import ExportedModel
 from .._core.rendering import Scheme, default_play_radius
+from ..errors import InputError
 from ..model import Model
 from ..planning.plan import require_force
 from ..recording.files import replacing
@@ -115,6 +116,11 @@ class Fmu:
         """Makes the tables of the identified model. Its plan is left out, because it holds for a device."""
         model = request.model()
         require_force(model)
+        if model.memory is not None:
+            raise InputError(
+                "the force has a memory, which an FMU does not contain: identify the model with "
+                "--inputs position"
+            )
         content = model.to_dict() | {"plan": None, "certificate": None}
         if model.hysteretic and model.play_radius is None:
             content["play_radius"] = default_play_radius(model, 0.0)

@@ -46,6 +46,10 @@ typedef struct NAME_state {
 //@ if massless
     NAME_real lag;   /* of the object behind the device: counts, or with doubles a position */
 //@ end
+//@ if memory
+    double coordinate; /* of the branches at the last tick */
+    double stretch[NAME_BRANCHES]; /* of the spring of each branch */
+//@ end
 //@ if stateless
     uint8_t unused;
 //@ end
@@ -178,6 +182,7 @@ NAME_INLINE NAME_real NAME_line(const NAME_real *line, NAME_real distance, NAME_
 }
 
 //@ end
+//@ if not memory
 //@ if single and hysteretic
 /* Direction state after a motion to a count, before it is limited to -1 and 1. */
 NAME_INLINE NAME_real NAME_direction(const NAME_state *s, int32_t count) {
@@ -337,6 +342,62 @@ static inline double NAME_law_at(double position, double direction, int sticks, 
 }
 
 //@ end
+//@ end
+//@ if memory
+/* Force at rest at a place, its slope, and the ratio of the branches with its slope. */
+typedef struct NAME_rest {
+    NAME_real force, slope, ratio, ratio_slope;
+} NAME_rest;
+
+/* Values in a cell. */
+NAME_INLINE NAME_rest NAME_rest_in(const NAME_real *c, NAME_real t, uint32_t k) {
+    NAME_rest at;
+    at.force = NAME_polynomial_slope(c, t, &at.slope);
+    at.ratio = NAME_polynomial_slope(c + 6, t, &at.ratio_slope);
+    at.slope = at.slope * NAME_law_per_width[k];
+    at.ratio_slope = at.ratio_slope * NAME_law_per_width[k];
+    return at;
+}
+
+/* Values at a distance outside the domain. */
+static inline NAME_rest NAME_rest_outside(NAME_real distance, int below) {
+    NAME_rest at;
+    at.force = NAME_line(NAME_law_lines[below ? 0 : 1], distance, &at.slope);
+    at.ratio = NAME_line(NAME_law_lines[below ? 2 : 3], distance, &at.ratio_slope);
+    return at;
+}
+
+//@ if single
+/* Values at a count. */
+NAME_INLINE NAME_rest NAME_rest_at(int32_t count) {
+    const NAME_real *c;
+    NAME_real t;
+    uint32_t k;
+    if ((uint32_t)count - (uint32_t)NAME_law_FIRST > (uint32_t)NAME_law_LAST - (uint32_t)NAME_law_FIRST) {
+        const int below = count < NAME_law_FIRST;
+        const NAME_real distance =
+            below ? (NAME_real)((uint32_t)NAME_law_FIRST - (uint32_t)count) - NAME_law_OFFSET_BELOW
+                  : (NAME_real)((uint32_t)count - (uint32_t)NAME_law_LAST) - NAME_law_OFFSET_ABOVE;
+        return NAME_rest_outside(distance, below);
+    }
+    c = NAME_law_cell(NAME_law_phase(count), &t, &k);
+    return NAME_rest_in(c, t, k);
+}
+//@ else
+/* Values at a position. */
+NAME_INLINE NAME_rest NAME_rest_at(double position) {
+    double t;
+    uint32_t cell, k;
+    if (!(position >= NAME_law_LOWER && position <= NAME_law_UPPER)) {
+        const int below = position < NAME_law_LOWER;
+        return NAME_rest_outside(below ? NAME_law_LOWER - position : position - NAME_law_UPPER, below);
+    }
+    cell = NAME_law_cell_at(position, &t, &k);
+    return NAME_rest_in(NAME_law_cells[cell], t, k);
+}
+//@ end
+
+//@ end
 /* ------------------------------------------------------------------------- energy, in both precisions with doubles */
 
 /* First and second antiderivative of one curve at a position of the domain. */
@@ -382,6 +443,7 @@ static inline void NAME_integrals(double position, int curve, double *first, dou
 //@ end
 }
 
+//@ if not memory
 /* Energy at a position, after a motion that starts with the play operator at `before`. */
 static inline NAME_real NAME_energy_from(double before, double position) {
     double mean, second;
@@ -399,8 +461,137 @@ static inline NAME_real NAME_energy_from(double before, double position) {
 //@ end
 }
 
+//@ end
 /* ------------------------------------------------------------------------------------------------ public functions */
 
+//@ if memory
+/* A number between -largest and largest. */
+NAME_INLINE double NAME_within(double value, double largest) {
+    return value > largest ? largest : value < -largest ? -largest : value;
+}
+
+/* Moves the branches by one tick to a position, and returns the force there and its slope. If the force would exceed
+   the force limit, or would pull a tool that can leave the object, all stretches are reduced by one factor. */
+NAME_INLINE NAME_real NAME_relaxed(NAME_state *s, double position, NAME_rest at, NAME_real *slope) {
+    const double rest = NAME_within((double)at.force, NAME_MOST_FORCE);
+    const double least = !NAME_CONTACT ? -NAME_MOST_FORCE : rest < 0.0 ? rest : 0.0;
+    double coordinate, moved, unlimited, force, factor, sum;
+    int j;
+    NAME_integrals(position, 1, &coordinate, &sum);
+    moved = coordinate - s->coordinate;
+    s->coordinate = coordinate;
+    sum = 0.0;
+    for (j = 0; j < NAME_BRANCHES; ++j) {
+        s->stretch[j] = NAME_within(NAME_kept[j] * (s->stretch[j] + moved), NAME_MOST_STRETCH);
+        sum += NAME_stiffness[j] * s->stretch[j];
+    }
+    unlimited = rest + (double)at.ratio * sum;
+    force = unlimited > NAME_MOST_FORCE ? NAME_MOST_FORCE : unlimited < least ? least : unlimited;
+    if (!(force < unlimited || force > unlimited)) {
+        *slope = (NAME_real)((double)at.slope + (double)at.ratio_slope * sum +
+                             (double)at.ratio * (double)at.ratio * NAME_SUDDEN);
+        return (NAME_real)force;
+    }
+    *slope = NAME_ZERO;
+    factor = (force - rest) / (unlimited - rest);
+    factor = factor < 0.0 ? 0.0 : factor > 1.0 ? 1.0 : factor;
+    for (j = 0; j < NAME_BRANCHES; ++j) {
+        s->stretch[j] *= factor;
+    }
+    return (NAME_real)force;
+}
+
+/* Stored energy of the object at rest at a position and of the branches. */
+static inline NAME_real NAME_energy_of(const NAME_state *s, double position) {
+    double energy, unused;
+    int j;
+    NAME_integrals(position, 0, &energy, &unused);
+    for (j = 0; j < NAME_BRANCHES; ++j) {
+        energy += 0.5 * NAME_stiffness[j] * s->stretch[j] * s->stretch[j];
+    }
+    return (NAME_real)energy;
+}
+
+/* Starts with the object at rest at this position. */
+static inline void NAME_start_at(NAME_state *s, double position) {
+    double unused;
+    int j;
+    NAME_integrals(position, 1, &s->coordinate, &unused);
+    for (j = 0; j < NAME_BRANCHES; ++j) {
+        s->stretch[j] = 0.0;
+    }
+}
+
+//@ if not single
+/* Moves the object by one tick to this position, and returns its force and slope. */
+static inline double NAME_relax_at(NAME_state *s, double position, double *slope) {
+    return NAME_relaxed(s, position, NAME_rest_at(position), slope);
+}
+
+/* Moves the object by one tick to this position. */
+static inline void NAME_advance_at(NAME_state *s, double position) {
+    double slope;
+    (void)NAME_relax_at(s, position, &slope);
+}
+
+/* Force of the object and its slope after a tick to this position; does not change the state. */
+static inline double NAME_force_slope_at(const NAME_state *s, double position, double *slope) {
+    NAME_state moved = *s;
+    return NAME_relax_at(&moved, position, slope);
+}
+
+/* Force of the object after a tick to this position; does not change the state. */
+static inline double NAME_force_at(const NAME_state *s, double position) {
+    double slope;
+    return NAME_force_slope_at(s, position, &slope);
+}
+
+/* Stored energy after a tick to this position, plus a constant; does not change the state. */
+static inline double NAME_energy_at(const NAME_state *s, double position) {
+    NAME_state moved = *s;
+    NAME_advance_at(&moved, position);
+    return NAME_energy_of(&moved, position);
+}
+
+//@ end
+/* Moves the object by one tick to this count, and returns its force and slope. */
+NAME_INLINE NAME_real NAME_relax(NAME_state *s, int32_t count, NAME_real *slope) {
+//@ if single
+    return NAME_relaxed(s, (double)count * NAME_STEP, NAME_rest_at(count), slope);
+//@ else
+    return NAME_relax_at(s, (double)count * NAME_STEP, slope);
+//@ end
+}
+
+/* Starts with the object at rest at this count. */
+static inline void NAME_start(NAME_state *s, int32_t count) { NAME_start_at(s, (double)count * NAME_STEP); }
+
+/* Moves the object by one tick to this count. */
+static inline void NAME_advance(NAME_state *s, int32_t count) {
+    NAME_real slope;
+    (void)NAME_relax(s, count, &slope);
+}
+
+/* Force of the object and its slope after a tick to this count; does not change the state. */
+static inline NAME_real NAME_force_slope(const NAME_state *s, int32_t count, NAME_real *slope) {
+    NAME_state moved = *s;
+    return NAME_relax(&moved, count, slope);
+}
+
+/* Force of the object after a tick to this count; does not change the state. */
+static inline NAME_real NAME_force(const NAME_state *s, int32_t count) {
+    NAME_real slope;
+    return NAME_force_slope(s, count, &slope);
+}
+
+/* Stored energy after a tick to this count, plus a constant; does not change the state. */
+static inline NAME_real NAME_energy(const NAME_state *s, int32_t count) {
+    NAME_state moved = *s;
+    NAME_advance(&moved, count);
+    return NAME_energy_of(&moved, (double)count * NAME_STEP);
+}
+
+//@ else
 //@ if not single
 /* Starts with the object at rest at this position. */
 static inline void NAME_start_at(NAME_state *s, double position) {
@@ -532,6 +723,7 @@ static inline NAME_real NAME_energy(const NAME_state *s, int32_t count) {
 //@ end
 }
 
+//@ end
 /* ------------------------------------------------------------------------------------------- structure: STRUCTURE */
 
 /* A force between the force limits of the device. */
@@ -616,6 +808,10 @@ NAME_INLINE double NAME_response(double position) {
 //@ end
 /* One tick: returns the force of the object, limited to the force of the device, and changes the state. */
 static inline NAME_real NAME_step(NAME_state *s, int32_t count) {
+//@ if memory
+    NAME_real slope;
+    return NAME_limited(NAME_relax(s, count, &slope));
+//@ end
 //@ if direct and single
     return NAME_limited(NAME_law(count, NAME_moved(s, count)));
 //@ end

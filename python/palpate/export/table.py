@@ -41,6 +41,10 @@ def table_of(model: Model) -> pd.DataFrame:
             f"the model has {model.dimension} inputs: a table needs a force of position alone, so identify "
             "the model with --inputs position"
         )
+    if model.memory is not None:
+        raise InputError(
+            "the force has a memory, which a table cannot contain: identify the model with --inputs position"
+        )
     position, force = units_of(model)
     x = np.linspace(model.lower[0], model.upper[0], ROWS)
     columns = {f"position_{position}": x}

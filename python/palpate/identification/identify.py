@@ -24,6 +24,7 @@ from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
 from .classes.findings import identified, verdict_of
+from .classes.memory import IdentifyRest, better_with_memory
 from .classes.model_selection import select
 from .data.limits import ForceScale
 from .data.outliers import without_isolated
@@ -45,8 +46,8 @@ def identify(
     """Identifies a model of force over position from recordings.
 
     Tries the model classes constant, linear, position and hysteresis, and takes the simplest that the data
-    supports; with time, mass, damping and velocity too. A recording with further inputs gives a force over
-    all of them (constant, linear, network).
+    supports; with time, mass, damping, velocity and memory too. A recording with further inputs gives a force
+    over all of them (constant, linear, network).
 
     Parameters
     ----------
@@ -141,6 +142,7 @@ def identify(
     # result.
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_rows(replace(rows, findings=(*isolated, *rows.findings)), settings)
+        network = better_with_memory(network, recordings, settings, _resting(rows, settings))
     source = Source.merged(part.source for part in recordings)
     every_row = len(rows.force) == sum(map(len, recordings))
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
@@ -286,6 +288,23 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     )
 
 
+def _resting(rows: Rows, options: IdentifyOptions) -> IdentifyRest:
+    """Returns the identification of a force at rest, a force of position alone."""
+    alone = replace(options, inputs=("position",))
+    units = {"position": rows.position_unit, "force": rows.force_unit}
+
+    def identified_at_rest(
+        position: Float1D, force: Float1D, rows: float, within: float, most_wavelets: int
+    ) -> FittedNetwork:
+        fewer = replace(alone, max_wavelets=min(alone.max_wavelets, most_wavelets))
+        weight = np.full(len(position), rows)
+        return fit_environment(
+            position[:, None], force, options=fewer, weight=weight, within=within, units=units
+        )
+
+    return identified_at_rest
+
+
 def model_of(
     network: FittedNetwork,
     units: Mapping[str, str],
@@ -303,6 +322,7 @@ def model_of(
         below=network.below,
         above="linear",
         period=options.period,
+        memory=None if network.memory is None else network.memory.memory(),
         play_radius=network.play_radius,
         mass=network.mass if options.search.filters == "matched" else options.search.assumed_mass,
         damping=options.search.assumed_damping
@@ -313,7 +333,7 @@ def model_of(
         data=source,
         notes={
             "model_selection": [str(decision) for decision in network.decisions],
-            "identification": list(network.notes),
+            "identification": [*network.notes, *network.band_check],
             "verdict": verdict.record(),
             **({} if lag is None else {"force_lag": lag.record()}),
         },
@@ -321,6 +341,8 @@ def model_of(
 
 
 def _kind(network: FittedNetwork) -> str:
+    if network.memory is not None:
+        return "memory"
     if len(network.inputs) == 1:
         return "hysteresis" if network.weight_hysteresis is not None else "position"
     return "position_velocity" if network.inputs == VELOCITY_INPUTS else "general"

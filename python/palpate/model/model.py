@@ -16,7 +16,7 @@ import pandas as pd
 
 from .._core import __version__
 from .._core.io import check_model, read_json
-from .._core.model import ForceModel
+from .._core.model import ForceModel, Memory
 from .._typing import Float1D
 from ..arguments import holds_numbers, instance_of, path_of, shown
 from ..errors import InputError
@@ -25,7 +25,7 @@ from ..recording.files import require_file
 from ..verdict import Verdict
 from .band import Band
 from .model_display import frame_of, html_of
-from .model_file import Fit, PathStep, describe, write_json
+from .model_file import Fit, PathStep, describe, memory_record, write_json
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,8 +48,9 @@ class Model(ForceModel):
 
     Parameters
     ----------
-    kind : {"position", "hysteresis", "position_velocity", "general"}
+    kind : {"position", "hysteresis", "memory", "position_velocity", "general"}
         "hysteresis": f(x, s) = g(x) + s h(x), mean force g of both strokes, hysteresis h, direction state s.
+        "memory": the network is the force at rest g(x), and `memory` relaxes.
     inputs : sequence of str
         One name for each dimension of the network, such as ("position",); without the direction of a
         hysteresis model.
@@ -62,6 +63,8 @@ class Model(ForceModel):
     bias : float
     weight_hysteresis, linear_hysteresis, bias_hysteresis : optional
         Weights (N,), slopes (d,) and constant of the hysteresis h, which has the wavelets of g; all or none.
+    memory : Memory, optional
+        Branches that relax, for a force of position: springs in series with dashpots.
     lower, upper : (d,) array_like
         Domain: least and largest value of each input in the recordings.
     below, above : {"linear", "free"}
@@ -108,6 +111,7 @@ class Model(ForceModel):
         weight_hysteresis: npt.ArrayLike | None = None,
         linear_hysteresis: npt.ArrayLike | None = None,
         bias_hysteresis: float | None = None,
+        memory: Memory | None = None,
         lower: npt.ArrayLike,
         upper: npt.ArrayLike,
         below: str = "linear",
@@ -149,7 +153,7 @@ class Model(ForceModel):
         instance_of("data", data, Source, "the source of the recordings")
         instance_of("band", band, (Band, NoneType), "the band of several recordings")
         of_velocity = kind == "position_velocity" and len(inputs) == 2
-        super().__init__(**network, below=below, above=above, of_velocity=of_velocity)
+        super().__init__(**network, below=below, above=above, of_velocity=of_velocity, memory=memory)
         self.kind = kind
         self.inputs = tuple(inputs)
         self.units = dict(units)
@@ -196,7 +200,7 @@ class Model(ForceModel):
         d, n = np.size(lower), np.size(weight)
         hysteretic = arguments.get("weight_hysteresis") is not None
         given: dict[str, Any] = {
-            "kind": "hysteresis" if hysteretic else "position" if d == 1 else "general",
+            "kind": _kind_of(d, hysteretic=hysteretic, memory=arguments.get("memory") is not None),
             "inputs": ("position",) if d == 1 else tuple(f"input_{k + 1}" for k in range(d)),
             "units": {"position": "", "force": ""},
             "linear": np.zeros(d),
@@ -275,7 +279,7 @@ class Model(ForceModel):
         if self.data.held_out_every:
             notes[_HELD_OUT_KEY] = self.data.held_out_every
         hysteresis_weights = self.weight_hysteresis, self.linear_hysteresis
-        bounds = self.slope_bounds
+        bounds, memory = self.slope_bounds, self.memory
         return {
             "format": "palpate-model",
             "version": 1,
@@ -298,6 +302,7 @@ class Model(ForceModel):
                 else hysteresis_weights[1].tolist(),
                 "bias_hysteresis": self.bias_hysteresis,
             },
+            **({} if memory is None else {"memory": memory_record(memory)}),
             "play_radius": self.play_radius,
             "mass": self.mass,
             "damping": self.damping,
@@ -330,6 +335,7 @@ class Model(ForceModel):
         file = dict(content)
         for part in ("format", "version"):
             del file[part]
+        memory = file.pop("memory", None)
         network, domain, continuation = (file.pop(part) for part in ("network", "domain", "continuation"))
         bounds, fit, data = (file.pop(part) for part in ("slope_bounds", "fit", "data"))
         band = file.pop("band", None)
@@ -339,6 +345,7 @@ class Model(ForceModel):
             **{name: value for name, value in network.items() if name != "dimension"},
             **domain,
             **continuation,
+            memory=None if memory is None else Memory(**memory),
             slope_bounds=None if bounds is None else (bounds["min"], bounds["max"]),
             fit=Fit(**fit),
             band=None if band is None else Band.from_record(band),
@@ -412,6 +419,12 @@ class Model(ForceModel):
 
     def __repr__(self) -> str:
         return f"<palpate.Model: {self.kind}, {self.n_wavelets} wavelets, {self.n_parameters} parameters>"
+
+
+def _kind_of(dimension: int, *, hysteretic: bool, memory: bool) -> str:
+    if dimension > 1:
+        return "general"
+    return "hysteresis" if hysteretic else "memory" if memory else "position"
 
 
 def _require_numbers(name: str, value: object) -> None:

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
 
+from .._core.model import Memory
 from .._core.stability import Certificate
 from ..errors import escaped
 from ..recording.files import replacing
 from ..recording.units import Unit
 from .band import BAND_LEVEL, Band
 
-_MULTILINE_FIELDS = ("network", "fit", "band", "plan", "certificate")
+_MULTILINE_FIELDS = ("network", "memory", "fit", "band", "plan", "certificate")
 """JSON objects of a model file that are written with each of their fields on its own line."""
 
 
@@ -64,6 +65,19 @@ class Fit:
                 for step in self.path
             ],
         }
+
+
+def memory_record(memory: Memory) -> dict[str, Any]:
+    """Returns the memory of a model for a model file."""
+    return {
+        "alpha": memory.alpha.tolist(),
+        "beta": memory.beta.tolist(),
+        "weight": memory.weight.tolist(),
+        "linear": memory.linear,
+        "bias": memory.bias,
+        "stiffness": memory.stiffness.tolist(),
+        "time_constant_s": memory.time_constant_s.tolist(),
+    }
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
@@ -159,7 +173,16 @@ def _terms(model: Model, force: str) -> list[str]:
     network = "sum_i w_i psi(alpha_i (x - beta_i)) " if model.n_wavelets else ""
     unit = f"  [{force}]"
     hysteretic = model.weight_hysteresis is not None and model.linear_hysteresis is not None
-    if not hysteretic:
+    if model.memory is not None:
+        ratio = f"sum of {len(model.memory.weight)} wavelets " if len(model.memory.weight) else ""
+        pairs = zip(model.memory.stiffness, model.memory.time_constant_s, strict=True)
+        formula = [
+            f"  f(x, t) = g(x) + p(x) sum_j k_j e_j{unit}, de_j/dt = p(x) dx/dt - e_j / tau_j",
+            f"  g(x) = {network}{linear} {model.bias:+.6g}",
+            f"  p(x) = {ratio}{model.memory.linear:+.6g} x {model.memory.bias:+.6g}",
+            *(f"  branch {j}: k = {k:.6g}, tau = {tau:.6g} s" for j, (k, tau) in enumerate(pairs)),
+        ]
+    elif not hysteretic:
         formula = [f"  f(x) = {network}{linear} {model.bias:+.6g}{unit}"]
     else:
         assert model.linear_hysteresis is not None

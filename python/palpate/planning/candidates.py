@@ -286,9 +286,13 @@ Propose = Callable[[Task], Candidate | Refusal]
 
 
 def _of_position(propose: Propose) -> Propose:
-    """Returns the candidate structure with a refusal of forces that depend on velocity."""
+    """Returns the candidate structure with a refusal of forces that depend on velocity or have a memory."""
 
     def guarded(task: Task) -> Candidate | Refusal:
+        if task.model.memory is not None:
+            return Refusal(
+                "the force has a memory: only direct rendering of the identified model has known bounds"
+            )
         if not task.model.of_velocity:
             return propose(task)
         return Refusal(
@@ -339,7 +343,7 @@ def _predicted(found: Candidate, task: Task) -> Candidate:
     `_LATE_TICK_PERIODS`, or the allowed time without prediction. If direct rendering is certified only with a
     prediction, every certified prediction is allowed.
     """
-    if task.predict is not None or task.model.of_velocity:
+    if task.predict is not None or task.model.of_velocity or task.model.memory is not None:
         return found
     enough = min(_LATE_TICK_PERIODS * task.device.longest_period_s, found.certificate.longest_period_s)
     for samples in _PREDICTION_SAMPLES:

@@ -59,7 +59,7 @@ NETWORK = (
 )
 """Arguments of a force model that define its network"""
 
-_DOMAIN = ("lower", "upper", "below", "above", "period", "play_radius", "of_velocity")
+_DOMAIN = ("lower", "upper", "below", "above", "period", "play_radius", "of_velocity", "memory")
 """Arguments of a force model that do not define its network"""
 
 
@@ -275,6 +275,9 @@ class Plan:
         x = np.linspace(self.model.lower[0], self.model.upper[0], SAMPLES)
         if self.model.of_velocity:  # this model is always rendered without a coupling
             force = self.model.predict(np.column_stack([x, np.zeros_like(x)]))[None, :]
+            return x, force, force
+        if self.model.memory is not None:  # so is this model, and its branches are relaxed at rest
+            force = strokes(self.model, x)
             return x, force, force
         return x, strokes(self.model, x), _at_rest(self.rendered, self.scheme, x)
 

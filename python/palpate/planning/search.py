@@ -133,10 +133,15 @@ def plan(
             "the model has position and velocity as inputs: it can only be rendered directly, without "
             "coupling, mass and damping"
         )
-    if samples and (model.of_velocity or task.coupling or task.dynamic):
+    if model.memory is not None and (task.coupling or task.dynamic):
         raise InputError(
-            f"predict is {samples}: must be 0 (off) with a coupling, mass, damping or velocity input; a "
-            "prediction is certified only for direct rendering of a force of position"
+            "the model has a memory: it can only be rendered directly, without coupling, mass and damping"
+        )
+    direct_only = model.of_velocity or model.memory is not None
+    if samples and (direct_only or task.coupling or task.dynamic):
+        raise InputError(
+            f"predict is {samples}: must be 0 (off) with a coupling, mass, damping, velocity input or "
+            "memory; a prediction is certified only for direct rendering of a force of position"
         )
     refused: list[str] = []
     chosen: Candidate | None = None

@@ -93,6 +93,20 @@ def hand_for(plan: Plan, device: DeviceProfile) -> Hand:
     )
 
 
+def holding_hand(plan: Plan, position: float) -> Hand:
+    """Returns a simulated hand that pulls the handle to a position and then does not move.
+
+    After the object has relaxed, the handle is at this position.
+    """
+    low, high = plan.model.lower[0], plan.model.upper[0]
+    if not low <= position <= high:
+        raise InputError(f"the held position is {position:g}: must be from {low:g} to {high:g}, the domain")
+    usual = rig_for(plan.model).hand
+    x, _, at_rest = plan.forces_at_rest()
+    target = position + float(np.interp(position, x, at_rest[0])) / usual.stiffness
+    return Hand(stiffness=usual.stiffness, damping=usual.damping, lower=target, upper=target)
+
+
 def simulate(
     plan: Plan,
     device: DeviceProfile,
@@ -229,6 +243,8 @@ def force_range(plan: Plan) -> float:
     if plan.model.of_velocity:
         axes = [np.linspace(low, high, _GRID) for low, high in zip(lower, upper, strict=True)]
         force = plan.model.predict(np.stack([axis.ravel() for axis in np.meshgrid(*axes)], axis=1))
+    elif plan.model.memory is not None:
+        force = plan.model.force(np.linspace(lower[0], upper[0], _GRID))
     else:
         sweep = np.linspace(lower[0], upper[0], _GRID)
         force = force_at(plan, np.concatenate([sweep, sweep[::-1]]))
@@ -324,15 +340,18 @@ def force_at(plan: Plan, position: Float1D, period_s: float | None = None) -> Fl
     position : (n,) array
         Positions of a motion, in order of time [rad or m].
     period_s : float, optional
-        Time between positions [s]; only a force that depends on velocity needs it.
+        Time between positions [s]; only a force that depends on velocity or has a
+        memory needs it.
 
     Returns
     -------
     (n,) array
         Force [N*m or N].
     """
-    if period_s is None and plan.model.of_velocity:
-        raise InputError("period_s is None: must be given for a force that depends on velocity")
+    if period_s is None and (plan.model.of_velocity or plan.model.memory is not None):
+        raise InputError(
+            "period_s is None: must be given for a force that depends on velocity or has a memory"
+        )
     exact = Scheme(structure="direct", play_radius=plan.scheme.play_radius)
     force: Float1D = motion_driven(plan.model, exact, position, period_s or 1.0)["force"]
     return force

@@ -123,24 +123,27 @@ LEAST_LOST_SHARE = 0.05
 """Gaps in time are reported if they are together at least this share of the recording's duration."""
 
 
-def findings_of(recordings: Sequence[Recording], side: Float1D | None = None) -> list[Finding]:
+def findings_of(
+    recordings: Sequence[Recording], side: Float1D | None = None, *, relaxes: bool = False
+) -> list[Finding]:
     """Returns findings on each recording, with its name if there are several, and on all of them together.
 
-    `side` (n,) is the direction of the rows of all recordings if they do not state it.
+    `side` (n,) is the direction of the rows of all recordings if they do not state it. The force of an object
+    that relaxes may change at the same position.
     """
     if len(recordings) == 1:
-        return quality_findings(recordings[0])
+        return quality_findings(recordings[0], relaxes=relaxes)
     found = [
         Finding(finding.level, f"{recording.source.files[0]}: {finding.sentence}")
         if recording.source.files
         else Finding(finding.level, f"recording {number}: {finding.sentence}")
         for number, recording in enumerate(recordings, 1)
-        for finding in quality_findings(recording)
+        for finding in quality_findings(recording, relaxes=relaxes)
     ]
     return [*found, *scale_findings(recordings, side)]
 
 
-def quality_findings(recording: Recording) -> list[Finding]:
+def quality_findings(recording: Recording, *, relaxes: bool = False) -> list[Finding]:
     """Returns findings on a recording as it was read; empty without defects."""
     if len(recording) < MIN_ROWS:
         return []
@@ -152,7 +155,7 @@ def quality_findings(recording: Recording) -> list[Finding]:
         *saturation_findings(recording, travel),
         *hold_findings(recording),
         *gap_findings(recording, travel),
-        *merged_findings(recording, cells),
+        *merged_findings(recording, None if relaxes else cells),
     ]
 
 

@@ -52,7 +52,10 @@ def explanation(model: Model, recording: Recording, prediction: Prediction) -> E
 
     The changes are: the sign of the force, press and release exchanged, the sign of the position, an offset
     of the force, another unit of force or position, an offset of the position, and a factor of the force.
+    None for a model with memory.
     """
+    if model.memory is not None:  # a changed position also changes the forces at later times
+        return None
     index = np.flatnonzero(prediction.rows)
     few = slice(None, None, max(1, -(-len(index) // MOST_ROWS)))
     force, modelled = recording.force[index][few], prediction.force[few]

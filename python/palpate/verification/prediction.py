@@ -49,6 +49,8 @@ class Prediction:
     """(k,) positions at which the force was computed"""
     side: Float1D | None = None
     """(k,) direction state in [-1, 1]; None for a model without hysteresis, or with mass or damping"""
+    over_time: bool = False
+    """True if the force depends on the earlier positions, because the model has a memory"""
 
 
 def predict(model: Model, recording: Recording, *, play_radius: float | None = None) -> Prediction:
@@ -56,7 +58,8 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
 
     For a hysteresis model s = +-1 is the direction of the recording, and rows without direction are left out.
     Without direction, time and play radius, the strokes follow from the order of rows. Without a direction,
-    or with a play radius, the play operator follows the positions in their order. The play radius is the
+    or with a play radius, the play operator follows the positions in their order. A memory follows the
+    positions over the time of the recording, from rest. The play radius is the
     first one available of: `play_radius`, the radius of the flight record, of the model, of its plan, or 1 %
     of the travel. A flight record behind a virtual coupling is compared at the position of the virtual
     object, except a compensated one. A flight record with prediction is compared at the predicted position.
@@ -124,14 +127,26 @@ def _static(model: Model, recording: Recording, play_radius: float | None) -> Pr
             where = "predicted half a sample ahead of the handle"
         notes = (f"The force is compared at the position {where}.",)
     side = None
-    if not model.hysteretic:
+    if model.memory is not None:
+        force = _relaxing(model, recording)
+        notes += ("The object is at rest at the first row.",)
+    elif not model.hysteretic:
         force = model.force(position)
     else:
         state = _state(model, recording, flight, play_radius)
         rows, notes, side = state.known, notes + state.notes, state.side[state.known]
         force = model.force(position[rows], direction=side)
     outside_rows = int(np.count_nonzero(model.extrapolated(position[rows])))
-    return Prediction(rows, force, outside_rows, notes, position[rows], side)
+    return Prediction(
+        rows, force, outside_rows, notes, position[rows], side, over_time=model.memory is not None
+    )
+
+
+def _relaxing(model: Model, recording: Recording) -> Float1D:
+    """Returns the force (n,) of a model with memory over the time of a recording."""
+    if recording.time is None:
+        raise InputError("the recording has no time, which the memory of the model needs: give --time NAME")
+    return model.force_over_time(recording.time, recording.position)[0]
 
 
 @dataclass(frozen=True)

@@ -79,9 +79,11 @@ def uncertainty(model: Model, recordings: Recording | Sequence[Recording]) -> Un
     Raises
     ------
     InputError
-        The model has several inputs, a mass or a damping, or hysteresis while a recording has no direction;
-        or there are not more rows than parameters.
+        The model has several inputs, a mass, a damping or a memory, or hysteresis while a recording has no
+        direction; or there are not more rows than parameters.
     """
+    if model.memory is not None:
+        raise InputError("the model has a memory: standard errors need a force without memory")
     if model.dimension != 1 or model.mass is not None or model.damping is not None:
         raise InputError(
             f"the inputs of the model are {', '.join(model.inputs)}, or it has mass or damping: standard "

@@ -176,7 +176,8 @@ class Verification:
         if residual:
             draw_residual(axes, recording, self.force, band=self.band)
         else:
-            one_curve = self.prediction.side is None or recording.direction is not None
+            one_curve = not self.prediction.over_time
+            one_curve &= self.prediction.side is None or recording.direction is not None
             draw_forces(axes, recording, self.force, one_curve=one_curve)
         return axes
 
@@ -361,7 +362,11 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
             )
         )
     if found.nrmse > USABLE_NRMSE:
-        known = {"velocity": model.of_velocity, "hysteresis": model.hysteretic}
+        known = {
+            "velocity": model.of_velocity,
+            "hysteresis": model.hysteretic,
+            "memory": model.memory is not None,
+        }
         missing = ", ".join(name for name, has in known.items() if not has)
         missing = f"{missing} or another column" if missing else "another column"
         cause = explanation(model, recording, found.prediction)

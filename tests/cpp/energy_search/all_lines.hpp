@@ -11,6 +11,7 @@
 #include "guard_lines.hpp"
 #include "held_lines.hpp"
 #include "line.hpp"
+#include "memory_lines.hpp"
 
 namespace palpate::energy_search {
 
@@ -38,6 +39,7 @@ namespace palpate::energy_search {
         hold("direct, steep shapes", n < 1.1, draw_direct_steep);
         hold("hysteresis", n == 0.0, draw_hysteresis);
         hold("velocity", false, draw_velocity);
+        hold("memory", false, [](R& random, double delay) { return draw_memory(random, delay, false); });
         if (n > 0.0) {
             hold("jitter", false,
                  [](R& random, double delay) { return draw_jitter(random, delay, Shapes::Any); });
@@ -85,6 +87,8 @@ namespace palpate::energy_search {
                  [](R& random, double delay) { return draw_coupled_encoder(random, delay, true); });
         friction("encoder, prediction", false,
                  [](R& random, double delay) { return draw_prediction(random, delay, true); });
+        friction("encoder, memory", false,
+                 [](R& random, double delay) { return draw_memory(random, delay, true); });
         friction("force step", false, draw_force_step);
     }
     return lines;

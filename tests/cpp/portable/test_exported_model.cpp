@@ -101,6 +101,26 @@ TEST_P(ExportedModelOf, EveryRandomModelAndStructureIsWithinItsProvedBounds) {
     }
 }
 
+TEST_P(ExportedModelOf, EveryRandomMemoryIsWithinItsProvedBounds) {
+    Random random{22};
+    for (int k = 0; k < cases(40); ++k) {
+        const Domain domain =
+            test::unit_domain(random() % 2 == 0 ? Continuation::Linear : Continuation::Free);
+        const ForceModel model =
+            ForceModel{test::random_network(random, 1 + random() % 4), domain}.with_memory(
+                test::random_memory(random));
+        const ExportTarget target = random_target(random, GetParam());
+        const ExportedModel exported{model, direct(), target};
+        const ExportCheck check = checked_export(exported, 1000, static_cast<std::uint64_t>(k));
+        ASSERT_TRUE(check.passed()) << k << ": " << check.force << " " << check.slope << " " << check.energy
+                                    << " " << check.step << ", step " << target.encoder_step;
+        EXPECT_LE(exported.step_error(),
+                  (GetParam() == Precision::Single ? 1e-5 : 1e-8) * exported.largest_force())
+            << k;
+        EXPECT_FALSE(exported.step_error_lasts());
+    }
+}
+
 TEST_P(ExportedModelOf, ForceAndSlopeAreAsAccurateAsPromised) {
     Random random{18};
     const bool single = GetParam() == Precision::Single;
@@ -221,6 +241,9 @@ TEST(ExportedModel, OtherStructuresAndModelsAreRefusedWithTheCure) {
     const ForceModel moving = ForceModel::of_velocity(test::random_network(random, 2, 2),
                                                       {{0.0, -1.0}, {1.0, 1.0}, {}, {}, std::nullopt});
     EXPECT_NE(refusal(moving, with(StructureKind::Direct), target).find("--inputs position"),
+              std::string::npos);
+    const ForceModel soft_tissue = position.with_memory({.stiffness = {1.0}, .time_constant_s = {0.5}});
+    EXPECT_NE(refusal(soft_tissue, with(StructureKind::Direct), {1e-3, 0.0}).find("needs the period"),
               std::string::npos);
     // A force that falls more steeply than the load line has several solutions
     const ForceModel falling{NetworkParameters{1, {10.0}, {0.5}, {-1.0}, {0.0}, 0.0}, test::unit_domain()};

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -272,6 +274,75 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
     }
     // With half of the required damping and friction the search finds motions that take energy out
     EXPECT_GE(found, 8);
+}
+
+/// Returns a soft spring with one slow branch of stiffness 4, for which the need of damping is known.
+ForceModel relaxing_model() {
+    MemoryParameters memory;
+    memory.stiffness = {4.0};
+    memory.time_constant_s = {1e3};
+    return ForceModel{{1, {}, {}, {}, {0.5}, 0.0}, {{0.0}, {1.0}, {}, {}, {}}}.with_memory(memory);
+}
+
+TEST(MemoryLines, CountTheSlopeOfASuddenMotion) {
+    const DeviceProfile profile = device(0.0, 1e-3);
+    const Certificate certificate = certify(relaxing_model(), direct_scheme(), profile);
+    ASSERT_EQ(certificate.inequalities.size(), 2U);
+    EXPECT_NEAR(certificate.inequalities[0].right, 4.5 * profile.period_s / 2.0, 1e-12);
+    EXPECT_NEAR(certificate.inequalities[1].right, 8.5 * 1e-3 / 2.0 + 0.5 * profile.force_step, 1e-12);
+    EXPECT_TRUE(certificate.certified());
+    const Certificate late = certify(relaxing_model(), direct_scheme(), device(2.0));
+    EXPECT_NEAR(late.inequalities[0].right,
+                profile.period_s * (4.5 / 2.0 + 2.0 * 4.5 + 3.0 * 4.0 * profile.period_s / 1e3), 1e-12);
+}
+
+TEST(MemoryLines, JitterCanBringOneMoreSampleIntoTheDelay) {
+    DeviceProfile profile = device(2.0);
+    profile.jitter_s = 1e-9;
+    EXPECT_EQ(most_samples_in_delay(device(2.0)), 2.0);
+    EXPECT_EQ(most_samples_in_delay(profile), 3.0);
+    EXPECT_EQ(most_samples_in_delay(device(0.0)), 0.0);
+}
+
+// A handle that moves between two positions in every sample takes energy out at less than the required damping.
+TEST(MemoryLines, AreTightForASlowBranch) {
+    const DeviceProfile profile = device(0.0);
+    const double need = certify(relaxing_model(), direct_scheme(), profile).inequalities[0].right;
+    const auto energy = [&](double damping) {
+        return with_structure(relaxing_model(), direct_scheme(), profile.period_s, 1e9, [&](auto structure) {
+            structure.reset(0.0);
+            double sum = 0.0;
+            double x = 0.0;
+            for (int k = 0; k < 200; ++k) {
+                const double d = (k % 2 == 0 ? 1.0 : -1.0) * 0.1;
+                sum += structure.step(x).force * d + damping / profile.period_s * d * d;
+                x += d;
+            }
+            return sum;
+        });
+    };
+    EXPECT_GE(energy(need), 0.0);
+    EXPECT_LT(energy(0.99 * need), -1e-3);
+}
+
+TEST(MemoryLines, RefuseEverythingButDirectRendering) {
+    const auto refusal = [](const Scheme& scheme) -> std::string {
+        try {
+            (void)certify(relaxing_model(), scheme, device(0.0));
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+        return "";
+    };
+    for (const StructureKind kind : {StructureKind::Massless, StructureKind::Implicit,
+                                     StructureKind::Explicit, StructureKind::EnergyConsistent}) {
+        Scheme scheme;
+        scheme.structure = kind;
+        EXPECT_NE(refusal(scheme).find("must be direct: only the direct structure"), std::string::npos);
+    }
+    Scheme predicted = direct_scheme();
+    predicted.predict = 2;
+    EXPECT_EQ(refusal(predicted), "predict is 2, must be 0 for a force with memory");
 }
 
 }  // namespace

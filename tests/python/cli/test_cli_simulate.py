@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models_by_hand import keyswitch_by_hand, model_by_hand
+from models_by_hand import keyswitch_by_hand, model_by_hand, relaxing_by_hand
 from palpate import Recording, _core, load_model, read_recording, simulate
 from palpate._core.device import DeviceProfile
 from palpate._core.rendering import Scheme
@@ -52,6 +52,22 @@ def test_the_rendered_recording_is_written_and_its_errors_are_printed(
     assert "wrote r.png\n" in captured.err
     assert len(read_recording("r.csv")) == 500
     assert Path("r.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_held_hand_feels_the_relaxation_of_a_memory(folder: Path) -> None:
+    relaxing_by_hand().save("soft.json")
+    assert main(["simulate", "soft.json", "--hold-at", "0.5", "-o", "held.csv"]) == 0
+    held = read_recording("held.csv")
+    assert held.force[100] > 1.7 * held.force[-1]
+    assert held.force[-1] == pytest.approx(1.0, rel=0.01)
+    assert held.position[-1] == pytest.approx(0.5, rel=0.01)
+
+
+def test_a_held_position_outside_the_domain_is_refused(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", "m.json", "--hold-at", "0.7"]) == 2
+    assert "the held position is 0.7: must be from 0 to 0.5, the domain" in capsys.readouterr().err
 
 
 def test_json_names_the_structure_and_its_errors(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

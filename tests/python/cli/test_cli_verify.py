@@ -98,7 +98,7 @@ def test_the_named_cause_is_not_an_input_that_the_model_has(
     main(["verify", "key.json", "other.csv"])
     printed = " ".join(capsys.readouterr().out.split())
     assert "its zero position is not the same" in printed
-    assert "such as velocity or another column" in printed
+    assert "such as velocity, memory or another column" in printed
 
 
 def test_json_is_one_object_with_the_fields_of_the_contract(

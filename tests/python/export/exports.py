@@ -8,7 +8,7 @@ import numpy as np
 from bench.portable.programs import FOLDER
 
 from palpate import Model
-from palpate._core.model import fingerprint
+from palpate._core.model import Memory, fingerprint
 from palpate._core.portable import ExportedModel
 from palpate._core.rendering import Scheme
 from palpate.export import Exported
@@ -16,6 +16,16 @@ from palpate.export.c_header import header_text
 from palpate.export.exported import units_of
 
 RATE_HZ = 1000
+
+MEMORY = Memory(
+    alpha=[5.0],
+    beta=[0.2],
+    weight=[0.3],
+    linear=-1.0,
+    bias=1.0,
+    stiffness=[3.0, 2.0],
+    time_constant_s=[0.02, 1.0],
+)
 
 KINDS: dict[str, dict[str, Any]] = {
     "position": {},
@@ -37,6 +47,8 @@ KINDS: dict[str, dict[str, Any]] = {
         "model": {"period": 0.5, "linear": [0.0]},
         "scheme": {"structure": "massless", "coupling_stiffness": 600.0, "coupling_damping": 0.2},
     },
+    "memory": {"model": {"memory": MEMORY}},
+    "free_memory": {"model": {"memory": MEMORY, "below": "free"}},
 }  # fmt: skip
 """Every combination of the parts of a header at least once: name -> changes of model and scheme."""
 

@@ -130,6 +130,33 @@ inline Domain read_domain(const JsonField& file, std::size_t d) {
     return read;
 }
 
+/// Reads the key `memory` of a model file: the ratio, a network of one input, and the branches.
+inline MemoryParameters read_memory(const JsonField& memory) {
+    memory.require_keys({"alpha", "beta", "weight", "linear", "bias", "stiffness", "time_constant_s"});
+    MemoryParameters read;
+    for (const JsonField& item : memory["alpha"].items()) {
+        read.ratio.alpha.push_back(item.positive());
+    }
+    read.ratio.beta = memory["beta"].numbers();
+    read.ratio.weight = memory["weight"].numbers();
+    read.ratio.linear = {memory["linear"].number()};
+    read.ratio.bias = memory["bias"].number();
+    const std::size_t n = read.ratio.alpha.size();
+    memory["beta"].require_length(n, "one for each wavelet of alpha");
+    memory["weight"].require_length(n, "one for each wavelet of alpha");
+    for (const JsonField& item : memory["stiffness"].items()) {
+        read.stiffness.push_back(item.not_negative());
+    }
+    for (const JsonField& item : memory["time_constant_s"].items()) {
+        read.time_constant_s.push_back(item.positive());
+    }
+    const std::size_t branches = read.stiffness.size();
+    memory["stiffness"].require(branches >= 1 && branches <= most_branches,
+                                "a list of 1 to " + std::to_string(most_branches) + " numbers");
+    memory["time_constant_s"].require_length(branches, "one for each branch");
+    return read;
+}
+
 /// Returns the model with the wavelet network at `network`, which is the identified network or the network of the plan.
 /// Domain and kind of the model are those in `file`.
 inline ForceModel read_network(const JsonField& network, const JsonField& file) {
@@ -153,17 +180,26 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
                               hysteresis.is_null() ? "null, because weight_hysteresis is null"
                                                    : "given, because weight_hysteresis is given");
     }
-    const std::string kind = file["kind"].one_of({"position", "hysteresis", "position_velocity", "general"});
+    const std::string kind =
+        file["kind"].one_of({"position", "hysteresis", "memory", "position_velocity", "general"});
     file["kind"].require(kind != "hysteresis" || !hysteresis.is_null(),
                          "another kind: weight_hysteresis is null");
-    file["kind"].require(kind != "position" || hysteresis.is_null(),
+    file["kind"].require((kind != "position" && kind != "memory") || hysteresis.is_null(),
                          "hysteresis: weight_hysteresis is given");
+    const bool remembers = file.value().contains("memory");
+    file["kind"].require((kind == "memory") == remembers,
+                         remembers ? "memory: memory is given" : "another kind: memory is not given");
+    network["dimension"].require(!remembers || d == 1, "1 in a model with memory");
     const JsonField radius = file["play_radius"];
     const std::optional<double> play_radius =
         radius.is_null() ? std::nullopt : std::optional{radius.positive()};
     radius.require(radius.is_null() || !hysteresis.is_null(), "null in a model without hysteresis");
     network["dimension"].require(hysteresis.is_null() || d == 1, "1 in a model with hysteresis");
     const Domain domain = read_domain(file, d);
+    if (remembers) {
+        file["continuation"]["period"].require(!domain.period, "null in a model with memory");
+        return ForceModel{read, domain}.with_memory(read_memory(file["memory"]));
+    }
     if (hysteresis.is_null()) {
         return kind == "position_velocity" && d == 2 ? ForceModel::of_velocity(read, domain)
                                                      : ForceModel{read, domain};
@@ -206,10 +242,11 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     const detail::JsonField version = file["version"];
     version.require(version.value().is_number_integer() && version.number() == 1.0,
                     "1, the version that this palpate reads");
-    file.require_keys({"format", "version", "created_by", "kind", "units", "inputs", "network", "play_radius",
-                       "mass", "damping", "domain", "continuation", "slope_bounds", "data", "fit", "band",
-                       "plan", "certificate", "notes"},
-                      "; put keys of your own under notes");
+    file.require_keys(
+        {"format", "version",     "created_by", "kind",    "units",       "inputs",       "network",
+         "memory", "play_radius", "mass",       "damping", "domain",      "continuation", "slope_bounds",
+         "data",   "fit",         "band",       "plan",    "certificate", "notes"},
+        "; put keys of your own under notes");
     (void)file["format"].one_of({"palpate-model"});
     (void)file["created_by"].string();
     const detail::JsonField units = file["units"];

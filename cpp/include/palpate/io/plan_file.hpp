@@ -93,6 +93,7 @@ inline void require_given(const JsonField& field, bool used, const char* structu
                                     "the unit of the model's position");
     read.bounds = file["bounds"].as<ForceBounds>();
     read.bounds.hysteresis = model.hysteresis() != nullptr;
+    read.bounds.memory = memory_bounds(model);
     for (const JsonField& line : file["inequalities"].items()) {
         read.inequalities.push_back(line.as<Inequality>());
     }

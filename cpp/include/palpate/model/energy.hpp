@@ -184,6 +184,9 @@ template <class At>
         range.largest +=
             0.5 * pair->play_radius() * std::max(0.0, pair->hysteresis_force().value_bounds().upper);
     }
+    if (const MemoryNetwork* memory = model.memory()) {
+        range.largest += memory->largest_energy();
+    }
     if (force.periodic()) {
         if (std::abs(energy.at_upper - energy.at_lower) > 1e-9 * (range.largest - range.least)) {
             range.least = -std::numeric_limits<double>::infinity();

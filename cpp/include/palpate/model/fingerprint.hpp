@@ -54,7 +54,7 @@ class NumberHash {
 }  // namespace detail
 
 /// Returns 16 hexadecimal digits that change with every number of a model's force: network, domain, continuation, play
-/// radius. The digits distinguish an edited model from the certified model; they are not a signature.
+/// radius, memory. The digits distinguish an edited model from the certified model; they are not a signature.
 [[nodiscard]] inline std::string fingerprint(const ForceModel& model) {
     detail::NumberHash hash;
     const NetworkParameters& network = model.parameters();
@@ -80,6 +80,16 @@ class NumberHash {
     if (model.velocity() != nullptr) {
         // A model of position and velocity gets another hash than a model of two positions with the same parameters
         hash.add(std::uint64_t{1});
+    }
+    if (const MemoryNetwork* memory = model.memory()) {
+        const MemoryParameters& parameters = memory->parameters();
+        hash.add(parameters.ratio.alpha);
+        hash.add(parameters.ratio.beta);
+        hash.add(parameters.ratio.weight);
+        hash.add(parameters.ratio.linear);
+        hash.add(parameters.ratio.bias);
+        hash.add(parameters.stiffness);
+        hash.add(parameters.time_constant_s);
     }
     return hash.text();
 }

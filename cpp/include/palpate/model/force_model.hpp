@@ -10,6 +10,7 @@
 
 #include "palpate/fields/readable.hpp"
 #include "palpate/model/hysteresis.hpp"
+#include "palpate/model/memory.hpp"
 #include "palpate/model/network.hpp"
 #include "palpate/model/radial_network.hpp"
 #include "palpate/model/velocity_network.hpp"
@@ -55,6 +56,9 @@ class ForceModel {
     [[nodiscard]] const RadialNetwork* radial() const noexcept {
         return velocity() != nullptr ? &velocity()->network() : std::get_if<RadialNetwork>(&kind_);
     }
+    /// Returns the memory of a force of position, or null if the model has no memory. `network` is then the force at
+    /// rest.
+    [[nodiscard]] const MemoryNetwork* memory() const noexcept { return memory_ ? &*memory_ : nullptr; }
     /// Returns the play radius [m], or nothing if the model was identified without a play radius.
     [[nodiscard]] std::optional<double> play_radius() const noexcept { return play_radius_; }
 
@@ -71,8 +75,8 @@ class ForceModel {
         return hysteresis() != nullptr ? hysteresis()->domain() : radial()->domain();
     }
 
-    /// Returns proved bounds of the slope of the force inside the domain [N/m], for press and release, and at velocity
-    /// zero. With a play radius r and h >= 0, the bounds also hold during the motion after a reversal that changes
+    /// Returns proved bounds of the slope of the force inside the domain [N/m], for press and release, at velocity zero,
+    /// and at rest. With a play radius r and h >= 0, the bounds also hold during the motion after a reversal that changes
     /// press force to release force, which adds h / r (hysteresis / play radius) to the slope. Throws
     /// std::invalid_argument for models that cannot be rendered (`require_renderable`).
     [[nodiscard]] Interval slope_bounds(std::optional<double> radius = std::nullopt) const {
@@ -111,7 +115,17 @@ class ForceModel {
 
     /// Returns the smallest width of a wavelet along the position [m], at most the length of the domain.
     [[nodiscard]] double finest_width() const noexcept {
-        return palpate::finest_width(parameters(), domain().upper[0] - domain().lower[0]);
+        const double width = palpate::finest_width(parameters(), domain().upper[0] - domain().lower[0]);
+        return memory_ ? memory_->finest_width(width) : width;
+    }
+
+    /// Returns a copy of a force of position without hysteresis, with this memory. The force becomes the force at rest.
+    [[nodiscard]] ForceModel with_memory(MemoryParameters parameters) const {
+        detail::require(network() != nullptr,
+                        "only a force of position without hysteresis can have a memory");
+        ForceModel model = *this;
+        model.memory_.emplace(std::move(parameters), network()->curve(), domain());
+        return model;
     }
 
     /// Returns a copy of the model with this play radius [m]. A model without hysteresis is copied unchanged.
@@ -146,6 +160,7 @@ class ForceModel {
 
     Kind kind_;
     std::optional<double> play_radius_;
+    std::optional<MemoryNetwork> memory_;
 };
 
 /// Throws std::invalid_argument unless the model is a force of position, with or without hysteresis or velocity. Models

@@ -44,6 +44,9 @@ class ExportComparison {
     /// Compares at the counts at both sides of every cell border, at both ends of the domain and of the integers, and at
     /// random counts.
     [[nodiscard]] ExportCheck run(std::size_t random_counts) {
+        if (model_.model().memory() != nullptr) {
+            return run_memory(random_counts);
+        }
         for (const std::int32_t count : notable_counts()) {
             compare_at(count);
         }
@@ -96,6 +99,60 @@ class ExportComparison {
     /// Returns the additional error that rounding of a distant position causes in the core too.
     [[nodiscard]] double far_away(double x) const noexcept {
         return model_.periodic() ? 8.0 * 0x1p-53 * std::abs(x) : 0.0;
+    }
+
+    /// Compares single ticks of a memory from the same states: at the borders of the cells, at random counts and along
+    /// a random motion.
+    [[nodiscard]] ExportCheck run_memory(std::size_t random_counts) {
+        const MemoryNetwork& memory = *model_.model().memory();
+        const MemoryForce<NetworkCurve> law{model_.model().network()->curve(), memory.ratio(), memory,
+                                            model_.target().period_s, model_.target().force_limit};
+        const double step = model_.target().encoder_step;
+        auto state = law.start(0.0);
+        const auto tick = [&](std::int32_t count) {
+            compare_tick(law, state, count);
+            law.advance(count * step, state);
+            ++check_.places;
+        };
+        for (const std::int32_t count : notable_counts()) {
+            tick(any_count());
+            tick(count);
+        }
+        const double travel = model_.law().grid().last_count - model_.law().grid().first_count;
+        double place = 0.5 * travel + model_.law().grid().first_count;
+        for (std::size_t k = 0; k < random_counts; ++k) {
+            place += std::uniform_real_distribution<double>{-1.0, 1.0}(random_) * 0.02 * travel;
+            place = std::clamp(place, model_.law().grid().first_count - 0.2 * travel,
+                               model_.law().grid().last_count + 0.2 * travel);
+            tick(k % 2 == 0 ? static_cast<std::int32_t>(place) : any_count());
+        }
+        return check_;
+    }
+
+    template <class Law>
+    void compare_tick(const Law& law, const typename Law::State& state, std::int32_t count) {
+        ExportedState<Real> exported;
+        exported.coordinate = state.coordinate;
+        exported.stretch = state.stretch;
+        const EnvironmentSample right = law.at(count * model_.target().encoder_step, state);
+        const auto found = exported_.force_slope(exported, count);
+        const double energy = exported_.energy(exported, count);
+        double outside = 0.0;
+        if (right.extrapolated) {
+            outside = 2.0 * at_ends_;
+            for (const ResponseCurve& curve : model_.law().curves()) {
+                outside += std::abs(curve.curve().at(count * model_.target().encoder_step).value);
+            }
+            outside *= 16.0 * unit_roundoff(model_.target().precision);
+        }
+        add(check_.force, found.force - right.force, model_.force_error() + outside);
+        add(check_.step, exported_.step(exported, count) - right.force, model_.step_error() + outside);
+        if (right.extrapolated || right.slope == 0.0 || found.slope == Real{0}) {
+            return;  // at a limit rounding decides by which factor the stretches are reduced
+        }
+        add(check_.slope, found.slope - right.slope, model_.slope_error());
+        add(check_.energy, energy - right.energy,
+            model_.energy_error() + 8.0 * unit_roundoff(model_.target().precision) * std::abs(right.energy));
     }
 
     void compare_at(std::int32_t count) {

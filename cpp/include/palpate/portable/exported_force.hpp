@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -23,6 +24,8 @@ struct ExportedState {
     std::uint32_t sum = 0;     ///< sum of the past counts, modulo 2^32
     std::uint32_t oldest = 0;  ///< index of the oldest past position
     Real lag = 0;              ///< lag of the object behind the device, x - y [counts or m]
+    double coordinate = 0.0;   ///< coordinate u of the branches at the last tick
+    std::array<double, most_branches> stretch{};  ///< stretch e_j of each branch
 };
 
 /// Evaluates an exported model with the arithmetic of the exported header: the same operations on the same numbers, in
@@ -48,11 +51,17 @@ class ExportedForce {
         state.past_counts.fill(count);
         state.past.fill(position(count));
         state.sum = static_cast<std::uint32_t>(taps()) * static_cast<std::uint32_t>(count);
+        if (model_.memory()) {
+            double unused = 0.0;
+            integrals(1, position(count), state.coordinate, unused);
+        }
         return state;
     }
 
     void advance(State& state, std::int32_t count) const noexcept {
-        if (model_.hysteretic()) {
+        if (model_.memory()) {
+            (void)relaxed(state, count);
+        } else if (model_.hysteretic()) {
             if constexpr (single) {
                 (void)moved(state, count);
             } else {
@@ -62,6 +71,10 @@ class ExportedForce {
     }
 
     [[nodiscard]] Sample force_slope(const State& state, std::int32_t count) const noexcept {
+        if (model_.memory()) {
+            State moved = state;
+            return relaxed(moved, count);
+        }
         if constexpr (single) {
             Real s = model_.hysteretic() ? direction(state, count) : Real{0};
             const bool sticks = s <= Real{1} && s >= Real{-1};
@@ -81,6 +94,13 @@ class ExportedForce {
         double first = 0.0;
         double second = 0.0;
         integrals(0, x, first, second);
+        if (model_.memory()) {
+            State moved = state;
+            (void)relaxed(moved, count);
+            for (std::size_t j = 0; j < model_.memory()->stiffness.size(); ++j) {
+                first += 0.5 * model_.memory()->stiffness[j] * moved.stretch[j] * moved.stretch[j];
+            }
+        }
         if (!model_.hysteretic()) {
             return static_cast<Real>(first);
         }
@@ -104,6 +124,9 @@ class ExportedForce {
             }
         }
         const Real limit = static_cast<Real>(model_.target().force_limit);
+        if (model_.memory()) {
+            return limited(relaxed(state, count).force, limit);
+        }
         if (model_.massless()) {
             return limited_step(state, count, limit);
         }
@@ -130,6 +153,47 @@ class ExportedForce {
 
     [[nodiscard]] static Real limited(Real value, Real limit) noexcept {
         return value > limit ? limit : value < -limit ? -limit : value;
+    }
+
+    /// Moves the branches by one tick to a count and returns force and slope, as `MemoryForce` does. The tables have the
+    /// number type of the export, the branches are doubles.
+    [[nodiscard]] Sample relaxed(State& state, std::int32_t count) const noexcept {
+        const ExportedMemory& memory = *model_.memory();
+        const double limit = model_.target().force_limit;
+        Place at;
+        if constexpr (single) {
+            at = place(model_.law(), count);
+        } else {
+            at = place(model_.law(), position(count));
+        }
+        const Sample g = value(model_.law(), model_.lines()[0], at, 0);
+        const Sample p = value(model_.law(), model_.lines()[1], at, 1);
+        double coordinate = 0.0;
+        double sum = 0.0;
+        integrals(1, position(count), coordinate, sum);
+        const double moved = coordinate - state.coordinate;
+        state.coordinate = coordinate;
+        sum = 0.0;
+        for (std::size_t j = 0; j < memory.stiffness.size(); ++j) {
+            const double stretch = memory.kept[j] * (state.stretch[j] + moved);
+            state.stretch[j] = std::clamp(stretch, -memory.largest_stretch, memory.largest_stretch);
+            sum += memory.stiffness[j] * state.stretch[j];
+        }
+        const double ratio = static_cast<double>(p.force);
+        const double rest = std::clamp(static_cast<double>(g.force), -limit, limit);
+        const double least = memory.contact ? std::min(rest, 0.0) : -limit;
+        const double unlimited = rest + ratio * sum;
+        const double force = std::clamp(unlimited, least, limit);
+        if (force == unlimited) {
+            const double slope = static_cast<double>(g.slope) + static_cast<double>(p.slope) * sum +
+                                 ratio * ratio * memory.sudden;
+            return {static_cast<Real>(force), static_cast<Real>(slope)};
+        }
+        const double factor = std::clamp((force - rest) / (unlimited - rest), 0.0, 1.0);
+        for (std::size_t j = 0; j < memory.stiffness.size(); ++j) {
+            state.stretch[j] *= factor;
+        }
+        return {static_cast<Real>(force), Real{0}};
     }
 
     /// Returns the direction state s after a motion to a count, without its limits -1 and 1.

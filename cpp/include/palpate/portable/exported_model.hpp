@@ -50,17 +50,29 @@ struct ExportedLag {
     double compliance = 0.0;  ///< 1 / p [m/N]; in single precision [counts/N]
 };
 
+/// Numbers of the branches of a model with memory, in the units in which the largest force of the branches along their
+/// coordinate is 1. The second curve of the table is the ratio, which is then a force too.
+struct ExportedMemory {
+    std::vector<double> stiffness;  ///< k_j of each branch
+    std::vector<double> kept;       ///< share of a stretch that is left after a period at rest [-]
+    double largest_stretch = 0.0;   ///< bound of |e_j|
+    double sudden = 0.0;            ///< sum of the stiffnesses for a motion within one period
+    bool contact = false;           ///< true if the branches do not pull the tool
+};
+
 /// A model as tables and numbers for a program in C without a library: the force law, and the structure of a plan.
 ///
-/// Exported are forces of position, with or without hysteresis, with the direct structure (and its prediction) or,
-/// without hysteresis, with the massless structure. Everything else is refused.
+/// Exported are forces of position, with or without hysteresis or memory, with the direct structure (and its
+/// prediction) or, without hysteresis and memory, with the massless structure. Everything else is refused.
 class ExportedModel {
   public:
     ExportedModel(const ForceModel& given, const Scheme& scheme, const ExportTarget& target)
-        : model_{scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given},
+        : model_{in_units_of_force(scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius)
+                                                            : given)},
           scheme_{used_part(scheme)},
           target_{target},
           law_{(require_exportable(given, scheme, target), make_law())},
+          memory_{make_memory()},
           response_{make_response()} {
         for (const ResponseCurve& curve : law_.curves()) {
             lines_.push_back({line(curve.below(), law_.grid(), -1.0), line(curve.above(), law_.grid(), 1.0)});
@@ -90,6 +102,8 @@ class ExportedModel {
         return response_lines_;
     }
     [[nodiscard]] const ExportedLag& lag() const noexcept { return lag_; }
+    /// Returns the branches of a model with memory.
+    [[nodiscard]] const std::optional<ExportedMemory>& memory() const noexcept { return memory_; }
     /// Returns the play radius [m]; 0 without hysteresis.
     [[nodiscard]] double play_radius() const noexcept {
         return hysteretic() ? model_.hysteresis()->play_radius() : 0.0;
@@ -113,6 +127,10 @@ class ExportedModel {
         if (hysteretic()) {
             slope = std::max(slope, law_.curves()[1].largest_samples()[0] / play_radius());
         }
+        if (memory_) {
+            const double ratio = law_.curves()[1].largest_samples()[0];
+            slope += ratio * ratio * memory_->sudden;
+        }
         return slope;
     }
 
@@ -124,6 +142,9 @@ class ExportedModel {
             refuse(
                 "the force depends on velocity, which is not exported: identify the model with --inputs "
                 "position");
+        }
+        if (model.memory() != nullptr && !(target.period_s > 0.0)) {
+            refuse("the memory of the force needs the period of a device: plan the model for a device");
         }
         if (model.radial() != nullptr) {
             refuse("the model has " + std::to_string(model.parameters().dimension) +
@@ -157,6 +178,41 @@ class ExportedModel {
         }
     }
 
+    /// Returns the same model with a ratio in units of force, so that both curves of the table are forces.
+    [[nodiscard]] static ForceModel in_units_of_force(const ForceModel& given) {
+        if (given.memory() == nullptr) {
+            return given;
+        }
+        const double unit = given.memory()->stiffness() * given.memory()->largest_stretch();
+        if (!(unit > 0.0 && std::isfinite(unit))) {
+            return given;
+        }
+        MemoryParameters scaled = given.memory()->parameters();
+        for (double& weight : scaled.ratio.weight) {
+            weight *= unit;
+        }
+        scaled.ratio.linear[0] *= unit;
+        scaled.ratio.bias *= unit;
+        for (double& stiffness : scaled.stiffness) {
+            stiffness /= unit * unit;
+        }
+        return given.with_memory(std::move(scaled));
+    }
+
+    [[nodiscard]] std::optional<ExportedMemory> make_memory() const {
+        const MemoryNetwork* memory = model_.memory();
+        if (memory == nullptr) {
+            return std::nullopt;
+        }
+        ExportedMemory made{
+            memory->parameters().stiffness, {}, memory->largest_stretch(), 0.0, memory->contact()};
+        for (std::size_t j = 0; j < made.stiffness.size(); ++j) {
+            made.kept.push_back(1.0 / (1.0 + target_.period_s / memory->parameters().time_constant_s[j]));
+            made.sudden += made.stiffness[j] * made.kept[j];
+        }
+        return made;
+    }
+
     [[nodiscard]] CellTable make_law() const {
         std::vector<ResponseCurve> curves;
         if (const HysteresisNetwork* both = model_.hysteresis()) {
@@ -164,6 +220,9 @@ class ExportedModel {
             curves.emplace_back(both->hysteresis_force(), 0.0);
         } else {
             curves.emplace_back(model_.network()->curve(), 0.0);
+        }
+        if (model_.memory() != nullptr) {
+            curves.emplace_back(model_.memory()->ratio(), 0.0);
         }
         return smallest_table(curves, target_.encoder_step, scheme_.predict > 0, target_.precision);
     }
@@ -219,9 +278,13 @@ class ExportedModel {
             energy_error_ += h.integral * (1.0 + 0.5 * law_.widest() / r) + 16.0 * u * r * h.largest;
             energy += largest_integral(1) + largest_integral(2) / r;
         }
+        if (memory_) {
+            energy += add_memory_errors(u);
+        }
         energy_error_ += (64.0 * 0x1p-53) * energy + 2.0 * u * energy;
         force_error_ = std::max(force_error_, at_ends);
         step_error_ = force_error_;
+        step_error_lasts_ = !memory_;
         if (response_) {
             bound_lag(u);
         }
@@ -236,6 +299,29 @@ class ExportedModel {
             largest = std::max(largest, std::abs(law_.integrals()[k]));
         }
         return largest + law_.errors()[which == 0 ? 0 : 1].largest * law_.widest();
+    }
+
+    /// Adds the errors of the branches in one tick from the same state, and returns a bound of their energy. The
+    /// coordinate has the errors of two antiderivatives of the ratio. Branches and limits are computed with doubles.
+    [[nodiscard]] double add_memory_errors(double u) {
+        const CurveErrors& g = law_.errors()[0];
+        const CurveErrors& p = law_.errors()[1];
+        const ExportedMemory& memory = *memory_;
+        double stiffness = 0.0;
+        for (const double k : memory.stiffness) {
+            stiffness += k;
+        }
+        const double size = largest_integral(1) + memory.largest_stretch;
+        const double of_stretch = 2.0 * (p.integral + 64.0 * 0x1p-53 * size);
+        const double sum = stiffness * memory.largest_stretch;
+        force_error_ +=
+            p.value * sum + p.largest * stiffness * of_stretch + 4.0 * u * (g.largest + p.largest);
+        slope_error_ += p.slope * sum + p.steepest * stiffness * of_stretch +
+                        (2.0 * p.largest + p.value) * p.value * memory.sudden +
+                        8.0 * u * (g.steepest + p.steepest + p.largest * p.largest * memory.sudden);
+        const double energy = 0.5 * sum * memory.largest_stretch;
+        energy_error_ += stiffness * (memory.largest_stretch + 0.5 * of_stretch) * of_stretch;
+        return energy;
     }
 
     /// Computes the error of a massless step. The lag e_k = memory e + F(x - memory e) / p changes by at most the factor
@@ -272,6 +358,7 @@ class ExportedModel {
     ExportTarget target_;
     ExportedLag lag_;
     CellTable law_;
+    std::optional<ExportedMemory> memory_;
     std::optional<CellTable> response_;
     std::vector<std::array<ExportedLine, 2>> lines_;
     std::array<ExportedLine, 2> response_lines_{};

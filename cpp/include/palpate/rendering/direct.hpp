@@ -24,15 +24,27 @@ class Direct {
 
     /// Returns the force at the measured position.
     [[nodiscard]] Rendered step(double position) noexcept {
-        const EnvironmentSample sample = environment_.at(position, state_);
+        typename E::State state = state_;
+        const EnvironmentSample sample = moved(position, state);
         if (!std::isfinite(position) || !std::isfinite(sample.force)) {
             return detail::refused(position);
         }
-        environment_.advance(position, state_);
+        state_ = state;
         return {sample.force, position, 1, Status::Ok, sample.extrapolated};
     }
 
   private:
+    /// Moves the state to this position and returns the sample there. `move` computes both at once.
+    [[nodiscard]] EnvironmentSample moved(double position, typename E::State& state) const noexcept {
+        if constexpr (requires { environment_.move(position, state); }) {
+            return environment_.move(position, state);
+        } else {
+            const EnvironmentSample sample = environment_.at(position, state);
+            environment_.advance(position, state);
+            return sample;
+        }
+    }
+
     E environment_;
     typename E::State state_;
 };

@@ -42,8 +42,8 @@ inline constexpr double force_reserve = 1.05;
                                          : model.network()->at(position, {}).force;
 }
 
-/// Returns the largest absolute force of a model at 1001 positions of its domain, in both directions [N or N*m]; 1 if
-/// all forces are 0.
+/// Returns the largest absolute force of a model at 1001 positions of its domain, in both directions, plus the largest
+/// force of its memory [N or N*m]; 1 if all forces are 0.
 [[nodiscard]] inline double largest_force(const ForceModel& model) noexcept {
     const double lower = model.domain().lower[0];
     const double step = (model.domain().upper[0] - lower) / 1000.0;
@@ -52,6 +52,9 @@ inline constexpr double force_reserve = 1.05;
         for (const double direction : {-1.0, 1.0}) {
             largest = std::max(largest, std::abs(sliding_force(model, lower + k * step, direction)));
         }
+    }
+    if (const MemoryNetwork* memory = model.memory()) {
+        largest += memory->stiffness() * memory->largest_ratio() * memory->largest_stretch();
     }
     return largest > 0.0 ? largest : 1.0;
 }
@@ -131,7 +134,8 @@ inline constexpr auto fields_of<SchemeChoices> =
 [[nodiscard]] inline Scheme scheme_for(const ForceModel& model, const ModelScale& scale,
                                        const DeviceProfile& device, const SchemeChoices& chosen = {}) {
     const Scheme standard;
-    const bool is_direct = model.velocity() != nullptr || chosen.predict.value_or(0) > 0;
+    const bool is_direct =
+        model.velocity() != nullptr || model.memory() != nullptr || chosen.predict.value_or(0) > 0;
     return {chosen.structure.value_or(is_direct ? StructureKind::Direct : standard.structure),
             {chosen.coupling_stiffness.value_or(standard.coupling.stiffness * scale.stiffness()),
              chosen.coupling_damping.value_or(standard.coupling.damping * scale.stiffness())},

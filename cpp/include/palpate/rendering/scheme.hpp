@@ -74,6 +74,9 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
         model.velocity() == nullptr || traits.velocity,
         "structure is " + structure +
             ", must be direct: only the direct structure can render a force of position and velocity");
+    detail::require(model.memory() == nullptr || scheme.structure == StructureKind::Direct,
+                    "structure is " + structure +
+                        ", must be direct: only the direct structure can render a force with memory");
     if (traits.coupling) {
         check_fields(scheme.coupling, "coupling_");
     }
@@ -88,6 +91,8 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
                     predict + ", must be 0 for the structure " + structure);
     detail::require(scheme.predict == 0 || model.velocity() == nullptr,
                     predict + ", must be 0 for a force of position and velocity");
+    detail::require(scheme.predict == 0 || model.memory() == nullptr,
+                    predict + ", must be 0 for a force with memory");
     detail::require(satisfies(scheme.play_radius, Rule::NotNegative),
                     "play_radius is " + readable(scheme.play_radius) + ", must be >= 0");
     detail::require(!model.hysteresis() || model.play_radius() || scheme.play_radius > 0.0,
@@ -139,14 +144,21 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
 ///
 /// `force_limit` is the force limit of the device [N or N*m], infinity without a limit. The massless, implicit and
 /// energy-consistent structures include the limit in their solution, so that object and device receive the same force.
-/// The direct and the explicit structure ignore `force_limit`: the guards clip their force, and the stability bound of
-/// the explicit structure holds only for forces below the limit.
+/// A force with memory keeps the limit itself. The direct and the explicit structure otherwise ignore `force_limit`: the
+/// guards clip their force, and the stability bound of the explicit structure holds only for forces below the limit.
 template <class Visitor>
 auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s, double force_limit,
                     Visitor visit) {
     validate(scheme, given);
     if (const VelocityNetwork* force = given.velocity()) {
         return visit(DirectVelocity{*force, period_s});
+    }
+    if (const MemoryNetwork* memory = given.memory()) {
+        // Also a constant ratio gets a table, which is faster than the exact continuation
+        const CompileOptions always{.fewest_wavelets = 0};
+        return visit(
+            Direct{MemoryForce{CompiledCurve{given.network()->curve(), always},
+                               CompiledCurve{memory->ratio(), always}, *memory, period_s, force_limit}});
     }
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
     const StructureNumbers numbers{scheme.coupling, scheme.inertia, scheme.predict,

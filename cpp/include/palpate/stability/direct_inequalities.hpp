@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -138,7 +139,41 @@ namespace detail {
                                         "L_x Delta / 2 + B_v Delta / T")};
 }
 
-/// Returns the inequalities of the direct structure for the kind of the force: of velocity, with hysteresis, or static.
+/// Returns the largest number of samples that the device takes while a command is on its way. With jitter the samples
+/// can be closer than the period.
+[[nodiscard]] inline double most_samples_in_delay(const DeviceProfile& device) noexcept {
+    const int late = device.late_samples();
+    if (late == 0 || device.jitter_s == 0.0) {
+        return late;
+    }
+    return std::floor((device.delay_s + device.jitter_s) / device.period_s + 1e-9) + 1.0;
+}
+
+/// Returns the inequalities of direct rendering of a force with memory. M_g and L_g are the bounds M and L of the force
+/// at rest. The encoder step Delta increases the largest stretch U of a branch by P Delta. With n samples of delay, the
+/// force of the branches also changes by their relaxation.
+[[nodiscard]] inline std::vector<Inequality> memory_inequalities(const ForceBounds& bounds,
+                                                                 const DeviceProfile& device) {
+    const MemoryBounds& memory = *bounds.memory;
+    const double bending = memory.bending + device.encoder_step * memory.bending_per_m;
+    const double rising = bounds.rising() + memory.stiffness + bending;
+    const double steepest = bounds.steepest + memory.stiffness + bending;
+    const double n = most_samples_in_delay(device);
+    const double relaxation = device.longest_period_s() * memory.relaxation_per_s;
+    const double late = n > 0.0 ? n * steepest + (1.0 + 0.5 * n * n) * relaxation : 0.0;
+    const double encoder = steepest + memory.stiffness + (n > 0.0 ? 2.0 * n * (steepest + relaxation) : 0.0);
+    return {
+        {"damping-hold", n > 0.0 ? "viscous damping against hold and delay" : "viscous damping against hold",
+         n > 0.0 ? "b >= T (M / 2 + n L + (1 + n^2 / 2) R)" : "b >= T (M_g + K (P^2 + U P')) / 2",
+         device.viscous_damping, device.longest_period_s() * (0.5 * rising + late), Basis::Proved,
+         "docs/certificate.md"},
+        detail::friction_inequality(device, encoder, bounds.mean_force,
+                                    n > 0.0 ? "(L_g + K (2 P^2 + U P') + 2 n (L + R)) Delta / 2"
+                                            : "(L_g + K (2 P^2 + U P')) Delta / 2")};
+}
+
+/// Returns the inequalities of the direct structure for the kind of the force: of velocity, with memory, with
+/// hysteresis, or static.
 [[nodiscard]] inline std::vector<Inequality> inequalities(DirectStructure, const ForceBounds& bounds,
                                                           const Scheme& scheme, const DeviceProfile& device) {
     if (bounds.drag > 0.0) {
@@ -149,6 +184,9 @@ namespace detail {
                              "docs/certificate.md"});
         }
         return lines;
+    }
+    if (bounds.memory) {
+        return memory_inequalities(bounds, device);
     }
     return bounds.hysteresis ? hysteresis_inequalities(bounds, device, scheme.predict)
                              : direct_inequalities(bounds, device, scheme.predict);

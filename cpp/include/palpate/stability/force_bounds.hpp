@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -16,7 +17,18 @@
 
 namespace palpate {
 
-/// Proved bounds of a model's force over all positions, continuations included. A force with hysteresis is f = g + s h
+/// Bounds of a memory over all positions: branches of stiffness k_j and time constant tau_j, ratio p with |p| <= P and
+/// |p'| <= P', stretches |e_j| <= U.
+struct MemoryBounds {
+    double stiffness = 0.0;      ///< P^2 sum_j k_j, the largest stiffness of the branches [N/m]
+    double bending = 0.0;        ///< U P' sum_j k_j, the largest slope by a change of the ratio [N/m]
+    double bending_per_m = 0.0;  ///< P P' sum_j k_j, increase of `bending` for each metre of U [N/m^2]
+    double relaxation_per_s =
+        0.0;  ///< P^2 sum_j k_j / tau_j, largest decrease of the stiffness by time [N/(m*s)]
+};
+
+/// Proved bounds of a model's force over all positions, continuations included. The bounds of a force with memory are
+/// those at rest, and those of its branches (`memory`). A force with hysteresis is f = g + s h
 /// (mean force g, hysteresis h, direction state s, play radius r). Its slope is g' + s h', plus h/r while the play
 /// operator does not move (sticks).
 struct ForceBounds {
@@ -28,6 +40,7 @@ struct ForceBounds {
     double mean_force = 0.0;
     double drag = 0.0;
     bool hysteresis = false;
+    std::optional<MemoryBounds> memory = std::nullopt;
 
     /// Returns M = max(0, max f'), the steepest rising slope [N/m]; NaN stays NaN.
     [[nodiscard]] double rising() const noexcept { return slope.upper <= 0.0 ? 0.0 : slope.upper; }
@@ -225,6 +238,24 @@ struct SlopeReading {
 
 }  // namespace detail
 
+/// Returns proved bounds of the memory of a model; nothing for a model without memory.
+[[nodiscard]] inline std::optional<MemoryBounds> memory_bounds(const ForceModel& model) {
+    const MemoryNetwork* memory = model.memory();
+    if (memory == nullptr) {
+        return std::nullopt;
+    }
+    const double ratio = memory->largest_ratio();
+    MemoryBounds bounds;
+    for (std::size_t j = 0; j < memory->parameters().stiffness.size(); ++j) {
+        const double k = memory->parameters().stiffness[j];
+        bounds.stiffness += ratio * ratio * k;
+        bounds.bending += memory->largest_stretch() * memory->steepest_ratio() * k;
+        bounds.bending_per_m += ratio * memory->steepest_ratio() * k;
+        bounds.relaxation_per_s += ratio * ratio * k / memory->parameters().time_constant_s[j];
+    }
+    return bounds;
+}
+
 /// Returns proved bounds of the force of a model of position, or of position and velocity, on a device with this force
 /// limit [N]. A `play_radius` above 0 replaces the play radius of the model [m]. Throws std::invalid_argument for
 /// models with other inputs.
@@ -235,7 +266,9 @@ struct SlopeReading {
         return detail::velocity_bounds(*force);
     }
     if (const WaveletNetwork* network = model.network()) {
-        return detail::static_bounds(network->curve(), force_limit);
+        ForceBounds bounds = detail::static_bounds(network->curve(), force_limit);
+        bounds.memory = memory_bounds(model);
+        return bounds;
     }
     const HysteresisNetwork& pair = *model.hysteresis();
     return detail::hysteresis_bounds(pair, play_radius > 0.0 ? play_radius : pair.play_radius(), force_limit);

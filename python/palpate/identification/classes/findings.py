@@ -90,7 +90,7 @@ def verdict_of(
     network: FittedNetwork, recordings: Sequence[Recording], side: Float1D | None = None
 ) -> Verdict:
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
-    findings = [*findings_of(recordings, side), *network.findings]
+    findings = [*findings_of(recordings, side, relaxes=network.memory is not None), *network.findings]
     findings += size_findings(network, recordings)
     findings += error_findings(network.nrmse, "the rows of the identification")
     return Verdict(tuple(dict.fromkeys(findings)))
@@ -446,7 +446,8 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         nrmse=error.nrmse,
         path=tuple(report.path),
         decisions=decisions,
-        notes=(*notes, *report.notes, *checked, *(f"Replaced decision: {each}." for each in replaced)),
+        notes=(*notes, *report.notes, *(f"Replaced decision: {each}." for each in replaced)),
         findings=tuple(findings),
         band=band,
+        band_check=checked,
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._core.model import ForceModel
+from ..._core.model import ForceModel, Memory
 from ..._typing import Float1D, Float2D
 from ...model import Fit, PathStep
 from ...model.band import Band
@@ -29,6 +29,30 @@ class PathPoint:
     n_wavelets: int
     rmse: float
     criterion: float
+
+
+@dataclass(frozen=True)
+class FittedMemory:
+    """Identified branches that relax, and the ratio p of their coordinate to the position."""
+
+    alpha: Float1D
+    """(m,) dilations of the wavelets of the ratio [1/position]"""
+    beta: Float1D
+    """(m,) translations [position]"""
+    weight: Float1D
+    """(m,) weights [-]"""
+    linear: float
+    """Slope of the ratio [1/position]"""
+    bias: float
+    """Constant of the ratio [-]"""
+    stiffness: Float1D
+    """(J,) stiffness of each branch [force/position]"""
+    time_constant_s: Float1D
+    """(J,) time constant of each branch [s]"""
+
+    def memory(self) -> Memory:
+        """Returns the memory of a model."""
+        return Memory(**vars(self))
 
 
 @dataclass(frozen=True)
@@ -65,6 +89,8 @@ class FittedNetwork:
     """Object mass m of F = m a + B v + f, if it was fitted [force s^2/position]"""
     damping: float | None = None
     """Object damping B of F = m a + B v + f, if it was fitted [force s/position]"""
+    memory: FittedMemory | None = None
+    """Branches that relax, in addition to the force at rest g; None for a force without memory"""
     model_class: str = ""
     """Name of the accepted model class"""
     stop_reason: str = ""
@@ -89,6 +115,8 @@ class FittedNetwork:
     """Findings that can lower the verdict"""
     band: Band | None = None
     """Band of a further recording; None for one recording"""
+    band_check: tuple[str, ...] = ()
+    """Sentence on the check of the band, or on a missing band; empty for one recording"""
 
     def parameters(self) -> dict[str, Any]:
         """Returns network and domain as keyword arguments of :class:`ForceModel`."""

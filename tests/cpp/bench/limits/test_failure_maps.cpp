@@ -77,6 +77,13 @@ TEST(FailureMaps, CouplingBoundsAreExactWithAndWithoutDelay) {
     expect_between(ratios(map, 2, 2), 1.0, 1.06);
 }
 
+// The bound of one branch counts its stiffness in full. A branch that relaxes within some samples has a margin.
+TEST(FailureMaps, MemoryBoundHoldsAndIsExactForSlowBranchesWithoutDelay) {
+    const FailureMap map = memory_map(test::cases(3));
+    EXPECT_GE(ratios(map, 0, 2).lower, 1.0);
+    EXPECT_LE(map.lines[0].measured.back() / map.lines[0].theory.back(), 1.01);
+}
+
 TEST(FailureMaps, FallingForcesDoNotFailBelowTheirBound) {
     EXPECT_GE(ratios(falling_map(test::cases(3)), 0, 1, 10.0).lower, 1.0);
 }

@@ -157,7 +157,8 @@ def test_noise_independent_of_velocity_does_not_make_velocity_an_input() -> None
 def test_measured_relaxation_is_identified_without_velocity(data: Path) -> None:
     """The position is constant in all rows that have a velocity."""
     model = identify(read_recording(data / "vhb4910_viscoelastic" / "relax_stretch_6d0.csv"))
-    assert model.kind == "position"
+    assert model.kind == "memory"
+    assert model.damping is None
 
 
 def test_velocity_of_split_rows_is_formed_from_all_rows() -> None:

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "palpate/model/compiled_network.hpp"
+#include "palpate/model/environment.hpp"
+#include "palpate/model/network_curve.hpp"
+#include "palpate/model/parameters.hpp"
+
+namespace palpate {
+
+/// Largest number of branches of a memory. A state with this number of branches fits into two cache lines.
+inline constexpr std::size_t most_branches = 8;
+
+/// Parameters of a memory: the ratio p, a network of one input without unit, and its branches.
+struct MemoryParameters {
+    NetworkParameters ratio{.linear = {0.0}, .bias = 1.0};  ///< p, change of the coordinate by position [-]
+    std::vector<double> stiffness;                          ///< stiffness k_j of each branch, >= 0 [N/m]
+    std::vector<double> time_constant_s;                    ///< time constant tau_j of each branch, > 0 [s]
+};
+
+/// Throws std::invalid_argument if a parameter of a memory is invalid. The message states its name and the rule.
+inline void validate(const MemoryParameters& memory, const Domain& domain) {
+    validate(memory.ratio, domain);
+    require_one_input(memory.ratio);
+    const std::size_t n = memory.stiffness.size();
+    detail::require(
+        n >= 1 && n <= most_branches,
+        "stiffness has " + std::to_string(n) + " values, must have 1 to " + std::to_string(most_branches));
+    detail::require_size(memory.time_constant_s, n, "time_constant_s");
+    for (std::size_t j = 0; j < n; ++j) {
+        const double k = memory.stiffness[j];
+        const double tau = memory.time_constant_s[j];
+        detail::require(k >= 0.0 && std::isfinite(k),
+                        "stiffness[" + std::to_string(j) + "] is " + std::to_string(k) + ", must be >= 0");
+        detail::require(tau > 0.0 && std::isfinite(tau), "time_constant_s[" + std::to_string(j) + "] is " +
+                                                             std::to_string(tau) + ", must be > 0");
+    }
+    detail::require(!domain.period, "period is set, but a force with memory cannot be periodic");
+}
+
+/// Memory of a relaxing object: springs in series with dashpots (branches), in parallel with the force at rest g.
+///
+/// The coordinate u with du/dx = p(x) moves one end of each branch, the dashpot moves the other end z_j:
+///
+///     f = g(x) + p(x) sum_j k_j e_j,   e_j = u - z_j,   dz_j/dt = e_j / tau_j.
+///
+/// The ratio p makes an object relax by other forces at other positions. The object stores the energy
+/// G(x) + sum_j k_j e_j^2 / 2 and dissipates the power sum_j k_j e_j^2 / tau_j >= 0 (G is the antiderivative of g), so
+/// no closed motion generates energy, for any p.
+class MemoryNetwork {
+  public:
+    /// Makes the memory of a model with the force at rest `force`. Outside the domain, p is constant, or with a free
+    /// continuation p decreases to zero over the distance over which g does.
+    MemoryNetwork(MemoryParameters parameters, const NetworkCurve& force, const Domain& domain)
+        : parameters_{(validate(parameters, domain), std::move(parameters))},
+          ratio_{parameters_.ratio, domain},
+          contact_{domain.below == Continuation::Free || domain.above == Continuation::Free} {
+        const double travel = domain.upper[0] - domain.lower[0];
+        const auto line = [&](const EdgeLine& g, const EdgeLine& edge, double outward,
+                              Continuation continuation) {
+            return continue_hysteresis(edge.edge, edge.at_edge, outward, continuation,
+                                       std::max(g.reach, 0.02 * travel));
+        };
+        ratio_.continue_with(line(force.below(), ratio_.below(), -1.0, domain.below),
+                             line(force.above(), ratio_.above(), +1.0, domain.above));
+        const Interval values = ratio_.value_bounds();
+        largest_ratio_ = values.largest();
+        steepest_ratio_ = ratio_.slope_bounds().largest();
+        double beyond = 0.0;
+        for (const EdgeLine& edge : {ratio_.below(), ratio_.above()}) {
+            steepest_ratio_ = std::max(steepest_ratio_, std::abs(edge.at_edge.slope));
+            beyond += std::isfinite(edge.reach) ? 0.5 * std::abs(edge.at_edge.value) * edge.reach : 0.0;
+        }
+        const double range = ratio_.above().at_edge.integral - ratio_.below().at_edge.integral;
+        largest_stretch_ = beyond + (values.lower >= 0.0 ? range : largest_ratio_ * travel);
+    }
+
+    [[nodiscard]] const MemoryParameters& parameters() const noexcept { return parameters_; }
+    /// Returns the ratio p over all positions; its antiderivative is the coordinate u.
+    [[nodiscard]] const NetworkCurve& ratio() const noexcept { return ratio_; }
+    /// Returns true if the tool can leave the object. The memory then never pulls the tool.
+    [[nodiscard]] bool contact() const noexcept { return contact_; }
+    /// Returns the sum of the stiffnesses of the branches [N/m].
+    [[nodiscard]] double stiffness() const noexcept {
+        double sum = 0.0;
+        for (const double k : parameters_.stiffness) {
+            sum += k;
+        }
+        return sum;
+    }
+    /// Return bounds of |p| and |dp/dx| over all positions.
+    [[nodiscard]] double largest_ratio() const noexcept { return largest_ratio_; }
+    [[nodiscard]] double steepest_ratio() const noexcept { return steepest_ratio_; }
+    /// Returns U, the largest stretch |e_j| [m]: the coordinate's range over the domain. A motion outside the domain
+    /// does not stretch a branch further.
+    [[nodiscard]] double largest_stretch() const noexcept { return largest_stretch_; }
+    /// Returns the largest energy that the branches store, sum_j k_j U^2 / 2 [J].
+    [[nodiscard]] double largest_energy() const noexcept {
+        return 0.5 * stiffness() * largest_stretch_ * largest_stretch_;
+    }
+    /// Returns the smallest width of a wavelet of the ratio, at most `travel` [m].
+    [[nodiscard]] double finest_width(double travel) const noexcept {
+        return palpate::finest_width(parameters_.ratio, travel);
+    }
+
+  private:
+    MemoryParameters parameters_;
+    NetworkCurve ratio_;
+    bool contact_;
+    double largest_ratio_ = 0.0;
+    double steepest_ratio_ = 0.0;
+    double largest_stretch_ = 0.0;
+};
+
+/// Exact change of a branch's stretch over a time in which du/dt is constant: e <- kept e + moved du.
+struct BranchStep {
+    double kept;   ///< exp(-seconds / tau), share of the stretch that is left [-]
+    double moved;  ///< share of the motion du that stretches the spring [-]
+
+    BranchStep(double seconds, double time_constant_s) noexcept {
+        const double ratio = seconds / time_constant_s;
+        kept = std::exp(-ratio);
+        moved = ratio > 0.0 ? -std::expm1(-ratio) / ratio : 1.0;
+    }
+};
+
+/// A force with memory that is computed once in each period. `C` is the type of the curves: `NetworkCurve` or
+/// `CompiledCurve`.
+///
+/// The branches use the backward Euler method, e_j <- (e_j + du) / (1 + T / tau_j), which needs no iteration. If the
+/// force would exceed the force limit, or would pull a tool that can leave the object, all stretches are multiplied by
+/// one factor from 0 to 1, so that the force is at this limit. The stored energy then only decreases.
+template <class C>
+class MemoryForce {
+  public:
+    struct State {
+        double coordinate = 0.0;                      ///< u at the last position [m]
+        std::array<double, most_branches> stretch{};  ///< stretch e_j of the spring of each branch [m]
+    };
+
+    /// Makes the force for the period `period_s` [s] on a device with this force limit [N].
+    MemoryForce(C force, C ratio, const MemoryNetwork& memory, double period_s,
+                double force_limit = std::numeric_limits<double>::infinity())
+        : force_{std::move(force)},
+          ratio_{std::move(ratio)},
+          branches_{memory.parameters().stiffness.size()},
+          contact_{memory.contact()},
+          force_limit_{force_limit},
+          largest_stretch_{memory.largest_stretch()} {
+        for (std::size_t j = 0; j < branches_; ++j) {
+            stiffness_[j] = memory.parameters().stiffness[j];
+            time_constant_s_[j] = memory.parameters().time_constant_s[j];
+            kept_[j] = 1.0 / (1.0 + period_s / time_constant_s_[j]);
+            sudden_stiffness_ += stiffness_[j] * kept_[j];
+        }
+    }
+
+    /// Returns force, slope and energy after a motion of one period to position x.
+    [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
+        State moved = state;
+        return move(x, moved);
+    }
+    /// Updates the state for a motion of one period to position x.
+    void advance(double x, State& state) const noexcept { (void)move(x, state); }
+    /// Returns the state of an object at rest at position x: no branch is stretched.
+    [[nodiscard]] State start(double x) const noexcept { return {ratio_.at(x).integral, {}}; }
+
+    /// Updates the state for a motion of one period to position x, and returns force, slope and energy there.
+    EnvironmentSample move(double x, State& state) const noexcept {
+        const Curve p = ratio_.at(x);
+        const double moved = p.integral - state.coordinate;
+        state.coordinate = p.integral;
+        double force = 0.0;
+        for (std::size_t j = 0; j < branches_; ++j) {
+            state.stretch[j] = limited(kept_[j] * (state.stretch[j] + moved));
+            force += stiffness_[j] * state.stretch[j];
+        }
+        return relaxed(x, p, force, sudden_stiffness_, state).sample;
+    }
+
+    /// Force of the recorded motion at one row, and the factor by which the stretches were reduced [-].
+    struct Recorded {
+        EnvironmentSample sample;
+        double factor = 1.0;
+    };
+
+    /// Updates the state for a motion to position x at constant speed du/dt during the time `seconds`, which may differ
+    /// from the period. The stretches are exact for this motion.
+    Recorded move_for(double x, double seconds, State& state) const noexcept {
+        const Curve p = ratio_.at(x);
+        const double moved = p.integral - state.coordinate;
+        state.coordinate = p.integral;
+        double force = 0.0;
+        double stiffness = 0.0;
+        for (std::size_t j = 0; j < branches_; ++j) {
+            const BranchStep share{seconds, time_constant_s_[j]};
+            state.stretch[j] = limited(share.kept * state.stretch[j] + share.moved * moved);
+            force += stiffness_[j] * state.stretch[j];
+            stiffness += stiffness_[j] * share.moved;
+        }
+        return relaxed(x, p, force, stiffness, state);
+    }
+
+  private:
+    [[nodiscard]] double limited(double stretch) const noexcept {
+        return std::clamp(stretch, -largest_stretch_, largest_stretch_);
+    }
+
+    /// Returns force, slope and energy for the sum `force` of the branches' forces along u, and reduces the stretches
+    /// if the force is outside its limits.
+    Recorded relaxed(double x, const Curve& p, double force, double stiffness, State& state) const noexcept {
+        const Curve g = force_.at(x);
+        const double rest = std::clamp(g.value, -force_limit_, force_limit_);
+        const double least = contact_ ? std::min(rest, 0.0) : -force_limit_;
+        const double unlimited = rest + p.value * force;
+        Recorded result{{unlimited, g.slope + p.slope * force + p.value * p.value * stiffness, g.integral,
+                         force_.extrapolated(x)},
+                        1.0};
+        const double limit = std::clamp(unlimited, least, force_limit_);
+        if (limit != unlimited) {
+            result.factor = std::clamp((limit - rest) / (unlimited - rest), 0.0, 1.0);
+            result.sample.force = limit;
+            result.sample.slope = 0.0;
+            for (std::size_t j = 0; j < branches_; ++j) {
+                state.stretch[j] *= result.factor;
+            }
+        }
+        for (std::size_t j = 0; j < branches_; ++j) {
+            result.sample.energy += 0.5 * stiffness_[j] * state.stretch[j] * state.stretch[j];
+        }
+        return result;
+    }
+
+    C force_;
+    C ratio_;
+    std::array<double, most_branches> stiffness_{};
+    std::array<double, most_branches> time_constant_s_{};
+    std::array<double, most_branches>
+        kept_{};                     ///< share of a stretch that is left after a period at rest [-]
+    double sudden_stiffness_ = 0.0;  ///< slope of the branches for a motion within one period [N/m]
+    std::size_t branches_;
+    bool contact_;
+    double force_limit_;
+    double largest_stretch_;
+};
+
+static_assert(Environment<MemoryForce<NetworkCurve>>);
+static_assert(Environment<MemoryForce<CompiledCurve>>);
+
+}  // namespace palpate

@@ -1,0 +1,626 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Model class memory: a force at rest and branches that relax, fitted over the time of the recordings.
+
+The force is f = g(x) + p(x) sum_j k_j e_j, with de_j/dt = p(x) dx/dt - e_j / tau_j. g is the force at rest,
+p the ratio. Each branch has a stiffness k_j >= 0 and a time constant tau_j. For given p and tau the force is
+linear in g and k_j: they follow from least squares with k_j >= 0. Branches and wavelets of p are added one at
+a time while the criterion decreases, and p and tau are refined after each. Then g is identified as any force
+of position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.optimize import least_squares, nnls
+
+from ..._core.model import ForceModel, stretches, wavelet_columns
+from ..._typing import Float1D, Float2D
+from ...recording import Recording
+from ..data.limits import FORCE_RESOLUTION, independent_share
+from ..decision import Decision, decided, squared_error_change
+from ..network.fitted import FittedMemory, FittedNetwork
+from ..options import IdentifyOptions
+from ..search.evidence import CRITERIA, ON_HELD_OUT_ROWS
+
+MOST_ROWS = 12_000
+"""Largest number of rows from which branches and ratio are chosen; of more rows an evenly spread part is
+used."""
+
+SPLINES = (4, 6, 8, 11, 15, 20, 28)
+"""Numbers of B-splines of the force at rest that are tried while branches and ratio are chosen. Few rows of a
+relaxation test determine the force at rest between its positions."""
+
+MOST_ROUGHNESS = 1e-3
+"""Largest weight of the curvature of the force at rest [spread of the force for a curvature of 1 in the unit
+box]."""
+
+ROUGHNESS_SHARE = 0.04
+"""Weight of the curvature of the force at rest, divided by the RMS error of the memory [-]. A larger weight
+would bias the time constants."""
+
+SETTLED = 0.8
+"""RMS error with a new weight of the curvature, divided by the error before, above which the weight is
+kept [-]."""
+
+ROUGHNESS_POINTS = 33
+"""Number of positions at which the curvature of the force at rest is computed."""
+
+CURVE_POINTS = 257
+"""Number of positions at which the force at rest is passed on to its identification."""
+
+MOST_BRANCHES = 6
+"""Largest number of branches; the core allows 8."""
+
+MOST_RATIO_WAVELETS = 4
+"""Largest number of wavelets in the ratio."""
+
+GRID_PER_DECADE = 3
+"""Number of time constants in a decade that are tried for a new branch."""
+
+STEPS = 12
+"""Largest number of refinement steps after each added branch or wavelet."""
+
+LEAST_RATIO = 0.02
+"""Smallest ratio over the domain, as a share of its mean [-]."""
+
+RATIO_POINTS = 201
+"""Number of positions at which the least ratio is computed."""
+
+LEAST_INDEPENDENT_SHARE = 0.02
+"""Least share of the rows that count as independent [-]."""
+
+LEAST_INDEPENDENT = 30.0
+"""Least number of rows that count as independent."""
+
+RESOLVED_RATIO = 1.5
+"""Least ratio of the largest time constant to the smallest one that the recordings resolve [-]. Faster
+branches cannot be distinguished from damping."""
+
+LEAST_NRMSE = 0.005
+"""NRMSE of the model without memory below which a memory is not tested [-]."""
+
+LEAST_GAIN = 0.25
+"""Least relative decrease of the squared error by a memory over a force of position or velocity [-]."""
+
+LEAST_GAIN_OVER_HYSTERESIS = 0.5
+"""Least relative decrease of the squared error by a memory over hysteresis [-]: at one rate both fit the same
+recording."""
+
+SECTION_ROWS = 10
+"""Number of successive rows in a section; each fifth section is held out."""
+
+UNDETERMINED = 0.03
+"""Singular value, as a share of the largest one, below which rows do not determine a combination of
+coefficients [-]."""
+
+PULLING_ROWS = 0.002
+"""If more than this share of the rows pulls the tool, the tool cannot leave the object [-]."""
+
+FOLDS = 5
+"""Number of times that the model is fitted without some sections."""
+
+CONTACT_SHARE = 0.02
+"""Share of the force range below which a tool that can leave the object has left it, after it was in contact
+[-]."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Rows of one recording, as shares of the travel and of the spread of the force."""
+
+    time: Float1D
+    position: Float1D
+    force: Float1D
+    used: NDArray[np.bool_]
+    """(n,) False after the tool has left the object"""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Time constants of the branches and parameters of the ratio p = 1 + c (x - 1/2) + sum_i w_i psi(...)."""
+
+    log_tau: Float1D
+    slope: float = 0.0
+    wavelets: Float2D = field(default_factory=lambda: np.zeros((0, 3)))
+    """(m, 3) weight, translation and logarithm of the dilation of each wavelet"""
+    sloped: bool = False
+    """True if the slope c is fitted"""
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of fitted values, stiffnesses included."""
+        return 2 * len(self.log_tau) + int(self.sloped) + self.wavelets.size
+
+    def vector(self) -> Float1D:
+        slope = [self.slope] if self.sloped else []
+        return np.concatenate([self.log_tau, slope, self.wavelets.ravel()])
+
+    def at(self, vector: Float1D) -> Shape:
+        """Returns the shape with the parameters of `vector`."""
+        branches, rest = len(self.log_tau), vector[len(self.log_tau) :]
+        slope = float(rest[0]) if self.sloped else 0.0
+        return replace(
+            self, log_tau=vector[:branches], slope=slope, wavelets=rest[int(self.sloped) :].reshape(-1, 3)
+        )
+
+    def bounds(self, log_tau: tuple[float, float]) -> tuple[Float1D, Float1D]:
+        """Returns the smallest and the largest values of `vector`."""
+        branches, wavelets = len(self.log_tau), len(self.wavelets)
+        slope = int(self.sloped)
+        low = [log_tau[0]] * branches + [-10.0] * slope + [-5.0, -0.3, 0.0] * wavelets
+        high = [log_tau[1]] * branches + [10.0] * slope + [5.0, 1.3, 2.5] * wavelets
+        return np.array(low), np.array(high)
+
+    @cached_property
+    def ratio(self) -> Ratio:
+        """Network of the ratio over the unit box as arguments of :class:`ForceModel`; its least value is
+        positive."""
+        weight, beta, log_alpha = self.wavelets.T
+        free = Ratio(np.exp(log_alpha), beta, weight, self.slope, 1.0 - 0.5 * self.slope)
+        values = np.asarray(free.network.force(np.linspace(0.0, 1.0, RATIO_POINTS)))
+        lift = max(0.0, LEAST_RATIO * max(float(values.mean()), LEAST_RATIO) - float(values.min()))
+        largest = float(values.max()) + lift
+        return Ratio(free.alpha, beta, weight / largest, self.slope / largest, (free.bias + lift) / largest)
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Network of the ratio p over the unit box, at most 1."""
+
+    alpha: Float1D
+    beta: Float1D
+    weight: Float1D
+    linear: float
+    bias: float
+
+    @cached_property
+    def network(self) -> ForceModel:
+        """The ratio as a force; its energy is the coordinate u."""
+        return ForceModel(
+            alpha=self.alpha[:, None],
+            beta=self.beta[:, None],
+            weight=self.weight,
+            linear=[self.linear],
+            bias=self.bias,
+            lower=[0.0],
+            upper=[1.0],
+        )
+
+
+Resting = Callable[[Float1D], Float2D]
+"""Returns the columns (n, m) of the force at rest at positions (n,) in the unit box"""
+
+
+class MemoryFit:
+    """Least-squares fits of memories to motions, with fixed columns for the force at rest.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+    resting : function
+        Columns of the force at rest. A small weight on its curvature decides where the rows do not: the ramps
+        of a relaxation test determine only the sum of the force at rest and of the branches.
+    least : float
+        Smallest mean squared error that the force sensor resolves.
+    rms : float
+        Expected RMS error, which determines the weight of the curvature.
+    """
+
+    def __init__(
+        self, motions: Sequence[Motion], resting: Resting, least: float, rms: float = np.inf
+    ) -> None:
+        self.motions, self.least = motions, least
+        columns = np.concatenate([resting(m.position[m.used]) for m in motions])
+        self._force = np.concatenate([m.force[m.used] for m in motions])
+        self.n_rows = len(self._force)
+        bends = (
+            np.diff(resting(np.linspace(0.0, 1.0, ROUGHNESS_POINTS)), 2, axis=0) * (ROUGHNESS_POINTS - 1) ** 2
+        )
+        bends *= min(MOST_ROUGHNESS, ROUGHNESS_SHARE * rms) * np.sqrt(self.n_rows / len(bends))
+        self._resting = np.concatenate([columns, bends])
+        self._space = np.linalg.qr(self._resting)[0]
+        self._target = self._free(self._force[:, None])[:, 0]
+
+    def _padded(self, columns: Float2D) -> Float2D:
+        """Returns columns (n, m) with zeros in the rows of the curvature."""
+        return np.concatenate([columns, np.zeros((len(self._resting) - len(columns), columns.shape[1]))])
+
+    def _free(self, columns: Float2D) -> Float2D:
+        """Returns columns without the part that the force at rest can fit."""
+        padded = self._padded(columns)
+        return padded - self._space @ (self._space.T @ padded)
+
+    def columns(self, shape: Shape) -> Float2D:
+        """Returns the force of each branch at stiffness 1, at the used rows of all motions."""
+        ratio = shape.ratio.network
+        tau = np.exp(shape.log_tau)
+        parts = []
+        for motion in self.motions:
+            coordinate = np.asarray(ratio.energy(motion.position))[:, None]
+            found = stretches(motion.time, coordinate, tau)[motion.used, 0]
+            parts.append(np.asarray(ratio.force(motion.position[motion.used]))[:, None] * found)
+        return np.concatenate(parts)
+
+    def residual(self, shape: Shape) -> Float1D:
+        """Returns force minus fitted force at the used rows, then the weighted curvature of the fitted force
+        at rest."""
+        free = self._free(self.columns(shape))
+        return self._target - free @ _nonnegative(free, self._target)
+
+    def solved(self, shape: Shape) -> tuple[Float1D, Float1D]:
+        """Returns the coefficients of the force at rest and the stiffnesses of the branches."""
+        columns = self.columns(shape)
+        stiffness = _nonnegative(self._free(columns), self._target)
+        target = self._padded((self._force - columns @ stiffness)[:, None])[:, 0]
+        return np.linalg.lstsq(self._resting, target, rcond=None)[0], stiffness
+
+    def refined(self, shape: Shape, log_tau: tuple[float, float], steps: int = STEPS) -> Shape:
+        """Returns the shape with refined time constants and ratio, of no larger error."""
+        low, high = shape.bounds(log_tau)
+        start = np.clip(shape.vector(), low + 1e-6, high - 1e-6)
+
+        def residual(vector: Float1D) -> Float1D:
+            return self.residual(shape.at(vector))
+
+        found = least_squares(
+            residual,
+            start,
+            bounds=(low, high),
+            diff_step=[1e-4],
+            max_nfev=steps,
+            x_scale=np.maximum(0.1, np.abs(start)),
+        )
+        better = shape.at(found.x)
+        return better if self.rss(better) < self.rss(shape) else shape
+
+    def rss(self, shape: Shape) -> float:
+        """Returns the residual sum of squares."""
+        residual = self.residual(shape)
+        return float(residual @ residual)
+
+    def static_rss(self) -> float:
+        """Returns the residual sum of squares without branches."""
+        return float(self._target @ self._target)
+
+    def error(self, shape: Shape | None) -> Float1D:
+        """Returns force minus fitted force at the used rows; without branches for None."""
+        return (self._target if shape is None else self.residual(shape))[: self.n_rows]
+
+    def independent(self, shape: Shape | None) -> float:
+        """Returns the number of independent rows of a residual; that without branches for None."""
+        residual = self.error(shape)
+        power = float(residual @ residual) + np.finfo(float).tiny
+        rho = max(0.0, float(residual[1:] @ residual[:-1]) / power)
+        return max(
+            LEAST_INDEPENDENT, LEAST_INDEPENDENT_SHARE * len(residual), independent_share(rho) * len(residual)
+        )
+
+    def value(self, rss: float, n_parameters: int, rows: float, criterion: str) -> float:
+        """Returns the criterion of a memory."""
+        mean = max(rss / self.n_rows, self.least)
+        p = min(n_parameters + self._resting.shape[1], int(rows) - 2)
+        return rows * float(np.log(mean)) + CRITERIA[criterion](rows, p)
+
+    def held_out_errors(self, shape: Shape) -> Float1D:
+        """Returns the mean squared error on each held-out fifth of the sections, fitted without it.
+
+        Coefficients that the other sections do not determine keep their values: in a relaxation test each
+        position is visited once.
+        """
+        columns = np.concatenate([self._resting[: self.n_rows], self.columns(shape)], axis=1)
+        columns /= np.linalg.norm(columns, axis=0) + np.finfo(float).tiny
+        section = np.concatenate(
+            [(np.arange(len(m.time)) // SECTION_ROWS % FOLDS)[m.used] for m in self.motions]
+        )
+        residual = self.error(shape)
+        errors = []
+        for fold in np.unique(section):
+            out = section == fold
+            change = np.linalg.lstsq(columns[~out], residual[~out], rcond=UNDETERMINED)[0]
+            errors.append(float(np.mean((residual[out] - columns[out] @ change) ** 2)))
+        return np.array(errors)
+
+
+def _nonnegative(columns: Float2D, target: Float1D) -> Float1D:
+    """Returns the least-squares coefficients >= 0 of columns."""
+    triangle = np.asarray(np.linalg.qr(np.column_stack([columns, target]), mode="r"))
+    table, right = triangle[:, :-1], triangle[:, -1]
+    size = np.linalg.norm(table, axis=0)
+    size[size == 0.0] = 1.0
+    return np.asarray(nnls(table / size, right)[0] / size)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Fit with a number of splines for the force at rest, and the memory; None without branches."""
+
+    splines: int
+    """Index in SPLINES"""
+    fit: MemoryFit
+    shape: Shape | None = None
+
+    def rss(self) -> float:
+        return self.fit.static_rss() if self.shape is None else self.fit.rss(self.shape)
+
+    def rms(self) -> float:
+        """Returns the RMS error of the force, without the weighted curvature."""
+        return float(np.sqrt(np.mean(self.fit.error(self.shape) ** 2)))
+
+    def value(self, rows: float, criterion: str) -> float:
+        used = 0 if self.shape is None else self.shape.n_parameters
+        return self.fit.value(self.rss(), used, rows, criterion)
+
+
+def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
+    """Returns the branches, the ratio and the number of splines that the criterion accepts."""
+    criterion = "bic" if options.criterion in ON_HELD_OUT_ROWS else options.criterion
+    best = Choice(0, recorded.fit(0))
+    while True:
+        expected = best.rms()
+        current = replace(best, fit=recorded.fit(best.splines, expected))
+        best, rows = current, current.fit.independent(current.shape)
+        value = current.value(rows, criterion) - options.search.evidence
+        for trial in _larger(current, recorded):
+            now = trial.value(rows, criterion)
+            if now < value:
+                value, best = now, trial
+        if best is current and current.rms() > SETTLED * expected:
+            break
+    if best.shape is None:
+        return best
+    refined = best.fit.refined(best.shape, recorded.log_tau, 3 * STEPS)
+    return replace(best, shape=_without_idle(best.fit, refined))
+
+
+def _without_idle(fit: MemoryFit, shape: Shape) -> Shape | None:
+    """Returns the shape without branches of stiffness 0."""
+    kept = fit.solved(shape)[1] > 0.0
+    return replace(shape, log_tau=shape.log_tau[kept]) if kept.any() else None
+
+
+def _larger(now: Choice, recorded: Recorded) -> Iterator[Choice]:
+    """Yields refined memories with one more branch, one more term of the ratio, or more splines."""
+    fit, shape, log_tau = now.fit, now.shape, recorded.log_tau
+
+    def best(trials: Iterable[Shape]) -> Choice:
+        return replace(now, shape=fit.refined(min(trials, key=fit.rss), log_tau))
+
+    for splines in range(now.splines + 1, len(SPLINES))[::2]:
+        finer = Choice(splines, recorded.fit(splines, now.rms()), shape)
+        yield finer if shape is None else replace(finer, shape=finer.fit.refined(shape, log_tau))
+    base = Shape(np.empty(0)) if shape is None else shape
+    if len(base.log_tau) < MOST_BRANCHES:
+        count = max(2, 1 + round((log_tau[1] - log_tau[0]) / np.log(10.0) * GRID_PER_DECADE))
+        grid = np.linspace(*log_tau, count)
+        yield best(replace(base, log_tau=np.append(base.log_tau, at)) for at in grid)
+    if shape is None:
+        return
+    if not shape.sloped and not len(shape.wavelets):
+        yield best(replace(shape, sloped=True, slope=c) for c in (-1.0, 1.0))
+    if len(shape.wavelets) < MOST_RATIO_WAVELETS:
+        yield best(
+            replace(shape, wavelets=np.vstack([shape.wavelets, [weight, beta, np.log(alpha)]]))
+            for weight in (-0.5, 0.5)
+            for beta in (0.0, 0.25, 0.5, 0.75, 1.0)
+            for alpha in (1.5, 4.0, 10.0)
+        )
+
+
+def _splines(position: Float1D, count: int) -> Float2D:
+    """Returns the columns (n, count) of cubic B-splines at positions (n,) in the unit box."""
+    knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, count - 2), np.ones(3)]
+    return np.asarray(BSpline.design_matrix(position, knots, 3).toarray())
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Recordings of one object, as shares of travel and spread."""
+
+    recordings: Sequence[Recording]
+    lower: float
+    travel: float
+    spread: float
+    contact: bool
+    """True if the tool can leave the object"""
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording], found: FittedNetwork) -> Recorded:
+        force = np.concatenate([part.force for part in recordings])
+        position = np.concatenate([part.position for part in recordings])
+        lower, travel = float(position.min()), float(np.ptp(position))
+        pulls = float(np.quantile(force, PULLING_ROWS)) < -CONTACT_SHARE * float(np.ptp(force))
+        contact = found.below == "free" and not pulls
+        return cls(recordings, lower, travel, float(np.std(force)), contact)
+
+    @cached_property
+    def motions(self) -> tuple[Motion, ...]:
+        """Rows of the recordings; of many rows an evenly spread part."""
+        step = max(1, -(-sum(map(len, self.recordings)) // MOST_ROWS))
+        return tuple(self._motion(part, step) for part in self.recordings)
+
+    def _motion(self, part: Recording, step: int) -> Motion:
+        assert part.time is not None
+        time, position, force = part.time[::step], part.position[::step], part.force[::step]
+        used = np.ones(len(force), dtype=bool)
+        if self.contact:
+            level = CONTACT_SHARE * float(np.ptp(force))
+            touched = np.maximum.accumulate(force > 2.0 * level)
+            used = ~(touched & (force < level))
+        box = np.clip((position - self.lower) / self.travel, 0.0, 1.0)
+        return Motion(time, box, force / self.spread, used)
+
+    @cached_property
+    def log_tau(self) -> tuple[float, float]:
+        """Logarithms of the smallest and the largest time constant that the recordings can resolve [s]."""
+        steps = np.concatenate(
+            [
+                np.diff(part.time)[np.abs(np.diff(part.position)) > 1e-4 * self.travel]
+                for part in self.recordings
+                if part.time is not None
+            ]
+        )
+        longest = max(float(np.ptp(part.time)) for part in self.recordings if part.time is not None)
+        shortest = 2.0 * float(np.median(steps)) if len(steps) else 0.01 * longest
+        return float(np.log(min(shortest, 0.1 * longest))), float(np.log(longest))
+
+    @cached_property
+    def least(self) -> float:
+        """Smallest mean squared error that the force sensor resolves."""
+        force = np.concatenate([motion.force for motion in self.motions])
+        return float((FORCE_RESOLUTION * np.ptp(force)) ** 2 + np.finfo(float).tiny)
+
+    def fit(self, splines: int, rms: float = np.inf) -> MemoryFit:
+        """Returns a fit with B-splines for the force at rest, for an expected RMS error."""
+        return MemoryFit(self.motions, lambda box: _splines(box, SPLINES[splines]), self.least, rms)
+
+    def at_rest(self, choice: Choice, identify_rest: IdentifyRest) -> FittedNetwork:
+        """Returns the force at rest as an identified network."""
+        assert choice.shape is not None
+        box = np.linspace(0.0, 1.0, CURVE_POINTS)
+        count = SPLINES[choice.splines]
+        curve = _splines(box, count) @ choice.fit.solved(choice.shape)[0]
+        share = choice.fit.n_rows / CURVE_POINTS
+        within = self.spread**2 * choice.fit.n_rows * choice.rms() ** 2
+        return identify_rest(self.lower + self.travel * box, self.spread * curve, share, within, count)
+
+    def wavelets(self, network: FittedNetwork) -> Resting:
+        """Returns the columns of a network for the force at rest: wavelets, slope and constant."""
+
+        def columns(box: Float1D) -> Float2D:
+            x = self.lower + self.travel * box[:, None]
+            return np.column_stack([wavelet_columns(x, network.alpha, network.beta), box, np.ones(len(x))])
+
+        return columns
+
+    def memory(self, shape: Shape, stiffness: Float1D) -> FittedMemory:
+        """Returns a memory in the units of the recordings, with its branches in order of time constant."""
+        order = np.argsort(shape.log_tau)
+        ratio = shape.ratio
+        linear = ratio.linear / self.travel
+        return FittedMemory(
+            alpha=ratio.alpha / self.travel,
+            beta=self.lower + self.travel * ratio.beta,
+            weight=ratio.weight,
+            linear=linear,
+            bias=ratio.bias - linear * self.lower,
+            stiffness=stiffness[order] * self.spread / self.travel,
+            time_constant_s=np.exp(shape.log_tau[order]),
+        )
+
+
+def untested(found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> str | None:
+    """Returns the reason why a memory is not tested; an empty text if no decision is reported; None if it is
+    tested."""
+    automatic = options.inputs == "auto" and options.period is None and options.search.filters == "matched"
+    if len(found.lower) > 1 and found.inputs[1:] != ("velocity",):
+        return ""
+    if not automatic or any(part.time is None or len(part.input_names) for part in recordings):
+        return ""
+    if found.nrmse < LEAST_NRMSE:
+        return f"the model without memory has an NRMSE of {found.nrmse:.2g}, below {LEAST_NRMSE:g}"
+    if options.slope_limits is not None or options.fixed_force is not None:
+        return "constraints of the slope or of a force are not imposed on a memory"
+    if options.loss != "squares":
+        return "the loss huber is not defined for a memory"
+    return None
+
+
+def better_with_memory(
+    found: FittedNetwork,
+    recordings: Sequence[Recording],
+    options: IdentifyOptions,
+    identify_rest: IdentifyRest,
+) -> FittedNetwork:
+    """Returns the model with memory if the recordings support it, else the model found without memory.
+
+    `identify_rest` identifies the force at rest.
+    """
+    reason = untested(found, recordings, options)
+    if reason is not None:
+        decision = Decision("memory", "not tested", reason)
+        return replace(found, decisions=(*found.decisions, decision)) if reason else found
+    recorded = Recorded.of(recordings, found)
+    choice = grown(recorded, options)
+    if choice.shape is None:
+        return _refused(found, "no branch lowers the criterion")
+    least_gain = LEAST_GAIN if found.weight_hysteresis is None else LEAST_GAIN_OVER_HYSTERESIS
+    before = found.nrmse**2
+    in_sample = 1.0 - choice.rms() ** 2 / before
+    if in_sample < least_gain:
+        return _refused(found, _gain_text(in_sample, 0.0, least_gain))
+    at_rest = recorded.at_rest(choice, identify_rest)
+    fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least, choice.rms())
+    refined = _without_idle(fit, fit.refined(choice.shape, recorded.log_tau, 3 * STEPS))
+    if refined is None:
+        return _refused(found, "no branch lowers the criterion")
+    shortest, longest = np.exp(recorded.log_tau)
+    if np.exp(refined.log_tau.max()) < RESOLVED_RATIO * shortest:
+        return _refused(found, f"the branches relax within {shortest:.2g} s, which the rows do not resolve")
+    coefficients, stiffness = fit.solved(refined)
+    network = replace(
+        at_rest,
+        weight=recorded.spread * coefficients[:-2],
+        linear=recorded.spread / recorded.travel * coefficients[-2:-1],
+        bias=recorded.spread * float(coefficients[-1] - coefficients[-2] * recorded.lower / recorded.travel),
+        memory=recorded.memory(refined, stiffness),
+        below="free" if recorded.contact else "linear",
+    )
+    error = _error(network, recordings)
+    if recorded.contact and (other := _error(linear := replace(network, below="linear"), recordings)) < error:
+        network, error = linear, other
+    nrmse = error / recorded.spread
+    held_out = fit.held_out_errors(refined)
+    gain = 1.0 - max(nrmse**2, float(held_out.mean())) / before
+    scatter = float(held_out.std(ddof=1)) / before / np.sqrt(len(held_out)) if len(held_out) > 1 else 0.0
+    text = _gain_text(gain, scatter, least_gain)
+    if gain - scatter < least_gain:
+        return _refused(found, text)
+    decision = decided("memory", True, text)
+    return replace(
+        network,
+        model_class="memory",
+        n_parameters=network.n_parameters + refined.n_parameters,
+        rmse=error,
+        nrmse=nrmse,
+        path=found.path + network.path,
+        decisions=(*found.decisions, decision),
+        notes=(
+            *found.notes,
+            f"Time constants between {shortest:.2g} and {longest:.2g} s are resolved by the recordings; "
+            f"found: {', '.join(f'{tau:.3g}' for tau in np.sort(np.exp(refined.log_tau)))} s.",
+        ),
+    )
+
+
+def _refused(found: FittedNetwork, reason: str) -> FittedNetwork:
+    return replace(found, decisions=(*found.decisions, decided("memory", False, reason)))
+
+
+def _gain_text(gain: float, error: float, least: float) -> str:
+    change = squared_error_change(gain, error, "held-out sections")
+    return f"{change}, must lower it by at least {100.0 * least:g} %"
+
+
+IdentifyRest = Callable[[Float1D, Float1D, float, float, int], FittedNetwork]
+"""Identifies a force of position from positions (n,), forces (n,), the number of rows that each represents,
+the sum of their squared errors, and the largest number of wavelets"""
+
+
+def _error(network: FittedNetwork, recordings: Sequence[Recording]) -> float:
+    """Returns the RMS error of a model with memory on all rows of recordings [force]."""
+    assert network.memory is not None
+    model = ForceModel(
+        **network.parameters(), below=network.below, above="linear", memory=network.memory.memory()
+    )
+    errors = [
+        model.force_over_time(part.time, part.position)[0] - part.force
+        for part in recordings
+        if part.time is not None
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Identification of memory: known branches, objects without branches, and measured relaxation."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+
+import palpate
+from palpate import Model, Recording
+from palpate._core.model import Memory, play
+from palpate.planning import hand_for, rig_for
+from palpate.planning.simulation import holding_hand
+
+
+def ramps_and_holds(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns time and position of ramps at 0.3 to 6 travels a second, each followed by a hold."""
+    random = np.random.default_rng(seed)
+    knots, places = [0.0], [0.0]
+    for rate in np.exp(random.uniform(np.log(0.3), np.log(6.0), 12)):
+        place = random.uniform(0.05, 1.0)
+        knots.append(knots[-1] + abs(place - places[-1]) / rate)
+        knots.append(knots[-1] + np.exp(random.uniform(np.log(0.3), np.log(8.0))))
+        places += [place, place]
+    time = np.arange(0.0, 40.0, 0.02)
+    return time, np.interp(time, knots, places)
+
+
+def relaxing(stiffness: list[float], tau: list[float], ratio: float = 0.0) -> Model:
+    memory = Memory(
+        alpha=[], beta=[], weight=[], linear=ratio, bias=1.0, stiffness=stiffness, time_constant_s=tau
+    )
+    return Model.from_network(
+        alpha=[[3.0]],
+        beta=[[0.4]],
+        weight=[0.2],
+        linear=[2.0],
+        lower=[0.0],
+        upper=[1.0],
+        memory=memory,
+    )
+
+
+def with_noise(force: np.ndarray, share: float, seed: int = 0) -> np.ndarray:
+    return force + share * force.std() * np.random.default_rng(seed).standard_normal(len(force))
+
+
+@pytest.mark.parametrize("tau", [[0.7], [0.3, 4.0], [0.2, 1.1, 6.0]], ids=["one", "two", "three"])
+def test_known_branches_are_found(tau: list[float]) -> None:
+    time, position = ramps_and_holds(1)
+    truth = relaxing([2.0, 1.5, 1.0][: len(tau)], tau)
+    force = with_noise(truth.force_over_time(time, position)[0], 0.005)
+    model = palpate.identify(position, force, time=time)
+    assert model.kind == model.fit.model_class == "memory"
+    assert model.memory is not None
+    np.testing.assert_allclose(model.memory.time_constant_s, tau, rtol=0.1)
+    assert model.fit.nrmse == pytest.approx(0.005, rel=0.1)
+    assert any("memory: accepted" in line for line in model.notes["model_selection"])
+    assert any("s are resolved by the recordings" in line for line in model.notes["identification"])
+
+
+def test_a_curved_force_at_rest_does_not_hide_a_branch() -> None:
+    time, position = ramps_and_holds(21)
+    memory = Memory(
+        alpha=[], beta=[], weight=[], linear=0.0, bias=1.0, stiffness=[1.0], time_constant_s=[0.21]
+    )
+    truth = Model.from_network(
+        alpha=[[3.92]],
+        beta=[[0.276]],
+        weight=[-0.291],
+        linear=[1.385],
+        lower=[0.0],
+        upper=[1.0],
+        memory=memory,
+    )
+    force = with_noise(truth.force_over_time(time, position)[0], 0.003)
+    model = palpate.identify(position, force, time=time)
+    assert model.memory is not None
+    np.testing.assert_allclose(model.memory.time_constant_s, [0.21], rtol=0.02)
+
+
+def test_a_ratio_that_depends_on_the_position_is_found() -> None:
+    time, position = ramps_and_holds(2)
+    truth = relaxing([2.0, 1.5], [0.3, 4.0], ratio=1.0)
+    force = with_noise(truth.force_over_time(time, position)[0], 0.003)
+    model = palpate.identify(position, force, time=time)
+    assert model.memory is not None
+    np.testing.assert_allclose(model.memory.time_constant_s, [0.3, 4.0], rtol=0.1)
+    x = np.array([0.1, 0.5, 0.9])
+    memory = model.memory
+    found = memory.linear * x + memory.bias
+    assert len(memory.weight) or found[2] / found[0] == pytest.approx(1.9 / 1.1, rel=0.1)
+    assert palpate.verify(model, position, force, time=time).nrmse < 0.004
+
+
+def test_irregular_times_and_several_recordings_are_one_object() -> None:
+    truth = relaxing([2.0], [0.7])
+    recordings = []
+    for seed in (3, 4):
+        time, position = ramps_and_holds(seed)
+        rows = np.sort(np.random.default_rng(seed).choice(len(time), 900, replace=False))
+        time, position = time[rows], position[rows]
+        force = with_noise(truth.force_over_time(time, position)[0], 0.005, seed)
+        recordings.append(Recording.from_arrays(position, force, time=time))
+    model = palpate.identify(recordings)
+    assert model.memory is not None
+    np.testing.assert_allclose(model.memory.time_constant_s, [0.7], rtol=0.05)
+    # the band and its check belong to the model without memory
+    assert model.band is None
+    assert not any("left out of the fit" in note for note in model.notes["identification"])
+
+
+def test_a_rendered_memory_is_identified_again_within_a_just_noticeable_difference() -> None:
+    truth = relaxing([2.0, 1.5], [0.3, 2.0])
+    device = rig_for(truth).device
+    plan = palpate.plan(truth, device)
+    hands = [hand_for(plan, device), holding_hand(plan, 0.3), holding_hand(plan, 0.9)]
+    found = palpate.identify([palpate.simulate(plan, device, hand, 8.0) for hand in hands])
+    assert found.memory is not None
+    np.testing.assert_allclose(found.memory.time_constant_s[:2], [0.3, 2.0], rtol=0.1)
+    fresh = palpate.simulate(plan, device, holding_hand(plan, 0.6), 8.0)
+    assert fresh.force[1000] > 1.3 * fresh.force[-1], "the rendered object relaxes"
+    assert palpate.verify(found, fresh).within_jnd == 1.0
+
+
+@pytest.mark.parametrize("kind", ["static", "hysteretic", "viscous"])
+def test_objects_that_do_not_relax_have_no_memory(kind: str) -> None:
+    time, position = ramps_and_holds(5)
+    position = gaussian_filter1d(position, 5)
+    force = 2.0 * position + 0.3 * np.sin(5.0 * position)
+    if kind == "hysteretic":
+        force += 0.2 * (position - play(position, 0.01)) / 0.01
+    if kind == "viscous":
+        force += 0.1 * np.gradient(position, time)
+    model = palpate.identify(position, with_noise(force, 0.02), time=time)
+    assert model.memory is None
+    assert any(line.startswith("memory: not ") for line in model.notes["model_selection"])
+
+
+def test_position_as_the_only_input_excludes_memory() -> None:
+    time, position = ramps_and_holds(1)
+    force = relaxing([2.0], [0.7]).force_over_time(time, position)[0]
+    model = palpate.identify(position, force, time=time, inputs=("position",))
+    assert model.memory is None
+
+
+def test_small_forces_and_offsets_do_not_change_the_branches() -> None:
+    time, position = ramps_and_holds(1)
+    force = with_noise(relaxing([2.0], [0.7]).force_over_time(time, position)[0], 0.005)
+    model = palpate.identify(1e-6 * position + 3.0, 1e-9 * force, time=time)
+    assert model.memory is not None
+    np.testing.assert_allclose(model.memory.time_constant_s, [0.7], rtol=0.05)
+    # the band and its check belong to the model without memory
+    assert model.band is None
+    assert not any("left out of the fit" in note for note in model.notes["identification"])
+
+
+def test_an_identified_memory_is_planned_saved_and_verified(tmp_path: Path) -> None:
+    time, position = ramps_and_holds(1)
+    force = with_noise(relaxing([2.0], [0.7]).force_over_time(time, position)[0], 0.005)
+    model = palpate.identify(Recording.from_arrays(position, force, time=time))
+    model.save(tmp_path / "model.json")
+    read = palpate.load_model(tmp_path / "model.json")
+    assert read == model
+    other_time, other = ramps_and_holds(7)
+    fresh = relaxing([2.0], [0.7]).force_over_time(other_time, other)[0]
+    assert palpate.verify(read, other, fresh, time=other_time).nrmse < 0.02
+
+
+def test_measured_relaxation_of_four_stretches_is_one_model(data: Path) -> None:
+    files = sorted((data / "vhb4910_viscoelastic").glob("relax_*.csv"))
+    model = palpate.identify(files)
+    assert model.memory is not None
+    assert model.fit.nrmse <= 0.05
+    # a force that changes at the same position is no sign of two objects in one file
+    assert model.verdict.level == "good"
