@@ -173,5 +173,5 @@ def test_measured_relaxation_of_four_stretches_is_one_model(data: Path) -> None:
     model = palpate.identify(files)
     assert model.memory is not None
     assert model.fit.nrmse <= 0.05
-    # a force that changes at the same position is no sign of two objects in one file
+    # a force that changes at the same position does not mean two objects in one file
     assert model.verdict.level == "good"
