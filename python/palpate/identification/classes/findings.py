@@ -14,6 +14,7 @@ from ...recording import Recording
 from ...recording.quality import findings_of
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, Verdict, no, usable
+from ..data.limits import neighbour_correlation
 from ..data.rows import period_notes
 from ..decision import latest
 from ..network.fitted import FittedNetwork
@@ -444,6 +445,8 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         below="free" if left_there else "linear",
         rmse=error.rmse,
         nrmse=error.nrmse,
+        residuals=int(np.count_nonzero(counted)),
+        residual_correlation=neighbour_correlation(best.residual[counted > 0.0]),
         path=tuple(report.path),
         decisions=decisions,
         notes=(*notes, *report.notes, *(f"Replaced decision: {each}." for each in replaced)),

@@ -85,6 +85,12 @@ branches cannot be distinguished from damping."""
 LEAST_NRMSE = 0.005
 """NRMSE of the model without memory below which a memory is not tested [-]."""
 
+LEAST_CORRELATION = 0.1
+"""Correlation of the residuals of neighbouring rows below which a memory is not tested [-], two standard
+errors included. A branch decays by at most 40 % in a sample interval, because two intervals must resolve it.
+Branches that explain the share LEAST_GAIN of the squared error therefore give a correlation of at least
+0.15."""
+
 LEAST_GAIN = 0.25
 """Least relative decrease of the squared error by a memory over a force of position or velocity [-]."""
 
@@ -524,6 +530,13 @@ def untested(found: FittedNetwork, recordings: Sequence[Recording], options: Ide
         return ""
     if found.nrmse < LEAST_NRMSE:
         return f"the model without memory has an NRMSE of {found.nrmse:.2g}, below {LEAST_NRMSE:g}"
+    every_second = 2 * found.residuals >= sum(len(part) for part in recordings)
+    upper = found.residual_correlation + 2.0 / np.sqrt(max(found.residuals, 1))
+    if every_second and upper < LEAST_CORRELATION:
+        return (
+            "the error of the model without memory is noise: residuals of neighbouring rows have a "
+            f"correlation below {upper:.2g}, a memory needs {LEAST_CORRELATION:g}"
+        )
     if options.slope_limits is not None or options.fixed_force is not None:
         return "constraints of the slope or of a force are not imposed on a memory"
     if options.loss != "squares":

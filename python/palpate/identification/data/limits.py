@@ -170,13 +170,18 @@ def evenness(residual: Float1D) -> float:
     return standard_deviation(residual) / float(np.sqrt(power / len(residual))) if power > 0.0 else 0.0
 
 
+def neighbour_correlation(residual: Float1D) -> float:
+    """Returns the correlation of neighbouring residuals (n,) in recorded order; 0 without residuals."""
+    power = float(residual @ residual)
+    return float(residual[1:] @ residual[:-1]) / power if power > 0.0 else 0.0
+
+
 def correlation(residual: Float1D) -> float:
     """Returns the correlation of neighbouring residuals (n,) in recorded order; 0 if the correlation can be
     random, or can come from a force that the model does not fit."""
-    power = float(residual @ residual)
-    if power == 0.0 or len(residual) < 2:
+    if len(residual) < 2:
         return 0.0
-    found = float(residual[1:] @ residual[:-1]) / power
+    found = neighbour_correlation(residual)
     limit = max(LEAST_CORRELATION, SIGNIFICANT_STANDARD_ERRORS / float(np.sqrt(len(residual))))
     return found if evenness(residual) >= LEAST_NOISE_EVENNESS and found > limit else 0.0
 

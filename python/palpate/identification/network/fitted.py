@@ -102,6 +102,10 @@ class FittedNetwork:
     """RMS error on the samples of the identification [force]"""
     nrmse: float = 0.0
     """RMS error divided by the standard deviation of the force [-]"""
+    residuals: int = 0
+    """Number of rows with a residual"""
+    residual_correlation: float = 0.0
+    """Correlation of the residuals of neighbouring rows in recorded order [-]"""
     path: tuple[PathPoint, ...] = ()
     """Networks that the model selection tested, in order"""
     decisions: tuple[Decision, ...] = ()
