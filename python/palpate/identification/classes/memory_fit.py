@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Least squares of a force at rest and of branches that relax, over the time of recordings.
+
+The force is f = g(x) + p(x) sum_j k_j e_j, with de_j/dt = p(x) dx/dt - e_j / tau_j. g is the force at rest,
+p the ratio. Each branch has a stiffness k_j >= 0 and a time constant tau_j. For given p and tau the force is
+linear in g and k_j: they follow from least squares with k_j >= 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, nnls
+
+from ..._core.model import ForceModel, stretches
+from ..._typing import Float1D, Float2D
+from ..data.limits import independent_share
+from ..search.evidence import CRITERIA
+
+MOST_ROUGHNESS = 1e-3
+"""Largest weight of the curvature of the force at rest [spread of the force for a curvature of 1 in the unit
+box]."""
+
+ROUGHNESS_SHARE = 0.04
+"""Weight of the curvature of the force at rest, divided by the RMS error of the memory [-]. A larger weight
+would bias the time constants."""
+
+ROUGHNESS_POINTS = 33
+"""Number of positions at which the curvature of the force at rest is computed."""
+
+STEPS = 12
+"""Largest number of refinement steps after each added branch or wavelet."""
+
+LEAST_RATIO = 0.02
+"""Smallest ratio over the domain, as a share of its mean [-]."""
+
+RATIO_POINTS = 201
+"""Number of positions at which the least ratio is computed."""
+
+LEAST_INDEPENDENT_SHARE = 0.02
+"""Least share of the rows that count as independent [-]."""
+
+LEAST_INDEPENDENT = 30.0
+"""Least number of rows that count as independent."""
+
+SECTION_ROWS = 10
+"""Number of successive rows in a section; each fifth section is held out."""
+
+UNDETERMINED = 0.03
+"""Singular value, as a share of the largest one, below which rows do not determine a combination of
+coefficients [-]."""
+
+FOLDS = 5
+"""Number of times that the model is fitted without some sections."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Rows of one recording, as shares of the travel and of the spread of the force."""
+
+    time: Float1D
+    position: Float1D
+    force: Float1D
+    used: NDArray[np.bool_]
+    """(n,) False after the tool has left the object"""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Time constants of the branches and parameters of the ratio p = 1 + c (x - 1/2) + sum_i w_i psi(...)."""
+
+    log_tau: Float1D
+    slope: float = 0.0
+    wavelets: Float2D = field(default_factory=lambda: np.zeros((0, 3)))
+    """(m, 3) weight, translation and logarithm of the dilation of each wavelet"""
+    sloped: bool = False
+    """True if the slope c is fitted"""
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of fitted values, stiffnesses included."""
+        return 2 * len(self.log_tau) + int(self.sloped) + self.wavelets.size
+
+    def vector(self) -> Float1D:
+        slope = [self.slope] if self.sloped else []
+        return np.concatenate([self.log_tau, slope, self.wavelets.ravel()])
+
+    def at(self, vector: Float1D) -> Shape:
+        """Returns the shape with the parameters of `vector`."""
+        branches, rest = len(self.log_tau), vector[len(self.log_tau) :]
+        slope = float(rest[0]) if self.sloped else 0.0
+        return replace(
+            self, log_tau=vector[:branches], slope=slope, wavelets=rest[int(self.sloped) :].reshape(-1, 3)
+        )
+
+    def bounds(self, log_tau: tuple[float, float]) -> tuple[Float1D, Float1D]:
+        """Returns the smallest and the largest values of `vector`."""
+        branches, wavelets = len(self.log_tau), len(self.wavelets)
+        slope = int(self.sloped)
+        low = [log_tau[0]] * branches + [-10.0] * slope + [-5.0, -0.3, 0.0] * wavelets
+        high = [log_tau[1]] * branches + [10.0] * slope + [5.0, 1.3, 2.5] * wavelets
+        return np.array(low), np.array(high)
+
+    @cached_property
+    def ratio(self) -> Ratio:
+        """Network of the ratio over the unit box as arguments of :class:`ForceModel`; its least value is
+        positive."""
+        weight, beta, log_alpha = self.wavelets.T
+        free = Ratio(np.exp(log_alpha), beta, weight, self.slope, 1.0 - 0.5 * self.slope)
+        values = np.asarray(free.network.force(np.linspace(0.0, 1.0, RATIO_POINTS)))
+        lift = max(0.0, LEAST_RATIO * max(float(values.mean()), LEAST_RATIO) - float(values.min()))
+        largest = float(values.max()) + lift
+        return Ratio(free.alpha, beta, weight / largest, self.slope / largest, (free.bias + lift) / largest)
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Network of the ratio p over the unit box, at most 1."""
+
+    alpha: Float1D
+    beta: Float1D
+    weight: Float1D
+    linear: float
+    bias: float
+
+    @cached_property
+    def network(self) -> ForceModel:
+        """The ratio as a force; its energy is the coordinate u."""
+        return ForceModel(
+            alpha=self.alpha[:, None],
+            beta=self.beta[:, None],
+            weight=self.weight,
+            linear=[self.linear],
+            bias=self.bias,
+            lower=[0.0],
+            upper=[1.0],
+        )
+
+
+Resting = Callable[[Float1D], Float2D]
+"""Returns the columns (n, m) of the force at rest at positions (n,) in the unit box"""
+
+
+class MemoryFit:
+    """Least-squares fits of memories to motions, with fixed columns for the force at rest.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+    resting : function
+        Columns of the force at rest. A small weight on its curvature decides where the rows do not: the ramps
+        of a relaxation test determine only the sum of the force at rest and of the branches.
+    least : float
+        Smallest mean squared error that the force sensor resolves.
+    rms : float
+        Expected RMS error, which determines the weight of the curvature.
+    """
+
+    def __init__(
+        self, motions: Sequence[Motion], resting: Resting, least: float, rms: float = np.inf
+    ) -> None:
+        self.motions, self.least = motions, least
+        columns = np.concatenate([resting(m.position[m.used]) for m in motions])
+        self._force = np.concatenate([m.force[m.used] for m in motions])
+        self.n_rows = len(self._force)
+        bends = (
+            np.diff(resting(np.linspace(0.0, 1.0, ROUGHNESS_POINTS)), 2, axis=0) * (ROUGHNESS_POINTS - 1) ** 2
+        )
+        bends *= min(MOST_ROUGHNESS, ROUGHNESS_SHARE * rms) * np.sqrt(self.n_rows / len(bends))
+        self._resting = np.concatenate([columns, bends])
+        self._space = np.linalg.qr(self._resting)[0]
+        self._target = self._free(self._force[:, None])[:, 0]
+
+    def _padded(self, columns: Float2D) -> Float2D:
+        """Returns columns (n, m) with zeros in the rows of the curvature."""
+        return np.concatenate([columns, np.zeros((len(self._resting) - len(columns), columns.shape[1]))])
+
+    def _free(self, columns: Float2D) -> Float2D:
+        """Returns columns without the part that the force at rest can fit."""
+        padded = self._padded(columns)
+        return padded - self._space @ (self._space.T @ padded)
+
+    def columns(self, shape: Shape) -> Float2D:
+        """Returns the force of each branch at stiffness 1, at the used rows of all motions."""
+        ratio = shape.ratio.network
+        tau = np.exp(shape.log_tau)
+        parts = []
+        for motion in self.motions:
+            coordinate = np.asarray(ratio.energy(motion.position))[:, None]
+            found = stretches(motion.time, coordinate, tau)[motion.used, 0]
+            parts.append(np.asarray(ratio.force(motion.position[motion.used]))[:, None] * found)
+        return np.concatenate(parts)
+
+    def residual(self, shape: Shape) -> Float1D:
+        """Returns force minus fitted force at the used rows, then the weighted curvature of the fitted force
+        at rest."""
+        free = self._free(self.columns(shape))
+        return self._target - free @ _nonnegative(free, self._target)
+
+    def solved(self, shape: Shape) -> tuple[Float1D, Float1D]:
+        """Returns the coefficients of the force at rest and the stiffnesses of the branches."""
+        columns = self.columns(shape)
+        stiffness = _nonnegative(self._free(columns), self._target)
+        target = self._padded((self._force - columns @ stiffness)[:, None])[:, 0]
+        return np.linalg.lstsq(self._resting, target, rcond=None)[0], stiffness
+
+    def refined(self, shape: Shape, log_tau: tuple[float, float], steps: int = STEPS) -> Shape:
+        """Returns the shape with refined time constants and ratio, of no larger error."""
+        low, high = shape.bounds(log_tau)
+        start = np.clip(shape.vector(), low + 1e-6, high - 1e-6)
+
+        def residual(vector: Float1D) -> Float1D:
+            return self.residual(shape.at(vector))
+
+        found = least_squares(
+            residual,
+            start,
+            bounds=(low, high),
+            diff_step=[1e-4],
+            max_nfev=steps,
+            x_scale=np.maximum(0.1, np.abs(start)),
+        )
+        better = shape.at(found.x)
+        return better if self.rss(better) < self.rss(shape) else shape
+
+    def rss(self, shape: Shape) -> float:
+        """Returns the residual sum of squares."""
+        residual = self.residual(shape)
+        return float(residual @ residual)
+
+    def static_rss(self) -> float:
+        """Returns the residual sum of squares without branches."""
+        return float(self._target @ self._target)
+
+    def error(self, shape: Shape | None) -> Float1D:
+        """Returns force minus fitted force at the used rows; without branches for None."""
+        return (self._target if shape is None else self.residual(shape))[: self.n_rows]
+
+    def independent(self, shape: Shape | None) -> float:
+        """Returns the number of independent rows of a residual; that without branches for None."""
+        residual = self.error(shape)
+        power = float(residual @ residual) + np.finfo(float).tiny
+        rho = max(0.0, float(residual[1:] @ residual[:-1]) / power)
+        return max(
+            LEAST_INDEPENDENT, LEAST_INDEPENDENT_SHARE * len(residual), independent_share(rho) * len(residual)
+        )
+
+    def value(self, rss: float, n_parameters: int, rows: float, criterion: str) -> float:
+        """Returns the criterion of a memory."""
+        mean = max(rss / self.n_rows, self.least)
+        p = min(n_parameters + self._resting.shape[1], int(rows) - 2)
+        return rows * float(np.log(mean)) + CRITERIA[criterion](rows, p)
+
+    def held_out_errors(self, shape: Shape) -> Float1D:
+        """Returns the mean squared error on each held-out fifth of the sections, fitted without it.
+
+        Coefficients that the other sections do not determine keep their values: in a relaxation test each
+        position is visited once.
+        """
+        columns = np.concatenate([self._resting[: self.n_rows], self.columns(shape)], axis=1)
+        columns /= np.linalg.norm(columns, axis=0) + np.finfo(float).tiny
+        section = np.concatenate(
+            [(np.arange(len(m.time)) // SECTION_ROWS % FOLDS)[m.used] for m in self.motions]
+        )
+        residual = self.error(shape)
+        errors = []
+        for fold in np.unique(section):
+            out = section == fold
+            change = np.linalg.lstsq(columns[~out], residual[~out], rcond=UNDETERMINED)[0]
+            errors.append(float(np.mean((residual[out] - columns[out] @ change) ** 2)))
+        return np.array(errors)
+
+
+def _nonnegative(columns: Float2D, target: Float1D) -> Float1D:
+    """Returns the least-squares coefficients >= 0 of columns."""
+    triangle = np.asarray(np.linalg.qr(np.column_stack([columns, target]), mode="r"))
+    table, right = triangle[:, :-1], triangle[:, -1]
+    size = np.linalg.norm(table, axis=0)
+    size[size == 0.0] = 1.0
+    return np.asarray(nnls(table / size, right)[0] / size)
