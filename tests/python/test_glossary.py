@@ -9,6 +9,7 @@ import pytest
 
 import palpate
 from palpate._core import rendering
+from palpate._core.model import Memory
 from palpate.cli.main import palpate as group
 from palpate.identification.options import IdentifyOptions
 from palpate.model import Fit
@@ -34,7 +35,7 @@ CONTROL_OPTIONS = {
     for option in re.findall(r"--[a-z][a-z-]*", path.read_text(encoding="utf-8"))
 }
 HEADERS = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "cpp/include").rglob("*.hpp"))
-OWNERS = {"Fit": Fit, "IdentifyOptions": IdentifyOptions, "Scheme": rendering.Scheme}
+OWNERS = {"Fit": Fit, "IdentifyOptions": IdentifyOptions, "Memory": Memory, "Scheme": rendering.Scheme}
 """Classes that `palpate` does not export"""
 
 
