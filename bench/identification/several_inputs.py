@@ -159,6 +159,11 @@ MARKERS = (("o", "black"), ("^", "white"), ("s", "0.6"), ("D", "white"))
 """Marker and its color for each method"""
 
 
+def percent(share: float) -> str:
+    """Returns a share in percent with two digits."""
+    return f"{100.0 * share:.2g}"
+
+
 def table(results: Sequence[Mapping[str, Any]]) -> str:
     """Returns a table row for each force, number of inputs and number of rows: median and range of NRMSE, and
     median time of each method."""
@@ -170,7 +175,7 @@ def table(results: Sequence[Mapping[str, Any]]) -> str:
             (
                 f"{problem} ({of[PALPATE]['draws']} draws)",
                 *(
-                    f"{row['nrmse']:.1e} ({row['nrmse_range'][0]:.1e} to {row['nrmse_range'][1]:.1e})"
+                    f"{percent(row['nrmse'])} ({' to '.join(map(percent, row['nrmse_range']))})"
                     for row in found
                 ),
                 str(of[PALPATE]["n_parameters"]),
@@ -178,14 +183,14 @@ def table(results: Sequence[Mapping[str, Any]]) -> str:
             )
         )
     names = [method.name for method in METHODS]
-    errors, times = [f"NRMSE, {name}" for name in names], [f"{name} [s]" for name in names]
+    errors, times = [f"NRMSE of {name} [%]" for name in names], [f"{name} [s]" for name in names]
     return markdown_table(("problem", *errors, "parameters of palpate", *times), lines)
 
 
 def draw(path: Path, results: Sequence[Mapping[str, Any]]) -> None:
     """Draws error over time of all methods, a panel for each number of inputs; larger marks: more rows."""
     measured = [each for each in INPUTS if any(f", {each} inputs, " in row["problem"] for row in results)]
-    with figure_file(path, height_inches=3.2, columns=len(measured)) as panels:
+    with figure_file(path, height_inches=1.0 + 1.5 * len(measured), rows=[1.0] * len(measured)) as panels:
         for axes, inputs in zip(panels, measured, strict=True):
             for method, (marker, color) in zip(METHODS, MARKERS, strict=True):
                 rows = [
@@ -207,13 +212,10 @@ def draw(path: Path, results: Sequence[Mapping[str, Any]]) -> None:
             axes.set_xscale("log")
             axes.set_yscale("log")
             grid(axes)
-            axes.set_title(f"{inputs} inputs", fontsize=7.0)
-            axes.set_xlabel("fit and tuning [s]")
-        panels[0].set_ylabel("NRMSE")
+            axes.set_ylabel(f"NRMSE, {inputs} inputs")
+        panels[-1].set_xlabel("time of the fit with tuning [s]")
         handles, names = panels[0].get_legend_handles_labels()
-        panels[0].figure.legend(
-            handles, names, frameon=False, loc="outside lower center", ncols=4, fontsize=6.0
-        )
+        panels[0].figure.legend(handles, names, frameon=False, loc="outside lower center", ncols=2)
 
 
 def main() -> None:
