@@ -64,6 +64,11 @@ Branches that explain the share LEAST_GAIN of the squared error therefore give a
 LEAST_GAIN = 0.25
 """Least relative decrease of the squared error by a memory over a force of position or velocity [-]."""
 
+MOST_LOSS = 0.15
+"""Largest relative increase of the squared error by a memory that has fewer parameters than a network of
+position and velocity [-]. At one speed such a network fits the same recording as a branch, with several
+times the parameters."""
+
 LEAST_GAIN_OVER_HYSTERESIS = 0.5
 """Least relative decrease of the squared error by a memory over hysteresis [-]: at one rate both fit the same
 recording."""
@@ -262,6 +267,8 @@ def untested(found: FittedNetwork, recordings: Sequence[Recording], options: Ide
         return ""
     if not automatic or any(part.time is None or len(part.input_names) for part in recordings):
         return ""
+    if "velocity" in found.inputs:
+        return _unsupported(options)
     if found.nrmse < LEAST_NRMSE:
         return f"the model without memory has an NRMSE of {found.nrmse:.2g}, below {LEAST_NRMSE:g}"
     every_second = 2 * found.residuals >= sum(len(part) for part in recordings)
@@ -271,6 +278,11 @@ def untested(found: FittedNetwork, recordings: Sequence[Recording], options: Ide
             "the error of the model without memory is noise: residuals of neighbouring rows have a "
             f"correlation below {upper:.2g}, a memory needs {LEAST_CORRELATION:g}"
         )
+    return _unsupported(options)
+
+
+def _unsupported(options: IdentifyOptions) -> str | None:
+    """Returns the reason why the options exclude a memory; None if they do not."""
     if options.slope_limits is not None or options.fixed_force is not None:
         return "constraints of the slope or of a force are not imposed on a memory"
     if options.loss != "squares":
@@ -296,11 +308,10 @@ def better_with_memory(
     choice = grown(recorded, options)
     if choice.shape is None:
         return _refused(found, "no branch lowers the criterion")
-    least_gain = LEAST_GAIN if found.weight_hysteresis is None else LEAST_GAIN_OVER_HYSTERESIS
     before = found.nrmse**2
     in_sample = 1.0 - choice.rms() ** 2 / before
-    if in_sample < least_gain:
-        return _refused(found, _gain_text(in_sample, 0.0, least_gain))
+    if in_sample < _least_gain(found, 0):
+        return _refused(found, _gain_text(in_sample, 0.0, _least_gain(found, 0)))
     at_rest = recorded.at_rest(choice, identify_rest)
     fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least, choice.rms())
     refined = _without_idle(fit, fit.refined(choice.shape, recorded.log_tau, 3 * STEPS))
@@ -325,6 +336,8 @@ def better_with_memory(
     held_out = fit.held_out_errors(refined)
     gain = 1.0 - max(nrmse**2, float(held_out.mean())) / before
     scatter = float(held_out.std(ddof=1)) / before / np.sqrt(len(held_out)) if len(held_out) > 1 else 0.0
+    n_parameters = network.n_parameters + refined.n_parameters
+    least_gain = _least_gain(found, n_parameters)
     text = _gain_text(gain, scatter, least_gain)
     if gain - scatter < least_gain:
         return _refused(found, text)
@@ -332,7 +345,7 @@ def better_with_memory(
     return replace(
         network,
         model_class="memory",
-        n_parameters=network.n_parameters + refined.n_parameters,
+        n_parameters=n_parameters,
         rmse=error,
         nrmse=nrmse,
         path=found.path + network.path,
@@ -349,8 +362,20 @@ def _refused(found: FittedNetwork, reason: str) -> FittedNetwork:
     return replace(found, decisions=(*found.decisions, decided("memory", False, reason)))
 
 
+def _least_gain(found: FittedNetwork, n_parameters: int) -> float:
+    """Returns the least relative decrease of the squared error by a memory with a number of parameters.
+
+    It is negative if a memory may increase the error.
+    """
+    if "velocity" in found.inputs and n_parameters < found.n_parameters:
+        return -MOST_LOSS
+    return LEAST_GAIN if found.weight_hysteresis is None else LEAST_GAIN_OVER_HYSTERESIS
+
+
 def _gain_text(gain: float, error: float, least: float) -> str:
     change = squared_error_change(gain, error, "held-out sections")
+    if least < 0.0:
+        return f"{change}, with fewer parameters; may raise it by at most {-100.0 * least:g} %"
     return f"{change}, must lower it by at least {100.0 * least:g} %"
 
 

@@ -60,6 +60,34 @@ def test_known_branches_are_found(tau: list[float]) -> None:
     assert any("s are resolved by the recordings" in line for line in model.notes["identification"])
 
 
+def pressed_twice() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns time, position and a wave of the force at rest of an object pressed twice at one speed."""
+    time = np.arange(1200) / 1000.0
+    position = 0.5 - 0.5 * np.cos(2.0 * np.pi * 1.7 * time) * np.exp(-0.2 * time)
+    return time, position, 0.3 * np.sin(9.0 * position)
+
+
+def test_a_branch_has_fewer_parameters_than_a_network_of_position_and_velocity() -> None:
+    """At one speed of pressing, both fit the force down to its noise."""
+    time, position, wave = pressed_twice()
+    truth = relaxing([2.0], [0.05])
+    branch = truth.force_over_time(time, position)[0] - truth.force(position)
+    model = palpate.identify(position, with_noise(3.0 * position**2 + wave + branch, 1e-3), time=time)
+    assert model.kind == "memory"
+    assert model.n_parameters <= 30
+    assert any("with fewer parameters" in line for line in model.notes["model_selection"])
+
+
+def test_nonlinear_damping_does_not_become_a_branch_with_fewer_parameters() -> None:
+    time, position, wave = pressed_twice()
+    velocity = np.gradient(position, time)
+    contact = 5.0 * np.maximum(position - 0.4, 0.0)
+    force = with_noise(contact + wave + 0.01 * velocity * np.abs(velocity), 1e-3)
+    model = palpate.identify(position, force, time=time)
+    assert model.kind == "position_velocity"
+    assert any("may raise it by at most" in line for line in model.notes["model_selection"])
+
+
 def test_a_curved_force_at_rest_does_not_hide_a_branch() -> None:
     time, position = ramps_and_holds(21)
     memory = Memory(
