@@ -53,6 +53,9 @@ class Invariants {
     [[nodiscard]] const Extremes& extremes() const { return extremes_; }
     [[nodiscard]] std::uint64_t ticks() const { return records_; }
 
+    /// Tells that the motor makes other forces than the commands, so that no force limits its energy.
+    void motor_does_not_obey() { motor_obeys_ = false; }
+
     /// Sets the guards of the running controller, whose energy tank and limit cycles are compared.
     void watch(const Guards& guards) { guards_ = &guards; }
 
@@ -134,8 +137,9 @@ class Invariants {
 
     /// A reading that is not new, not a number or too far from the last one makes no force.
     void check_reading(Status status) noexcept {
-        is_valid_ = sends_force(reading_.status) && (!has_reading_ || reading_.sequence > sequence_) &&
-                    std::isfinite(reading_.position);
+        // The sample number may wrap around
+        const bool is_new = !has_reading_ || static_cast<std::int64_t>(reading_.sequence - sequence_) > 0;
+        is_valid_ = sends_force(reading_.status) && is_new && std::isfinite(reading_.position);
         if (!is_valid_) {
             require(!sends_force(status), "an invalid reading makes a force");
             return;
@@ -215,7 +219,8 @@ class Invariants {
                     "the energy tank does not limit the force");
             // Forces sent before the tank was empty may still act
             const double allowed = reserve + (device_.late_samples() + 2) * most_work_;
-            require(excess <= allowed + rounding, "the rendering gives more energy than the tank allows");
+            require(!motor_obeys_ || excess <= allowed + rounding,
+                    "the rendering gives more energy than the tank allows");
             extremes_.tank = std::max(extremes_.tank, excess / allowed);
         }
     }
@@ -224,6 +229,7 @@ class Invariants {
     LoopSettings loop_;
     DeviceProfile device_;
     const Guards* guards_ = nullptr;
+    bool motor_obeys_ = true;
     std::string broken_;
     Extremes extremes_;
 
@@ -305,20 +311,25 @@ class VirtualClock {
     Nanoseconds offset_ = 0;  ///< negative after a jump backward
 };
 
-/// Runs the control loop on a device in virtual time, with all promises checked. The device must be open.
-template <Structure S, Device D>
+/// Runs the control loop on a device in virtual time, with all promises checked. Calls `each(record)` after every tick.
+/// The device must be open.
+template <Structure S, Device D, class Each>
 LoopReport run_checked(S structure, D device, const Guards& guards, const LoopSettings& loop, double period_s,
-                       std::vector<ClockFault> clock_faults, Invariants& invariants) {
+                       std::vector<ClockFault> clock_faults, Invariants& invariants, Each each) {
     struct Sink {
         Invariants& invariants;
-        void push(const TickRecord& record) noexcept { invariants.records(record); }
+        Each& each;
+        void push(const TickRecord& record) noexcept {
+            invariants.records(record);
+            each(record);
+        }
     };
     CheckedDevice<D> checked{std::move(device), invariants};
     Controller controller{checked, std::move(structure), guards};
     invariants.watch(controller.guards());
     detail::ControllerOf any{controller};
     VirtualClock clock{period_s, std::move(clock_faults), invariants};
-    Sink sink{invariants};
+    Sink sink{invariants, each};
     const auto progress = std::make_unique<LoopProgress>();
     const auto report = std::make_unique<LoopReport>();
     const std::atomic<bool> stop_requested{false};

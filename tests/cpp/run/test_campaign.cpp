@@ -78,8 +78,8 @@ std::pair<Scene, Certificate> random_scene(Random& random) {
         DeviceProfile& device = scene.device;
         device.period_s = 1e-9 * std::round(1e9 * device.period_s);  // the unit of the clock
         device.jitter_s = random() % 2 == 0 ? 0.0 : uniform(random, 0.0, 0.5) * device.period_s;
-        device.delay_s = device.period_s * (random() % 2 == 0 ? static_cast<double>(random() % 3)
-                                                              : uniform(random, 0.0, 3.0));
+        device.delay_s = device.period_s *
+                         (random() % 2 == 0 ? static_cast<double>(random() % 3) : uniform(random, 0.0, 3.0));
         device.force_limit = std::exp(uniform(random, -3.0, 3.0));
         try {
             validate(scene.scheme, scene.model, scene.device.period_s);
@@ -197,7 +197,8 @@ std::string run_scene(std::uint64_t seed, Totals& totals) {
             test::Invariants invariants{guards, loop, scene.device};
             const LoopReport report = test::run_checked(
                 structure, std::move(device), guards_of(guards, scene.model, scene.scheme, period_s), loop,
-                period_s, random_clock_faults(random, ticks, period_s, totals), invariants);
+                period_s, random_clock_faults(random, ticks, period_s, totals), invariants,
+                [](const TickRecord&) {});
             broken = invariants.broken();
             // A certificate without delay proves that the tank never acts, except with the energy of the start ramp
             const auto limited = report.ticks_by_status[static_cast<std::size_t>(Status::EnergyLimited)];
