@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No verb and no run of palpate-control opens a network socket. Exceptions: the Inverse3, and telemetry on request.
+"""No verb and no run of palpate-control opens a network socket, except for the Inverse3 and for telemetry.
 
-A filter of the kernel ends a program with SIGSYS when it calls socket() for IPv4 or IPv6. The filter also holds for the
-threads and the child processes of the program.
+A filter of the kernel ends a program with SIGSYS when it calls socket() for IPv4 or IPv6. The filter also
+holds for the threads and the child processes of the program.
 """
 
 from __future__ import annotations
