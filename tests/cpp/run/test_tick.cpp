@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests one tick of the controller on adversarial readings, for every structure: floating-point exceptions, and the
 // number of machine instructions.
+#include <signal.h>
+
 #include <algorithm>
 #include <array>
 #include <cfenv>
@@ -111,6 +113,133 @@ TEST(Tick, RaisesNoFloatingPointException) {
         });
     }
 }
+
+#if defined(__x86_64__) && defined(__linux__)
+
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ == 12 && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
+constexpr bool counts_are_comparable = true;
+#else
+constexpr bool counts_are_comparable = false;
+#endif
+
+volatile std::uint64_t executed = 0;
+
+void count_instruction(int /*signal*/) {
+    executed = executed + 1;
+}
+
+/// Returns the number of machine instructions that a function executes. The trap flag of the processor makes the kernel
+/// send SIGTRAP after each one.
+template <class Function>
+std::uint64_t instructions(const Function& function) {
+    struct sigaction action{};
+    action.sa_handler = count_instruction;
+    struct sigaction before{};
+    sigaction(SIGTRAP, &action, &before);
+    executed = 0;
+    // The area below the stack pointer may be in use
+    asm volatile("lea -128(%%rsp), %%rsp; pushfq; orq $0x100, (%%rsp); popfq; lea 128(%%rsp), %%rsp" ::
+                     : "memory", "cc");
+    function();
+    asm volatile("lea -128(%%rsp), %%rsp; pushfq; andq $-257, (%%rsp); popfq; lea 128(%%rsp), %%rsp" ::
+                     : "memory", "cc");
+    sigaction(SIGTRAP, &before, nullptr);
+    return executed;
+}
+
+/// Positions of successive ticks.
+struct Input {
+    const char* name;
+    std::vector<double> positions;
+};
+
+std::vector<Input> inputs() {
+    std::vector<Input> all;
+    all.push_back({"inside", {}});
+    for (int k = 0; k < 40; ++k) {
+        all.back().positions.push_back(0.02 + 0.005 * k + 1e-4 * (k % 7));
+    }
+    all.push_back({"borders of cells", {}});
+    for (int k = 0; k <= 64; ++k) {
+        for (const double side : {-1.0, 2.0}) {
+            all.back().positions.push_back(std::nextafter(k / 64.0, side));
+        }
+    }
+    all.push_back({"outside", {1.5, 1.55, 1.52, 1.53}});
+    all.push_back({"far outside", {1e6, 1e6 + 0.05, 1e6 - 0.02}});
+    all.push_back({"force limit", {0.9, 0.95, 0.88, 0.86, 0.94}});
+    all.push_back({"reversals", {}});
+    for (int k = 0; k < 30; ++k) {
+        all.back().positions.push_back(0.2 + (k % 2 == 0 ? 0.04 : -0.04));
+    }
+    all.push_back({"NaN", {0.1, nan, 0.1, nan}});
+    all.push_back({"jump", {0.1, 0.9}});
+    return all;
+}
+
+/// Most instructions of a tick, in the order of `all_variants`: 1.2 times the numbers counted with g++ 12.2, -O1, glibc
+/// 2.36 and the AVX-512 kernels, for all ticks of `inputs`. With -O3 a tick needs fewer.
+constexpr std::array<std::uint64_t, 18> most_instructions{
+    840,    // direct, position
+    1240,   // direct, hysteresis
+    950,    // direct, predicted
+    1400,   // direct, predicted hysteresis
+    1230,   // massless, position
+    4900,   // massless, hysteresis
+    2450,   // massless, compensated
+    1530,   // implicit, position
+    6380,   // implicit, hysteresis
+    1830,   // implicit, compensated
+    830,    // explicit, position
+    1690,   // explicit, hysteresis
+    2750,   // explicit, compensated
+    3510,   // energy-consistent, position
+    11730,  // energy-consistent, hysteresis
+    15160,  // energy-consistent, compensated
+    1390,   // direct, velocity
+    1330,   // direct, memory
+};
+
+// A tick must end in time for every reading, so its number of instructions is bounded.
+TEST(Tick, ExecutesABoundedNumberOfInstructions) {
+    if (!counts_are_comparable) {
+        GTEST_SKIP() << "the numbers are known for g++ 12 without sanitizers";
+    }
+    if (__builtin_cpu_supports("avx2") == 0) {
+        GTEST_SKIP() << "the numbers are known for processors with AVX2";
+    }
+    const bool all_ticks = test::cases(1) > 1;  // some machines need 20 us for an instruction
+    const std::vector<test::Variant> variants = test::all_variants();
+    ASSERT_EQ(variants.size(), most_instructions.size());
+    for (std::size_t k = 0; k < variants.size(); ++k) {
+        const test::Variant& variant = variants[k];
+        with_structure(variant.model, variant.scheme, period_s, 2.0, [&](const auto& structure) {
+            const Guards guards = guards_of(guard_settings(), variant.model, variant.scheme, period_s);
+            for (const Input& input : inputs()) {
+                HeldDevice device;
+                device.next.position = input.positions.front();
+                Controller controller{device, structure, guards};
+                (void)controller.start();
+                // A tick uses the reading of the exchange before it
+                std::vector<double> played = input.positions;
+                played.push_back(played.back());
+                for (const double& position : played) {
+                    device.next.position = position;
+                    if (all_ticks || &position == &played.back()) {
+                        const std::uint64_t counted = instructions([&] { (void)controller.tick(); });
+                        EXPECT_GT(counted, 100U);
+                        EXPECT_LE(counted, most_instructions.at(k)) << variant.name << ": " << input.name;
+                    } else {
+                        (void)controller.tick();
+                    }
+                }
+            }
+        });
+    }
+}
+
+#endif
 
 }  // namespace
 }  // namespace palpate

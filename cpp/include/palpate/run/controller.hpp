@@ -6,6 +6,7 @@
 
 #include "palpate/device/device.hpp"
 #include "palpate/guard/guards.hpp"
+#include "palpate/realtime/nonblocking.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/status.hpp"
 
@@ -39,7 +40,7 @@ class Controller {
 
     /// Computes the force for the last reading, sends the force and takes the next reading. The first valid reading sets
     /// the virtual object at rest at the position of the handle.
-    [[nodiscard]] Tick tick() noexcept {
+    [[nodiscard]] Tick tick() noexcept PALPATE_NONBLOCKING {
         const Status reading_status =
             guards_.reading.check(reading_.position, reading_.sequence, reading_.status);
         Tick tick{reading_, {}, {}, reading_status};
