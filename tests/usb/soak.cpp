@@ -41,7 +41,7 @@
 namespace palpate {
 namespace {
 
-/// Whether a fault ends the session: never, always, or depending on the times of the packets.
+/// A fault never ends the session, always ends it, or ends it at some times of the packets.
 enum class Ends : std::uint8_t { Never, Always, Perhaps };
 
 /// A fault of the emulated device, and the documented answer of the host.
@@ -198,7 +198,8 @@ class Soak {
         Opened opened = device.open();
         // A late computer may miss the first packets
         for (int k = 0; k < 5 && !opened; ++k) {
-            std::cout << "session " << totals_.sessions << " does not open: " << opened.reason << "\n"
+            std::cout << "session " << totals_.sessions << " does not open after " << last_fault_ << ": "
+                      << opened.reason << "\n"
                       << std::flush;
             ++totals_.reopened;
             std::this_thread::sleep_for(std::chrono::seconds{1});
@@ -315,7 +316,8 @@ class Soak {
                 }
             }
             const bool detectable = fault.status != Status::Frozen || slowest > 1.5 * guards.frozen_speed;
-            const bool ends_rightly = report.loop.exit_reason == fault.exit && fault.ends != Ends::Never;
+            const bool ends_rightly = report.loop.exit_reason == fault.exit && fault.ends != Ends::Never &&
+                                      (fault.status == Status::Ok || report.loop.status == fault.status);
             // Faults of this counter so far, this one included
             const auto of_counter = static_cast<std::uint64_t>(
                 std::count_if(injected.data(), &one + 1, [&](const Injected& earlier) {
@@ -350,14 +352,17 @@ class Soak {
     /// Checks that the device is at rest, then removes the fault that ended the session.
     void restore(UsbDevice& device, const std::vector<Injected>& injected) {
         expect(device.in_flight() == 0, "transfers are in flight after closing");
-        const std::string last = injected.empty() ? "" : injected.back().fault->name;
+        const std::string last = injected.empty() ? "no fault" : injected.back().fault->name;
+        last_fault_ = last;
         if (last == "unplug") {
             std::this_thread::sleep_for(
                 std::chrono::milliseconds{20});  // the fault may follow the end of the session
             test::send_order("plug");
         }
         // The frames that remain of the last fault
-        std::this_thread::sleep_for(std::chrono::milliseconds{last == "slow" ? 1700 : 160});
+        std::this_thread::sleep_for(std::chrono::milliseconds{last == "slow"   ? 1700
+                                                              : last == "mute" ? 1000
+                                                                               : 160});
         expect(test::state("torque_uNm") == 0.0, "the motor has a torque after the session");
         expect(test::state("enabled") == 0.0, "the device is enabled after the session");
         detail::UsbConnection connection;
@@ -370,7 +375,8 @@ class Soak {
     std::mt19937_64 random_;
     Nanoseconds end_;
     std::string record_;
-    std::vector<TickRecord> kept_;  ///< memory for the records of a session
+    std::string last_fault_ = "no fault";  ///< last fault of the last session
+    std::vector<TickRecord> kept_;         ///< memory for the records of a session
     Totals totals_;
 };
 

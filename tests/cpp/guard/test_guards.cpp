@@ -583,7 +583,7 @@ TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
     }
 }
 
-// The object is so heavy that it hardly follows the handle: its soft coupling stores more energy than the object can.
+// A heavy object almost does not follow the handle, so its soft coupling stores more energy than the object can.
 TEST(GuardedAccount, AStretchedCouplingOfAHeavyObjectDoesNotEmptyTheTank) {
     DeviceProfile device;
     device.encoder_step = 0.0;

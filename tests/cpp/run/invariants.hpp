@@ -53,7 +53,7 @@ class Invariants {
     [[nodiscard]] const Extremes& extremes() const { return extremes_; }
     [[nodiscard]] std::uint64_t ticks() const { return records_; }
 
-    /// Tells that the motor makes other forces than the commands, so that no force limits its energy.
+    /// States that the motor makes other forces than the commands, so that no force limits its energy.
     void motor_does_not_obey() { motor_obeys_ = false; }
 
     /// Sets the guards of the running controller, whose energy tank and limit cycles are compared.

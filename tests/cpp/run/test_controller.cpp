@@ -365,7 +365,7 @@ TEST(Controller, EveryEventInEveryStateOfEveryStructureKeepsThePromises) {
     RecordProperty("runs", std::to_string(runs));
 }
 
-// Each state of the table is what its name says.
+// Each sequence of events leads to the state of its name.
 TEST(Controller, EventsReachEveryState) {
     const test::Variant variant = test::all_variants().front();
     with_structure(variant.model, variant.scheme, period_s, 2.0, [&](const auto& structure) {

@@ -53,7 +53,7 @@ GuardSettings guard_settings() {
     return settings;
 }
 
-/// Positions inside, at the borders and far outside of the model, and readings that are no positions.
+/// Positions inside, at the borders and far outside of the model, and readings that are not finite.
 const std::vector<double> positions{0.05,
                                     0.1,
                                     0.5,
