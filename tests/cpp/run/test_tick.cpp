@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests one tick of the controller on adversarial readings, for every structure: floating-point exceptions, and the
 // number of machine instructions.
-#include <signal.h>
-
 #include <algorithm>
 #include <array>
 #include <cfenv>
@@ -17,6 +15,7 @@
 #include "palpate/guard/guards.hpp"
 #include "palpate/run/controller.hpp"
 #include "support.hpp"
+#include "tick.hpp"
 #include "variants.hpp"
 
 namespace palpate {
@@ -25,23 +24,6 @@ namespace {
 constexpr double period_s = 1e-3;
 constexpr double inf = std::numeric_limits<double>::infinity();
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-/// A device that reports one reading again and again, with the next sample number.
-class HeldDevice {
-  public:
-    Opened open() { return {}; }
-    [[nodiscard]] Reading exchange(const Command& command) noexcept {
-        sent = command.force;
-        Reading reported = next;
-        reported.sequence = ++sequence;
-        return reported;
-    }
-    void close() noexcept {}
-
-    Reading next;
-    double sent = 0.0;
-    std::uint64_t sequence = 0;
-};
 
 GuardSettings guard_settings() {
     GuardSettings settings;
@@ -93,7 +75,7 @@ TEST(Tick, RaisesNoFloatingPointException) {
                             continue;
                         }
                         std::feclearexcept(FE_ALL_EXCEPT);
-                        HeldDevice device;
+                        test::HeldDevice device;
                         device.next.position = start;
                         Controller controller{device, structure, guards};
                         (void)controller.start();
@@ -122,31 +104,6 @@ constexpr bool counts_are_comparable = true;
 #else
 constexpr bool counts_are_comparable = false;
 #endif
-
-volatile std::uint64_t executed = 0;
-
-void count_instruction(int /*signal*/) {
-    executed = executed + 1;
-}
-
-/// Returns the number of machine instructions that a function executes. The trap flag of the processor makes the kernel
-/// send SIGTRAP after each one.
-template <class Function>
-std::uint64_t instructions(const Function& function) {
-    struct sigaction action{};
-    action.sa_handler = count_instruction;
-    struct sigaction before{};
-    sigaction(SIGTRAP, &action, &before);
-    executed = 0;
-    // The area below the stack pointer may be in use
-    asm volatile("lea -128(%%rsp), %%rsp; pushfq; orq $0x100, (%%rsp); popfq; lea 128(%%rsp), %%rsp" ::
-                     : "memory", "cc");
-    function();
-    asm volatile("lea -128(%%rsp), %%rsp; pushfq; andq $-257, (%%rsp); popfq; lea 128(%%rsp), %%rsp" ::
-                     : "memory", "cc");
-    sigaction(SIGTRAP, &before, nullptr);
-    return executed;
-}
 
 /// Positions of successive ticks.
 struct Input {
@@ -217,7 +174,7 @@ TEST(Tick, ExecutesABoundedNumberOfInstructions) {
         with_structure(variant.model, variant.scheme, period_s, 2.0, [&](const auto& structure) {
             const Guards guards = guards_of(guard_settings(), variant.model, variant.scheme, period_s);
             for (const Input& input : inputs()) {
-                HeldDevice device;
+                test::HeldDevice device;
                 device.next.position = input.positions.front();
                 Controller controller{device, structure, guards};
                 (void)controller.start();
@@ -227,7 +184,7 @@ TEST(Tick, ExecutesABoundedNumberOfInstructions) {
                 for (const double& position : played) {
                     device.next.position = position;
                     if (all_ticks || &position == &played.back()) {
-                        const std::uint64_t counted = instructions([&] { (void)controller.tick(); });
+                        const std::uint64_t counted = test::instructions([&] { (void)controller.tick(); });
                         EXPECT_GT(counted, 100U);
                         EXPECT_LE(counted, most_instructions.at(k)) << variant.name << ": " << input.name;
                     } else {
