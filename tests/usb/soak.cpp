@@ -83,10 +83,13 @@ constexpr std::array<FaultCase, 22> fault_cases{{
     {"unplug", 1, Status::Fault, Ends::Always, ExitReason::DeviceFault},
 }};
 
-/// Returns true if a tick with this status shows a fault: a tick whose force is also scaled reports the scaling first.
+/// Returns true if a tick with this status shows a fault. A tick whose force is also scaled reports the scaling first,
+/// and an encoder that was frozen during slow motion can jump when it moves again.
 bool shows(Status status, Status fault) {
-    return status == fault || (fault == Status::Limited &&
-                               (status == Status::EnergyLimited || status == Status::LimitCycleScaled));
+    return status == fault ||
+           (fault == Status::Limited &&
+            (status == Status::EnergyLimited || status == Status::LimitCycleScaled)) ||
+           (fault == Status::Frozen && status == Status::Jump);
 }
 
 /// Resources of this process.
@@ -318,7 +321,7 @@ class Soak {
             }
             const bool detectable = fault.status != Status::Frozen || slowest > 1.5 * guards.frozen_speed;
             const bool ends_rightly = report.loop.exit_reason == fault.exit && fault.ends != Ends::Never &&
-                                      (fault.status == Status::Ok || report.loop.status == fault.status);
+                                      (fault.status == Status::Ok || shows(report.loop.status, fault.status));
             // Faults of this counter so far, this one included
             const auto of_counter = static_cast<std::uint64_t>(
                 std::count_if(injected.data(), &one + 1, [&](const Injected& earlier) {

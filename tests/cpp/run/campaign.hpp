@@ -194,6 +194,10 @@ inline std::string run_scene(std::uint64_t seed, Totals& totals) {
             if (!broken.empty()) {
                 broken += ", run " + std::to_string(run) + (follows_certificate ? ", certified" : "");
             }
+            for (const Fault& fault : faults) {
+                totals.faults[static_cast<std::size_t>(fault.kind)] +=
+                    fault.exchange < invariants.ticks() ? 1 : 0;
+            }
             ++totals.runs;
             totals.ticks += invariants.ticks();
             totals.ticks_by_scene[name] += invariants.ticks();
