@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <optional>
 #include <ostream>
+#include <utility>
 
 #include "palpate/model/energy.hpp"
 #include "palpate/rendering/compensated.hpp"
@@ -161,6 +162,41 @@ inline Scene random_certified_scene(Random& random, double factor) {
                 energy_at(model, scheme, start) - range.least,
                 std::max(std::abs(range.least), std::abs(range.largest))};
     }
+}
+
+/// Returns a scene with this model, rendered directly on a random device without damping and friction.
+inline Scene random_direct_scene(Random& random, ForceModel model) {
+    Scene scene{std::move(model), {}, {}};
+    scene.scheme.structure = StructureKind::Direct;
+    DeviceProfile& device = scene.device;
+    device.period_s = uniform(random, 3e-4, 2e-3);
+    device.inertia = std::exp(uniform(random, -10.0, -5.0));
+    device.delay_s = static_cast<double>(random() % 3) * device.period_s;
+    device.encoder_step = random() % 2 == 0 ? 0.0 : std::exp(uniform(random, -11.0, -6.0));
+    device.force_limit = 1e9;
+    device.viscous_damping = device.coulomb_friction = 0.0;
+    scene.steepest = steepest_place(scene.model);
+    scene.start = std::max(device.encoder_step, 1e-3) * std::round(uniform(random, 0.0, 100.0));
+    return scene;
+}
+
+/// Returns a scene with a random network of position and velocity.
+inline Scene random_scene_of_velocity(Random& random) {
+    NetworkParameters network = random_network(random, random() % 7, 2);
+    const double fastest = uniform(random, 0.2, 5.0);
+    for (std::size_t i = 0; i < network.weight.size(); ++i) {
+        network.alpha[2 * i + 1] = std::exp(uniform(random, -1.0, 2.0)) / fastest;
+        network.beta[2 * i + 1] = uniform(random, -1.0, 1.0) * fastest;
+    }
+    network.linear[1] = uniform(random, -0.2, 0.2);  // damping of the object, positive or negative
+    const double slowest = random() % 4 == 0 ? uniform(random, 0.0, 0.1) : -fastest;
+    return random_direct_scene(
+        random, ForceModel::of_velocity(network, {{0.0, slowest}, {1.0, fastest}, {}, {}, std::nullopt}));
+}
+
+/// Returns a scene with a random force of position with memory.
+inline Scene random_scene_of_memory(Random& random) {
+    return random_direct_scene(random, random_model(random, false).with_memory(random_memory(random)));
 }
 
 /// Runs a scene in a closed control loop and computes the energy account of hand, device and object.

@@ -112,23 +112,6 @@ TEST(CertifiedScenes, DoNotOscillateWithPassiveHands) {
     }
 }
 
-/// Returns a scene with a random network of position and velocity, on a device with exactly the damping and friction
-/// that its certificate requires.
-Scene random_scene_of_velocity(test::Random& random) {
-    NetworkParameters network = test::random_network(random, random() % 7, 2);
-    const double fastest = test::uniform(random, 0.2, 5.0);
-    for (std::size_t i = 0; i < network.weight.size(); ++i) {
-        network.alpha[2 * i + 1] = std::exp(test::uniform(random, -1.0, 2.0)) / fastest;
-        network.beta[2 * i + 1] = test::uniform(random, -1.0, 1.0) * fastest;
-    }
-    network.linear[1] = test::uniform(random, -0.2, 0.2);  // damping of the object, positive or negative
-    const double slowest = random() % 4 == 0 ? test::uniform(random, 0.0, 0.1) : -fastest;
-    Scene scene{
-        ForceModel::of_velocity(network, {{0.0, slowest}, {1.0, fastest}, {}, {}, std::nullopt}), {}, {}};
-    scene.scheme.structure = StructureKind::Direct;
-    return scene;
-}
-
 /// Returns the energy of the object at rest at position x minus its energy at the lower edge of the domain [J].
 double resting_energy(const VelocityNetwork& force, double x) {
     constexpr int cells = 200;  // number of cells for the integral of the force over the position
@@ -150,19 +133,11 @@ TEST(CertifiedScenes, NeverGiveEnergyWithForcesOfVelocity) {
     constexpr double quadrature = 1e-6;
     test::Random random{22};
     for (int k = 0; k < test::cases(200); ++k) {
-        Scene scene = random_scene_of_velocity(random);
+        Scene scene = test::random_scene_of_velocity(random);
         const VelocityNetwork& force = *scene.model.velocity();
-        DeviceProfile device;
-        device.period_s = test::uniform(random, 3e-4, 2e-3);
-        device.inertia = std::exp(test::uniform(random, -10.0, -5.0));
-        device.delay_s = static_cast<double>(random() % 3) * device.period_s;
-        device.encoder_step = random() % 2 == 0 ? 0.0 : std::exp(test::uniform(random, -11.0, -6.0));
-        device.force_limit = 1e9;
-        const auto enough = test::device_at_its_bound(scene.model, scene.scheme, device, 1.0 + 1e-9);
+        const auto enough = test::device_at_its_bound(scene.model, scene.scheme, scene.device, 1.0 + 1e-9);
         ASSERT_TRUE(enough.has_value());
         scene.device = *enough;
-        scene.steepest = test::steepest_place(scene.model);
-        scene.start = std::max(device.encoder_step, 1e-3) * std::round(test::uniform(random, 0.0, 100.0));
         const EnergyRange range = energy_range(force, 1e9);
         scene.held = resting_energy(force, scene.start) - range.least + quadrature;
         scene.largest = std::max(std::abs(range.least), std::abs(range.largest));

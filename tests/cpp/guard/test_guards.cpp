@@ -196,6 +196,11 @@ TEST(StoredEnergy, GrowsWithTheVisitedPositions) {
     stored = StoredEnergy{{.within = 1.0, .force_limit = 5.0, .stiffness = 50.0}};
     stored.visit(0.0, 0.4);  // stretches the coupling by 0.3 more than the force limit of the device does
     EXPECT_NEAR(stored.most(), 1.0 + 5.0 * 0.3, 1e-12);
+    stored = StoredEnergy{{.within = 1.0, .force_limit = 5.0, .stiffness = 50.0, .included_stretch = 0.02}};
+    stored.visit(0.0, 0.06);
+    EXPECT_NEAR(stored.most(), 1.0 + 25.0 * (0.06 * 0.06 - 0.02 * 0.02), 1e-12);
+    stored.visit(0.0, 0.4);
+    EXPECT_NEAR(stored.most(), 1.0 + 25.0 * (0.1 * 0.1 - 0.02 * 0.02) + 5.0 * 0.3, 1e-12);
 }
 
 TEST(ReadMotion, MovesTheLeastDistanceThatReadingsProve) {
@@ -576,6 +581,31 @@ TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
     for (const auto& [structure, count] : scenes) {
         RecordProperty(structure, count);
     }
+}
+
+// A heavy object almost does not follow the handle, so its soft coupling stores more energy than the object can.
+TEST(GuardedAccount, AStretchedCouplingOfAHeavyObjectDoesNotEmptyTheTank) {
+    DeviceProfile device;
+    device.encoder_step = 0.0;
+    device.viscous_damping = 0.005;
+    Scheme scheme;
+    scheme.structure = StructureKind::Implicit;
+    scheme.coupling = {0.3, 0.0};
+    scheme.inertia = {10.0, 0.1};
+    const ForceModel soft{NetworkParameters{1, {}, {}, {}, {0.01}, 0.0}, test::unit_domain()};
+    ASSERT_TRUE(certify(soft, scheme, device).certified());
+    GuidedHandle handle{device, 0.0};
+    with_structure(soft, scheme, device.period_s, device.force_limit, [&](auto structure) {
+        Guards guards = certified_guards(soft, scheme, device);
+        guards.limit_cycle = {};
+        Controller controller{handle, std::move(structure), guards};
+        EXPECT_EQ(controller.start(), Status::Ok);
+        for (int k = 0; k < 2000; ++k) {
+            handle.move_to(0.5 - 0.5 * std::cos(0.01 * k));
+            ASSERT_NE(controller.tick().status, Status::EnergyLimited) << k;
+        }
+        EXPECT_GT(controller.guards().tank.most_given(), 0.1);
+    });
 }
 
 // A spring of stiffness 2 b / T, moved back and forth at every sample, generates exactly the energy that the device

@@ -1,17 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/run/controller.hpp"
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "invariants.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "support.hpp"
+#include "variants.hpp"
 
 namespace palpate {
 namespace {
+
+using test::ClockFault;
 
 /// A device that returns prescribed readings, some of them invalid, to test the controller.
 class ScriptedDevice {
@@ -29,29 +37,6 @@ class ScriptedDevice {
     double sent = 0.0;
     std::uint64_t sequence = 0;
 };
-
-TEST(Controller, SendsZeroForceOnAnyInvalidReading) {
-    ScriptedDevice device;
-    device.next.position = 0.2;
-    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
-                                                                ForceLimit{5.0}};
-    ASSERT_EQ(controller.start(), Status::Ok);
-    for (const Status bad : {Status::Timeout, Status::Lost, Status::Fault}) {
-        device.next.status = Status::Ok;
-        (void)controller.tick();
-        EXPECT_EQ(controller.tick().command.force, 2.0);
-        EXPECT_EQ(device.sent, 2.0);
-        device.next.status = bad;
-        (void)controller.tick();
-        EXPECT_EQ(controller.tick().status, bad);
-        EXPECT_EQ(device.sent, 0.0);
-    }
-    device.next = {};
-    device.next.position = std::numeric_limits<double>::quiet_NaN();
-    (void)controller.tick();
-    EXPECT_EQ(controller.tick().status, Status::NonFinite);
-    EXPECT_EQ(device.sent, 0.0);
-}
 
 TEST(Controller, PutsTheObjectAtRestUnderTheHandleBeforeTheFirstForce) {
     const VirtualCoupling coupling;
@@ -126,6 +111,285 @@ TEST(Controller, SendsZeroForceAtOnceAfterAFailedStep) {
         (void)controller.tick();
         EXPECT_NEAR(device.sent, 1.0, 1e-12) << "after the failed step the force rises from zero";
     }
+}
+
+// ------------------------------------------------------------- every state, every event, every structure
+
+constexpr double period_s = 1e-3;
+constexpr double inf = std::numeric_limits<double>::infinity();
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::uint64_t tolerated = 3;
+
+GuardSettings guard_settings(bool certified) {
+    GuardSettings settings;
+    settings.force_limit = 2.0;
+    settings.slew_s = certified ? 0.0 : 0.01;
+    settings.ramp_s = 0.01;
+    settings.frozen_s = 0.01;
+    settings.encoder_step = 1e-4;
+    settings.device_damping = 0.001;
+    settings.device_friction = 0.001;
+    settings.certified = certified;
+    return settings;
+}
+
+/// Largest change of position that is not a jump.
+const double largest_step = guard_settings(false).largest_speed * period_s;
+
+/// A reading that follows the last valid one, or a disturbance of the clock, with the answer in a healthy state.
+struct Event {
+    const char* name;
+    Status answer;          ///< status of the tick; Ok: any status that sends a force
+    double moved = 0.0;     ///< motion of the handle [rad]
+    double position = 0.0;  ///< if not 0: reported position [rad]
+    Status status = Status::Ok;
+    std::uint64_t samples = 1;  ///< change of the sample number
+    double applied = 0.0;       ///< if not 0: reported force of the motor [N*m]
+    ClockFault clock{};
+};
+
+const std::vector<Event> events{
+    {"rest", Status::Ok},
+    {"creep", Status::Ok, 1e-4},
+    {"back", Status::Ok, -1e-4},
+    {"fast", Status::Ok, 0.9 * largest_step},
+    {"fast back", Status::Ok, -0.9 * largest_step},
+    {"largest step", Status::Ok, largest_step * (1.0 - 1e-9)},
+    {"jump", Status::Jump, 1.01 * largest_step},
+    {"jump back", Status::Jump, -1.01 * largest_step},
+    {"far", Status::Jump, 0.0, 1e3},
+    {"largest number", Status::Jump, 0.0, std::numeric_limits<double>::max()},
+    {"NaN", Status::NonFinite, 0.0, nan},
+    {"infinity", Status::NonFinite, 0.0, inf},
+    {"minus infinity", Status::NonFinite, 0.0, -inf},
+    {"timeout", Status::Timeout, 0.0, 0.0, Status::Timeout, 0},
+    {"timeout with NaN", Status::Timeout, 0.0, nan, Status::Timeout, 0},
+    {"command lost", Status::Lost, 0.0, 0.0, Status::Lost},
+    {"one sample lost", Status::Lost, 0.0, 0.0, Status::Ok, 2},
+    {"many samples lost", Status::Lost, 0.0, 0.0, Status::Ok, 1000},
+    {"repeated", Status::Lost, 0.0, 0.0, Status::Ok, 0},
+    {"older", Status::Lost, 0.0, 0.0, Status::Ok, std::uint64_t(-1)},
+    {"much older", Status::Lost, 0.0, 0.0, Status::Ok, std::uint64_t{1} << 63U},
+    {"device fault", Status::Fault, 0.0, 0.0, Status::Fault},
+    {"device fault with NaN", Status::Fault, 0.0, nan, Status::Fault, 0},
+    {"device reports a jump", Status::Jump, 0.0, 0.0, Status::Jump},
+    {"device reports NaN", Status::NonFinite, 0.0, 0.0, Status::NonFinite},
+    {"device limits", Status::Ok, 0.0, 0.0, Status::Limited},
+    {"motor force NaN", Status::Ok, 1e-4, 0.0, Status::Ok, 1, nan},
+    {"motor force infinite", Status::Ok, 1e-4, 0.0, Status::Ok, 1, inf},
+    {"motor gives energy", Status::Ok, -0.9 * largest_step, 0.0, Status::Ok, 1, 2.0},
+    {"late tick", Status::Ok, 0.0, 0.0, Status::Ok, 1, 0.0, {0, 400'000, 0}},
+    {"much too late tick", Status::Ok, 0.0, 0.0, Status::Ok, 1, 0.0, {0, 3'000'000, 0}},
+    {"clock jumps back", Status::Ok, 0.0, 0.0, Status::Ok, 1, 0.0, {0, 0, -5'000'000}},
+};
+
+std::size_t event(const std::string& name) {
+    for (std::size_t k = 0; k < events.size(); ++k) {
+        if (name == events[k].name) {
+            return k;
+        }
+    }
+    throw std::invalid_argument(name);
+}
+
+/// Events that bring the controller into a state.
+struct State {
+    const char* name;
+    std::vector<std::size_t> before;
+    bool healthy = false;  ///< the next event has the answer of its row
+};
+
+std::vector<State> states() {
+    const auto times = [](std::size_t count, std::vector<std::string> names) {
+        std::vector<std::size_t> all;
+        for (std::size_t k = 0; k < count; ++k) {
+            for (const std::string& name : names) {
+                all.push_back(event(name));
+            }
+        }
+        return all;
+    };
+    const auto then = [](std::vector<std::size_t> first, const std::vector<std::size_t>& second) {
+        first.insert(first.end(), second.begin(), second.end());
+        return first;
+    };
+    const auto running = times(15, {"creep"});
+    return {{"start", {}},
+            {"ramp", times(5, {"creep"}), true},
+            {"running", running, true},
+            {"after one bad tick", then(running, times(1, {"timeout"}))},
+            {"after all tolerated bad ticks", then(running, times(tolerated, {"repeated"}))},
+            {"limited", then(running, times(6, {"fast"})), true},
+            {"slewing back", then(running, times(6, {"fast", "fast back"})), true},
+            {"almost frozen", then(running, then(times(1, {"fast"}), times(9, {"rest"})))},
+            {"tank empty", then(running, times(30, {"fast", "motor gives energy"})), true},
+            {"limit cycle", then(running, times(12, {"fast", "creep", "fast back", "back"})), true}};
+}
+
+/// A device that plays events, then rests.
+class EventDevice {
+  public:
+    EventDevice(const std::vector<std::size_t>& played, double start) : played_{played} {
+        reading_.position = start;
+    }
+    Opened open() { return {}; }
+    [[nodiscard]] Reading exchange(const Command& command) noexcept {
+        const Event& next = events[exchanges_ < played_.size() ? played_[exchanges_] : 0];
+        ++exchanges_;
+        reading_.position += next.moved;
+        reading_.applied = command.force;
+        Reading reported = reading_;
+        reported.sequence += next.samples;
+        reported.status = next.status;
+        reported.position = next.position != 0.0 ? next.position : reported.position;
+        reported.applied = next.applied != 0.0 ? next.applied : reported.applied;
+        // Samples follow the newest one
+        if (static_cast<std::int64_t>(reported.sequence - reading_.sequence) > 0) {
+            reading_.sequence = reported.sequence;
+        }
+        return reported;
+    }
+    void close() noexcept {}
+
+  private:
+    const std::vector<std::size_t>& played_;
+    std::size_t exchanges_ = 0;
+    Reading reading_;
+};
+
+struct Played {
+    std::vector<Status> statuses;
+    LoopReport report;
+    std::string broken;
+};
+
+/// Plays events and then eight samples at rest.
+template <Structure S>
+Played play(const S& structure, const Guards& guards, const GuardSettings& settings,
+            const std::vector<std::size_t>& played) {
+    LoopSettings loop;
+    loop.rate_hz = 1.0 / period_s;
+    loop.tolerated = tolerated;
+    loop.lowest_rate_share = 0.0;
+    loop.longest_period_s = settings.certified ? 1.5 * period_s : inf;
+    // The clock stretches the run when it jumps, so the number of ticks is not that of the events
+    loop.duration_s = static_cast<double>(played.size() + 8) * period_s;
+    std::vector<ClockFault> clock;
+    for (std::size_t k = 0; k < played.size(); ++k) {
+        ClockFault fault = events[played[k]].clock;
+        if (fault.late != 0 || fault.jump != 0) {
+            fault.tick = k;
+            clock.push_back(fault);
+        }
+    }
+    DeviceProfile device;
+    device.encoder_step = settings.encoder_step;
+    device.force_limit = settings.force_limit;
+    test::Invariants invariants{settings, loop, device};
+    invariants.motor_does_not_obey();
+    Played result;
+    result.report =
+        test::run_checked(structure, EventDevice{played, 0.05}, guards, loop, period_s, clock, invariants,
+                          [&](const TickRecord& record) { result.statuses.push_back(record.status); });
+    result.broken = invariants.broken();
+    return result;
+}
+
+/// Checks the answer to the event after `state`, in tick `at`.
+std::string wrong_answer(const State& state, const Event& next, const Played& run, std::size_t at,
+                         bool certified) {
+    if (next.clock.late > 500'000 && certified && at > 0) {  // no force is held before the first tick
+        return run.report.exit_reason == ExitReason::NotCertified && run.statuses.size() == at
+                   ? ""
+                   : "a tick later than certified does not end the run";
+    }
+    if (run.statuses.size() <= at) {
+        return "the run ended before the event";
+    }
+    const Status status = run.statuses[at];
+    const bool right = next.answer == Status::Ok ? sends_force(status) : status == next.answer;
+    if (state.healthy && !right) {
+        return std::string("the status is ") + text(status).word;
+    }
+    const bool ends = run.statuses.size() == at + 1;
+    if (state.healthy && ends != is_final(status)) {
+        return ends ? "the run ends" : "the run continues";
+    }
+    // After one bad first sample the run continues, unless the next ones cannot follow its number or position
+    const bool continues = at == 0 && !is_final(next.answer) && next.name != std::string("much older");
+    if (!ends && !sends_force(run.statuses.back()) &&
+        (continues || run.report.exit_reason == ExitReason::TimeUp)) {
+        return "the force does not return";
+    }
+    return "";
+}
+
+TEST(Controller, EveryEventInEveryStateOfEveryStructureKeepsThePromises) {
+    const std::vector<State> all_states = states();
+    // The normal test run plays every eighth pair of events, others for every structure and state
+    const std::size_t stride = test::cases(1) > 1 ? 1 : 8;
+    std::size_t runs = 0;
+    for (const test::Variant& variant : test::all_variants()) {
+        with_structure(variant.model, variant.scheme, period_s, 2.0, [&](const auto& structure) {
+            for (const bool certified : {false, true}) {
+                const GuardSettings settings = guard_settings(certified);
+                const Guards guards = guards_of(settings, variant.model, variant.scheme, period_s);
+                for (const State& state : all_states) {
+                    for (std::size_t first = 0; first < events.size(); ++first) {
+                        for (std::size_t second = 0; second < events.size(); ++second) {
+                            if (second > 0 && (first + second + runs) % stride != 0) {
+                                continue;
+                            }
+                            std::vector<std::size_t> played = state.before;
+                            played.push_back(first);
+                            played.push_back(second);
+                            const Played run = play(structure, guards, settings, played);
+                            ++runs;
+                            const std::string wrong =
+                                !run.broken.empty() ? run.broken
+                                : second == 0
+                                    ? wrong_answer(state, events[first], run, state.before.size(), certified)
+                                    : "";
+                            ASSERT_EQ(wrong, "") << variant.name << (certified ? ", certified" : "")
+                                                 << "; state " << state.name << ", then "
+                                                 << events[first].name << ", then " << events[second].name;
+                        }
+                    }
+                }
+            }
+        });
+        if (HasFatalFailure()) {
+            return;
+        }
+    }
+    RecordProperty("runs", std::to_string(runs));
+}
+
+// Each sequence of events leads to the state of its name.
+TEST(Controller, EventsReachEveryState) {
+    const test::Variant variant = test::all_variants().front();
+    with_structure(variant.model, variant.scheme, period_s, 2.0, [&](const auto& structure) {
+        const GuardSettings settings = guard_settings(false);
+        const Guards guards = guards_of(settings, variant.model, variant.scheme, period_s);
+        for (const State& state : states()) {
+            const Played run = play(structure, guards, settings, state.before);
+            const std::string name = state.name;
+            const auto expects = [&](Status status) {
+                EXPECT_GT(run.report.ticks_by_status[static_cast<std::size_t>(status)], 0U) << name;
+            };
+            EXPECT_EQ(run.broken, "");
+            expects(Status::Ramp);
+            if (name == "limited" || name == "slewing back") {
+                expects(Status::Limited);
+            } else if (name == "tank empty") {
+                expects(Status::EnergyLimited);
+            } else if (name == "limit cycle") {
+                expects(Status::LimitCycleScaled);
+            } else if (name == "almost frozen") {
+                EXPECT_EQ(run.report.status, Status::Frozen);
+            }
+        }
+    });
 }
 
 }  // namespace

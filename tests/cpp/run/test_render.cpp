@@ -2,6 +2,8 @@
 #include "palpate/run/render.hpp"
 
 #include <algorithm>
+#include <initializer_list>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -26,9 +28,8 @@ PlannedModel stored(const std::string& name) {
             std::move(file.certificate)};
 }
 
-/// Prepares a rendering of a stored model on the device of its certificate.
-RenderJob prepared(const PlannedModel& model, bool simulated, const RenderOptions& options) {
-    const DeviceProfile& profile = model.certificate->device;
+RenderJob prepared(const PlannedModel& model, const DeviceProfile& profile, bool simulated,
+                   const RenderOptions& options) {
     LiveDeviceOf<SimulatedDevice> device{SimulatedDevice{profile, Hand{}}};
     device.profile = profile;
     device.scale = scale_of(model.model, true);
@@ -36,6 +37,11 @@ RenderJob prepared(const PlannedModel& model, bool simulated, const RenderOption
     device.simulated = simulated;
     RecordSinks sinks;
     return prepare_rendering(options, model, device, sinks);
+}
+
+/// Prepares a rendering of a stored model on the device of its certificate.
+RenderJob prepared(const PlannedModel& model, bool simulated, const RenderOptions& options) {
+    return prepared(model, model.certificate->device, simulated, options);
 }
 
 std::string certified(const RenderJob& job) {
@@ -65,14 +71,81 @@ TEST(PrepareRendering, KeepsAllGuardsIfThePlanIsOnlyStable) {
     EXPECT_EQ(job.notes.front().rfind("uncertified: the certificate is stable-locally: ", 0), 0U);
 }
 
-TEST(PrepareRendering, MovesARealDeviceWithAStablePlanOnlyIfUncertifiedIsSet) {
-    const PlannedModel model = stored("certificate_stable.json");
-    EXPECT_THROW((void)prepared(model, false, {}), std::invalid_argument);
-    RenderOptions options;
-    options.uncertified = true;
-    const RenderJob job = prepared(model, false, options);
-    EXPECT_FALSE(job.guards.certified);
-    EXPECT_EQ(certified(job), "no: uncertified was set");
+/// A difference between the device and that of the certificate.
+struct Difference {
+    const char* name;
+    void (*apply)(DeviceProfile& device);
+};
+
+/// An option that changes the plan.
+struct Change {
+    const char* name;
+    void (*apply)(RenderOptions& options);
+};
+
+// A real device moves only if a certificate holds for model, plan and device, or if uncertified is set. The guards rely
+// on a certificate only if it holds.
+TEST(PrepareRendering, NeedsACertificateThatHoldsOrTheOptionUncertified) {
+    const Difference differences[] = {
+        {"none", [](DeviceProfile&) {}},
+        {"other device", [](DeviceProfile& device) { device.id += "-2"; }},
+        {"longer period", [](DeviceProfile& device) { device.period_s *= 1.01; }},
+        {"coarser encoder",
+         [](DeviceProfile& device) { device.encoder_step = 2.0 * device.encoder_step + 1e-4; }},
+        {"weaker motor", [](DeviceProfile& device) { device.force_limit *= 0.5; }},
+    };
+    const Change changes[] = {
+        {"none", [](RenderOptions&) {}},
+        {"structure", [](RenderOptions& options) { options.scheme.structure = StructureKind::Implicit; }},
+        {"coupling", [](RenderOptions& options) { options.scheme.coupling_stiffness = 50.0; }},
+        {"force limit", [](RenderOptions& options) { options.force_limit = 0.1; }},
+        {"slew", [](RenderOptions& options) { options.slew_s = 0.0; }},
+        {"tolerated samples", [](RenderOptions& options) { options.tolerated = 3; }},
+    };
+    PlannedModel without = stored("certificate_massless.json");
+    const DeviceProfile certified_device = without.certificate->device;
+    without.certificate.reset();
+    PlannedModel refused = stored("certificate_massless.json");
+    refused.certificate->verdict = Verdict::Refused;
+    const PlannedModel stable = stored("certificate_stable.json");
+    const PlannedModel proved = stored("certificate_massless.json");
+    for (const PlannedModel* model :
+         std::initializer_list<const PlannedModel*>{&without, &refused, &stable, &proved}) {
+        for (const Difference& difference : differences) {
+            for (const Change& change : changes) {
+                for (const bool simulated : {false, true}) {
+                    for (const bool uncertified : {false, true}) {
+                        DeviceProfile profile =
+                            model->certificate ? model->certificate->device : certified_device;
+                        difference.apply(profile);
+                        RenderOptions options;
+                        options.uncertified = uncertified;
+                        change.apply(options);
+                        const bool fits = model == &proved && change.name == std::string("none");
+                        const bool holds = fits && difference.name == std::string("none");
+                        const std::string what = std::string(difference.name) + ", " + change.name +
+                                                 (simulated ? ", simulated" : "") +
+                                                 (uncertified ? ", uncertified" : "");
+                        if (!simulated && !uncertified && !holds) {
+                            EXPECT_THROW((void)prepared(*model, profile, simulated, options),
+                                         std::invalid_argument)
+                                << what;
+                            continue;
+                        }
+                        const RenderJob job = prepared(*model, profile, simulated, options);
+                        // A simulated device takes the profile of the certificate when it is opened
+                        const bool relies = !uncertified && (simulated ? fits : holds);
+                        EXPECT_EQ(job.guards.certified, relies) << what;
+                        EXPECT_EQ(certified(job).rfind("no: ", 0) != 0, relies) << what;
+                        EXPECT_LE(job.guards.force_limit,
+                                  simulated && relies ? certified_device.force_limit : profile.force_limit)
+                            << what;
+                        EXPECT_EQ(job.session.loop.tolerated == 0, relies) << what;
+                    }
+                }
+            }
+        }
+    }
 }
 
 }  // namespace

@@ -35,6 +35,15 @@ struct Guards {
     PassivityObserver observer{};       ///< sums the energy that the rendering absorbs after the start ramp
 };
 
+/// Returns the largest force of a model of position inside its domain, limited to the force limit [N or N*m].
+[[nodiscard]] inline double largest_resting_force(const ForceModel& model, double force_limit) {
+    const HysteresisNetwork* pair = model.hysteresis();
+    const double force = pair != nullptr ? pair->force().value_bounds().largest() +
+                                               pair->hysteresis_force().value_bounds().largest()
+                                         : model.network()->curve().value_bounds().largest();
+    return std::min(force, force_limit);
+}
+
 /// Returns an upper bound of the energy that a rendering stores while handle and virtual object do not move and are
 /// inside the domain of the model [J]. The bound is infinite for a periodic model that gives energy in every period.
 ///
@@ -51,11 +60,7 @@ struct Guards {
     if (!has_coupling(scheme.structure)) {
         return object_energy;
     }
-    const HysteresisNetwork* pair = model.hysteresis();
-    const double force = pair != nullptr ? pair->force().value_bounds().largest() +
-                                               pair->hysteresis_force().value_bounds().largest()
-                                         : model.network()->curve().value_bounds().largest();
-    const double largest_force = std::min(force, force_limit);
+    const double largest_force = largest_resting_force(model, force_limit);
     const double coupling_energy = 0.5 * largest_force * largest_force / scheme.coupling.stiffness;
     return object_energy + (scheme.compensated ? 2.0 : 1.0) * coupling_energy;
 }
@@ -74,6 +79,10 @@ struct Guards {
     stored.force_limit = force_limit;
     if (has_coupling(scheme.structure)) {
         stored.stiffness = scheme.coupling.stiffness;
+        // The stretch of a massless object is in balance with its force
+        if (has_mass(scheme.structure)) {
+            stored.included_stretch = largest_resting_force(model, force_limit) / stored.stiffness;
+        }
     }
     stored.mass = has_mass(scheme.structure) ? scheme.inertia.mass : 0.0;
     stored.period_s = period_s;

@@ -41,7 +41,7 @@ class LimitCycleDetector {
         least_force_ = std::min(least_force_, force);
         largest_force_ = std::max(largest_force_, force);
         const double ahead = direction_ * (position - extreme_);
-        if (ahead >= 0.0 || std::isnan(extreme_)) {
+        if (std::isnan(extreme_) || ahead >= 0.0) {
             extreme_ = position;
         } else if (-ahead > settings_.encoder_step) {
             end_swing();

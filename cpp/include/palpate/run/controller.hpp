@@ -6,6 +6,7 @@
 
 #include "palpate/device/device.hpp"
 #include "palpate/guard/guards.hpp"
+#include "palpate/realtime/nonblocking.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/status.hpp"
 
@@ -31,19 +32,22 @@ class Controller {
     Controller(D& device, S structure, ForceLimit limit)
         : Controller{device, std::move(structure), Guards{.limit = limit}} {}
 
-    /// Sends zero force, takes the first sample and sets the virtual object at rest at the position of this sample.
+    /// Sends zero force and takes the first sample.
     [[nodiscard]] Status start() noexcept {
         reading_ = device_.exchange({});
-        structure_.reset(reading_.position);
         return reading_.status;
     }
 
-    /// Computes the force for the last reading, sends the force and takes the next reading.
-    [[nodiscard]] Tick tick() noexcept {
+    /// Computes the force for the last reading, sends the force and takes the next reading. The first valid reading sets
+    /// the virtual object at rest at the position of the handle.
+    [[nodiscard]] Tick tick() noexcept PALPATE_NONBLOCKING {
         const Status reading_status =
             guards_.reading.check(reading_.position, reading_.sequence, reading_.status);
         Tick tick{reading_, {}, {}, reading_status};
         if (sends_force(reading_status)) {
+            if (!std::exchange(is_placed_, true)) {
+                structure_.reset(reading_.position);
+            }
             tick.rendered = structure_.step(reading_.position);
             observe(tick.rendered.environment_position);
             tick.status = limit_force(tick.rendered, tick.command.force, reading_status);
@@ -116,6 +120,7 @@ class Controller {
     S structure_;
     Guards guards_;
     Reading reading_;
+    bool is_placed_ = false;  ///< true after the virtual object was placed at the handle
 };
 
 }  // namespace palpate

@@ -39,7 +39,9 @@ inline void validate(const LoopSettings& settings) {
     require_field(settings.rate_hz >= lowest_rate_hz && settings.rate_hz <= highest_rate_hz, "rate_hz",
                   settings.rate_hz, readable(lowest_rate_hz) + " to " + readable(highest_rate_hz));
     require_field(settings.duration_s > 0.0, "duration_s", settings.duration_s, "> 0");
-    require_field(settings.longest_period_s >= 1.0 / settings.rate_hz, "longest_period_s",
+    // A certificate without reserve holds for exactly one period, and 1 / rate_hz is rounded
+    constexpr double rounding = 1e-9;
+    require_field(settings.longest_period_s * settings.rate_hz >= 1.0 - rounding, "longest_period_s",
                   settings.longest_period_s, "at least one period");
     require_field(settings.lowest_rate_share >= 0.0 && settings.lowest_rate_share <= 1.0, "lowest_rate_share",
                   settings.lowest_rate_share, "0 to 1");
