@@ -7,7 +7,6 @@ The table contains every verb that writes, and palpate-control. file_faults.c co
 from __future__ import annotations
 
 import errno
-import json
 import os
 import random
 import re
@@ -15,13 +14,10 @@ import shlex
 import shutil
 import signal
 import stat
-import zipfile
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from control_program import PROGRAM
@@ -119,7 +115,9 @@ def put_old_outputs(name: str, folder: Path) -> None:
         (folder / each).write_text("old\n", encoding="utf-8")
 
 
-def run(programs: Programs, name: str, folder: Path, fault: Fault | None = None, *, force: bool = False) -> Ended:
+def run(
+    programs: Programs, name: str, folder: Path, fault: Fault | None = None, *, force: bool = False
+) -> Ended:
     command = CASES[name] + (" --force" if force and name in WITH_FORCE else "")
     if name == "palpate-control":
         return programs.program(shlex.split(command), folder, fault)
@@ -155,10 +153,14 @@ def is_complete(name: str, content: bytes) -> bool:
     }  # fmt: skip
     kind = name.rpartition(".")[2]
     last = content.splitlines(keepends=True)[-1] if kind == "h" else content
-    return (last.startswith if kind == "h" else last.endswith)(ends[kind]) and b"not yet" not in content[:4096]
+    return (last.startswith if kind == "h" else last.endswith)(ends[kind]) and b"not yet" not in content[
+        :4096
+    ]
 
 
-def require_safe(folder: Path, inputs: dict[str, bytes], old: dict[str, bytes], new: dict[str, bytes] | None) -> None:
+def require_safe(
+    folder: Path, inputs: dict[str, bytes], old: dict[str, bytes], new: dict[str, bytes] | None
+) -> None:
     """Requires that each file is an unchanged input, an old or a complete output, or a known leftover.
 
     Parameters
@@ -181,7 +183,11 @@ def require_safe(folder: Path, inputs: dict[str, bytes], old: dict[str, bytes], 
 def leftovers(folder: Path) -> set[str]:
     """Returns the kinds of temporary files and unfinished recordings in a folder."""
     names = {path.name for path in folder.rglob("*")}
-    return {TEMPORARY.sub("temporary", name) for name in names if TEMPORARY.fullmatch(name) or name.endswith(".part")}
+    return {
+        TEMPORARY.sub("temporary", name)
+        for name in names
+        if TEMPORARY.fullmatch(name) or name.endswith(".part")
+    }
 
 
 def require_order(calls: tuple[Call, ...]) -> None:
@@ -234,7 +240,9 @@ def test_at_every_call_each_file_is_absent_old_or_complete(
     ended = run(programs, name, folder, Fault(states=states), force=before == "old")
     assert ended.code == 0, ended.messages
     new = files_in(folder)
-    assert new.keys() == inputs.keys() | set(outputs_of(name)) | {each for each in new if each.startswith("demo/")}
+    assert new.keys() == inputs.keys() | set(outputs_of(name)) | {
+        each for each in new if each.startswith("demo/")
+    }
     require_order(ended.calls)
     seen: dict[str, Path] = {}
     for state in sorted(states.iterdir()):
@@ -262,7 +270,9 @@ def calls_to_fault(ended: Ended, name: str, seed: int) -> list[int]:
 
 
 @every_quick_case
-def test_after_kill_each_file_is_old_or_complete(programs: Programs, name: str, folder: Path, tmp_path: Path) -> None:
+def test_after_kill_each_file_is_old_or_complete(
+    programs: Programs, name: str, folder: Path, tmp_path: Path
+) -> None:
     inputs = files_in(folder)
     first = tmp_path / "first"
     shutil.copytree(folder, first)
@@ -281,7 +291,9 @@ ERRORS = {"write": errno.ENOSPC, "pwrite": errno.ENOSPC, "fsync": errno.EIO}
 """Error number of a failed call by its name; others fail with EACCES."""
 
 
-def require_reported(ended: Ended, work: Path, name: str, inputs: dict[str, bytes], old: dict[str, bytes]) -> None:
+def require_reported(
+    ended: Ended, work: Path, name: str, inputs: dict[str, bytes], old: dict[str, bytes]
+) -> None:
     """Requires one sentence about the failure and no file that is neither old nor complete."""
     assert ended.code in (0, 1, 2), ended.messages
     assert "Traceback" not in ended.messages
@@ -366,7 +378,9 @@ def test_new_files_follow_the_umask_and_replaced_files_keep_mode_and_link(
 
 
 @every_quick_case
-def test_two_writers_of_one_output_leave_one_complete_file(programs: Programs, name: str, folder: Path) -> None:
+def test_two_writers_of_one_output_leave_one_complete_file(
+    programs: Programs, name: str, folder: Path
+) -> None:
     if name == "palpate-control":
         pytest.skip("tested in control/test_control_record.py")
     inputs = files_in(folder)
@@ -403,7 +417,9 @@ def test_no_input_is_overwritten_under_any_of_its_names(
         for alias in spellings(folder, source, output):
             if name == "plan" and output == "out.json":
                 continue  # a plan is stored in the model file
-            command = CASES[name].replace(f" {output}", f" {alias}") + (" --force" if name in WITH_FORCE else "")
+            command = CASES[name].replace(f" {output}", f" {alias}") + (
+                " --force" if name in WITH_FORCE else ""
+            )
             if name == "palpate-control":
                 ended = programs.program(shlex.split(command), folder)
             else:
@@ -416,7 +432,9 @@ def test_no_input_is_overwritten_under_any_of_its_names(
 
 
 @every_quick_case
-def test_an_existing_recording_is_replaced_only_with_force(programs: Programs, name: str, folder: Path) -> None:
+def test_an_existing_recording_is_replaced_only_with_force(
+    programs: Programs, name: str, folder: Path
+) -> None:
     for output in outputs_of(name):
         if name in RECORDING and output.startswith("out."):
             (folder / output).write_text("old\n", encoding="utf-8")
