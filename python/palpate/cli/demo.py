@@ -154,7 +154,7 @@ def _require_folder(folder: Path) -> None:
         require_writable(folder / "model.json")
         for path in (folder / name for name in _SAMPLES):
             if os.path.lexists(path) and not path.read_bytes().startswith(_SIMULATED):
-                raise InputError(f"{path} exists already and is no recording of a demo; choose another folder")
+                raise InputError(f"{path} exists already and is not from a demo; choose another folder")
     elif folder.exists():
         raise InputError(
             f"{folder} is a file, but the demo writes a folder; choose another name with --output"

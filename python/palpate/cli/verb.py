@@ -300,9 +300,7 @@ def require_model_name(output: Path) -> None:
         raise InputError(f"{output} is not a model file: its name must end in .json")
 
 
-def require_writable(
-    *targets: Path | None, inputs: Sequence[Path | None] = (), force: bool = False
-) -> None:
+def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = (), force: bool = False) -> None:
     """Refuses output files that cannot be written, before anything is computed. None means no file.
 
     Raises

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files of a program that is killed, or whose disk fails, at any call: each is absent, old, or complete.
 
-The table contains every verb that writes, and palpate-control. file_faults.c counts the calls that change files.
+The table contains every verb that writes, and palpate-control. file_faults.c counts the calls that change
+files.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ CASES = {
     "demo": "demo -o demo",
     "palpate-control": f"{PROGRAM} m.json --record out.csv {SHORT_LIVE}",
 }
-"""Command lines that write every kind of output file; each ends quickly, except the last three columns of slow."""
+"""Command lines that write every kind of output file"""
 
 SLOW = {"check-device", "demo"}
 """Commands that take more than three seconds; fewer faults of them are tested."""
@@ -56,8 +57,8 @@ WITHOUT_FILES = {"devices"}
 """Verbs that write no file. The udev rule of devices is tested in devices/test_udev.py."""
 
 INPUTS = {
-    "model_file", "recording_file", "recording_files", "file", "other_file", "object_file", "profile", "source",
-    "identified_on",
+    "model_file", "recording_file", "recording_files", "file", "other_file", "object_file", "profile",
+    "source", "identified_on",
 }  # fmt: skip
 """Parameters of verbs that name a file to read."""
 
@@ -148,8 +149,8 @@ def require_readable_part(path: Path) -> None:
 def is_complete(name: str, content: bytes) -> bool:
     """Returns True if a file of this name ends as a complete one does."""
     ends = {
-        "png": b"IEND\xaeB`\x82", "html": b"</html>\n", "h": b"#endif", "mcap": b"\x89MCAP0\r\n", "json": b"}\n",
-        "toml": b"\n", "csv": b"\n", "fmu": b"",
+        "png": b"IEND\xaeB`\x82", "html": b"</html>\n", "h": b"#endif", "mcap": b"\x89MCAP0\r\n",
+        "json": b"}\n", "toml": b"\n", "csv": b"\n", "fmu": b"",
     }  # fmt: skip
     kind = name.rpartition(".")[2]
     last = content.splitlines(keepends=True)[-1] if kind == "h" else content
@@ -191,7 +192,7 @@ def leftovers(folder: Path) -> set[str]:
 
 
 def require_order(calls: tuple[Call, ...]) -> None:
-    """Requires that new files are created safely, and are on the disk before and after they get their name."""
+    """Requires that files are created safely, and are on the disk before and after they get their name."""
     created: set[str] = set()
     unsaved: set[str] = set()
     renamed = False
