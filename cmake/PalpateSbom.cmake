@@ -7,7 +7,7 @@ include_guard()
 
 set(palpate_components "")
 
-# palpate_component(NAME VERSION LICENCE PURL): VERSION is empty if the library was not found.
+# palpate_component(NAME VERSION LICENCE PURL): VERSION is empty if the library was not found; PURL ends before it.
 function(palpate_component name version licence purl)
   if(version)
     string(CONFIGURE [[
@@ -17,20 +17,20 @@ function(palpate_component name version licence purl)
       "name": "@name@",
       "version": "@version@",
       "licenses": [{ "license": { "id": "@licence@" } }],
-      "purl": "@purl@@@version@"
+      "purl": "@purl@@version@"
     }]] component @ONLY)
     list(APPEND palpate_components "${component}")
     set(palpate_components "${palpate_components}" PARENT_SCOPE)
   endif()
 endfunction()
 
-palpate_component(pybind11 "${pybind11_VERSION}" BSD-3-Clause "pkg:pypi/pybind11")
-palpate_component(nlohmann-json "${nlohmann_json_VERSION}" MIT "pkg:github/nlohmann/json")
+palpate_component(pybind11 "${pybind11_VERSION}" BSD-3-Clause "pkg:pypi/pybind11@")
+palpate_component(nlohmann-json "${nlohmann_json_VERSION}" MIT "pkg:github/nlohmann/json@v")
 if(PALPATE_BUILD_CONTROL)
-  palpate_component(CLI11 "${CLI11_VERSION}" BSD-3-Clause "pkg:github/CLIUtils/CLI11")
+  palpate_component(CLI11 "${CLI11_VERSION}" BSD-3-Clause "pkg:github/CLIUtils/CLI11@v")
 endif()
 if(TARGET Boost::headers)
-  palpate_component(boost "${Boost_VERSION}" BSL-1.0 "pkg:github/boostorg/boost")
+  palpate_component(boost "${Boost_VERSION}" BSL-1.0 "pkg:github/boostorg/boost@boost-")
 endif()
 list(JOIN palpate_components ",\n" palpate_components)
 configure_file("${PROJECT_SOURCE_DIR}/cmake/palpate.cdx.json.in" "${PROJECT_BINARY_DIR}/palpate.cdx.json" @ONLY)

@@ -3,7 +3,7 @@
 # Writes tools/locked/GROUP.txt for each dependency group of pyproject.toml: exact versions with their SHA-256, for all
 # supported versions of Python and all architectures. `make` installs nothing else from the internet with pip.
 #
-#   tools/lock.sh             adds what pyproject.toml needs and keeps all other versions; needs `pip install uv`
+#   tools/lock.sh             adds missing packages of pyproject.toml and keeps all other versions; needs `pip install uv`
 #   tools/lock.sh --upgrade   takes the newest versions
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -23,7 +23,7 @@ lock pyproject.toml --output-file "$everything" "${groups[@]/#/--group=}" "$@"
 for group in "${groups[@]}"; do
     file=tools/locked/$group.txt
     packages=()
-    if [ "$group" = build ]; then packages=(pyproject.toml); fi # and what palpate itself needs
+    if [ "$group" = build ]; then packages=(pyproject.toml); fi # with the packages that palpate imports
     {
         echo "# SPDX-License-Identifier: Apache-2.0"
         echo "# Written by tools/lock.sh."

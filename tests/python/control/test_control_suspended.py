@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +26,7 @@ LONGEST_WAIT_S = 60.0
 
 
 def run_suspended(command: list[object], recording: Path) -> subprocess.CompletedProcess[str]:
-    """Runs a live program; suspends it for a while as soon as it has recorded rows."""
+    """Runs a live program; suspends it for a while after its first rows."""
     words = [*map(str, command), "--duration-s", "3", "--json"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     wait_for_rows(Path(f"{recording}.part"), process)
@@ -76,10 +75,10 @@ def test_a_suspended_recording_by_hand_goes_on_and_counts_the_gap(tmp_path: Path
 
 
 @pytest.fixture(scope="module")
-def jumping_clock(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
+def jumping_clock(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Returns an environment in which the system time jumps by a day at every reading."""
     library = compiled_library(tmp_path_factory.mktemp("library"))
-    yield {"LD_PRELOAD": str(library), "FILE_FAULTS_CLOCK_STEP_S": "86400", "PATH": "/usr/bin:/bin"}
+    return {"LD_PRELOAD": str(library), "FILE_FAULTS_CLOCK_STEP_S": "86400", "PATH": "/usr/bin:/bin"}
 
 
 def test_the_jumping_clock_jumps(jumping_clock: dict[str, str]) -> None:
