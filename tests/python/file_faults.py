@@ -83,9 +83,7 @@ class Programs:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        assert self._server.stdin is not None
-        self._server.stdin.close()
-        self._server.wait()
+        self._server.communicate()
 
     def verb(self, command: str, folder: Path, fault: Fault | None = None) -> Ended:
         """Runs a verb until it ends."""

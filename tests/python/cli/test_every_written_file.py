@@ -68,6 +68,9 @@ RECORDING = {"simulate", "render", "record", "export --table", "export --mcap", 
 WITH_FORCE = {"simulate", "render", "record", "palpate-control"}
 """Commands with the option --force, which replaces a recording"""
 
+SAMPLE = {"plan", "simulate", "render", "export --mcap", "palpate-control"}
+"""Commands for `make test`: one for each way of writing. `make test-full` takes all."""
+
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
 
 TEMPORARY = re.compile(r"\.[^/]+\.[0-9a-f]{16}\.tmp")
@@ -80,7 +83,9 @@ def case(name: str) -> pytest.ParameterSet:  # type: ignore[name-defined]
 
 
 every_case = pytest.mark.parametrize("name", [case(name) for name in CASES])
-every_quick_case = pytest.mark.parametrize("name", [case(name) for name in CASES if name not in SLOW])
+every_quick_case = pytest.mark.parametrize(
+    "name", [case(name) for name in CASES if name in SAMPLE or (SCALE > 1 and name not in SLOW)]
+)
 
 
 @pytest.fixture(scope="module")
@@ -236,8 +241,8 @@ def test_at_every_call_each_file_is_absent_old_or_complete(
 ) -> None:
     if before == "old" and (name == "demo" or (name in RECORDING and name not in WITH_FORCE)):
         pytest.skip("replaces no file")
-    if name in SLOW and before == "old" and SCALE == 1:
-        pytest.skip("slow, part of make test-full")
+    if name not in SAMPLE and before == "old" and SCALE == 1:
+        pytest.skip("part of make test-full")
     inputs = files_in(folder)
     if before == "old":
         put_old_outputs(name, folder)
