@@ -33,5 +33,27 @@ if(TARGET Boost::headers)
   palpate_component(boost "${Boost_VERSION}" BSL-1.0 "pkg:github/boostorg/boost@boost-")
 endif()
 list(JOIN palpate_components ",\n" palpate_components)
-configure_file("${PROJECT_SOURCE_DIR}/cmake/palpate.cdx.json.in" "${PROJECT_BINARY_DIR}/palpate.cdx.json" @ONLY)
+file(
+  CONFIGURE
+  OUTPUT "${PROJECT_BINARY_DIR}/palpate.cdx.json"
+  CONTENT [==[
+{
+  "bomFormat": "CycloneDX",
+  "specVersion": "1.6",
+  "version": 1,
+  "metadata": {
+    "component": {
+      "type": "library",
+      "bom-ref": "palpate",
+      "name": "palpate",
+      "version": "@PROJECT_VERSION@",
+      "licenses": [{ "license": { "id": "Apache-2.0" } }],
+      "purl": "pkg:pypi/palpate@@PROJECT_VERSION@"
+    }
+  },
+  "components": [
+@palpate_components@
+  ]
+}
+]==] @ONLY)
 install(FILES "${PROJECT_BINARY_DIR}/palpate.cdx.json" DESTINATION "${SKBUILD_METADATA_DIR}/sboms" COMPONENT python)
