@@ -31,12 +31,13 @@ export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
 # Writes only below this folder: no download cache and no font cache in the home directory.
 export PIP_NO_CACHE_DIR ?= 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
-export PIP_CONSTRAINT := tools/constraints.txt
 export MPLCONFIGDIR ?= $(CURDIR)/build/matplotlib
 
 python := .venv/bin/python
 # Two runs of pip must not change one environment at the same time.
 pip := flock .venv/pip.lock $(python) -m pip
+# Exact versions with their SHA-256, and no package that runs its own build; tools/lock.sh writes the files.
+install_locked := $(pip) install --quiet --require-hashes --only-binary :all: --requirement
 # Two runs of apt-get must not overlap either.
 system_packages := flock Makefile tools/system_packages.sh "$(PYTHON)"
 stamps := .venv/stamps
@@ -53,18 +54,17 @@ help:
 
 # ---------------------------------------------------------------------------------------------------------- set-up
 
-$(stamps)/build: pyproject.toml tools/constraints.txt tools/system_packages.sh $(moved)
+$(stamps)/build: tools/locked/build.txt tools/system_packages.sh $(moved)
 	$(system_packages) build
 	if [ "$$(cat .venv/folder 2>/dev/null)" != "$$(pwd -P)" ]; then rm -rf .venv build; "$(PYTHON)" -m venv .venv; fi
-	$(pip) install --quiet --upgrade pip
-	$(pip) install --quiet --group build
+	$(install_locked) tools/locked/build.txt
 	mkdir -p $(stamps) && pwd -P > .venv/folder
 	touch $@
 
 # The compiled module and the editable package: a change of a C++ source builds the module again. `make control` builds
 # palpate-control in another folder.
 $(stamps)/core: $(stamps)/build $(core_sources)
-	$(pip) install --quiet --no-build-isolation -C cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON \
+	$(pip) install --quiet --no-deps --no-build-isolation -C cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON \
 	    -C cmake.define.PALPATE_BUILD_CONTROL=OFF --editable .
 	touch $@
 
@@ -74,14 +74,14 @@ $(stamps)/control $(stamps)/test-cpp: $(stamps)/build
 	touch $@
 
 # Tools by their group in pyproject.toml: tests, linters, tests of the packages and of the MuJoCo plugin.
-$(stamps)/test $(stamps)/lint $(stamps)/package $(stamps)/simulators: $(stamps)/build
-	$(pip) install --quiet --group "$(@F)"
+$(stamps)/test $(stamps)/lint $(stamps)/package $(stamps)/simulators: $(stamps)/%: tools/locked/%.txt $(stamps)/build
+	$(install_locked) "$<"
 	touch $@
 
 # The programs that build the documentation site.
-$(stamps)/docs: $(stamps)/build
+$(stamps)/docs: tools/locked/docs.txt $(stamps)/build
 	$(system_packages) docs
-	$(pip) install --quiet --group docs
+	$(install_locked) "$<"
 	touch $@
 
 setup: $(stamps)/core $(stamps)/control $(stamps)/test-cpp $(stamps)/test $(stamps)/lint

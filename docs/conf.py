@@ -5,7 +5,6 @@ Everything in docs/generated and docs/gallery is made by the build. The site loa
 """
 
 import builtins
-import shutil
 import sys
 import warnings
 from pathlib import Path
@@ -116,7 +115,8 @@ def setup(app: Any) -> None:
     # A cached environment does not know new pages, so their files are listed.
     app.config.autosummary_generate = python_pages.write_pages(generated / "python")
     command_pages.write_pages(generated)
-    shutil.copy(DOCS.parent / "SECURITY.md", generated / "security.md")
+    security = (DOCS.parent / "SECURITY.md").read_text(encoding="utf-8")
+    (generated / "security.md").write_text(security.replace("](docs/", "](../"), encoding="utf-8")
     figures.write_figures(generated / "figures")
     notebook_page.write_page(generated)
     outputs = page_code.run_pages()

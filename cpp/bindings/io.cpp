@@ -8,6 +8,7 @@
 #include <pybind11/stl.h>
 
 #include "bindings.hpp"
+#include "palpate/io/growing_file.hpp"
 #include "palpate/io/model_file.hpp"
 
 namespace palpate::bindings {
@@ -109,6 +110,18 @@ detail::JsonField given(const detail::JsonField& part) {
 }  // namespace
 
 void bind_io(py::module_& module) {
+    module.def(
+        "follow_links",
+        [](const std::string& path) {
+            std::string target;
+            if (const std::string reason = palpate::detail::follow_links(path, target); !reason.empty()) {
+                throw py::value_error{reason};
+            }
+            return target;
+        },
+        "path"_a,
+        "Returns the file to which a chain of symbolic links leads; the file may be missing. Raises\n"
+        "ValueError if a link in a folder that all users share belongs to another user.");
     module.def(
         "read_json", [](const std::string& path) { return to_python(read_json(path)); }, "path"_a,
         "Returns the content of a JSON file. Raises ValueError with one sentence that begins with the\n"

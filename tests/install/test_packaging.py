@@ -20,7 +20,7 @@ PORT = ROOT / "packaging" / "vcpkg" / "ports" / "palpate"
 CONAN = shutil.which("conan", path=str(Path(sys.executable).parent))
 
 
-@pytest.mark.skipif(CONAN is None, reason="needs Conan: pip install --group package")
+@pytest.mark.skipif(CONAN is None, reason="needs Conan: make test-packages")
 def test_conan_creates_the_package_and_runs_its_test_program(tmp_path: Path) -> None:
     environment = os.environ | {"CONAN_HOME": str(tmp_path / "home")}
     run(CONAN, "profile", "detect", env=environment)
@@ -40,7 +40,7 @@ def test_conan_creates_the_package_and_runs_its_test_program(tmp_path: Path) -> 
     assert json.loads(stated)["version"] == package["version"]
 
 
-@pytest.mark.skipif(CONAN is None, reason="needs Conan: pip install --group package")
+@pytest.mark.skipif(CONAN is None, reason="needs Conan: make test-packages")
 def test_conan_refuses_a_standard_before_cpp_20(tmp_path: Path) -> None:
     environment = os.environ | {"CONAN_HOME": str(tmp_path / "home")}
     run(CONAN, "profile", "detect", env=environment)

@@ -6,6 +6,8 @@ The environments of the tests use numpy and the other dependencies of .venv, and
 
 from __future__ import annotations
 
+import importlib.metadata
+import json
 import re
 import shutil
 import subprocess
@@ -14,6 +16,7 @@ import sysconfig
 import tarfile
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,7 +28,7 @@ TOOLS = sysconfig.get_path("scripts")
 
 needs_tools = pytest.mark.skipif(
     any(shutil.which(tool, path=TOOLS) is None for tool in ("auditwheel", "pyproject-build")),
-    reason="needs build and auditwheel: pip install --group package",
+    reason="needs build and auditwheel: make test-packages",
 )
 
 
@@ -92,7 +95,17 @@ def repaired(wheel: Path) -> Path:
 def test_the_source_package_contains_all_sources_and_no_result_of_a_build(sdist: Path) -> None:
     with tarfile.open(sdist) as archive:
         names = {name.split("/", 1)[1] for name in archive.getnames() if "/" in name}
-    command = ["git", "ls-files", "cmake", "cpp", "python", "CMakeLists.txt", "LICENSE", "pyproject.toml"]
+    command = [
+        "git",
+        "ls-files",
+        "cmake",
+        "cpp",
+        "licenses",
+        "python",
+        "CMakeLists.txt",
+        "LICENSE",
+        "pyproject.toml",
+    ]
     tracked = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
     assert set(tracked) <= names
     assert not [
@@ -117,6 +130,58 @@ def test_the_wheel_contains_types_licence_and_both_programs(wheel: Path) -> None
     assert not [name for name in names if name.endswith((".hpp", ".cmake"))]
 
 
+def list_of_libraries(wheel: Path, name: str) -> dict[str, Any]:
+    """Returns a list of components in a wheel, after a check against the schema of CycloneDX."""
+    schema = pytest.importorskip("cyclonedx.schema", reason="needs cyclonedx-python-lib: make test-packages")
+    validation = pytest.importorskip("cyclonedx.validation.json")
+    with zipfile.ZipFile(wheel) as archive:
+        text = archive.read(f"palpate-{wheel.name.split('-')[1]}.dist-info/sboms/{name}").decode()
+    listed: dict[str, Any] = json.loads(text)
+    version = schema.SchemaVersion.from_version(listed["specVersion"])
+    errors = validation.JsonStrictValidator(version).validate_str(text)
+    assert errors is None, errors
+    return listed
+
+
+@needs_tools
+def test_the_wheel_lists_the_libraries_that_are_compiled_into_it(wheel: Path) -> None:
+    listed = list_of_libraries(wheel, "palpate.cdx.json")
+    assert listed["metadata"]["component"]["version"] == wheel.name.split("-")[1]
+    components = {each["name"]: each for each in listed["components"]}
+    with zipfile.ZipFile(wheel) as archive:
+        module = next(archive.read(name) for name in archive.namelist() if "/_core." in name)
+    # Names of the libraries in the module; CLI11 is in palpate-control.
+    compiled = {"nlohmann-json": b"nlohmann", "pybind11": b"pybind11", "boost": b"boost"}
+    expected = {name for name, word in compiled.items() if word in module} | {"CLI11"}
+    assert {"nlohmann-json", "pybind11"} <= expected
+    assert components.keys() == expected
+    assert components["pybind11"]["version"] == importlib.metadata.version("pybind11")
+    for component in components.values():
+        assert re.fullmatch(r"\d+\.\d+\.\d+", component["version"]), component
+        assert component["purl"].endswith(component["version"])
+
+
+@needs_tools
+def test_the_wheel_contains_the_licence_of_each_library(wheel: Path) -> None:
+    listed = list_of_libraries(wheel, "palpate.cdx.json")
+    folder = f"palpate-{wheel.name.split('-')[1]}.dist-info/licenses/licenses/"
+    texts = {name.removeprefix(folder) for name in names_of(wheel) if name.startswith(folder)}
+    assert texts == {f"{each['name'].lower()}.txt" for each in listed["components"]} | {
+        "libusb.txt",
+        "boost.txt",
+    }
+    for path in (ROOT / "licenses").iterdir():
+        assert "opyright" in path.read_text(encoding="utf-8") or path.name == "boost.txt"
+
+
+@needs_tools
+def test_the_repaired_wheel_lists_the_libraries_that_were_copied_into_it(repaired: Path) -> None:
+    copied = [name for name in names_of(repaired) if name.startswith("palpate.libs/")]
+    listed = list_of_libraries(repaired, "auditwheel.cdx.json")
+    assert any("libusb" in name for name in copied)
+    assert any("libusb" in each["name"] for each in listed["components"])
+
+
 @needs_tools
 def test_the_wheel_of_the_source_package_works(wheel: Path, tmp_path: Path) -> None:
     python = clean_environment(tmp_path)
@@ -138,7 +203,7 @@ def test_the_repaired_wheel_works_with_the_libusb_that_it_contains(repaired: Pat
 
 @pytest.mark.skipif(sys.version_info < (3, 11), reason="cibuildwheel needs Python 3.11")
 def test_cibuildwheel_accepts_its_settings() -> None:
-    pytest.importorskip("cibuildwheel", reason="needs cibuildwheel: pip install --group package")
+    pytest.importorskip("cibuildwheel", reason="needs cibuildwheel: make test-packages")
     options = ["--platform", "linux", "--archs", "x86_64,aarch64"]
     printed = run(sys.executable, "-m", "cibuildwheel", *options, "--print-build-identifiers", cwd=ROOT)
     versions = re.findall(r"Python :: 3\.(\d+)", (ROOT / "pyproject.toml").read_text(encoding="utf-8"))

@@ -87,3 +87,26 @@ def test_imports_have_no_cycle() -> None:
             del imports[name]
     in_cycle = {name: sorted(imported & set(imports)) for name, imported in imports.items()}
     assert not in_cycle, f"in or behind a cycle: {in_cycle}"
+
+
+NETWORK = {
+    "asyncio",
+    "ftplib",
+    "http",
+    "requests",
+    "smtplib",
+    "socket",
+    "ssl",
+    "urllib",
+    "websockets",
+    "xmlrpc",
+}
+"""Packages that can open a connection. joblib and distributed do so when the user starts them."""
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_no_module_imports_a_network_library(path: Path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    imports = [node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom))]
+    used = {target.split(".")[0] for node in imports for target in targets_of(path, node)}
+    assert not used & NETWORK

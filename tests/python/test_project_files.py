@@ -9,12 +9,19 @@ from pathlib import Path
 
 import pytest
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 from conftest import ROOT
 
 GITHUB = ROOT / ".github"
 WORKFLOWS = sorted((GITHUB / "workflows").glob("*.yml"))
 FORMS = sorted((GITHUB / "ISSUE_TEMPLATE").glob("[!c]*.yml"))
 PORT = ROOT / "packaging" / "vcpkg" / "ports" / "palpate"
+
+LOCKED = sorted((ROOT / "tools" / "locked").glob("*.txt"))
 
 SCHEMAS = {
     **dict.fromkeys(WORKFLOWS, "github-workflows"),
@@ -45,7 +52,56 @@ def test_make_control_installs_neither_linters_nor_test_tools() -> None:
     command = ["make", "--always-make", "--dry-run", "control"]
     commands = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert "cmake --build --preset control" in commands
-    assert set(re.findall(r"--group ([\w-]+)", commands)) == {"build"}
+    assert set(re.findall(r"tools/locked/([\w-]+)\.txt", commands)) == {"build"}
+
+
+def test_make_installs_only_locked_versions_with_their_hashes() -> None:
+    command = ["make", "--always-make", "--dry-run", "setup", "docs", "test-packages", "test-full-native"]
+    dry_run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    installs = [line for line in dry_run.replace("\\\n", " ").splitlines() if " pip install " in line]
+    assert len(installs) >= 6
+    for line in installs:
+        locked = "--require-hashes --only-binary :all: --requirement" in line
+        assert locked or ("--no-deps --no-build-isolation" in line and line.endswith("--editable .")), line
+    workflows = "".join(path.read_text(encoding="utf-8") for path in WORKFLOWS)
+    for line in re.findall(r".*pip install.*", workflows):
+        assert "--require-hashes" in line
+
+
+def test_the_locked_files_contain_every_tool_with_its_hashes() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    groups = settings["dependency-groups"]
+    groups["build"] = groups["build"] + settings["project"]["dependencies"]
+    assert {path.stem for path in LOCKED} == groups.keys()
+    for path in LOCKED:
+        content = path.read_text(encoding="utf-8").replace("\\\n", " ")
+        entries = [line for line in content.splitlines() if not line.startswith("#")]
+        names = {re.split(r"[=\[]", entry)[0] for entry in entries}
+        for entry in entries:
+            assert re.match(r"[\w.-]+==[\w.!]+ .*--hash=sha256:[0-9a-f]{64}", entry), entry
+        for requirement in groups[path.stem]:
+            name = re.split(r"[<>=;\[ ]", requirement)[0].lower().replace("_", "-")
+            assert name in names, f"{name} is not in {path.name}: call tools/lock.sh"
+
+
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda file: file.name)
+def test_a_workflow_names_each_action_by_its_commit(workflow: Path) -> None:
+    for action in re.findall(r"uses: (.*)", workflow.read_text(encoding="utf-8")):
+        assert re.fullmatch(r"[\w/-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+", action), action
+
+
+def test_every_download_of_cmake_has_a_checksum() -> None:
+    for path in [
+        *(ROOT / "cmake").glob("*.cmake"),
+        *ROOT.glob("*/**/CMakeLists.txt"),
+        ROOT / "CMakeLists.txt",
+    ]:
+        if {"build", ".venv"} & set(path.relative_to(ROOT).parts):
+            continue
+        content = path.read_text(encoding="utf-8")
+        for checksum in re.findall(r"https://\S+\.(?:tar\.\w+|zip)\s*([^\s)]*)", content):
+            assert re.fullmatch(r"[0-9a-f]{64}", checksum), f"{path}: {checksum}"
+        assert not re.search(r"GIT_TAG\s+(?![0-9a-f]{40}\b)", content), path
 
 
 def test_the_ci_of_a_change_runs_the_commands_of_the_workflows() -> None:

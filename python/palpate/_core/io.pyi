@@ -8,7 +8,7 @@ import palpate._core.model
 import palpate._core.rendering
 import palpate._core.stability
 import typing
-__all__: list[str] = ['check_model', 'checked_certificate', 'profile_of', 'read_json', 'scheme_of']
+__all__: list[str] = ['check_model', 'checked_certificate', 'follow_links', 'profile_of', 'read_json', 'scheme_of']
 def check_model(content: typing.Any) -> None:
     """
     Checks the content of a model file and computes its certificate again. Raises ValueError with
@@ -18,6 +18,11 @@ def checked_certificate(model: palpate._core.model.ForceModel, plan: typing.Any,
     """
     Computes the certificate of a model file again from the rendered model and returns it. Raises
     ValueError with the field that differs, its value and the correct value.
+    """
+def follow_links(path: str) -> str:
+    """
+    Returns the file to which a chain of symbolic links leads; the file may be missing. Raises
+    ValueError if a link in a folder that all users share belongs to another user.
     """
 def profile_of(content: typing.Any) -> palpate._core.device.DeviceProfile:
     """

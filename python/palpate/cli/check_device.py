@@ -81,7 +81,7 @@ def check_device(
     if write_profile is not None:
         if not push:
             raise InputError("--write-profile needs --push, because the mechanics are measured in motion")
-        require_writable(write_profile)
+        require_writable(write_profile, inputs=(object_file, profile, model_file))
     mounted = None if object_file is None else load_model(object_file)
     expected = None if profile is None else DeviceProfile.load(profile)
     certified = None if model_file is None else load_model(model_file)

@@ -15,7 +15,7 @@ SHELLS = ("bash", "zsh", "fish")
 _VARIABLE = "_PALPATE_COMPLETE"
 """Environment variable with which the script in the shell requests completions."""
 
-_RECORDINGS = (".csv", ".part", ".parquet", ".xlsx", ".npz", ".mat", ".mcap")
+RECORDINGS = (".csv", ".part", ".parquet", ".xlsx", ".npz", ".mat", ".mcap")
 """Suffixes of the files that can be recordings."""
 
 FIGURES = (".png", ".pdf", ".svg")
@@ -50,7 +50,7 @@ def completes(group: click.Group) -> bool:
 def suffixes_of(placeholder: str) -> tuple[str, ...]:
     """Returns the suffixes of files for the placeholder of a parameter in the help."""
     if placeholder.startswith("RECORDING"):
-        return _RECORDINGS
+        return RECORDINGS
     if placeholder == "PNG":
         return FIGURES
     return (Path(placeholder).suffix,)

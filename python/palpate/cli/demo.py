@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 
@@ -40,6 +41,13 @@ IDENTIFY_SEED, FRESH_SEED = 1, 2
 
 RENDERED_S = 4.0
 """Simulated time of each rendering [s]."""
+
+
+_SAMPLES = ("sample-1.csv", "sample-2.csv")
+"""Names of the recordings to identify and to verify"""
+
+_SIMULATED = b"# simulated: yes, by palpate"
+"""First line of a recording of a demo"""
 
 
 @verb("palpate demo -o demo", no_args_is_help=False)
@@ -87,8 +95,8 @@ def demo(output: Path, as_json: bool) -> None:
         )
     with finishing():
         output.mkdir(exist_ok=True)
-        recording.write(output / "sample-1.csv")
-        fresh.write(output / "sample-2.csv")
+        for name, each in zip(_SAMPLES, (recording, fresh), strict=True):
+            each.write(output / name)
         model.save(output / "model.json")
         write_figures()
         if as_json:
@@ -144,6 +152,9 @@ def _require_folder(folder: Path) -> None:
     """Refuses a folder that cannot be created or written, before anything is computed."""
     if folder.is_dir():
         require_writable(folder / "model.json")
+        for path in (folder / name for name in _SAMPLES):
+            if os.path.lexists(path) and not path.read_bytes().startswith(_SIMULATED):
+                raise InputError(f"{path} exists already and is not from a demo; choose another folder")
     elif folder.exists():
         raise InputError(
             f"{folder} is a file, but the demo writes a folder; choose another name with --output"

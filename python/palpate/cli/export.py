@@ -52,7 +52,7 @@ format_options: Callable[[Any], Any] = options(
     type=PATH,
     metavar="OUT",
     required=True,
-    help="File to write; an existing one is replaced, except a recording (--mcap).",
+    help="File to write; an existing one is replaced, except a recording.",
 )
 @click.option(
     "--precision",

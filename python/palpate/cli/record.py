@@ -78,9 +78,9 @@ def record(
     limit. The force is that of the transducer; without one it is the motor's force, which includes the
     friction of the device. Ctrl-C ends the recording and keeps it.
     """
-    require_writable(recording, inputs=(object_file,))
     if not force:
         require_absent(recording)
+    require_writable(recording, inputs=(object_file,), force=force)
     if device == "simulated" and object_file is None:
         raise InputError("the simulated device has no object; add --object MODEL.json, a model of one")
     given = [name for name, value in sweep.items() if value is not None]

@@ -88,9 +88,9 @@ def render(
     device that contains it; this program then watches and records. Ctrl-C stops the loop: it sends zero
     force, closes the device and the recording, and prints the summary.
     """
-    require_writable(record, inputs=(model_file,))
     if record is not None and not force:
         require_absent(record)
+    require_writable(record, inputs=(model_file,), force=force)
     if Path(device).suffix == ".toml" or device in example_profiles():
         raise InputError(
             f"--device {device} is a profile: give it to palpate plan, which writes it into the model file; "

@@ -80,9 +80,9 @@ def simulate(
     for, unless a structure is given.
     A simulation shows one case; it does not prove stability.
     """
-    require_writable(output, plot, inputs=(model_file,))
     if output is not None and not force:
         require_absent(output)
+    require_writable(output, plot, inputs=(model_file,), force=force)
     model = load_model(model_file)
     rig = rig_for(model)
     plan = _chosen_plan(model, rig, scheme)

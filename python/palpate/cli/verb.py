@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +17,7 @@ from .._core.rendering import Scheme, most_prediction_taps, structure_names
 from ..arguments import first_sentence, parameter_texts
 from ..errors import InputError
 from ..recording import Recording, read_recording
-from .completion import FIGURES, FileName
+from .completion import FIGURES, RECORDINGS, FileName
 from .exit_status import interrupted_at_once
 from .printing import TERMS, Option, Verb, set_quiet, talk
 
@@ -299,17 +300,18 @@ def require_model_name(output: Path) -> None:
         raise InputError(f"{output} is not a model file: its name must end in .json")
 
 
-def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = ()) -> None:
+def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = (), force: bool = False) -> None:
     """Refuses output files that cannot be written, before anything is computed. None means no file.
 
     Raises
     ------
     InputError
-        A folder does not exist or cannot be written, a target is a folder or one of the inputs, or two
-        targets are one file.
+        A folder does not exist or cannot be written, a target is a folder or one of the inputs, two targets
+        are one file, or a target is an existing recording and `force` is False.
     """
     wanted = [target for target in targets if target is not None]
-    for target in wanted:
+    places = [os.path.realpath(target) for target in wanted]
+    for target, place in zip(wanted, places, strict=True):
         if not target.parent.is_dir():
             raise InputError(f"{target} cannot be written: there is no folder {target.parent}")
         if target.is_dir():
@@ -317,12 +319,14 @@ def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = ()) 
         for given in inputs:
             if given is not None and given.exists() and target.exists() and target.samefile(given):
                 raise InputError(f"{target} is also an input; the result would overwrite it")
+        if not force and target.suffix.lower() in RECORDINGS and os.path.lexists(target):
+            raise InputError(f"{target} exists already, and a recording is not replaced: choose another name")
         try:
-            with tempfile.TemporaryFile(dir=target.parent):
+            with tempfile.TemporaryFile(dir=Path(place).parent):
                 pass
         except OSError as error:
             raise InputError(
                 f"{target} cannot be written: its folder accepts no new file ({error.strerror})"
             ) from None
-        if [each.absolute() for each in wanted].count(target.absolute()) > 1:
+        if places.count(place) > 1:
             raise InputError(f"two results have the same file name: {target}")

@@ -22,6 +22,7 @@ from typing import Any
 
 import pandas as pd
 
+from .._core.io import follow_links
 from ..errors import InputError, shortened
 from .table import Cells
 
@@ -81,7 +82,9 @@ def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator
 
     An error removes the temporary file. Its name is unpredictable. An existing file keeps its mode and, if
     permitted, its owner.
-    A symbolic link is kept and its target is replaced. The content is on the disk before the file is renamed.
+    A symbolic link is kept and its target is replaced, except that of another user in a folder that all users
+    share, such as /tmp. The content is on the disk before the file is renamed. If the process is killed, the
+    temporary file stays; no later run reads it.
 
     Parameters
     ----------
@@ -95,9 +98,10 @@ def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator
     InputError
         The folder does not exist or cannot be written, or the file exists or is not a regular file.
     """
-    target = Path(path)
-    if target.is_symlink():
-        target = Path(os.path.realpath(target))
+    try:
+        target = Path(follow_links(os.fspath(path)))
+    except ValueError as error:
+        raise InputError(str(error)) from None
     if not target.parent.is_dir():
         raise InputError(f"{path} cannot be written: there is no folder {target.parent}")
     if target.is_dir():

@@ -4,10 +4,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -128,11 +130,60 @@ TEST_F(GrowingFileTest, KeepsAnInterruptedRecordingIfTheRunIsRefused) {
     EXPECT_EQ(text("a.csv.part"), "cut off\n");
 }
 
-TEST_F(GrowingFileTest, RefusesAnEmptyPartThatMayBelongToAStartingRun) {
+TEST_F(GrowingFileTest, RemovesAnEmptyPartOfAKilledRun) {
     put("a.csv.part", "");
     GrowingFile growing;
-    EXPECT_NE(growing.open(file("a.csv")).find("is empty and may belong to a run that is starting"),
+    ASSERT_EQ(growing.open(file("a.csv")), "");
+    EXPECT_EQ(growing.interrupted_name(), "");
+    EXPECT_EQ(growing.finish(), "");
+    EXPECT_FALSE(there("a.csv.1.part"));
+}
+
+TEST_F(GrowingFileTest, OfTwoRunsThatStartTogetherExactlyOneWrites) {
+    for (int round = 0; round < 200; ++round) {
+        std::array<GrowingFile, 2> runs;
+        std::array<std::string, 2> reasons;
+        {
+            std::jthread other{[&] { reasons[1] = runs[1].open(file("a.csv")); }};
+            reasons[0] = runs[0].open(file("a.csv"));
+        }
+        ASSERT_EQ((reasons[0].empty() ? 1 : 0) + (reasons[1].empty() ? 1 : 0), 1) << reasons[0] << reasons[1];
+        GrowingFile& winner = runs[reasons[0].empty() ? 0 : 1];
+        (void)winner.append("own\n");
+        ASSERT_EQ(text("a.csv.part"), "own\n");
+        winner.discard();
+    }
+}
+
+TEST_F(GrowingFileTest, ReplacesARecordingWithForceAndKeepsItsMode) {
+    put("a.csv", "old\n");
+    ASSERT_EQ(chmod(file("a.csv").c_str(), 0600), 0);
+    GrowingFile growing;
+    ASSERT_EQ(growing.open(file("a.csv"), true), "");
+    struct stat about{};
+    ASSERT_EQ(stat(file("a.csv.part").c_str(), &about), 0);
+    EXPECT_EQ(about.st_mode & 07777U, 0600U);
+    EXPECT_EQ(growing.finish(), "");
+}
+
+TEST_F(GrowingFileTest, DoesNotFollowALinkOfAnotherUserInASharedFolder) {
+    if (geteuid() != 0) {
+        GTEST_SKIP() << "needs root, to create a link of another user";
+    }
+    std::filesystem::create_directory(file("shared"));
+    ASSERT_EQ(chown(file("shared").c_str(), 1000, 1000), 0);
+    ASSERT_EQ(chmod(file("shared").c_str(), 01777), 0);
+    put("victim.csv", "precious\n");
+    std::filesystem::create_symlink(file("victim.csv"), file("shared/a.csv"));
+    ASSERT_EQ(lchown(file("shared/a.csv").c_str(), 1001, 1001), 0);
+    GrowingFile refused;
+    EXPECT_NE(refused.open(file("shared/a.csv"), true).find("link of another user in a shared folder"),
               std::string::npos);
+    EXPECT_EQ(text("victim.csv"), "precious\n");
+    ASSERT_EQ(lchown(file("shared/a.csv").c_str(), 0, 0), 0);
+    GrowingFile own;
+    EXPECT_EQ(own.open(file("shared/a.csv"), true), "");
+    own.discard();
 }
 
 TEST_F(GrowingFileTest, KeepsASymbolicLinkAndReplacesItsTargetWithForce) {

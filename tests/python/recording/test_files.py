@@ -183,3 +183,21 @@ def test_without_replace_a_recording_is_not_overwritten(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="exists already"):
         recording.write(path, replace=False)
     recording.write(path)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to create a link of another user")
+def test_a_link_of_another_user_in_a_shared_folder_is_not_followed(tmp_path: Path) -> None:
+    victim, shared = tmp_path / "victim.json", tmp_path / "shared"
+    victim.write_text("precious", encoding="utf-8")
+    shared.mkdir()
+    os.chown(shared, 1000, 1000)
+    shared.chmod(0o1777)
+    link = shared / "m.json"
+    link.symlink_to(victim)
+    os.lchown(link, 1001, 1001)
+    with pytest.raises(InputError, match="symbolic link of another user in a shared folder"):
+        write(link, "new")
+    assert victim.read_text(encoding="utf-8") == "precious"
+    os.lchown(link, 0, 0)
+    write(link, "new")
+    assert victim.read_text(encoding="utf-8") == "new"

@@ -48,6 +48,33 @@ namespace detail {
     return std::generic_category().message(error);
 }
 
+/// Finds the file to which a chain of symbolic links leads; the file may be missing. Returns the reason if a link must
+/// not be followed, otherwise "". In a folder that all users can write, such as /tmp, another user can place a link to
+/// a file of this user. There only a link of this user or of the owner of the folder is followed, as on systems with
+/// the setting fs.protected_symlinks.
+[[nodiscard]] inline std::string follow_links(const std::string& name, std::string& target) {
+    constexpr int most_links = 40;
+    constexpr mode_t shared = S_ISVTX | S_IWOTH;
+    std::filesystem::path file{name};
+    std::error_code error;
+    for (int links = 0; std::filesystem::is_symlink(file, error); ++links) {
+        const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+        struct stat link{};
+        struct stat parent{};
+        if (links == most_links || ::lstat(file.c_str(), &link) != 0 ||
+            ::stat(folder.c_str(), &parent) != 0) {
+            return name + " cannot be written: " + reason_of(ELOOP);
+        }
+        if ((parent.st_mode & shared) == shared && link.st_uid != ::geteuid() &&
+            link.st_uid != parent.st_uid) {
+            return name + " cannot be written: it is a symbolic link of another user in a shared folder";
+        }
+        file = folder / std::filesystem::read_symlink(file, error);
+    }
+    target = file;
+    return "";
+}
+
 }  // namespace detail
 
 /// A text file that is written as NAME.part, whole lines at a time, and is renamed to NAME when it is finished.
@@ -65,36 +92,24 @@ class GrowingFile {
     /// Creates NAME.part. Returns the reason if the file cannot be created, otherwise "". An existing NAME.part with
     /// content but without a writer is the only copy of an interrupted recording; it is renamed to the first free name
     /// of NAME.1.part, NAME.2.part, ... With `force` an existing NAME is replaced when the new file is finished; if
-    /// NAME is a symbolic link, the target of the link is replaced.
+    /// NAME is a symbolic link, the target of the link is replaced. The new file has the mode of the replaced one.
     [[nodiscard]] std::string open(const std::string& name, bool force = false) {
         force_ = force;
         name_ = name;
-        std::error_code error;
-        if (force && std::filesystem::is_symlink(name, error)) {
-            name_ = std::filesystem::canonical(name, error);
-            if (error) {
+        if (force) {
+            if (std::string reason = detail::follow_links(name, name_); !reason.empty()) {
+                return reason;
+            }
+            if (std::error_code error; name_ != name && !std::filesystem::exists(name_, error)) {
                 return name + " cannot be written: it is a symbolic link to a missing file";
             }
         }
         if (std::string reason = name_conflict(); !reason.empty()) {
             return reason;
         }
-        // If another run finishes its recording after the first failed try, a later try to create NAME.part succeeds.
-        for (int retries = 2; descriptor_ < 0; --retries) {
-            descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-            if (descriptor_ < 0 && (errno != EEXIST || retries == 0)) {
-                return name_ + " cannot be written: " + detail::reason_of(errno);
-            }
-            if (descriptor_ < 0) {
-                if (std::string reason = rename_interrupted(); !reason.empty()) {
-                    return reason;
-                }
-            }
+        if (std::string reason = create_part(); !reason.empty()) {
+            return reason;
         }
-        // Locks NAME.part. Only a program that locks the new file first can delay the lock. On a file system without
-        // locks (some network file systems) no other program writes the recording either, because O_EXCL created a new
-        // file.
-        (void)::flock(descriptor_, LOCK_EX);
         std::string reason = name_conflict();
         if (!reason.empty()) {
             discard();
@@ -136,20 +151,27 @@ class GrowingFile {
         return done;
     }
 
-    /// Overwrites a part of the file, from byte `place` on, with a text of the same length as that part.
+    /// Overwrites a part of the file, from byte `place` on, with a text of the same length as that part. If this write
+    /// fails, the file keeps its old text, and finish() reports the reason.
     void overwrite(off_t place, std::string_view text) noexcept {
-        if (descriptor_ >= 0 && place + static_cast<off_t>(text.size()) <= size_) {
-            // If this write fails, the file keeps its old text, which is also valid.
-            (void)!::pwrite(descriptor_, text.data(), text.size(), place);
+        if (descriptor_ >= 0 && place + static_cast<off_t>(text.size()) <= size_ &&
+            ::pwrite(descriptor_, text.data(), text.size(), place) != static_cast<ssize_t>(text.size())) {
+            unsaved_ = errno != 0 ? errno : EIO;
         }
     }
 
     /// Writes all data to the disk and renames NAME.part to NAME. Returns "", or the reason why the file could not be
     /// renamed; the recording then keeps the name NAME.part.
     [[nodiscard]] std::string finish() {
-        (void)::fsync(descriptor_);
+        // Some network file systems have no fsync: EINVAL, ENOTSUP.
+        if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP) {
+            unsaved_ = errno;
+        }
         std::string reason;
-        if (!detail::is_path_of(part(), descriptor_)) {
+        if (unsaved_ != 0) {
+            reason = "the recording keeps the name " + part() +
+                     ", because it is incomplete on the disk: " + detail::reason_of(unsaved_);
+        } else if (!detail::is_path_of(part(), descriptor_)) {
             reason = part() + " was moved or replaced by another program while it was written";
         } else if (const int error = rename_to_final_name(); error == EEXIST) {
             reason = name_ +
@@ -173,6 +195,37 @@ class GrowingFile {
     }
 
   private:
+    /// Creates and locks NAME.part. Returns the reason if that is not possible.
+    [[nodiscard]] std::string create_part() {
+        // Between two tries another run can finish its recording, or remove the file that it found empty.
+        for (int tries = 3; tries > 0; --tries) {
+            descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+            if (descriptor_ >= 0) {
+                // On a file system without locks no other program writes the recording either, because of O_EXCL.
+                (void)::flock(descriptor_, LOCK_EX);
+                if (detail::is_path_of(part(), descriptor_)) {
+                    copy_mode();
+                    return "";
+                }
+                close();
+            } else if (errno != EEXIST) {
+                return name_ + " cannot be written: " + detail::reason_of(errno);
+            } else if (std::string reason = clear_interrupted(); !reason.empty()) {
+                return reason;
+            }
+        }
+        return name_ + " cannot be written: other runs create " + part() + " again and again";
+    }
+
+    /// Gives the new file the owner and the mode of the file that it will replace.
+    void copy_mode() const noexcept {
+        struct stat replaced{};
+        if (::stat(name_.c_str(), &replaced) == 0) {
+            (void)!::fchown(descriptor_, replaced.st_uid, replaced.st_gid);  // only root may change the owner
+            (void)!::fchmod(descriptor_, replaced.st_mode & 07777U);
+        }
+    }
+
     void close() noexcept {
         if (const int descriptor = std::exchange(descriptor_, -1); descriptor >= 0) {
             ::close(descriptor);
@@ -214,9 +267,9 @@ class GrowingFile {
         return end == std::string_view::npos ? 0 : end + 1;
     }
 
-    /// Renames a NAME.part that no program is writing to a free name. Returns the reason if NAME.part cannot be renamed
-    /// or may belong to another run.
-    [[nodiscard]] std::string rename_interrupted() {
+    /// Renames a NAME.part that no program is writing to a free name, or removes it if it is empty. Returns the reason
+    /// if NAME.part cannot be renamed or may belong to another run.
+    [[nodiscard]] std::string clear_interrupted() {
         const int there = ::open(part().c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
         if (there < 0) {
             return errno == ENOENT ? "" : part() + " cannot be replaced: " + detail::reason_of(errno);
@@ -233,9 +286,8 @@ class GrowingFile {
         } else if (detail::is_path_of(part(),
                                       there)) {  // false: another run has just renamed NAME.part
             if (::fstat(there, &about) == 0 && about.st_size == 0) {
-                reason =
-                    part() +
-                    " is empty and may belong to a run that is starting; remove it if no run is starting";
+                // A run that has created the file and waits for its lock sees that the file is gone and tries again.
+                (void)::unlink(part().c_str());
             } else {
                 reason = rename_to_first_free_name();
             }
@@ -261,6 +313,7 @@ class GrowingFile {
     bool force_ = false;
     int descriptor_ = -1;
     std::atomic<int> error_{0};
+    int unsaved_ = 0;  ///< error number of data that did not reach the disk; 0 without an error
     off_t size_ = 0;
 };
 

@@ -146,9 +146,14 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
         const auto gap = static_cast<double>(wake.now - report.timing.last) * 1e-9;
         const bool too_late = report.timing.ticks() > 0 && gap > settings.longest_period_s;
         report.timing.add(wake);
+        const bool window_ended = progress.rate.add(wake.now);
         if (too_late) {
             report.exit_reason = ExitReason::NotCertified;
             break;  // the device held the last force longer than the certificate allows
+        }
+        if (window_ended && progress.rate.rate_hz() < settings.lowest_rate_share * settings.rate_hz) {
+            report.exit_reason = ExitReason::RateTooLow;
+            break;  // before a tick, because a process that was suspended would send a force first
         }
         const Tick tick = controller.tick();
         const TickRecord record = record_of(tick, wake, report.timing.first);
@@ -165,11 +170,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
         progress.applied.store(tick.reading.applied, std::memory_order_relaxed);
         progress.object_force.store(object_force(record), std::memory_order_relaxed);
 
-        const bool window_ended = progress.rate.add(wake.now);
         if (detail::must_stop(tick.status, bad_in_a_row, settings.tolerated, report.exit_reason)) {
-            running = false;
-        } else if (window_ended && progress.rate.rate_hz() < settings.lowest_rate_share * settings.rate_hz) {
-            report.exit_reason = ExitReason::RateTooLow;
             running = false;
         } else if (stop_requested.load(std::memory_order_relaxed)) {
             report.exit_reason = ExitReason::StopRequested;
