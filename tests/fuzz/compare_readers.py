@@ -15,7 +15,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -209,15 +208,18 @@ class Readers:
     """The readers, each with its result for a file."""
 
     def __init__(self, folder: Path) -> None:
-        library = folder / "model_reader.so"
+        compiled, library = folder / "model_reader.o", folder / "model_reader.so"
         include = ROOT / "cpp" / "include"
-        flags = ["-std=c++20", "-O1", "-shared", "-fPIC", "-D_GLIBCXX_ASSERTIONS", f"-I{include}"]
+        flags = ["-std=c++20", "-O1", "-fPIC", "-D_GLIBCXX_ASSERTIONS", f"-I{include}"]
         source = Path(__file__).with_name("model_reader.cpp")
-        subprocess.run(["g++", *flags, str(source), "-o", str(library)], check=True)
+        # Two steps, so that a compiler cache can keep the first one.
+        subprocess.run(["g++", *flags, "-c", str(source), "-o", str(compiled)], check=True)
+        subprocess.run(["g++", "-shared", str(compiled), "-o", str(library)], check=True)
         self._read = ctypes.CDLL(str(library)).read_model
         self._read.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_size_t]
         self._text = ctypes.create_string_buffer(4096)
         self._file = folder / "case.json"
+        self.accepted = 0
         schema = json.loads(SCHEMA.read_text(encoding="utf-8"))
         self._schema = jsonschema.validators.validator_for(schema)(schema)
 
@@ -241,35 +243,34 @@ class Readers:
         if cpp != python or 2 in (cpp[0], python[0]):
             return f"C++: {cpp}; Python: {python}"
         if cpp[0] == 0:
+            self.accepted += 1
             found = next(self._schema.iter_errors(json.loads(content)), None)
             if found is not None:
                 return f"accepted, but not by the schema: {found.json_path}: {found.message[:200]}"
         return ""
 
 
-def main(cases: int, seed: int) -> int:
-    counts: Counter[str] = Counter()
-    differences = 0
-    start = time.monotonic()
+def compare(cases: int, seed: int) -> list[str]:
+    """Compares the readers on mutated files; returns a line for each difference, and keeps its file."""
+    differences: list[str] = []
     with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:
         readers, files = Readers(Path(folder)), Cases(seed)
-        for number in range(cases):
-            content, name = files.next()
-            difference = readers.difference(content)
-            counts[name.split()[0] if name else "none"] += 1
-            if difference:
-                differences += 1
-                print(f"case {number} ({name}): {difference}", flush=True)
+        start = time.monotonic()
+        for number in range(1, cases + 1):
+            content, mutations = files.next()
+            if difference := readers.difference(content):
                 kept = ROOT / "build" / "fuzzing" / f"readers-{seed}-{number}.json"
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 kept.write_bytes(content)
-            if differences == 50:
-                break
-    seconds = time.monotonic() - start
-    read = sum(counts.values())
-    print(f"{read} files, {differences} differences, {seconds:.0f} s; first mutations: {dict(counts)}")
-    return int(differences > 0)
+                differences.append(f"{kept} ({mutations}): {difference}")
+                print(differences[-1], flush=True)
+            if number % 50_000 == 0 or number == cases:
+                seconds = time.monotonic() - start
+                counts = f"{readers.accepted} accepted, {len(differences)} differences"
+                print(f"{number} files, {counts}, {seconds:.0f} s", flush=True)
+    return differences
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 1))
+    given = [int(argument) for argument in sys.argv[1:]]
+    sys.exit(bool(compare(given[0], given[1] if len(given) > 1 else 1)))

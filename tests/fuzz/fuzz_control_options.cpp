@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The command line of palpate-control: one argument in each line of the input. The arguments are refused with exit code
-// 2, ask for help (0), or give options within their bounds. Nothing is opened.
+// 2, print the help (exit code 0), or give options within their bounds. Nothing is opened.
 #include <cmath>
 #include <iostream>
 #include <optional>

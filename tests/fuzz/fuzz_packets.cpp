@@ -85,7 +85,8 @@ void run(Input& input) {
             }
             case 1: {  // a fragment, or a packet with further bytes
                 const auto bytes = input.take_bytes(input.take<std::uint8_t>() % (wire::largest_packet + 1));
-                require(!stream.take(bytes, now) || bytes.size() == wire::in_size, "a fragment is no packet");
+                require(!stream.take(bytes, now) || bytes.size() == wire::in_size,
+                        "a fragment is not read as a packet");
                 break;
             }
             case 2: {

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <type_traits>
 
-/// What the fuzz targets share. Each target defines LLVMFuzzerTestOneInput, which libFuzzer calls with every input.
+/// Check and input of all fuzz targets. Each target defines LLVMFuzzerTestOneInput, which libFuzzer calls with every input.
 namespace palpate::fuzz {
 
 /// Ends the program if `holds` is false; libFuzzer then stores the input.

@@ -13,9 +13,7 @@
 /// Reads a model file. Returns 0 and writes the fingerprint of the model to `text`, or returns 1 and writes the reason
 /// why the file is refused, or returns 2 and writes an exception that no reader may throw.
 extern "C" int read_model(const char* bytes, std::size_t size, char* text, std::size_t capacity) {
-    const auto write = [&](std::string_view written) {
-        text[written.copy(text, capacity - 1)] = '\0';
-    };
+    const auto write = [&](std::string_view written) { text[written.copy(text, capacity - 1)] = '\0'; };
     try {
         write(palpate::fingerprint(palpate::parse_model(palpate::parse_json({bytes, size})).model));
         return 0;

@@ -6,6 +6,8 @@ from typing import Any
 
 from hypothesis import HealthCheck, settings
 
+from palpate.errors import escaped
+
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
 
 
@@ -23,4 +25,4 @@ def cases(count: int) -> Any:
 
 def is_one_sentence(text: str) -> bool:
     """Returns True if a message is one line without control characters, and not longer than a page."""
-    return "\n" not in text and text.isprintable() and 0 < len(text) < 4000
+    return escaped(text) == text and 0 < len(text) < 4000

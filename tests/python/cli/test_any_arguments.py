@@ -31,6 +31,9 @@ KEPT_OUT = {"--install-udev-rule", "--scheduler"}
 ENDLESS = {"--duration-s", "--seconds", "--jobs", "--settle-s"}
 """Options whose large values are long work, which is not a hang."""
 
+SLOW = ("demo", "report", "render")
+"""Verbs that take a second or more."""
+
 TEXTS = "m.json|a.csv|missing.csv|folder|broken.json|empty.csv|out.json|rad|N|mm|position_rad|force_N*m|x=N|:"
 TEXTS += (
     "|0:3|3:1|bench-knob|direct|massless|implicit|simulated|usb|inverse3:q|auto|-|--|--help|\u2028|é|a b|=|,"
@@ -111,13 +114,26 @@ def check_error(error: BaseException) -> None:
     assert f"{os.sep}palpate{os.sep}" in trace.tb_frame.f_code.co_filename, repr(error)
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", [verb for verb in VERBS if verb not in SLOW])
 @cases(12)
 @given(data=st.data())
 def test_any_arguments_end_with_a_documented_exit_code(
     verb: str, data: st.DataObject, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    arguments = data.draw(command_lines(verb))
+    run(data.draw(command_lines(verb)), folder, monkeypatch)
+
+
+@pytest.mark.parametrize("verb", SLOW)
+@cases(2)
+@given(data=st.data())
+def test_any_arguments_of_slow_verbs_end_with_a_documented_exit_code(
+    verb: str, data: st.DataObject, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(data.draw(command_lines(verb)), folder, monkeypatch)
+
+
+def run(arguments: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs a command line and checks its end."""
     write_files(folder)
     errors: list[BaseException] = []
 

@@ -3,7 +3,6 @@
 
 import re
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -121,31 +120,49 @@ numbers = st.one_of(
 
 
 @st.composite
-def tables(draw: Callable[..., Any]) -> tuple[bytes, int]:
-    """Returns a CSV file, and the number of its data rows."""
-    separator = draw(st.sampled_from([",", ";", "\t", " ", "|"]))
-    names = draw(st.lists(st.sampled_from(NAMES), min_size=1, max_size=6))
-    count = draw(st.integers(0, 40))
-    smooth = draw(st.booleans())
-    lines = []
+def tables(draw: st.DrawFn) -> tuple[bytes, int | None]:
+    """Returns a CSV file, often one that can be read, and the number of its data rows, if it is certain."""
+
+    def usually(usual: Any, *others: Any) -> Any:
+        return usual if draw(st.integers(0, 9)) else draw(st.sampled_from(others))
+
+    separator = draw(st.sampled_from([",", ";", "\t"])) if draw(st.integers(0, 9)) else " "
+    first = [usually("position_mm", *NAMES), usually("force_N", *NAMES)]
+    names = [*first, *draw(st.lists(st.sampled_from(NAMES), max_size=3, unique=True))]
+    names = list(dict.fromkeys(names)) if draw(st.integers(0, 9)) else names
+    names = list(draw(st.permutations(names)))
+    count = draw(st.integers(9, 40)) if draw(st.integers(0, 9)) else draw(st.integers(0, 9))
+    steady = draw(st.booleans())
+    lines, certain = [], True
     for row in range(count):
-        cells = [str(row * (column + 1) * 0.25) if smooth else draw(numbers) for column in range(len(names))]
-        lines.append(separator.join(cells))
-    for _ in range(draw(st.integers(0, 3)) if lines else 0):
-        row = draw(st.integers(0, len(lines) - 1))
-        after = separator + lines[row].partition(separator)[2]
-        one_cell = st.sampled_from([cell + after for cell in CELLS])
-        others = st.sampled_from(
-            ["", "# a comment", 9 * separator, f"{lines[row]}{separator}1", lines[row][:-3]]
-        )
-        lines[row] = draw(st.one_of(one_cell, others, st.text(max_size=20)))
-    before = ["# key: value", "Date 2024", "", "sensor;3", f"mm{separator}N"]
-    head = draw(st.lists(st.sampled_from(before), max_size=3))
-    header = [separator.join(names)] if draw(st.integers(0, 5)) else []
-    end = draw(st.sampled_from(["\n", "\r\n", "\r"]))
-    text = end.join([*head, *header, *lines]) + draw(st.sampled_from([end, "", "\0", end * 3]))
-    encoding = draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "latin-1", "utf-16-be"]))
-    return text.encode(encoding, "replace"), count
+        cells = [str(0.25 * row + column) if steady else draw(numbers) for column in range(len(names))]
+        for column, name in enumerate(names):
+            if name in ("direction", "segment", "status"):
+                cells[column] = usually("Ok" if name == "status" else "press", "release", "Ramp", "Limited")
+        lines.append(cells)
+    for _ in range(usually(0, 1, 2, 3) if lines else 0):
+        cells = draw(st.sampled_from(lines))
+        cells[draw(st.integers(0, len(cells) - 1))] = draw(st.sampled_from(CELLS))
+        certain = False
+    rows = [separator.join(cells) for cells in lines]
+    if rows and not draw(st.integers(0, 9)):
+        row = draw(st.integers(0, len(rows) - 1))
+        others = [
+            "",
+            "# a comment",
+            9 * separator,
+            rows[row] + separator + "1",
+            rows[row][:-3],
+            draw(st.text()),
+        ]
+        rows[row] = draw(st.sampled_from(others))
+        certain = False
+    head = usually([], ["# key: value"], ["Date 2024", ""], ["sensor;3"], [separator.join(["mm", "N"])])
+    header = usually([separator.join(names)], [])
+    end = usually("\n", "\r\n", "\r")
+    text = end.join([*head, *header, *rows]) + usually(end, "", "\0", end * 3)
+    content = text.encode(usually("utf-8", "utf-8-sig", "utf-16", "latin-1", "utf-16-be"), "replace")
+    return content, count if certain and header else None
 
 
 ends = st.one_of(st.none(), st.integers(-2, 50))
@@ -169,17 +186,20 @@ OPTIONS = st.fixed_dictionaries(
 )
 
 
-@cases(300)
+@cases(150)
 @given(table=tables(), options=st.one_of(st.just({}), st.just({"invalid": "drop"}), OPTIONS))
 def test_any_table_is_read_or_refused(
-    table: tuple[bytes, int], options: dict[str, Any], tmp_path_factory: pytest.TempPathFactory
+    table: tuple[bytes, int | None], options: dict[str, Any], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "any_table.csv"
-    path.write_bytes(table[0] or b" ")
-    result_of(path, **options)
+    content, count = table
+    path.write_bytes(content or b" ")
+    recording = result_of(path, **options)
+    if recording is not None and count is not None:
+        assert recording.source.file_rows == count
 
 
-@cases(100)
+@cases(50)
 @given(content=st.binary(min_size=1, max_size=400), suffix=st.sampled_from([".csv", ".part", ".txt", ".tsv"]))
 def test_any_bytes_are_read_or_refused(
     content: bytes, suffix: str, tmp_path_factory: pytest.TempPathFactory
@@ -218,7 +238,7 @@ def test_the_unchanged_file_is_read(suffix: str, valid: dict[str, bytes], tmp_pa
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-@cases(60)
+@cases(20)
 @given(data=st.data())
 def test_a_damaged_file_is_read_or_refused(
     suffix: str, valid: dict[str, bytes], data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
@@ -264,7 +284,7 @@ ARRAYS = st.sampled_from(
 )
 
 
-@cases(100)
+@cases(50)
 @given(
     arrays=st.dictionaries(st.sampled_from(NAMES), ARRAYS, min_size=1, max_size=4),
     suffix=st.sampled_from(FORMATS[1:5]),
