@@ -20,14 +20,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         const palpate::Inverse3Info info = palpate::read_inverse3_inventory(message, "127.0.0.1:10001");
         require(std::isfinite(info.force_gate) && std::isfinite(info.damping), "the settings are finite");
         id = info.id;
-        std::string command;
-        palpate::write_inverse3_command(command, "{", palpate::inverse3_command_head(id), axis,
-                                        std::isfinite(force) ? force : 0.0);
-        const auto written = nlohmann::json::parse(command);
-        require(written.at("inverse3").at(0).at("device_id") == id, "a command names the device");
     } catch (const nlohmann::json::exception&) {
     } catch (const std::runtime_error&) {
     }
+    std::string command;
+    palpate::write_inverse3_command(command, "{", palpate::inverse3_command_head(id), axis,
+                                    std::isfinite(force) ? force : 0.0);
+    const auto written = nlohmann::json::parse(command, nullptr, false);
+    require(!written.is_discarded() && written["inverse3"][0]["device_id"] == id,
+            "a command is JSON that names the device");
     try {
         const palpate::Inverse3State state = palpate::read_inverse3_state(message, id, axis);
         require(std::isfinite(state.position) && std::isfinite(state.velocity) && std::isfinite(state.force),

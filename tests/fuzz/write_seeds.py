@@ -78,8 +78,9 @@ def main() -> None:
         "state": state,
         "status": {"calibrated": True},
     }
-    message = json.dumps({"session_id": 7, "inverse3": [device]}).encode()
-    write("inverse3", "state", struct.pack("<Bd", 2, 1.5) + message)
+    for name, identifier in {"state": "049D", "quotes_in_name": '0"\\\u2028'}.items():
+        message = json.dumps({"session_id": 7, "inverse3": [{**device, "device_id": identifier}]})
+        write("inverse3", name, struct.pack("<Bd", 2, 1.5) + message.encode())
     for name, line in {
         "rendering": "m.json --device simulated --rate-hz 1000 --structure massless --mass 0.1 --predict 3",
         "guards": "m.json --force-limit 2 --slew-s 0.1 --no-energy-tank --tolerated-samples 3 --ramp-s=1",
