@@ -33,24 +33,24 @@ struct Inverse3State {
 /// contains no device, or the device is not calibrated, and an exception of nlohmann-json for other content.
 [[nodiscard]] inline Inverse3Info read_inverse3_inventory(const std::string& message,
                                                           const std::string& service) {
-    using Json = nlohmann::json;
-    const Json inventory = Json::parse(message);
-    const Json none = Json::array();
-    const Json& devices = inventory.contains("inverse3") ? inventory.at("inverse3") : none;
+    using Message = nlohmann::json;
+    const Message inventory = Message::parse(message);
+    const Message none = Message::array();
+    const Message& devices = inventory.contains("inverse3") ? inventory.at("inverse3") : none;
     if (devices.empty()) {
         throw std::runtime_error(
             "the Haply Inverse Service at " + service +
             " detects no Inverse3: plug the Inverse3 in, and check that Haply Hub shows it");
     }
-    const Json& device = devices.at(0);
+    const Message& device = devices.at(0);
     Inverse3Info info;
     info.id = device.at("device_id").get<std::string>();
-    const Json& config = device.at("config");
+    const Message& config = device.at("config");
     info.type = config.value("type", "inverse3");
-    const Json filters = config.value("filters", Json::object());
-    info.force_gate = filters.value(Json::json_pointer{"/force_gate/gain"}, 0.0);
-    info.damping = filters.value(Json::json_pointer{"/damping/scalar"}, 0.0);
-    if (!device.value(Json::json_pointer{"/status/calibrated"}, true)) {
+    const Message filters = config.value("filters", Message::object());
+    info.force_gate = filters.value(Message::json_pointer{"/force_gate/gain"}, 0.0);
+    info.damping = filters.value(Message::json_pointer{"/damping/scalar"}, 0.0);
+    if (!device.value(Message::json_pointer{"/status/calibrated"}, true)) {
         throw std::runtime_error("Inverse3 " + info.id +
                                  " is not calibrated: follow the instructions of its light or of Haply Hub");
     }
