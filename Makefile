@@ -4,6 +4,7 @@
 #   make demo         identify, verify and render the sample scene; pictures in demo/
 #   make test         build, C++ tests, Python tests, lint                        (minutes)
 #   make control      build palpate-control, the real-time program: build/control/palpate-control
+#   make fuzz         fuzz targets of the C++ readers, FUZZ_SECONDS each: make fuzz FUZZ_SECONDS=3600
 #   make test-full    the same tests with long counts, with sanitizers, and of the installed package  (an hour)
 #   make bench        all studies, JSON and figures in build/bench/
 #   make figures      the same studies, figures and generated pages in docs/
@@ -26,6 +27,8 @@ PYTHON ?= python3
 test test-cpp test-python: export PALPATE_TEST_SCALE ?= 1
 test-full test-full-native: export PALPATE_TEST_SCALE ?= 100
 bench figures: export PALPATE_BENCH_SCALE ?= 1
+# Seconds for each fuzz target: a sample for every change.
+FUZZ_SECONDS ?= 3
 
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
 # Writes only below this folder: no download cache and no font cache in the home directory.
@@ -46,7 +49,7 @@ core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree contain absolute paths: they are created again after the folder was moved.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python examples test-packages bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python fuzz examples test-packages bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved
 
 help:
@@ -68,8 +71,8 @@ $(stamps)/core: $(stamps)/build $(core_sources)
 	    -C cmake.define.PALPATE_BUILD_CONTROL=OFF --editable .
 	touch $@
 
-# The libraries of palpate-control and of the C++ tests.
-$(stamps)/control $(stamps)/test-cpp: $(stamps)/build
+# The libraries of palpate-control and of the C++ tests; clang for the fuzz targets.
+$(stamps)/control $(stamps)/test-cpp $(stamps)/fuzz: $(stamps)/build
 	$(system_packages) "$(@F)"
 	touch $@
 
@@ -94,7 +97,7 @@ demo: $(stamps)/core
 # The linters and the compilers share the processors. The C++ and the Python tests, many of which wait for a clock, do
 # not overlap. The Python tests run last, so that their summary is at the end of the output.
 test: | setup
-	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control test-cpp
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control test-cpp fuzz
 	$(MAKE) --no-print-directory test-python
 
 # One process more than the number of processors, because many tests wait for a clock. Files keep their order, because
@@ -115,6 +118,10 @@ examples: setup
 test-cpp: setup
 	tools/cpp_tests.sh dev
 
+# Random and mutated inputs for the readers and the state machines, with sanitizers.
+fuzz: $(stamps)/core $(stamps)/fuzz
+	tools/fuzz.sh $(FUZZ_SECONDS)
+
 test-full: test-full-native
 	$(MAKE) --no-print-directory test-python
 
@@ -123,6 +130,7 @@ test-full: test-full-native
 test-full-native: setup control test-packages $(stamps)/simulators
 	tools/cpp_tests.sh release
 	for preset in asan tsan; do tools/cpp_tests.sh $$preset; done
+	$(MAKE) --no-print-directory fuzz FUZZ_SECONDS=120
 	$(python) -m pytest tests/usb tests/simulators
 	$(system_packages) browser
 	$(python) -m pytest tests/browser

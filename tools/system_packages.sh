@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the missing Debian or Ubuntu packages, or prints one line with the packages to install.
 #
-#   tools/system_packages.sh PYTHON build|control|test-cpp|docs|guest|browser|portable
+#   tools/system_packages.sh PYTHON build|control|test-cpp|docs|guest|browser|portable|fuzz
 set -euo pipefail
 
 python=$1
@@ -10,6 +10,12 @@ purpose=$2
 
 compiles() { echo "$1" | "${CXX:-g++}" -std=c++20 -fsyntax-only -x c++ - 2>/dev/null; }
 python_says() { "$python" -c "$1" >/dev/null 2>&1; }
+
+fuzzes() { echo 'extern "C" int LLVMFuzzerTestOneInput(const char*, unsigned long) { return 0; }' |
+    clang++ -fsanitize=fuzzer,address,undefined -o /dev/null -x c++ - 2>/dev/null; }
+# The version of clang, also before it is installed.
+clang_version() { clang -dumpversion 2>/dev/null | cut -d. -f1 | grep . ||
+    apt-cache depends clang 2>/dev/null | sed -n 's/.*Depends: clang-\([0-9]*\)$/\1/p' | head -1; }
 
 missing_packages() {
     command -v "${CXX:-g++}" >/dev/null || echo g++
@@ -50,6 +56,12 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         [ -e /usr/include/newlib ] || echo libnewlib-arm-none-eabi
         command -v qemu-system-arm >/dev/null || echo qemu-system-arm
         command -v clang >/dev/null || echo clang
+    fi
+    if [ "$purpose" = fuzz ]; then
+        # clang with libFuzzer, whose package has the version of clang in its name on some systems
+        command -v clang >/dev/null || echo clang
+        fuzzes || apt-cache pkgnames 2>/dev/null | grep -x "libclang-rt-$(clang_version)-dev" || true
+        compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
     fi
     if [ "$purpose" = browser ]; then
         # for the tests that open a report

@@ -83,6 +83,9 @@ Json to_json(const py::handle& value, int depth = 0) {
         return value.cast<std::string>();
     }
     if (is_object) {
+        if (py::len(value) > most_json_keys) {
+            throw std::invalid_argument(too_many_keys());
+        }
         Json items = Json::object();
         for (const auto& [key, item] : py::reinterpret_borrow<py::dict>(value)) {
             items[py::str(key).cast<std::string>()] = to_json(item, depth + 1);
@@ -110,6 +113,7 @@ detail::JsonField given(const detail::JsonField& part) {
 }  // namespace
 
 void bind_io(py::module_& module) {
+    module.attr("largest_json_bytes") = largest_json_bytes;
     module.def(
         "follow_links",
         [](const std::string& path) {

@@ -58,6 +58,7 @@ OPTIONAL_HEADERS = {
     "device/detail/usb_text.hpp",
     "device/detail/usb_transfers.hpp",
     "device/inverse3.hpp",
+    "device/inverse3_messages.hpp",
     "device/usb.hpp",
     "io/json_field.hpp",
     "io/json_text.hpp",

@@ -8,7 +8,7 @@ import palpate._core.model
 import palpate._core.rendering
 import palpate._core.stability
 import typing
-__all__: list[str] = ['check_model', 'checked_certificate', 'follow_links', 'profile_of', 'read_json', 'scheme_of']
+__all__: list[str] = ['check_model', 'checked_certificate', 'follow_links', 'largest_json_bytes', 'profile_of', 'read_json', 'scheme_of']
 def check_model(content: typing.Any) -> None:
     """
     Checks the content of a model file and computes its certificate again. Raises ValueError with
@@ -39,3 +39,4 @@ def scheme_of(plan: typing.Any) -> palpate._core.rendering.Scheme:
     Returns the scheme (structure and its numbers) in the plan of a model file. Raises ValueError
     with the first wrong field, its value and the correct values.
     """
+largest_json_bytes: int = 8388608

@@ -430,7 +430,7 @@ static inline void NAME_integrals(double position, int curve, double *first, dou
     *first += turns * turn - a[3];
     *second += turns * (turn * along + double_turn + 0.5 * (turns - 1.0) * turn * period) - a[4] - a[3] * along;
 //@ else
-    if (position < NAME_law_LOWER || position > NAME_law_UPPER) {
+    if (!(position >= NAME_law_LOWER && position <= NAME_law_UPPER)) {
         const double *e = NAME_law_ends[2 * curve + (position < NAME_law_LOWER ? 0 : 1)];
         const double d = position - e[0];
         const double inside = d > e[5] ? e[5] : d < -e[5] ? -e[5] : d;

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
 
+from .._core.io import largest_json_bytes
 from .._core.model import Memory
 from .._core.stability import Certificate
-from ..errors import escaped
+from ..errors import InputError, escaped
 from ..recording.files import replacing
 from ..recording.units import Unit
 from .band import BAND_LEVEL, Band
@@ -95,8 +96,14 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
 
 def write_json(path: Path, content: dict[str, Any]) -> Path:
     """Writes readable JSON; the file gets its name only when it is completely written."""
+    text = f"{_lines(content, '')}\n".encode()
+    if len(text) > largest_json_bytes:
+        raise InputError(
+            f"{path} would have {len(text)} bytes: must have at most {largest_json_bytes}, as otherwise it "
+            "cannot be read; remove notes, or identify the model with fewer wavelets"
+        )
     with replacing(path) as temporary:
-        temporary.write_text(f"{_lines(content, '')}\n", encoding="utf-8")
+        temporary.write_bytes(text)
     return path
 
 

@@ -21,6 +21,12 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+_LARGEST_BYTES = 20_000
+"""Largest size of a profile; the examples have less than 2000, and tomllib takes long for more [bytes]."""
+
+_MOST_ERRORS = 20
+"""Largest number of wrong fields that a message names."""
+
 EXAMPLES = Path(__file__).parent / "profiles"
 """Example profiles; a comment at the top of each gives the sources of its numbers."""
 
@@ -78,6 +84,11 @@ class DeviceProfile(_core.device.DeviceProfile):
         """
         file = path_of("path", path)
         require_file(file)
+        if (size := file.stat().st_size) > _LARGEST_BYTES:
+            raise InputError(
+                f"{file} has {size} bytes: a device profile must have at most {_LARGEST_BYTES}; remove "
+                "comments"
+            )
         try:
             content = tomllib.loads(file.read_text(encoding="utf-8"))
         except tomllib.TOMLDecodeError as error:
@@ -128,6 +139,8 @@ def _wrong_fields(content: Mapping[str, Any]) -> list[str]:
             _core.io.profile_of(fields)
         except ValueError as error:
             errors.append(str(error))
+        if len(errors) > _MOST_ERRORS:
+            return [*errors[:-1], "and more"]
     return errors
 
 

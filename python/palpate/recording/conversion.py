@@ -144,7 +144,15 @@ class Conversion:
                     f"({', '.join(sorted(used))})"
                 )
         negated_columns = frozenset(column for column in negated if negated.count(column) % 2)
-        return Conversion(name, choice, choice.direction, status, negated_columns, drop, metadata)
+        conversion = Conversion(name, choice, choice.direction, status, negated_columns, drop, metadata)
+        for column in conversion.text:
+            if column in conversion.numbers:
+                role = "direction" if column == choice.direction else "status"
+                raise InputError(
+                    f"{name}: column {column} is the {role} and also a column of numbers; use another column "
+                    "for one of them"
+                )
+        return conversion
 
     @property
     def columns(self) -> list[Column]:

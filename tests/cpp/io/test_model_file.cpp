@@ -99,5 +99,36 @@ TEST(ModelFile, ReportsAMissingFile) {
     EXPECT_THROW((void)load_model_file(corpus + "nothing.json"), std::invalid_argument);
 }
 
+/// Returns the error message of reading a file with this content.
+std::string refusal(const std::string& content) {
+    const std::string path = testing::TempDir() + "refused.json";
+    std::ofstream{path} << content;
+    try {
+        (void)read_json(path);
+    } catch (const std::invalid_argument& error) {
+        return std::string(error.what()).substr(path.size());
+    }
+    return "";
+}
+
+TEST(ModelFile, RefusesALargeFileBeforeItIsRead) {
+    EXPECT_EQ(refusal("[]" + std::string(largest_json_bytes - 2, ' ')), "");
+    EXPECT_EQ(
+        refusal("[]" + std::string(largest_json_bytes - 1, ' ')),
+        ": the file has 8388609 bytes: must have at most 8388608; remove notes, or identify the model with "
+        "fewer wavelets");
+}
+
+TEST(ModelFile, RefusesAnObjectWithManyKeys) {
+    std::string keys;
+    for (std::size_t k = 0; k < most_json_keys; ++k) {
+        keys += "\"" + std::to_string(k) + "\": 1, ";
+    }
+    const std::string last = R"("a": 1)";
+    EXPECT_EQ(refusal("{" + keys.substr(0, keys.size() - 2) + "}"), "");
+    EXPECT_EQ(refusal("{" + keys + last + "}"),
+              ": an object has more than 1000 keys: store its values in lists");
+}
+
 }  // namespace
 }  // namespace palpate

@@ -106,6 +106,14 @@ def test_contracted_header_is_within_its_proved_bounds(precision: str, tmp_path:
     assert np.abs(contracted[:, 2] - model.slope(x)).max() <= tables.slope_error
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_position_has_defined_behaviour(kind: str, tmp_path: Path) -> None:
+    model, tables = tables_of(kind, precision="double")
+    header_of(model, tables, tmp_path)
+    sanitizer = ["-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
+    run_here(Path(__file__).with_name("any_position.c"), tmp_path, sanitizer)
+
+
 @pytest.mark.parametrize(("kind", "precision"), CASES)
 def test_header_compiles_without_warnings_as_c99_and_cpp11(kind: str, precision: str, tmp_path: Path) -> None:
     header = header_of(*tables_of(kind, precision=precision), tmp_path)

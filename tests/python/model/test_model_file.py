@@ -17,7 +17,7 @@ import pytest
 import palpate.model
 from conftest import ROOT
 from palpate import InputError, load_model
-from palpate._core.io import check_model, checked_certificate, scheme_of
+from palpate._core.io import check_model, checked_certificate, largest_json_bytes, scheme_of
 
 CORPUS = ROOT / "tests" / "models"
 GOOD: list[dict[str, str]] = json.loads((CORPUS / "good.json").read_text(encoding="utf-8"))
@@ -265,6 +265,36 @@ def test_notes_nest_as_deep_when_checked_as_when_read(tmp_path: Path) -> None:
     content["notes"] = {"a": [deepest]}
     with pytest.raises(ValueError, match="nested more than 100 levels deep"):
         check_model(content)
+
+
+def test_a_file_above_the_largest_size_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    sentence = refusal(tmp_path / "a.json", b"[" * (largest_json_bytes + 1))
+    assert sentence.startswith(
+        f"the file has {largest_json_bytes + 1} bytes: must have at most {largest_json_bytes}; "
+    )
+
+
+def test_an_object_with_many_keys_is_refused_when_read_and_when_saved(tmp_path: Path) -> None:
+    many = {f"k{number}": number for number in range(1000)}
+    content = {**json.loads(TEXT), "notes": many}
+    (tmp_path / "a.json").write_text(json.dumps(content), encoding="utf-8")
+    model = load_model(tmp_path / "a.json")
+    many["one more"] = 1
+    sentence = "an object has more than 1000 keys: store its values in lists"
+    assert refusal(tmp_path / "a.json", json.dumps(content).encode()) == sentence
+    model.notes = many
+    with pytest.raises(ValueError, match=sentence):
+        model.save(tmp_path / "b.json")
+
+
+def test_a_model_that_could_not_be_read_again_is_not_saved(tmp_path: Path) -> None:
+    model = load_model(CORPUS / "good" / "position.json")
+    model.notes = {"log": "x" * largest_json_bytes}
+    with pytest.raises(
+        InputError, match=rf"b\.json would have \d+ bytes: must have at most {largest_json_bytes}"
+    ):
+        model.save(tmp_path / "b.json")
+    assert not list(tmp_path.iterdir())
 
 
 def test_keys_with_a_nul_character_are_checked_by_their_whole_name() -> None:

@@ -31,7 +31,7 @@ MODEL = ROOT / "tests" / "models" / "good" / "position.json"
         ("inertia", '"heavy"', 'inertia is "heavy": must be a number'),
         ("inertia", "[1.0]", "inertia is [1.0]: must be a number"),
         ("inertia", "[" * 5000 + "]" * 5000, "the file is nested too deeply; a profile has no"),
-        ("inertia", "{a = " * 5000 + "1" + "}" * 5000, "the file is nested too deeply; a profile has no"),
+        ("inertia", "{a = " * 3000 + "1" + "}" * 3000, "the file is nested too deeply; a profile has no"),
         (
             "inertia",
             "1979-05-27",
@@ -62,3 +62,18 @@ def test_invalid_profile_value_is_reported_in_one_sentence(
     assert printed.startswith(f"error: {path}: ")
     assert "defect" not in printed
     assert "sys." not in printed
+
+
+def test_a_long_profile_is_refused_before_it_is_parsed(tmp_path: Path) -> None:
+    file = tmp_path / "long.toml"
+    file.write_text(".".join("a" * 45_000) + " = 1", encoding="utf-8")  # a minute in tomllib
+    with pytest.raises(InputError, match=r"has 90003 bytes: a device profile must have at most 20000"):
+        DeviceProfile.load(file)
+
+
+def test_the_message_on_a_profile_names_a_limited_number_of_fields(tmp_path: Path) -> None:
+    file = tmp_path / "other.toml"
+    file.write_text("".join(f"k{number} = 1\n" for number in range(900)), encoding="utf-8")
+    with pytest.raises(InputError, match=r"k0 is not a key of this format; .*; and more$") as refused:
+        DeviceProfile.load(file)
+    assert len(str(refused.value)) < 1000 + len(str(file))

@@ -52,6 +52,18 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
         "press.csv, line 1: there is one column (depth_mm); a recording needs a position and a force, "
         "separated by commas, semicolons or tabs",
     ),
+    "direction is the position": (
+        lines(HEADER, rows()),
+        {"direction": "depth_mm"},
+        "press.csv: column depth_mm is the direction and also a column of numbers; use another column for "
+        "one of them",
+    ),
+    "status is the force": (
+        lines('# palpate-columns: {"status": "force_gf"}', HEADER, rows()),
+        {},
+        "press.csv: column force_gf is the status and also a column of numbers; use another column for one "
+        "of them",
+    ),
     "spaces": (
         "depth_mm force_N\n1 2\n",
         {},

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -22,6 +21,7 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/device/device.hpp"
+#include "palpate/device/inverse3_messages.hpp"
 
 namespace palpate {
 
@@ -34,15 +34,6 @@ struct Inverse3Settings {
     std::chrono::milliseconds step_timeout{2000};  ///< longest wait in each step of opening the device
     /// Longest wait of a tick for the service's message with position and force
     std::chrono::milliseconds answer_timeout{20};
-};
-
-/// Properties of the Inverse3 that its service sent when the device was opened.
-struct Inverse3Info {
-    std::string id;    ///< identifier of the device, such as 049D
-    std::string type;  ///< device type: inverse3, inverse3x or minverse
-    /// Setting of the service: gain of its reduction of forces when the handle oscillates [-]
-    double force_gate = 0.0;
-    double damping = 0.0;  ///< setting of the service: damping that it adds to commanded forces, no unit
 };
 
 /// One direction of a Haply Inverse3, Inverse3x or Minverse, through the Inverse Service of its maker: JSON over a
@@ -75,10 +66,10 @@ class Inverse3Device {
         const std::string service = settings_.host + ":" + std::to_string(settings_.port);
         try {
             connect(service);
-            const Json inventory = Json::parse(received(service, "reports no device"));
-            read_inventory(inventory, service);
+            info_ = read_inverse3_inventory(received(service, "reports no device"), service);
+            link_->command_head = inverse3_command_head(info_.id);
             begin_session(service);
-        } catch (const Json::exception& error) {
+        } catch (const nlohmann::json::exception& error) {
             link_.reset();
             return {"the program at " + service + " is not a Haply Inverse Service: " + error.what()};
         } catch (const std::exception& error) {
@@ -127,7 +118,6 @@ class Inverse3Device {
     [[nodiscard]] const Inverse3Info& info() const noexcept { return info_; }
 
   private:
-    using Json = nlohmann::json;
     using Error = boost::system::error_code;
 
     /// A connection to the service and its unfinished operations. The address of a Link must not change, because
@@ -143,11 +133,9 @@ class Inverse3Device {
         bool sending = false;
         bool reading = false;
         bool disconnected = false;
-        int unanswered = 0;     ///< sent messages that the service has not answered
-        double position = 0.0;  ///< handle position that the service sent last [m]
-        double origin = 0.0;    ///< handle position when the device was opened [m]
-        double velocity = 0.0;
-        double echoed = 0.0;  ///< force that the service reported last [N]
+        int unanswered = 0;   ///< sent messages that the service has not answered
+        Inverse3State state;  ///< state that the service sent last
+        double origin = 0.0;  ///< handle position when the device was opened [m]
         std::uint64_t sequence = 0;
         /// Number of consecutive exchanges in which the service reports zero force although a force was commanded
         int states_without_effect = 0;
@@ -220,32 +208,6 @@ class Inverse3Device {
         return text;
     }
 
-    /// Reads the properties of the first device in the service's first message. Throws if the message contains no
-    /// device, or the device is not calibrated.
-    void read_inventory(const Json& inventory, const std::string& service) {
-        const Json none = Json::array();
-        const Json& devices = inventory.contains("inverse3") ? inventory.at("inverse3") : none;
-        if (devices.empty()) {
-            throw std::runtime_error(
-                "the Haply Inverse Service at " + service +
-                " detects no Inverse3: plug the Inverse3 in, and check that Haply Hub shows it");
-        }
-        const Json& device = devices.at(0);
-        info_.id = device.at("device_id").get<std::string>();
-        const Json& config = device.at("config");
-        info_.type = config.value("type", "inverse3");
-        const Json filters = config.value("filters", Json::object());
-        info_.force_gate = filters.value(Json::json_pointer{"/force_gate/gain"}, 0.0);
-        info_.damping = filters.value(Json::json_pointer{"/damping/scalar"}, 0.0);
-        if (!device.value(Json::json_pointer{"/status/calibrated"}, true)) {
-            throw std::runtime_error(
-                "Inverse3 " + info_.id +
-                " is not calibrated: follow the instructions of its light or of Haply Hub");
-        }
-        link_->command_head = R"("inverse3":[{"device_id":)" + Json(info_.id).dump() +
-                              R"(,"commands":{"set_cursor_force":{"vector":{)";
-    }
-
     /// Sends the first message: the name of this program and a command of zero force. Takes the start position of the
     /// handle from the answer.
     void begin_session(const std::string& service) {
@@ -253,24 +215,15 @@ class Inverse3Device {
         Error error;
         link_->stream.write(boost::asio::buffer(link_->message), error);
         take_state(received(service, "does not answer a command"));
-        link_->origin = link_->position;
+        link_->origin = link_->state.position;
         last_ = {};
         last_.sequence = link_->sequence;
     }
 
     /// Writes a command with this force as the next message to the service.
     void write_message(double force, const char* head) {
-        std::string& text = link_->message;
-        text.assign(head).append(link_->command_head);
-        for (int k = 0; k < 3; ++k) {
-            text += k > 0 ? "," : "";
-            text += axis_keys[static_cast<std::size_t>(k)];
-            std::array<char, 32> digits{};
-            const double along = k == settings_.axis ? -settings_.direction * force : 0.0;
-            text.append(digits.data(),
-                        std::to_chars(digits.data(), digits.data() + digits.size(), along).ptr);
-        }
-        text += "}}}}]}";
+        write_inverse3_command(link_->message, head, link_->command_head, settings_.axis,
+                               -settings_.direction * force);
     }
 
     /// Sends a force command and waits for the service's next message with the position. Returns the tick's status.
@@ -293,14 +246,15 @@ class Inverse3Device {
         if (link.disconnected) {
             return Status::Fault;
         }
-        last_.position = settings_.direction * (link.position - link.origin);
-        last_.velocity = settings_.direction * link.velocity;
-        last_.applied = -settings_.direction * link.echoed;
+        last_.position = settings_.direction * (link.state.position - link.origin);
+        last_.velocity = settings_.direction * link.state.velocity;
+        last_.applied = -settings_.direction * link.state.force;
         last_.device_time =
             std::chrono::duration<double>(std::chrono::steady_clock::now() - link.start).count();
         last_.sequence = link.sequence;
-        link.states_without_effect =
-            std::abs(force) > least_visible_force && link.echoed == 0.0 ? link.states_without_effect + 1 : 0;
+        link.states_without_effect = std::abs(force) > least_visible_force && link.state.force == 0.0
+                                         ? link.states_without_effect + 1
+                                         : 0;
         if (link.states_without_effect > most_states_without_effect) {
             return Status::Fault;
         }
@@ -330,23 +284,9 @@ class Inverse3Device {
     /// Reads position, velocity and force from a message of the service. Throws if the message differs from the
     /// service's documentation, or does not contain this device.
     void take_state(const std::string& text) {
-        const Json message = Json::parse(text);
-        for (const Json& device : message.at("inverse3")) {
-            if (device.at("device_id").get_ref<const std::string&>() == info_.id) {
-                const Json& state = device.at("state");
-                const std::string key(1, axis_names[static_cast<std::size_t>(settings_.axis)]);
-                link_->position = state.at("cursor_position").at(key).get<double>();
-                link_->velocity = state.at("cursor_velocity").at(key).get<double>();
-                link_->echoed = state.at("current_cursor_force").at(key).get<double>();
-                ++link_->sequence;
-                return;
-            }
-        }
-        throw std::runtime_error("Inverse3 " + info_.id + " is missing in the service's message");
+        link_->state = read_inverse3_state(text, info_.id, settings_.axis);
+        ++link_->sequence;
     }
-
-    static constexpr std::string_view axis_names = "xyz";
-    static constexpr std::array<const char*, 3> axis_keys{R"("x":)", R"("y":)", R"("z":)"};
 
     Inverse3Settings settings_;
     Inverse3Info info_;

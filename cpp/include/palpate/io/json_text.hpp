@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -19,16 +20,24 @@ namespace palpate {
 /// JSON value whose objects keep their keys in the order of the file.
 using Json = nlohmann::ordered_json;
 
-inline constexpr int deepest_json = 100;  ///< largest allowed depth of nested lists and objects
+// Bounds of a JSON file, so that reading one takes limited time and memory. A model of 1000 wavelets has 30 kB.
+inline constexpr std::size_t largest_json_bytes = 8 << 20;  ///< largest size of a file [bytes]
+inline constexpr int deepest_json = 100;             ///< largest allowed depth of nested lists and objects
+inline constexpr std::size_t most_json_keys = 1000;  ///< largest number of keys of one object
 
 /// Returns the error message for content that is nested too deeply.
 [[nodiscard]] inline std::string too_deep() {
     return "the file is nested more than " + std::to_string(deepest_json) + " levels deep";
 }
 
+/// Returns the error message for an object with too many keys.
+[[nodiscard]] inline std::string too_many_keys() {
+    return "an object has more than " + std::to_string(most_json_keys) + " keys: store its values in lists";
+}
+
 /// Parses JSON by RFC 8259, and refuses content that other readers interpret differently: a byte order mark, NUL bytes,
-/// repeated keys, unpaired surrogates, numbers too large for a double, more than `deepest_json` levels. Throws
-/// std::invalid_argument with the reason in one sentence.
+/// repeated keys, unpaired surrogates, numbers too large for a double, more than `deepest_json` levels, or
+/// `most_json_keys` keys in an object. Throws std::invalid_argument with the reason in one sentence.
 [[nodiscard]] inline Json parse_json(std::string_view text) {
     if (text.starts_with("\xEF\xBB\xBF")) {
         throw std::invalid_argument("the file begins with a byte order mark: save it as UTF-8 without one");
@@ -50,6 +59,9 @@ inline constexpr int deepest_json = 100;  ///< largest allowed depth of nested l
         } else if (event == Json::parse_event_t::key) {
             if (const auto key = parsed.get<std::string>(); !keys.back().insert(key).second) {
                 throw std::invalid_argument("the key " + Json(key).dump() + " occurs twice in one object");
+            }
+            if (keys.back().size() > most_json_keys) {
+                throw std::invalid_argument(too_many_keys());
             }
         }
         return true;
@@ -76,6 +88,11 @@ inline constexpr int deepest_json = 100;  ///< largest allowed depth of nested l
     }
     if (!stream.is_open()) {
         throw std::invalid_argument(path + ": there is no such file, or it cannot be read");
+    }
+    if (const std::uintmax_t size = std::filesystem::file_size(path, none); size > largest_json_bytes) {
+        throw std::invalid_argument(path + ": the file has " + std::to_string(size) +
+                                    " bytes: must have at most " + std::to_string(largest_json_bytes) +
+                                    "; remove notes, or identify the model with fewer wavelets");
     }
     const std::string text{std::istreambuf_iterator<char>{stream}, {}};
     try {
