@@ -21,7 +21,7 @@ namespace palpate {
 using Json = nlohmann::ordered_json;
 
 // Bounds of a JSON file, so that reading one takes limited time and memory. A model of 1000 wavelets has 30 kB.
-inline constexpr std::size_t largest_json_bytes = 8 << 20;  ///< largest size of a file [bytes]
+inline constexpr std::size_t largest_json_bytes = std::size_t{8} << 20U;  ///< largest size of a file [bytes]
 inline constexpr int deepest_json = 100;             ///< largest allowed depth of nested lists and objects
 inline constexpr std::size_t most_json_keys = 1000;  ///< largest number of keys of one object
 
