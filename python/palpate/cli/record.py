@@ -11,7 +11,6 @@ import click
 from ..devices import record as record_object
 from ..errors import InputError
 from ..model import load_model
-from ..recording.files import require_absent
 from .exit_status import end_with
 from .live import device_options, live_line, session_verdict
 from .printing import number, print_json, print_numbers, print_verdict, talk
@@ -78,9 +77,7 @@ def record(
     limit. The force is that of the transducer; without one it is the motor's force, which includes the
     friction of the device. Ctrl-C ends the recording and keeps it.
     """
-    if not force:
-        require_absent(recording)
-    require_writable(recording, inputs=(object_file,), force=force)
+    require_writable(recording=recording, force=force, inputs=(object_file,))
     if device == "simulated" and object_file is None:
         raise InputError("the simulated device has no object; add --object MODEL.json, a model of one")
     given = [name for name, value in sweep.items() if value is not None]

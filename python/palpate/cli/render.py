@@ -13,7 +13,6 @@ from .._core.run import render as render_live
 from ..errors import InputError
 from ..model import load_model
 from ..planning import Plan, example_profiles
-from ..recording.files import require_absent
 from .exit_status import end_with
 from .live import live_line, session_verdict
 from .printing import print_json, print_numbers, print_verdict, talk
@@ -88,9 +87,7 @@ def render(
     device that contains it; this program then watches and records. Ctrl-C stops the loop: it sends zero
     force, closes the device and the recording, and prints the summary.
     """
-    if record is not None and not force:
-        require_absent(record)
-    require_writable(record, inputs=(model_file,), force=force)
+    require_writable(recording=record, force=force, inputs=(model_file,))
     if Path(device).suffix == ".toml" or device in example_profiles():
         raise InputError(
             f"--device {device} is a profile: give it to palpate plan, which writes it into the model file; "

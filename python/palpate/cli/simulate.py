@@ -15,7 +15,6 @@ from ..model import Model, load_model
 from ..planning import Plan, force_error, force_range, hand_for, judge, rig_for
 from ..planning import simulate as render
 from ..planning.simulation import covered_text, holding_hand
-from ..recording.files import require_absent
 from .exit_status import end_with, finishing
 from .figures import drawing, picture_rendering
 from .printing import (
@@ -80,9 +79,7 @@ def simulate(
     for, unless a structure is given.
     A simulation shows one case; it does not prove stability.
     """
-    if output is not None and not force:
-        require_absent(output)
-    require_writable(output, plot, inputs=(model_file,), force=force)
+    require_writable(plot, recording=output, force=force, inputs=(model_file,))
     model = load_model(model_file)
     rig = rig_for(model)
     plan = _chosen_plan(model, rig, scheme)

@@ -17,6 +17,7 @@ from .._core.rendering import Scheme, most_prediction_taps, structure_names
 from ..arguments import first_sentence, parameter_texts
 from ..errors import InputError
 from ..recording import Recording, read_recording
+from ..recording.files import require_absent
 from .completion import FIGURES, RECORDINGS, FileName
 from .exit_status import interrupted_at_once
 from .printing import TERMS, Option, Verb, set_quiet, talk
@@ -300,16 +301,32 @@ def require_model_name(output: Path) -> None:
         raise InputError(f"{output} is not a model file: its name must end in .json")
 
 
-def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = (), force: bool = False) -> None:
+def require_writable(
+    *targets: Path | None,
+    recording: Path | None = None,
+    force: bool = False,
+    inputs: Sequence[Path | None] = (),
+) -> None:
     """Refuses output files that cannot be written, before anything is computed. None means no file.
+
+    Parameters
+    ----------
+    *targets : path, optional
+        Output files, which replace an existing file that is not a recording.
+    recording : path, optional
+        An output file, which replaces an existing file only if `force` is True.
+    force : bool
+        The value of the option --force.
+    inputs : sequence of path
+        The files that the verb reads.
 
     Raises
     ------
     InputError
-        A folder does not exist or cannot be written, a target is a folder or one of the inputs, two targets
-        are one file, or a target is an existing recording and `force` is False.
+        A folder does not exist or cannot be written, an output is a folder or one of the inputs, two outputs
+        are one file, or an existing file must not be replaced.
     """
-    wanted = [target for target in targets if target is not None]
+    wanted = [target for target in (recording, *targets) if target is not None]
     places = [os.path.realpath(target) for target in wanted]
     for target, place in zip(wanted, places, strict=True):
         if not target.parent.is_dir():
@@ -319,7 +336,10 @@ def require_writable(*targets: Path | None, inputs: Sequence[Path | None] = (), 
         for given in inputs:
             if given is not None and given.exists() and target.exists() and target.samefile(given):
                 raise InputError(f"{target} is also an input; the result would overwrite it")
-        if not force and target.suffix.lower() in RECORDINGS and os.path.lexists(target):
+        if target == recording:
+            if not force:
+                require_absent(target)
+        elif target.suffix.lower() in RECORDINGS and os.path.lexists(target):
             raise InputError(f"{target} exists already, and a recording is not replaced: choose another name")
         try:
             with tempfile.TemporaryFile(dir=Path(place).parent):

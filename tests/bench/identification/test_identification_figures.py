@@ -120,8 +120,8 @@ def test_fills_the_table_of_several_inputs(results_folder: Path) -> None:
     main([str(results_folder), "--to", str(results_folder)])
     (line,) = [each for each in page.read_text(encoding="utf-8").splitlines() if problem in each]
     cells = [cell.strip() for cell in line.strip("|").split("|")]
-    assert cells[:2] == [f"{problem} (12 draws)", "2.0e-03 (1.0e-03 to 4.0e-03)"]
-    assert cells[4:7] == ["1.0e-03 (5.0e-04 to 2.0e-03)", "71", "0.75"]
+    assert cells[:2] == [f"{problem} (12 draws)", "0.2 (0.1 to 0.4)"]
+    assert cells[4:7] == ["0.1 (0.05 to 0.2)", "71", "0.75"]
     figure = results_folder / "figures" / "identification-several.png"
     assert figure.read_bytes().startswith(PNG)
 
