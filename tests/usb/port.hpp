@@ -77,8 +77,11 @@ class Port {
         return false;
     }
 
-    /// Forgets how the last host made its transfers, because this host has closed the device.
+    /// Forgets how the last host made its transfers, because this host has closed the device. An endpoint that the
+    /// device has halted answers the first transfer of the next host with a stall.
     void reset_host() {
+        in_held_ = false;
+        out_held_ = false;
         reads_ahead_ = false;
         host_must_answer_ = true;
     }

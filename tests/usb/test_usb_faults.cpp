@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests UsbDevice with faults of the USB transfers and faults of the device.
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <string>
@@ -52,6 +53,25 @@ TEST(UsbDevice, ClearsHaltedEndpointsAndContinuesTheStream) {
         EXPECT_EQ(device.health().stalls, ++stalls) << fault;
         EXPECT_EQ(settled(device, 0.1).status, Status::Ok) << fault;
         EXPECT_EQ(state("torque_uNm"), -100'000.0) << fault;
+    }
+}
+
+TEST(UsbDevice, OpensADeviceThatTheLastProgramLeftHalted) {
+    for (const unsigned char endpoint : {wire::in_endpoint, wire::out_endpoint}) {
+        {
+            detail::UsbConnection last;
+            ASSERT_TRUE(last.open(""));
+            send_order(endpoint == wire::in_endpoint ? "fault stall-in 1" : "fault stall-out 1");
+            std::array<unsigned char, 64> packet{};
+            int moved = 0;
+            const int code =
+                libusb_bulk_transfer(last.handle(), endpoint, packet.data(), packet.size(), &moved, 1000);
+            ASSERT_EQ(code, LIBUSB_ERROR_PIPE);
+        }
+        UsbDevice device = patient();
+        ASSERT_EQ(device.open().reason, "");
+        EXPECT_EQ(settled(device, 0.1).status, Status::Ok);
+        EXPECT_EQ(device.health().stalls, 1U);
     }
 }
 

@@ -46,7 +46,7 @@ CASES = {
     "export --schema": "export --schema -o out.json",
     "export --mcap": "export a.csv --mcap -o out.mcap",
     "demo": "demo -o demo",
-    "palpate-control": f"{PROGRAM} m.json --record out.csv {SHORT_LIVE}",
+    "palpate-control": f"{shlex.quote(str(PROGRAM))} m.json --record out.csv {SHORT_LIVE}",
 }
 """Command lines that write every kind of output file"""
 

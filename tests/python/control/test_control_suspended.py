@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 import signal
 import subprocess
 import sys
@@ -91,17 +90,17 @@ def test_the_jumping_clock_jumps(jumping_clock: dict[str, str]) -> None:
 @pytest.mark.parametrize(
     "command",
     [
-        pytest.param(f"{PROGRAM} {MODEL} --record out.csv", id="palpate-control", marks=needs_program),
-        pytest.param(f"{sys.executable} -m palpate render {MODEL} --record out.csv", id="render"),
-        pytest.param(f"{sys.executable} -m palpate record out.csv --object {MODEL}", id="record"),
+        pytest.param([PROGRAM, MODEL, "--record", "out.csv"], id="palpate-control", marks=needs_program),
+        pytest.param([*RENDER, MODEL, "--record", "out.csv"], id="render"),
+        pytest.param([*RENDER[:-1], "record", "out.csv", "--object", MODEL], id="record"),
     ],
 )
 def test_jumps_of_the_system_time_change_no_time(
-    tmp_path: Path, command: str, jumping_clock: dict[str, str]
+    tmp_path: Path, command: list[str | Path], jumping_clock: dict[str, str]
 ) -> None:
     began = time.monotonic()
     completed = subprocess.run(
-        [*shlex.split(command), *ANY_RATE, "--duration-s", "1", "--json"],
+        [*command, *ANY_RATE, "--duration-s", "1", "--json"],
         cwd=tmp_path, env=jumping_clock, capture_output=True, text=True, check=False, timeout=LONGEST_WAIT_S,
     )  # fmt: skip
     assert completed.returncode in (0, 1), completed.stderr
