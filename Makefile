@@ -6,6 +6,8 @@
 #   make control      build palpate-control, the real-time program: build/control/palpate-control
 #   make fuzz         fuzz targets of the C++ readers, FUZZ_SECONDS each: make fuzz FUZZ_SECONDS=3600
 #   make test-full    the same tests with long counts, with sanitizers, and of the installed package  (an hour)
+#   make coverage     lines and branches that the tests execute                        (an hour)
+#   make mutants      share of small errors in the C++ headers that the tests find      (hours)
 #   make bench        all studies, JSON and figures in build/bench/
 #   make figures      the same studies, figures and generated pages in docs/
 #   make docs         the documentation site: build/docs/html/index.html; every example and command of it is run
@@ -49,7 +51,7 @@ core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree contain absolute paths: they are created again after the folder was moved.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python fuzz examples test-packages bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python fuzz examples test-packages coverage mutants bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved
 
 help:
@@ -76,8 +78,8 @@ $(stamps)/control $(stamps)/test-cpp $(stamps)/fuzz: $(stamps)/build
 	$(system_packages) "$(@F)"
 	touch $@
 
-# Tools by their group in pyproject.toml: tests, linters, tests of the packages and of the MuJoCo plugin.
-$(stamps)/test $(stamps)/lint $(stamps)/package $(stamps)/simulators: $(stamps)/%: tools/locked/%.txt $(stamps)/build
+# Tools by their group in pyproject.toml: tests, linters, tests of the packages and of the MuJoCo plugin, coverage.
+$(stamps)/test $(stamps)/lint $(stamps)/package $(stamps)/simulators $(stamps)/coverage: $(stamps)/%: tools/locked/%.txt $(stamps)/build
 	$(install_locked) "$<"
 	touch $@
 
@@ -136,6 +138,14 @@ test-full-native: setup control test-packages $(stamps)/simulators
 	$(python) -m pytest tests/browser
 	$(system_packages) portable
 	$(python) -m pytest tests/python/export tests/firmware
+
+# Lines and branches that the tests execute, and small errors in the C++ headers that they find. For a change of
+# tests: both take an hour or more.
+coverage: setup $(stamps)/coverage
+	tools/coverage.sh
+
+mutants: setup $(stamps)/coverage
+	$(python) tests/mutation/mutants.py model solver rendering stability guard run
 
 # The packages as users install them.
 test-packages: $(stamps)/core $(stamps)/control $(stamps)/test $(stamps)/package

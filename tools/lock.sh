@@ -8,7 +8,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-groups=(build test lint package simulators docs)
+groups=(build test lint package simulators docs coverage)
 export UV_PYTHON_DOWNLOADS=never
 everything=$(mktemp)
 trap 'rm -f "$everything"' EXIT
