@@ -20,6 +20,7 @@ void translate_invalid_argument(std::exception_ptr thrown) {
 
 }  // namespace
 
+// The objects of the module have no locks. By default pybind11 turns on the global lock of a Python without one.
 PYBIND11_MODULE(_core, module) {
     module.doc() = "The C++ core of palpate, one submodule for each folder of its headers.";
     module.attr("__version__") = palpate::library_version;

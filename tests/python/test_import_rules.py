@@ -24,7 +24,7 @@ IMPORTED_LATE = {
     "jinja2",
     "pywt",
 }
-IMPORTED_LATE |= {"scipy.io", "usb"}
+IMPORTED_LATE |= {"scipy.io", "scipy.signal", "usb"}
 
 
 def module_of(path: Path) -> str:
