@@ -337,16 +337,16 @@ def main() -> int:
     for folder in arguments.folders:
         inside = [n for n in mutants if mutants[n].header.startswith(f"{HEADERS}/{folder}/")]
         tried = [n for n in inside if n in survived]
-        alive = [n for n in tried if survived[n]]
+        surviving = [n for n in tried if survived[n]]
         rows.append(
             {"folder": folder, "mutants": len(inside), "executed": sum(n in executed for n in inside)}
         )
-        rows[-1] |= {"tried": len(tried), "found": len(tried) - len(alive)}
+        rows[-1] |= {"tried": len(tried), "found": len(tried) - len(surviving)}
         print(
             f"{folder:12} {len(inside)} mutants, {rows[-1]['executed']} executed, {len(tried)} tried, "
-            f"{len(tried) - len(alive)} found ({100 * (1 - len(alive) / max(1, len(tried))):.0f} %)"
+            f"{len(tried) - len(surviving)} found ({100 * (1 - len(surviving) / max(1, len(tried))):.0f} %)"
         )
-        for n in alive:
+        for n in surviving:
             print(f"  survived: {mutants[n].header}:{mutants[n].line}: {mutants[n].change}")
     survivors = [asdict(mutants[n]) | {"insertions": None} for n in survived if survived[n]]
     arguments.report.write_text(json.dumps({"folders": rows, "survivors": survivors}, indent=1))
