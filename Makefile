@@ -131,7 +131,7 @@ test-full: test-full-native
 # exported models on a microcontroller, if Chromium or QEMU was not installed.
 test-full-native: setup control test-packages $(stamps)/simulators
 	tools/cpp_tests.sh release
-	for preset in asan tsan; do tools/cpp_tests.sh $$preset; done
+	for preset in asan tsan; do tools/cpp_tests.sh $$preset; tools/python_sanitized.sh $$preset; done
 	$(MAKE) --no-print-directory fuzz FUZZ_SECONDS=120
 	$(python) -m pytest tests/usb tests/simulators
 	$(system_packages) browser
