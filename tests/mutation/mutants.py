@@ -242,7 +242,7 @@ def compile_errors() -> str:
 def build_errors() -> str:
     """Builds all C++ tests of the copy; returns the output if this failed."""
     options = ["-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=-O1", "-DPALPATE_BUILD_TESTS=ON"]
-    options += [f"-DCMAKE_CXX_FLAGS=-w -include '{ACTIVE}'"]
+    options += [f"-DCMAKE_CXX_FLAGS=-w -std=c++20 -include '{ACTIVE}'"]
     return errors_of(
         ["cmake", "-G", "Ninja", "-S", str(COPY), "-B", str(BUILD), *options],
         ["cmake", "--build", str(BUILD), "--", "-k", "0"],

@@ -253,7 +253,7 @@ class Soak {
                 return run_session(controller, settings, sinks, stop_requested, inject);
             });
         ++totals_.sessions;
-        totals_.ticks += report.loop.timing.ticks();
+        totals_.ticks += report.loop.ticks();
         check_records(report, sinks, guards);
         check_faults(report, sinks.kept, injected, device.health(), guards);
         restore(device, injected);
@@ -263,7 +263,7 @@ class Soak {
 
     /// Checks that every tick has one record, in order, in memory and in the file, with a force within its limits.
     void check_records(const SessionReport& report, RecordSinks& sinks, const GuardSettings& guards) {
-        const std::uint64_t ticks = report.loop.timing.ticks();
+        const std::uint64_t ticks = report.loop.ticks();
         expect(report.lost_records == 0, "records are lost");
         expect(sinks.kept.size() == ticks, "records in memory are missing or double");
         expect(sinks.file.written() == ticks, "records in the file are missing or double");

@@ -47,7 +47,7 @@ TEST(LoopTiming, MeasuresPeriodLatenessAndRate) {
         timing.add({k * 1'000'000, k * 1'000'000 + 5'000, 0});
     }
     timing.add({1'000'000'000, 1'003'000'000, 3});
-    EXPECT_EQ(timing.ticks(), 1001U);
+    EXPECT_EQ(timing.wakes(), 1001U);
     EXPECT_EQ(timing.missed, 3U);
     EXPECT_NEAR(timing.lateness.quantile(0.5), 5'000, 20);
     EXPECT_EQ(timing.period.largest(), 3'995'000);

@@ -105,16 +105,12 @@ class Invariants {
     /// Checks the report after the run.
     void ends(const LoopReport& report) {
         require(is_closed_ && exchanges_ == records_ + 2, "the run does not end with one zero force");
-        std::uint64_t counted = 0;
-        for (const std::uint64_t ticks : report.ticks_by_status) {
-            counted += ticks;
-        }
-        require(counted == records_, "the report counts other ticks than the records");
+        require(report.ticks() == records_, "the report counts other ticks than the records");
         require(records_ == 0 || report.status == status_,
                 "the report has another status than the last record");
         const bool certificate_ended = report.exit_reason == ExitReason::NotCertified;
         const bool before_tick = certificate_ended || report.exit_reason == ExitReason::RateTooLow;
-        require(report.timing.ticks() == records_ + (before_tick ? 1 : 0), "a wake-up has no tick");
+        require(report.timing.wakes() == records_ + (before_tick ? 1 : 0), "a wake-up has no tick");
         require(certificate_ended == late_, "a tick later than certified must end the run");
         const bool by_status =
             report.exit_reason == ExitReason::Guard || report.exit_reason == ExitReason::DeviceFault;

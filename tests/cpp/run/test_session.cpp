@@ -222,7 +222,7 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenActi
             while (!over.load()) {
                 std::this_thread::sleep_for(std::chrono::milliseconds{1});
             }
-            counts = {allocations, locks, exceptions, report->timing.ticks()};
+            counts = {allocations, locks, exceptions, report->ticks()};
             if constexpr (std::is_same_v<After, std::remove_const_t<decltype(nothing)>>) {
                 loop.join();
             } else {

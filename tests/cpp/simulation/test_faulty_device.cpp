@@ -159,6 +159,24 @@ void expect_safe(const Rendering& run) {
     ASSERT_TRUE(run.observed.closed);
 }
 
+// A suspended process wakes up late: the run ends before the next tick, which would send a force.
+TEST(Faults, RunThatEndsBeforeATickCountsTheTicksThatAreRecorded) {
+    LoopSettings settings;
+    settings.duration_s = 2.0;
+    const Rendering slow = render({}, settings, nullptr, {1000, 400'000'000});
+    EXPECT_EQ(slow.report->exit_reason, ExitReason::RateTooLow);
+    settings.longest_period_s = 1.5 * period_s;
+    const Rendering late = render({}, settings, nullptr, {1000, 400'000'000});
+    EXPECT_EQ(late.report->exit_reason, ExitReason::NotCertified);
+    for (const Rendering* run : {&slow, &late}) {
+        EXPECT_EQ(run->report->ticks(), run->ticks.size());
+        EXPECT_EQ(run->report->timing.wakes(), run->ticks.size() + 1);
+        EXPECT_EQ(run->observed.forces.back(), 0.0);
+        const std::string counted = " over " + std::to_string(run->ticks.size()) + " ticks;";
+        EXPECT_NE(timing_text(*run->report, 1000.0).find(counted), std::string::npos);
+    }
+}
+
 TEST(Faults, RunWithoutFaultsIsOrderly) {
     const Rendering run = render({}, 2.0);
     expect_safe(run);

@@ -90,10 +90,11 @@ struct LoopTiming {
         missed += wake.skipped;
     }
 
-    [[nodiscard]] std::uint64_t ticks() const noexcept { return lateness.count(); }
-    /// Returns the mean number of ticks a second over the whole run [Hz].
+    /// Returns the number of wake-ups. The last one has no tick if it ended the loop.
+    [[nodiscard]] std::uint64_t wakes() const noexcept { return lateness.count(); }
+    /// Returns the mean number of wake-ups a second over the whole run [Hz].
     [[nodiscard]] double rate_hz() const noexcept {
-        return last > first ? static_cast<double>(ticks() - 1) * 1e9 / static_cast<double>(last - first)
+        return last > first ? static_cast<double>(wakes() - 1) * 1e9 / static_cast<double>(last - first)
                             : 0.0;
     }
 };

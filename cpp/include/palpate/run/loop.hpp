@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 
 #include "palpate/fields/field_table.hpp"
 #include "palpate/io/tick_record.hpp"
@@ -89,6 +90,11 @@ struct LoopReport {
     double most_stored = 0.0;  ///< upper bound of the energy stored in the object, above its minimum [J]
     /// Number of detected limit cycles; each multiplied all later forces by 0.7
     std::uint64_t limit_cycles = 0;
+
+    /// Returns the number of ticks, which is the number of records.
+    [[nodiscard]] std::uint64_t ticks() const noexcept {
+        return std::accumulate(ticks_by_status.begin(), ticks_by_status.end(), std::uint64_t{0});
+    }
 };
 
 /// Returns the record of a tick for a recording; `first` is the time of the first wake-up [ns].
@@ -144,7 +150,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
     for (bool running = true; running;) {
         const Wake wake = clock.wait();
         const auto gap = static_cast<double>(wake.now - report.timing.last) * 1e-9;
-        const bool too_late = report.timing.ticks() > 0 && gap > settings.longest_period_s;
+        const bool too_late = report.timing.wakes() > 0 && gap > settings.longest_period_s;
         report.timing.add(wake);
         const bool window_ended = progress.rate.add(wake.now);
         if (too_late) {
@@ -162,7 +168,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
         ++report.ticks_by_status[static_cast<std::size_t>(tick.status)];
         bad_in_a_row = sends_force(tick.status) ? 0 : bad_in_a_row + 1;
 
-        progress.ticks.store(report.timing.ticks(), std::memory_order_relaxed);
+        progress.ticks.store(report.timing.wakes(), std::memory_order_relaxed);
         progress.missed.store(report.timing.missed, std::memory_order_relaxed);
         progress.lost.store(controller.reading_guard().lost(), std::memory_order_relaxed);
         progress.position.store(tick.reading.position, std::memory_order_relaxed);
@@ -175,7 +181,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
         } else if (stop_requested.load(std::memory_order_relaxed)) {
             report.exit_reason = ExitReason::StopRequested;
             running = false;
-        } else if (report.timing.ticks() + report.timing.missed >= deadlines) {
+        } else if (report.timing.wakes() + report.timing.missed >= deadlines) {
             report.exit_reason = ExitReason::TimeUp;
             running = false;
         }

@@ -29,9 +29,10 @@ namespace palpate {
 }
 
 /// Returns one line of text with the rate of a control loop, its periods, and how late its ticks were.
-[[nodiscard]] inline std::string timing_text(const LoopTiming& timing, double wanted_hz) {
+[[nodiscard]] inline std::string timing_text(const LoopReport& report, double wanted_hz) {
+    const LoopTiming& timing = report.timing;
     return readable(timing.rate_hz()) + " Hz of " + readable(wanted_hz) + " Hz over " +
-           std::to_string(timing.ticks()) + " ticks; period " + percentiles(timing.period) + "; late by " +
+           std::to_string(report.ticks()) + " ticks; period " + percentiles(timing.period) + "; late by " +
            percentiles(timing.lateness) + "; missed deadlines " + std::to_string(timing.missed) +
            "; longest gap " + readable(1e-3 * static_cast<double>(timing.period.largest())) + " us";
 }
@@ -121,7 +122,7 @@ namespace palpate {
         warnings.push_back(name + " is incomplete: " + std::generic_category().message(disk) + "; " +
                            std::to_string(file.refused()) + " rows are missing at its end");
     }
-    const std::string timing = timing_text(report.loop.timing, settings.rate_hz) + "; lost records " +
+    const std::string timing = timing_text(report.loop, settings.rate_hz) + "; lost records " +
                                std::to_string(report.lost_records);
     if (std::string reason = file.finish(ended, timing); !reason.empty()) {
         name = file.file().part();

@@ -64,8 +64,8 @@ inline constexpr double smallest_domain_share = 0.1;
 inline void judge_losses(const SessionReport& report, const LoopSettings& settings,
                          std::vector<SessionFinding>& findings) {
     const LoopTiming& timing = report.loop.timing;
-    const std::uint64_t ticks = timing.ticks();
-    if (const std::uint64_t deadlines = ticks + timing.missed;
+    const std::uint64_t ticks = report.loop.ticks();
+    if (const std::uint64_t deadlines = timing.wakes() + timing.missed;
         exceeds(timing.missed, deadlines, tolerated_loss)) {
         findings.push_back(
             {"usable",
@@ -94,7 +94,7 @@ inline void judge_losses(const SessionReport& report, const LoopSettings& settin
 /// Adds findings about ticks with a changed or unsolved force or outside the domain, and about a run without a force.
 inline void judge_forces(const LoopReport& loop, const RecordSinks& sinks, const SessionExpectation& expected,
                          std::vector<SessionFinding>& findings) {
-    const std::uint64_t ticks = loop.timing.ticks();
+    const std::uint64_t ticks = loop.ticks();
     const auto count = [&](Status status) { return loop.ticks_by_status[static_cast<std::size_t>(status)]; };
     const auto changed = [&](std::uint64_t part, const std::string& sentence) {
         if (exceeds(part, ticks, tolerated_change)) {

@@ -95,7 +95,7 @@ struct Summary {
         {"ended", summary.ended()},
         {"status", std::string(text(loop.status).word)},
         {"device", summary.device},
-        {"ticks", loop.timing.ticks()},
+        {"ticks", loop.ticks()},
         {"rate_hz", loop.timing.rate_hz()},
         {"wanted_rate_hz", summary.loop.rate_hz},
         {"period", fields(loop.timing.period)},
