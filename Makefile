@@ -50,9 +50,12 @@ stamps := .venv/stamps
 core_sources := CMakeLists.txt $(shell find cpp cmake -type f)
 # A virtual environment and a build tree contain absolute paths: they are created again after the folder was moved.
 moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo moved)
+# The editable package finds only the files that it had when it was installed.
+module_names := find python -name '*.py' | LC_ALL=C sort
+renamed := $(shell $(module_names) | cmp -s - $(stamps)/modules 2>/dev/null || echo renamed)
 
 .PHONY: help demo control test test-full test-full-native test-cpp test-python fuzz examples test-packages coverage mutants bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
-        setup clean moved
+        setup clean moved renamed
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -68,9 +71,10 @@ $(stamps)/build: tools/locked/build.txt tools/system_packages.sh $(moved)
 
 # The compiled module and the editable package: a change of a C++ source builds the module again. `make control` builds
 # palpate-control in another folder.
-$(stamps)/core: $(stamps)/build $(core_sources)
+$(stamps)/core: $(stamps)/build $(core_sources) $(renamed)
 	$(pip) install --quiet --no-deps --no-build-isolation -C cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON \
 	    -C cmake.define.PALPATE_BUILD_CONTROL=OFF --editable .
+	$(module_names) > $(stamps)/modules
 	touch $@
 
 # The libraries of palpate-control and of the C++ tests; clang for the fuzz targets.
