@@ -122,8 +122,8 @@ namespace palpate {
         warnings.push_back(name + " is incomplete: " + std::generic_category().message(disk) + "; " +
                            std::to_string(file.refused()) + " rows are missing at its end");
     }
-    const std::string timing = timing_text(report.loop, settings.rate_hz) + "; lost records " +
-                               std::to_string(report.lost_records);
+    const std::string timing =
+        timing_text(report.loop, settings.rate_hz) + "; lost records " + std::to_string(report.lost_records);
     if (std::string reason = file.finish(ended, timing); !reason.empty()) {
         name = file.file().part();
         warnings.push_back(std::move(reason));
