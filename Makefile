@@ -54,7 +54,7 @@ moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo m
 module_names := find python -name '*.py' | LC_ALL=C sort
 renamed := $(shell $(module_names) | cmp -s - $(stamps)/modules 2>/dev/null || echo renamed)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python fuzz examples test-packages coverage mutants bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-full-native test-cpp test-python fuzz cpp-tests examples test-packages coverage mutants bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved renamed
 
 help:
@@ -101,9 +101,10 @@ demo: $(stamps)/core
 	.venv/bin/palpate demo
 
 # The linters and the compilers share the processors. The C++ and the Python tests, many of which wait for a clock, do
-# not overlap. The Python tests run last, so that their summary is at the end of the output.
+# not overlap with them. The Python tests run last, so that their summary is at the end of the output.
 test: | setup
-	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control test-cpp fuzz
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control cpp-tests fuzz
+	$(MAKE) --no-print-directory test-cpp
 	$(MAKE) --no-print-directory test-python
 
 # One process more than the number of processors, because many tests wait for a clock. Files keep their order, because
@@ -115,6 +116,11 @@ test-python: setup control examples
 control: $(stamps)/control
 	cmake --preset control >/dev/null
 	cmake --build --preset control
+
+# The programs of the C++ tests.
+cpp-tests: setup
+	cmake --preset dev >/dev/null
+	cmake --build --preset dev
 
 # The examples in C++, which the Python tests run.
 examples: setup

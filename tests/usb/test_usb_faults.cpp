@@ -97,9 +97,7 @@ TEST(UsbDevice, ReportsATimeoutWhileTheDeviceDoesNotAnswer) {
 
 // After a late command the next commands must arrive in time, because each late command ends a certified run.
 TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
-    constexpr int wanted = 10;
-    constexpr int most_rounds =
-        400;  // on a computer with other work, most rounds contain another late command
+    constexpr int rounds = 20;
     constexpr int commands = 40;
     UsbOptions options;
     options.wait = std::chrono::seconds{20};
@@ -108,9 +106,8 @@ TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
     ASSERT_EQ(device.open().reason, "");
     int late = 0;
     int in_time_again = 0;
-    int rounds = 0;
     // The first round of this loop sends the first command after the device was opened.
-    for (; rounds < most_rounds && in_time_again < wanted; ++rounds) {
+    for (int round = 0; round < rounds; ++round) {
         send_order("fault busy 1");
         int in_a_row = 0;
         for (int k = 0; k < commands; ++k) {
@@ -121,7 +118,8 @@ TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
         in_time_again += in_a_row >= commands / 2 ? 1 : 0;
     }
     EXPECT_GE(late, rounds);
-    EXPECT_EQ(in_time_again, wanted) << "of " << rounds << " rounds";
+    // At least half of the rounds; on a fast computer the commands arrive in time again in every round
+    EXPECT_GE(in_time_again, rounds / 2);
 }
 
 TEST(UsbDevice, CountsSkippedSamplesInTheSequence) {
