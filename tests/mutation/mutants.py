@@ -3,11 +3,12 @@
 
 Usage: python tests/mutation/mutants.py [--sample N] [--report FILE] FOLDER ...
 
-FOLDER is a folder of cpp/include/palpate, such as `guard`. From each folder the program draws N mutants that
-the tests execute. A mutant replaces an operator by its neighbour (``+`` by ``-``, ``<`` by ``<=``, ``&&`` by
-one of its sides), removes a sign, a negation or a statement, flips a truth value or changes a small number.
+FOLDER is a folder of cpp/include/palpate, such as `guard`. From each folder the program draws N mutants. A mutant
+replaces an operator by its neighbour (``+`` by ``-``, ``<`` by ``<=``, ``&&`` by one of its sides), removes a
+sign, a negation or a statement, flips a truth value or changes a small number. A mutant that no test executes
+counts as not found.
 
-All mutants are compiled at once, into a copy of the sources in build/mutation; the environment variable
+The drawn mutants are compiled at once, into a copy of the sources in build/mutation; the environment variable
 PALPATE_MUTANT selects one of them. Constant expressions are not changed. Some mutants are equivalent to the
 original; docs/robustness.md explains the survivors.
 """
@@ -62,6 +63,8 @@ STATEMENTS = {
 }
 CONSTANTS = {CursorKind.STATIC_ASSERT, CursorKind.FIELD_DECL, CursorKind.ENUM_CONSTANT_DECL}
 """Nodes without mutants: constant expressions, and defaults of members, which Python tests compare."""
+WITH_CLOCK = {"realtime"}
+"""Folders of tests/cpp whose tests wait for a clock: they could fail beside other work, without a mutant."""
 FEW_SECONDS = 5.0
 """Time that a test with a mutant may take beyond ten times its usual duration [s]."""
 
@@ -242,13 +245,19 @@ def compile_errors() -> str:
     return errors_of(["c++", *options, str(unit)])
 
 
+def test_names() -> list[str]:
+    """Returns the names of the C++ tests that do not wait for a clock."""
+    sources = sorted((ROOT / "tests" / "cpp").rglob("test_*.cpp"))
+    return [source.stem for source in sources if source.parent.name not in WITH_CLOCK]
+
+
 def build_errors() -> str:
-    """Builds all C++ tests of the copy; returns the output if this failed."""
+    """Builds the C++ tests of the copy; returns the output if this failed."""
     options = ["-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=-O1", "-DPALPATE_BUILD_TESTS=ON"]
     options += [f"-DCMAKE_CXX_FLAGS=-w -std=c++20 -include '{ACTIVE}'"]
     return errors_of(
         ["cmake", "-G", "Ninja", "-S", str(COPY), "-B", str(BUILD), *options],
-        ["cmake", "--build", str(BUILD), "--", "-k", "0"],
+        ["cmake", "--build", str(BUILD), "--target", *test_names(), "--", "-k", "0"],
     )
 
 
@@ -286,8 +295,13 @@ def main() -> int:
     parser.add_argument("--report", type=Path, default=ROOT / "build" / "mutation" / "report.json")
     arguments = parser.parse_args()
 
-    mutants = dict(enumerate(find_mutants(arguments.folders)))
-    print(f"{len(mutants)} mutants", flush=True)
+    every = find_mutants(arguments.folders)
+    mutants: dict[int, Mutant] = {}
+    for folder in arguments.folders:
+        members = [n for n, m in enumerate(every) if m.header.startswith(f"{HEADERS}/{folder}/")]
+        random.Random(arguments.seed).shuffle(members)
+        mutants |= {n: every[n] for n in members[: arguments.sample or None]}
+    print(f"{len(mutants)} of {len(every)} mutants", flush=True)
     while True:
         write_copy(mutants)
         errors = compile_errors() or build_errors()
@@ -303,28 +317,18 @@ def main() -> int:
             del mutants[number]
 
     executed: dict[int, list[TestProgram]] = defaultdict(list)
-    for path in sorted(BUILD.rglob("test_*")):
-        if not path.is_file() or not os.access(path, os.X_OK) or path.suffix:
-            continue
-        program = TestProgram(path)
+    for name in test_names():
+        program = TestProgram(BUILD / "tests" / "cpp" / name)
         trace = BUILD / "trace.txt"
         trace.unlink(missing_ok=True)
         start = time.monotonic()
         passed = program.run({"PALPATE_MUTANT_TRACE": str(trace)}, None)
         program.duration = time.monotonic() - start
         state = "" if passed else ", not used: FAILED without mutant"
-        print(f"{path.name}: {program.duration:.1f} s{state}", flush=True)
+        print(f"{name}: {program.duration:.1f} s{state}", flush=True)
         if passed and trace.exists():
             for number in {int(word) for word in trace.read_text().split()}:
                 executed[number].append(program)
-
-    chosen: list[int] = []
-    for folder in arguments.folders:
-        members = [
-            n for n, m in mutants.items() if m.header.startswith(f"{HEADERS}/{folder}/") and n in executed
-        ]
-        random.Random(arguments.seed).shuffle(members)
-        chosen += members[: arguments.sample or None]
 
     def survives(number: int) -> bool:
         own = "test_" + Path(mutants[number].header).stem
@@ -332,25 +336,18 @@ def main() -> int:
             limit = 10 * program.duration + FEW_SECONDS
             if not program.run({"PALPATE_MUTANT": str(number)}, limit):
                 return False
+        where = f"{mutants[number].header}:{mutants[number].line}: {mutants[number].change}"
+        print(f"  survived: {where}" + ("" if executed[number] else ", not executed"), flush=True)
         return True
 
     with ThreadPoolExecutor(int(os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL", os.cpu_count() or 1))) as pool:
-        survived = dict(zip(chosen, pool.map(survives, chosen), strict=True))
+        survived = dict(zip(mutants, pool.map(survives, mutants), strict=True))
     rows = []
     for folder in arguments.folders:
         inside = [n for n in mutants if mutants[n].header.startswith(f"{HEADERS}/{folder}/")]
-        tried = [n for n in inside if n in survived]
-        surviving = [n for n in tried if survived[n]]
-        rows.append(
-            {"folder": folder, "mutants": len(inside), "executed": sum(n in executed for n in inside)}
-        )
-        rows[-1] |= {"tried": len(tried), "found": len(tried) - len(surviving)}
-        print(
-            f"{folder:12} {len(inside)} mutants, {rows[-1]['executed']} executed, {len(tried)} tried, "
-            f"{len(tried) - len(surviving)} found ({100 * (1 - len(surviving) / max(1, len(tried))):.0f} %)"
-        )
-        for n in surviving:
-            print(f"  survived: {mutants[n].header}:{mutants[n].line}: {mutants[n].change}")
+        found = sum(not survived[n] for n in inside)
+        rows.append({"folder": folder, "mutants": len(inside), "found": found})
+        print(f"{folder:12} {len(inside)} mutants, {found} found ({100 * found / max(1, len(inside)):.0f} %)")
     survivors = [asdict(mutants[n]) | {"insertions": None} for n in survived if survived[n]]
     arguments.report.write_text(json.dumps({"folders": rows, "survivors": survivors}, indent=1))
     return 0

@@ -54,7 +54,6 @@ class UsbfsNode {
     void remove_closed_clients() {
         for (auto& [client, is_connected] : clients_) {
             if (is_connected && umockdev_ioctl_client_get_connected(client) == FALSE) {
-                is_connected = false;
                 remove_client(client);
             }
         }
@@ -70,8 +69,9 @@ class UsbfsNode {
     static gboolean ioctl_called(UMockdevIoctlBase* /*handler*/, UMockdevIoctlClient* client,
                                  UsbfsNode* self) {
         const std::lock_guard locked{self->mutex_};
-        self->notice(client);
-        const int result = self->answer(client, umockdev_ioctl_client_get_request(client));
+        const bool is_connected = self->notice(client);
+        const int result =
+            is_connected ? self->answer(client, umockdev_ioctl_client_get_request(client)) : -ENODEV;
         self->show_readiness();
         if (result == -ENOTTY) {
             return FALSE;
@@ -80,14 +80,18 @@ class UsbfsNode {
         return TRUE;
     }
 
-    /// Keeps a reference to a new client, so that its end can be detected.
-    void notice(UMockdevIoctlClient* client) {
-        if (clients_.insert({client, true}).second) {
+    /// Keeps a reference to a new client, so that its end can be detected. Returns false if the client was removed: an
+    /// ioctl of a killed client can arrive later, and its transfers would stay forever.
+    bool notice(UMockdevIoctlClient* client) {
+        const auto [place, is_new] = clients_.insert({client, true});
+        if (is_new) {
             g_object_ref(client);
         }
+        return place->second;
     }
 
-    void remove_client(const UMockdevIoctlClient* client) {
+    void remove_client(UMockdevIoctlClient* client) {
+        clients_[client] = false;
         port_.remove_client(client);
         if (claimed_by_ == client) {
             reset_host();
