@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mutation tests of the C++ headers: small errors are inserted one at a time, and the tests must find them.
 
-Usage: python tests/mutation/mutants.py [--sample N] [--report FILE] FOLDER ...
+Usage: python tests/mutation/mutants.py [--sample N] [--tests NAME ...] FOLDER ...
 
-FOLDER is a folder of cpp/include/palpate, such as `guard`. From each folder the program draws N mutants. A mutant
-replaces an operator by its neighbour (``+`` by ``-``, ``<`` by ``<=``, ``&&`` by one of its sides), removes a
-sign, a negation or a statement, flips a truth value or changes a small number. A mutant that no test executes
-counts as not found.
+FOLDER is a folder or a header of cpp/include/palpate, such as `guard` or `model/memory.hpp`. From each one the
+program draws N mutants. A mutant replaces an operator by its neighbour (``+`` by ``-``, ``<`` by ``<=``, ``&&``
+by one of its sides), removes a sign, a negation or a statement, flips a truth value or changes a small number.
+A mutant that no test executes counts as not found.
 
-The drawn mutants are compiled at once, into a copy of the sources in build/mutation; the environment variable
+The drawn mutants are compiled at once, into a copy of the sources below build/; the environment variable
 PALPATE_MUTANT selects one of them. Constant expressions are not changed. Some mutants are equivalent to the
 original; docs/robustness.md explains the survivors.
 """
@@ -20,22 +20,19 @@ import json
 import os
 import random
 import re
-import shutil
 import subprocess
 import sys
 import time
 from collections import defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from clang.cindex import Cursor, CursorKind, Index
 
 ROOT = Path(__file__).resolve().parents[2]
-COPY = ROOT / "build" / "mutation" / "source"
-BUILD = ROOT / "build" / "mutation" / "build"
 ACTIVE = Path(__file__).with_name("active.hpp")
 """The header that every translation unit of the copy includes first."""
 HEADERS = Path("cpp/include/palpate")
@@ -65,6 +62,8 @@ CONSTANTS = {CursorKind.STATIC_ASSERT, CursorKind.FIELD_DECL, CursorKind.ENUM_CO
 """Nodes without mutants: constant expressions, and defaults of members, which Python tests compare."""
 WITH_CLOCK = {"realtime"}
 """Folders of tests/cpp whose tests wait for a clock: they could fail beside other work, without a mutant."""
+COUNTS = "Tick.ExecutesABoundedNumberOfInstructions"
+"""Test that fails without a mutant, because the copy has more instructions."""
 FEW_SECONDS = 5.0
 """Time that a test with a mutant may take beyond ten times its usual duration [s]."""
 
@@ -75,10 +74,14 @@ class Mutant:
 
     header: str
     line: int
+    column: int
     change: str
     insertions: tuple[tuple[int, int, int, str], ...]
     """Start and end of the replaced text, the nesting that orders insertions at one place, and the new text.
     ``@`` is replaced by the number of the mutant."""
+
+    def __str__(self) -> str:
+        return f"{self.header}:{self.line}:{self.column}: {self.change}"
 
 
 def operator_between(text: bytes, start: int, end: int) -> tuple[str, int, int] | None:
@@ -94,11 +97,11 @@ def operator_between(text: bytes, start: int, end: int) -> tuple[str, int, int] 
 def mutants_of(cursor: Cursor, text: bytes, header: str, depth: int) -> Iterator[Mutant]:
     """Yields the mutants of one node of the syntax tree."""
     start, end = cursor.extent.start.offset, cursor.extent.end.offset
-    line = cursor.extent.start.line
+    line, column = cursor.extent.start.line, cursor.extent.start.column
     children = list(cursor.get_children())
 
     def mutant(change: str, *insertions: tuple[int, int, int, str]) -> Mutant:
-        return Mutant(header, line, change, insertions)
+        return Mutant(header, line, column, change, insertions)
 
     def wrapped(change: str, call: str) -> Mutant:
         opening = (start, start, depth, f"palpate_mutant::{call}(@, ")
@@ -131,7 +134,7 @@ def mutants_of(cursor: Cursor, text: bytes, header: str, depth: int) -> Iterator
                     )
     elif cursor.kind == CursorKind.UNARY_OPERATOR and len(children) == 1:
         symbol = text[start : start + 1].decode()
-        if symbol in ("-", "!") and children[0].extent.start.offset > start:
+        if symbol in ("-", "!") and text[start : start + 2] != b"--":
             name = "negative" if symbol == "-" else "negated"
             yield mutant(
                 f"without {symbol}",
@@ -155,19 +158,32 @@ def mutants_of(cursor: Cursor, text: bytes, header: str, depth: int) -> Iterator
                 yield Mutant(
                     header,
                     child.extent.start.line,
+                    child.extent.start.column,
                     f"without {' '.join(statement.split())[:60]}",
                     ((at, at, depth, "if (!palpate_mutant::active(@)) "),),
                 )
 
 
+def headers_of(folder: str) -> list[str]:
+    """Returns the headers of a folder of cpp/include/palpate, or the header itself."""
+    path = ROOT / HEADERS / folder
+    if not path.exists():
+        raise SystemExit(f"{folder}: not in {HEADERS}")
+    found = [path] if path.is_file() else sorted(path.rglob("*.hpp"))
+    return [each.relative_to(ROOT).as_posix() for each in found if not str(each).endswith(WITHOUT_MUTANTS)]
+
+
+def is_constant(cursor: Cursor, text: bytes) -> bool:
+    """Returns True for a node that the compiler evaluates."""
+    if cursor.kind == CursorKind.VAR_DECL:
+        start = cursor.extent.start.offset
+        return b"constexpr" in text[text.rfind(b"\n", 0, start) + 1 : cursor.location.offset]
+    return cursor.kind in CONSTANTS
+
+
 def find_mutants(folders: list[str]) -> list[Mutant]:
     """Returns the mutants of all headers of the folders."""
-    headers = sorted(
-        header.relative_to(ROOT).as_posix()
-        for folder in folders
-        for header in (ROOT / HEADERS / folder).rglob("*.hpp")
-        if not header.as_posix().endswith(WITHOUT_MUTANTS)
-    )
+    headers = [header for folder in folders for header in headers_of(folder)]
     resources = next((Path(sys.prefix) / "lib").glob("python3*/site-packages/clang_tidy/data/lib/clang/*"))
     unit = "".join(
         f'#include "{header.removeprefix("cpp/include/")}"\n'
@@ -186,7 +202,7 @@ def find_mutants(folders: list[str]) -> list[Mutant]:
     def walk(cursor: Cursor, depth: int) -> None:
         path = cursor.extent.start.file.name if cursor.extent.start.file else ""
         if path in wanted:
-            if cursor.kind in CONSTANTS:
+            if is_constant(cursor, texts[path]):
                 return
             for mutant in mutants_of(cursor, texts[path], wanted[path], depth):
                 found.setdefault((mutant.header, mutant.change, mutant.insertions), mutant)
@@ -199,17 +215,19 @@ def find_mutants(folders: list[str]) -> list[Mutant]:
     return list(found.values())
 
 
-def write_copy(mutants: dict[int, Mutant]) -> None:
+def write_copy(mutants: dict[int, Mutant], copy: Path) -> None:
     """Copies the sources and inserts the mutants into the copy."""
-    files = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True).stdout
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    changed = {mutant.header for mutant in mutants.values()}
+    files = subprocess.run(command, cwd=ROOT, check=True, capture_output=True).stdout
     for name in files.decode().split("\0"):
         if (ROOT / name).is_file() and name.startswith(
-            ("cpp/", "cmake/", "tests/", "bench/", "CMake", "python/palpate/_schema", "examples/")
+            ("cpp/", "cmake/", "tests/", "bench/", "CMake", "docs/figures/", "examples/")
         ):
-            target = COPY / name
+            target = copy / name
             target.parent.mkdir(parents=True, exist_ok=True)
-            if not target.exists() or target.read_bytes() != (ROOT / name).read_bytes():
-                shutil.copy(ROOT / name, target)
+            if name not in changed:
+                write_if_different(target, (ROOT / name).read_bytes())
     edits: dict[str, list[tuple[int, int, int, str]]] = defaultdict(list)
     for number, mutant in mutants.items():
         for start, end, order, new in mutant.insertions:
@@ -223,7 +241,13 @@ def write_copy(mutants: dict[int, Mutant]) -> None:
             parts += [text[at:start], new.encode()]
             at = end
         parts.append(text[at:])
-        (COPY / header).write_bytes(b"".join(parts))
+        write_if_different(copy / header, b"".join(parts))
+
+
+def write_if_different(path: Path, content: bytes) -> None:
+    """Writes a file, unless it has this content: the build tool compiles changed files again."""
+    if not path.exists() or path.read_bytes() != content:
+        path.write_bytes(content)
 
 
 def errors_of(*commands: list[str]) -> str:
@@ -235,10 +259,10 @@ def errors_of(*commands: list[str]) -> str:
     return ""
 
 
-def compile_errors() -> str:
+def compile_errors(copy: Path) -> str:
     """Compiles the headers of the copy without their users; returns the output if this failed."""
-    unit = COPY / "headers.cpp"
-    folder = COPY / HEADERS.parent
+    unit = copy / "headers.cpp"
+    folder = copy / HEADERS.parent
     headers = sorted(each.relative_to(folder).as_posix() for each in folder.rglob("*.hpp"))
     unit.write_text("".join(f'#include "{each}"\n' for each in headers if "/detail/" not in each))
     options = ["-std=c++20", "-w", "-fsyntax-only", f"-I{folder}", "-include", str(ACTIVE)]
@@ -251,13 +275,13 @@ def test_names() -> list[str]:
     return [source.stem for source in sources if source.parent.name not in WITH_CLOCK]
 
 
-def build_errors() -> str:
+def build_errors(copy: Path, build: Path, tests: list[str]) -> str:
     """Builds the C++ tests of the copy; returns the output if this failed."""
     options = ["-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=-O1", "-DPALPATE_BUILD_TESTS=ON"]
     options += [f"-DCMAKE_CXX_FLAGS=-w -std=c++20 -include '{ACTIVE}'"]
     return errors_of(
-        ["cmake", "-G", "Ninja", "-S", str(COPY), "-B", str(BUILD), *options],
-        ["cmake", "--build", str(BUILD), "--target", *test_names(), "--", "-k", "0"],
+        ["cmake", "-G", "Ninja", "-S", str(copy), "-B", str(build), *options],
+        ["cmake", "--build", str(build), "--target", *tests, "--", "-k", "0"],
     )
 
 
@@ -270,12 +294,12 @@ class TestProgram:
 
     def run(self, environment: dict[str, str], limit: float | None) -> bool:
         """Returns True if all tests pass in time."""
-        command = [str(self.path), "--gtest_fail_fast", "--gtest_brief=1"]
+        command = [str(self.path), "--gtest_fail_fast", "--gtest_brief=1", f"--gtest_filter=-{COUNTS}"]
         try:
             result = subprocess.run(
                 command,
                 env={**os.environ, **environment},
-                cwd=BUILD,
+                cwd=self.path.parent,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 timeout=limit,
@@ -292,19 +316,23 @@ def main() -> int:
     parser.add_argument("folders", nargs="+", metavar="FOLDER")
     parser.add_argument("--sample", type=int, default=100, help="mutants per folder; 0: all")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--report", type=Path, default=ROOT / "build" / "mutation" / "report.json")
+    parser.add_argument(
+        "--tests", nargs="+", default=test_names(), metavar="NAME", help="default: all C++ tests"
+    )
+    parser.add_argument("--to", type=Path, default=ROOT / "build" / "mutation", help="folder of the copy")
     arguments = parser.parse_args()
+    copy, build = arguments.to.resolve() / "source", arguments.to.resolve() / "build"
 
     every = find_mutants(arguments.folders)
     mutants: dict[int, Mutant] = {}
     for folder in arguments.folders:
-        members = [n for n, m in enumerate(every) if m.header.startswith(f"{HEADERS}/{folder}/")]
+        members = [n for n, m in enumerate(every) if m.header in headers_of(folder)]
         random.Random(arguments.seed).shuffle(members)
         mutants |= {n: every[n] for n in members[: arguments.sample or None]}
     print(f"{len(mutants)} of {len(every)} mutants", flush=True)
     while True:
-        write_copy(mutants)
-        errors = compile_errors() or build_errors()
+        write_copy(mutants, copy)
+        errors = compile_errors(copy) or build_errors(copy, build, arguments.tests)
         if not errors:
             break
         lines = set(re.findall(r"(cpp/include/palpate/\S+?):(\d+):\d+: error", errors))
@@ -317,9 +345,9 @@ def main() -> int:
             del mutants[number]
 
     executed: dict[int, list[TestProgram]] = defaultdict(list)
-    for name in test_names():
-        program = TestProgram(BUILD / "tests" / "cpp" / name)
-        trace = BUILD / "trace.txt"
+    for name in arguments.tests:
+        program = TestProgram(build / "tests" / "cpp" / name)
+        trace = build / "trace.txt"
         trace.unlink(missing_ok=True)
         start = time.monotonic()
         passed = program.run({"PALPATE_MUTANT_TRACE": str(trace)}, None)
@@ -336,20 +364,20 @@ def main() -> int:
             limit = 10 * program.duration + FEW_SECONDS
             if not program.run({"PALPATE_MUTANT": str(number)}, limit):
                 return False
-        where = f"{mutants[number].header}:{mutants[number].line}: {mutants[number].change}"
-        print(f"  survived: {where}" + ("" if executed[number] else ", not executed"), flush=True)
+        print(f"  survived: {mutants[number]}" + ("" if executed[number] else ", not executed"), flush=True)
         return True
 
     with ThreadPoolExecutor(int(os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL", os.cpu_count() or 1))) as pool:
         survived = dict(zip(mutants, pool.map(survives, mutants), strict=True))
     rows = []
     for folder in arguments.folders:
-        inside = [n for n in mutants if mutants[n].header.startswith(f"{HEADERS}/{folder}/")]
+        inside = [n for n in mutants if mutants[n].header in headers_of(folder)]
         found = sum(not survived[n] for n in inside)
         rows.append({"folder": folder, "mutants": len(inside), "found": found})
         print(f"{folder:12} {len(inside)} mutants, {found} found ({100 * found / max(1, len(inside)):.0f} %)")
-    survivors = [asdict(mutants[n]) | {"insertions": None} for n in survived if survived[n]]
-    arguments.report.write_text(json.dumps({"folders": rows, "survivors": survivors}, indent=1))
+    survivors = [str(mutants[n]) for n in survived if survived[n]]
+    report = {"seed": arguments.seed, "folders": rows, "survivors": survivors}
+    (arguments.to / "report.json").write_text(json.dumps(report, indent=1))
     return 0
 
 
