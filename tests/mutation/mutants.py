@@ -3,10 +3,10 @@
 
 Usage: python tests/mutation/mutants.py [--sample N] [--tests NAME ...] FOLDER ...
 
-FOLDER is a folder or a header of cpp/include/palpate, such as `guard` or `model/memory.hpp`. From each one the
-program draws N mutants. A mutant replaces an operator by its neighbour (``+`` by ``-``, ``<`` by ``<=``, ``&&``
-by one of its sides), removes a sign, a negation or a statement, flips a truth value or changes a small number.
-A mutant that no test executes counts as not found.
+FOLDER is a folder or a header of cpp/include/palpate, such as `guard` or `model/memory.hpp`. From each one,
+the program draws N mutants. A mutant replaces an operator by its neighbour (``+`` by ``-``, ``<`` by ``<=``,
+``&&`` by one of its sides), removes a sign, a negation or a statement, flips a truth value or changes a small
+number. A mutant that no test executes counts as not found.
 
 The drawn mutants are compiled at once, into a copy of the sources below build/; the environment variable
 PALPATE_MUTANT selects one of them. Constant expressions are not changed. Some mutants are equivalent to the
