@@ -170,6 +170,34 @@ def same(first: palpate.Model, second: palpate.Model) -> bool:
     return json.dumps(first.to_dict()) == json.dumps(second.to_dict())
 
 
+def test_files_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
+    newtons, directed, empty = tmp_path / "newtons.csv", tmp_path / "directed.csv", tmp_path / "empty.csv"
+    rows(400).drop(columns=["direction"]).to_csv(newtons, index=False)
+    rows(400).to_csv(directed, index=False)
+    rows(400).assign(torque_Nm=np.nan).to_csv(empty, index=False)
+    with pytest.raises(InputError, match=r"files is empty: give a path or a list of paths"):
+        palpate.identify_files([])
+    with pytest.raises(
+        InputError, match=r"directed\.csv and .*newtons\.csv differ in their units, or only one"
+    ):
+        palpate.identify_files([newtons, directed])
+    with pytest.raises(InputError, match=r"empty\.csv: no row is usable"):
+        palpate.identify_files(empty, invalid="drop")
+
+
+def test_a_period_and_inputs_without_hysteresis_apply_part_by_part(tmp_path: Path) -> None:
+    """Error on all rows of a knob that was turned by several turns: that of the noise."""
+    file, random = tmp_path / "knob.csv", np.random.default_rng(1)
+    angle = np.concatenate([np.linspace(0.0, 19.0, 9_000), np.linspace(19.0, 0.0, 9_000)])
+    torque = 0.5 * np.sin(angle) + random.normal(0.0, 0.02, len(angle))
+    pd.DataFrame({"angle_rad": angle, "torque_Nm": torque}).to_csv(file, index=False)
+    model = palpate.identify_files(file, part_rows=4_000, period=2 * np.pi, inputs="position")
+    assert model.fit.model_class == "position"
+    assert model.fit.nrmse == pytest.approx(0.02 / torque.std(), rel=0.05)
+    x = np.linspace(30.0, 36.0, 50)
+    assert np.abs(model.force(x) - 0.5 * np.sin(x)).max() < 0.01
+
+
 def test_several_processes_give_the_same_to_the_last_bit(tmp_path: Path) -> None:
     rows(20_000).to_parquet(tmp_path / "press.parquet", row_group_size=1_500)
     one = palpate.identify_files(tmp_path / "press.parquet", part_rows=1_500)

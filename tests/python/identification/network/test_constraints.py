@@ -12,8 +12,14 @@ from palpate import InputError
 from palpate._core.model import derivative_bounds, wavelet_columns, wavelet_slope_columns
 from palpate.identification import FittedNetwork, IdentifyOptions, fit_environment
 from palpate.identification.data.compression import Compressor
+from palpate.identification.network import constraints
 from palpate.identification.network.basis import Basis
-from palpate.identification.network.constraints import domain_bounds, impose, violated_positions
+from palpate.identification.network.constraints import (
+    crosses_where_steep,
+    domain_bounds,
+    impose,
+    violated_positions,
+)
 from palpate.identification.network.separable import SeparableProblem, Solution, problem_of
 from palpate.recording import Recording
 
@@ -71,6 +77,36 @@ def test_imposed_bounds_hold_between_grid_points(seed: int, slopes: tuple[float,
             assert (slope @ stroke).max() <= slopes[1]
     assert not any(len(violated_positions(problem, kept, bound)) for bound in bounds)
     assert kept.rss >= free.rss * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("slopes", [None, (-3.0, np.inf), (-np.inf, 8.0), (-3.0, 8.0)])
+@pytest.mark.parametrize(("fixed", "periodic"), [(None, False), ((0.4, 0.1), False), (None, True)])
+def test_constraints_hold_if_no_round_is_left(
+    monkeypatch: pytest.MonkeyPatch,
+    slopes: tuple[float, float] | None,
+    fixed: tuple[float, float] | None,
+    periodic: bool,
+) -> None:
+    """After the last round the fit is mixed with a straight line, as little as necessary."""
+    problem, free = random_network(3)
+    bounds = domain_bounds(problem, hysteresis=True, slopes=slopes, fixed=fixed, periodic=periodic)
+    imposed = impose(problem, free, bounds)
+    monkeypatch.setattr(constraints, "MOST_ROUNDS", 0)
+    mixed = impose(problem, free, bounds)
+    assert not any(len(violated_positions(problem, mixed, bound)) for bound in bounds)
+    assert mixed.rss >= imposed.rss * (1 - 1e-9)
+    if fixed is None and not periodic:  # no equality: the largest share of the free fit that is allowed
+        nearer = problem.with_coefficients(
+            free, mixed.coefficients + 1e-6 * (free.coefficients - mixed.coefficients)
+        )
+        assert any(len(violated_positions(problem, nearer, bound)) for bound in bounds)
+
+
+def test_strokes_that_do_not_cross_are_not_delayed() -> None:
+    problem, free = random_network(0)
+    apart = problem.with_coefficients(free, free.coefficients.copy())
+    above = np.linalg.solve(problem.readout, np.vstack([np.zeros(8), np.eye(8)[0]]))
+    assert not crosses_where_steep(problem, replace(apart, coefficients=above))
 
 
 def test_a_dip_between_two_samples_of_any_grid_is_found() -> None:
