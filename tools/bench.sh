@@ -40,6 +40,7 @@ done
 
 # Runs the studies of its input, one a line. A short run only tests them, two at a time; times are measured alone.
 at_once=$(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 1 }')
+if [ "$at_once" -gt 1 ]; then export OPENBLAS_NUM_THREADS=1; fi # as for the tests
 studies() { xargs -P "$at_once" -I STUDY bash -c 'echo; .venv/bin/python bench/STUDY'; }
 studies <<END
 solvers/python_calls.py build/bench/bench_python_calls.json

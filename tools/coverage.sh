@@ -16,7 +16,10 @@ PALPATE_CONTROL=$PWD/$build/palpate-control \
 .venv/bin/gcovr --root . --filter 'cpp/(include|control)/' --exclude-throw-branches --exclude-unreachable-branches \
     --gcov-ignore-parse-errors --merge-mode-functions separate --object-directory "$build" \
     --json-summary "$build/summary.json" --html-details "$build/index.html" "$build"
-.venv/bin/python - "$build/summary.json" <<'PYTHON'
+OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest --quiet --numprocesses "${CMAKE_BUILD_PARALLEL_LEVEL:-1}" \
+    --cov=palpate.identification --cov-branch --cov-report=json:"$build/identification.json" \
+    --cov-report=html:"$build/identification" tests/python/identification
+.venv/bin/python - "$build/summary.json" "$build/identification.json" <<'PYTHON'
 import collections, json, sys
 from pathlib import Path
 
@@ -26,8 +29,10 @@ for file in json.loads(Path(sys.argv[1]).read_text())["files"]:
     folder = parts[3] if parts[1] == "include" and len(parts) > 4 else "control" if parts[1] == "control" else "."
     for k, name in enumerate(("line_covered", "line_total", "branch_covered", "branch_total")):
         counts[folder][k] += file[name]
+python = json.loads(Path(sys.argv[2]).read_text())["totals"]
+counts["identification"] = [
+    python[name] for name in ("covered_lines", "num_statements", "covered_branches", "num_branches")
+]
 for folder, (lines, all_lines, branches, all_branches) in sorted(counts.items()):
-    print(f"{folder:12} lines {100 * lines / all_lines:5.1f} %   branches {100 * branches / max(all_branches, 1):5.1f} %")
+    print(f"{folder:14} lines {100 * lines / all_lines:5.1f} %   branches {100 * branches / max(all_branches, 1):5.1f} %")
 PYTHON
-.venv/bin/python -m pytest --quiet --numprocesses "${CMAKE_BUILD_PARALLEL_LEVEL:-1}" --cov=palpate.identification --cov-branch \
-    --cov-report=term --cov-report=html:"$build/identification" tests/python/identification

@@ -2,10 +2,14 @@
 #include "palpate/model/hysteresis.hpp"
 
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <stdexcept>
+#include <string>
 
 #include <gtest/gtest.h>
 
+#include "palpate/model/wavelet.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -138,9 +142,123 @@ TEST(Hysteresis, FreeContinuationDecreasesHysteresisToZero) {
     EXPECT_EQ(object.hysteresis_force().at(1.5).value, 0.05);
 }
 
-TEST(Hysteresis, RefusesAPlayRadiusOfZero) {
-    EXPECT_THROW(HysteresisNetwork({1, {}, {}, {}, {2.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), 0.0),
-                 std::invalid_argument);
+// The slot of width 2 r moves with the position only when the position reaches one of its edges.
+TEST(Hysteresis, PlayIsMovedByTheEdgesOfItsSlot) {
+    EXPECT_EQ(play(1.25, 1.0, 0.5), 1.0);
+    EXPECT_EQ(play(0.75, 1.0, 0.5), 1.0);
+    EXPECT_EQ(play(1.5, 1.0, 0.5), 1.0);
+    EXPECT_EQ(play(0.5, 1.0, 0.5), 1.0);
+    EXPECT_EQ(play(2.0, 1.0, 0.5), 1.5);
+    EXPECT_EQ(play(0.25, 1.0, 0.5), 0.75);
+}
+
+TEST(Hysteresis, UsualPlayRadiusIsAtLeastFourEncoderSteps) {
+    EXPECT_DOUBLE_EQ(usual_play_radius(2.0), 0.02);
+    EXPECT_DOUBLE_EQ(usual_play_radius(2.0, 0.004), 0.02);
+    EXPECT_DOUBLE_EQ(usual_play_radius(2.0, 0.01), 0.04);
+}
+
+TEST(Hysteresis, SlidingForceIsMeanForceAndAShareOfTheHysteresis) {
+    Random random{16};
+    for (int k = 0; k < cases(50); ++k) {
+        const HysteresisNetwork object = random_hysteresis(random);
+        const double x = uniform(random, -0.3, 1.3);
+        const double s = uniform(random, -1.0, 1.0);
+        const EnvironmentSample sample = object.sliding(x, s);
+        const double press = object.sliding(x, 1.0).force;
+        const double release = object.sliding(x, -1.0).force;
+        EXPECT_NEAR(sample.force, 0.5 * ((1.0 + s) * press + (1.0 - s) * release), 1e-13);
+        EXPECT_NEAR(press - release, 2.0 * object.hysteresis_force().at(x).value, 1e-13);
+        EXPECT_EQ(sample.energy, object.force().at(x).integral);
+        EXPECT_EQ(sample.extrapolated, x < 0.0 || x > 1.0);
+        EXPECT_EQ(object.at(x, {0.5}).extrapolated, x < 0.0 || x > 1.0);
+        constexpr double h = 1e-7;
+        const double slope = (object.sliding(x + h, s).force - object.sliding(x - h, s).force) / (2.0 * h);
+        const double before = (object.sliding(x, s).force - object.sliding(x - h, s).force) / h;
+        if (std::abs(slope - before) < 1e-3) {  // not at an end of the domain or of a continuation
+            EXPECT_NEAR(sample.slope, slope, 1e-4 * (1.0 + std::abs(slope)));
+        }
+    }
+}
+
+// The energy is G(x) + (1/r) int_play^x (xi - play) h(xi) dxi, here with the midpoint rule.
+TEST(Hysteresis, StoredEnergyIsThatOfTheSpringBetweenPlayAndPosition) {
+    Random random{17};
+    for (int k = 0; k < cases(50); ++k) {
+        const HysteresisNetwork object = random_hysteresis(random);
+        const double x = uniform(random, -0.3, 1.3);
+        const double r = object.play_radius();
+        const HysteresisNetwork::State state{x + uniform(random, -1.0, 1.0) * r};
+        constexpr int steps = 4'000;
+        double stored = 0.0;
+        for (int j = 0; j < steps; ++j) {
+            const double xi = state.play + (x - state.play) * (j + 0.5) / steps;
+            stored +=
+                (xi - state.play) * object.hysteresis_force().at(xi).value / r * (x - state.play) / steps;
+        }
+        EXPECT_NEAR(object.at(x, state).energy, object.force().at(x).integral + stored, 1e-6) << k;
+    }
+}
+
+// Over [1, 3], g(1) = 0 and g falls at once to zero below the domain. h falls over 2 % of the domain, which is 0.04.
+TEST(Hysteresis, FreeContinuationIsAtLeastTwoPercentOfTheDomainLong) {
+    const HysteresisNetwork object{{1, {}, {}, {}, {2.0}, -2.0},
+                                   {{}, 0.25, 0.25},
+                                   {{1.0}, {3.0}, Continuation::Free, Continuation::Free, std::nullopt},
+                                   0.01};
+    const NetworkCurve& h = object.hysteresis_force();
+    EXPECT_NEAR(h.at(1.0).value, 0.5, 1e-15);
+    EXPECT_NEAR(h.at(0.98).value, 0.25, 1e-12);
+    EXPECT_NEAR(h.at(0.97).value, 0.125, 1e-12);
+    EXPECT_EQ(h.at(0.9599).value, 0.0);
+    // g(3) = 4 = max|g| pulls the tool back and falls to zero over the length of the domain. h(3) = 1 falls with it.
+    EXPECT_NEAR(h.at(3.5).value, 0.75, 0.01);
+    EXPECT_NEAR(h.at(4.5).value, 0.25, 0.01);
+    EXPECT_EQ(h.at(5.1).value, 0.0);
+    EXPECT_EQ(object.domain().lower[0], 1.0);
+    EXPECT_EQ(object.parameters().bias, -2.0);
+}
+
+TEST(Hysteresis, MeanForceAndHysteresisHaveTheSameWavelets) {
+    const HysteresisNetwork object{
+        {1, {4.0}, {0.4}, {0.5}, {2.0}, 0.1}, {{0.25}, 0.5, 0.75}, test::unit_domain(), 0.01};
+    for (const double x : {0.0, 0.3, 0.9}) {
+        const double hat = mexican_hat(4.0 * (x - 0.4)).value;
+        EXPECT_NEAR(object.force().at(x).value, 0.5 * hat + 2.0 * x + 0.1, 1e-14);
+        EXPECT_NEAR(object.hysteresis_force().at(x).value, 0.25 * hat + 0.5 * x + 0.75, 1e-14);
+    }
+}
+
+TEST(Hysteresis, RefusesInvalidNumbersByName) {
+    const auto refusal = [](const NetworkParameters& network, const HysteresisParameters& hysteresis,
+                            double play_radius, const Domain& domain = test::unit_domain()) -> std::string {
+        try {
+            const HysteresisNetwork object{network, hysteresis, domain, play_radius};
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+        return "accepted";
+    };
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    const NetworkParameters good{1, {4.0}, {0.4}, {0.5}, {2.0}, 0.1};
+    const HysteresisParameters h{{0.25}, 0.5, 0.75};
+    EXPECT_EQ(refusal(good, h, std::numeric_limits<double>::denorm_min()), "accepted");
+    EXPECT_EQ(refusal(good, h, 0.5), "accepted");
+    EXPECT_EQ(refusal(good, h, 0.0), "play_radius is 0.000000, must be > 0");
+    EXPECT_EQ(refusal(good, h, -0.1), "play_radius is -0.100000, must be > 0");
+    EXPECT_EQ(refusal(good, h, infinity), "play_radius is inf, must be > 0");
+    EXPECT_EQ(refusal(good, h, nan), "play_radius is nan, must be > 0");
+    EXPECT_EQ(refusal(good, {{}, 0.5, 0.75}, 0.1), "weight_hysteresis has 0 values, must have 1");
+    EXPECT_EQ(refusal(good, {{0.1, 0.2}, 0.5, 0.75}, 0.1), "weight_hysteresis has 2 values, must have 1");
+    EXPECT_EQ(refusal(good, {{nan}, 0.5, 0.75}, 0.1), "weight_hysteresis[0] is not a finite number");
+    EXPECT_EQ(refusal(good, {{0.25}, infinity, 0.75}, 0.1), "linear_hysteresis is not a finite number");
+    EXPECT_EQ(refusal(good, {{0.25}, 0.5, nan}, 0.1), "bias_hysteresis is not a finite number");
+    EXPECT_EQ(refusal({1, {-4.0}, {0.4}, {0.5}, {2.0}, 0.1}, h, 0.1),
+              "alpha[0][0] is -4.000000, must be > 0");
+    EXPECT_EQ(refusal({2, {}, {}, {}, {2.0, 1.0}, 0.1}, {{}, 0.5, 0.75}, 0.1,
+                      {{0.0, 0.0}, {1.0, 1.0}, {}, {}, std::nullopt}),
+              "the network has 2 inputs, must have 1");
 }
 
 }  // namespace

@@ -165,6 +165,25 @@ std::string refusal(NetworkParameters parameters, Domain domain) {
     return "accepted";
 }
 
+// Over [1, 3] the force 2 x - 1 pushes the tool out below and pulls it back above.
+TEST(Network, ContinuesAtTheEndsOfItsDomain) {
+    const NetworkParameters line{1, {}, {}, {}, {2.0}, -1.0};
+    const WaveletNetwork linear{line, {{1.0}, {3.0}, {}, {}, std::nullopt}};
+    // The largest force 5 divided by the length 2 exceeds the slope 2 of the line.
+    EXPECT_NEAR(force(linear, 0.9), 1.0 - 0.1 * 2.5, 1e-9);
+    EXPECT_NEAR(force(linear, 3.5), 6.0, 1e-9);
+    const WaveletNetwork free{line, {{1.0}, {3.0}, Continuation::Free, Continuation::Free, std::nullopt}};
+    EXPECT_NEAR(force(free, 0.9), 1.0 - 0.1 * 2.5, 1e-9);
+    EXPECT_EQ(force(free, 0.5), 0.0);
+    EXPECT_NEAR(force(free, 3.5), 5.0 - 0.5 * 2.5, 1e-9);
+    EXPECT_EQ(force(free, 5.1), 0.0);
+}
+
+TEST(Network, HasOneInput) {
+    EXPECT_EQ(refusal({2, {}, {}, {}, {2.0, 1.0}, 0.0}, {{0.0, 0.0}, {1.0, 1.0}, {}, {}, std::nullopt}),
+              "the network has 2 inputs, must have 1");
+}
+
 TEST(Network, RefusesInvalidNumbersByName) {
     const NetworkParameters good{1, {5.0}, {0.5}, {1.0}, {2.0}, 0.0};
     EXPECT_EQ(refusal(good, unit_domain()), "accepted");

@@ -130,7 +130,7 @@ template <class At>
 /// w/6, w/3 and w/6 away from them.
 [[nodiscard]] inline EnergyRange energy_range(const VelocityNetwork& force, double force_limit) {
     const auto at = [&](double x) noexcept {
-        return Curve{std::clamp(force.force(x, 0.0), -force_limit, force_limit), 0.0, 0.0, 0.0};
+        return Curve{.value = std::clamp(force.force(x, 0.0), -force_limit, force_limit)};
     };
     const auto work = [&](double from, double at_from, double to, double at_to) noexcept {
         return (to - from) / 6.0 * (at_from + 4.0 * at(0.5 * (from + to)).value + at_to);

@@ -91,7 +91,7 @@ class VelocityNetwork {
     [[nodiscard]] Curve resting(double position) const noexcept {
         std::array<double, 2> gradient{};
         const double value = network_.at(std::array{position, clipped(0.0)}, gradient);
-        return {value, gradient[0], 0.0, 0.0};
+        return {.value = value, .slope = gradient[0]};
     }
 
     RadialNetwork network_;
