@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/bounds.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -122,6 +123,159 @@ TEST(Bounds, AreTightForLargeWeightsThatCancel) {
         EXPECT_LE(proved.upper - sampled.upper, 0.011 * sampled.largest()) << k;
         EXPECT_LE(sampled.lower - proved.lower, 0.011 * sampled.largest()) << k;
         EXPECT_GE(proved.upper, sampled.upper - 1e-6 * sampled.largest());
+    }
+}
+
+/// Returns the binomial coefficient.
+double choose(int n, int k) {
+    return std::round(std::tgamma(n + 1.0) / (std::tgamma(k + 1.0) * std::tgamma(n - k + 1.0)));
+}
+
+// For a polynomial of degree 7, the range of a cell is given by the Bernstein coefficients sum_j binomial(i, j) /
+// binomial(7, j) a_j, with the coefficients a_j of the powers of the place in the cell.
+TEST(Bounds, RangeOfACellIsThatOfItsBernsteinCoefficients) {
+    Random random{41};
+    for (int k = 0; k < cases(1000); ++k) {
+        const double left = uniform(random, -2.0, 2.0);
+        const double h = std::ldexp(1.0, static_cast<int>(random() % 5) - 2);
+        std::array<double, 8> a;
+        for (double& coefficient : a) {
+            coefficient = uniform(random, -1.0, 1.0);
+        }
+        std::array<Jet, 2> ends{};
+        Interval expected{1e300, -1e300};
+        for (int j = 0; j < 8; ++j) {
+            double product = 1.0;
+            for (int d = 0; d < 4; ++d) {
+                const auto order = static_cast<std::size_t>(d);
+                ends[0][order] += j == d ? product * a[static_cast<std::size_t>(j)] : 0.0;
+                ends[1][order] += product * a[static_cast<std::size_t>(j)];
+                product *= (j - d) / h;
+            }
+            double bernstein = 0.0;
+            for (int l = 0; l <= j; ++l) {
+                bernstein += choose(j, l) / choose(7, l) * a[static_cast<std::size_t>(l)];
+            }
+            expected = expected.with({bernstein, bernstein});
+        }
+        const detail::BoundedCell cell{left, left + h, ends[0], ends[1], 0.25};
+        EXPECT_NEAR(cell.range.lower, expected.lower - 0.25, 1e-12) << k;
+        EXPECT_NEAR(cell.range.upper, expected.upper + 0.25, 1e-12) << k;
+    }
+}
+
+TEST(Bounds, CellsAreOrderedByTheirLargestAbsoluteValue) {
+    const auto cell = [](double value) {
+        return detail::BoundedCell{0.0, 1.0, {value, 0.0, 0.0, 0.0}, {value, 0.0, 0.0, 0.0}, 0.0};
+    };
+    EXPECT_TRUE(cell(1.0) < cell(-2.0));
+    EXPECT_FALSE(cell(-2.0) < cell(1.0));
+    EXPECT_FALSE(cell(2.0) < cell(-2.0));
+}
+
+// The line is zero at one end of the interval, so its bound there is the remainder of the last of 16 cells. Value and
+// slope have rounding errors of 4 epsilon (see `derivatives_rounding`), and the products with them 8 epsilon.
+TEST(Bounds, OfALineExceedItByItsRoundingErrors) {
+    const NetworkParameters line{1, {}, {}, {}, {1.0}, 0.0};
+    const double rounding =
+        ((4.0 + 8.0 / 16.0) + 3.0 / 7.0 / 16.0 * (4.0 + 8.0)) * std::numeric_limits<double>::epsilon();
+    EXPECT_DOUBLE_EQ(value_bounds(line, -1.0, 0.0).upper, rounding);
+    EXPECT_DOUBLE_EQ(value_bounds(line, 0.0, 1.0).lower, -rounding);
+    const NetworkParameters constant{1, {}, {}, {}, {0.0}, 2.0};
+    EXPECT_EQ(slope_bounds(constant, 0.0, 1.0).lower, 0.0);
+    EXPECT_EQ(slope_bounds(constant, 0.0, 1.0).upper, 0.0);
+}
+
+// The Mexican hat rises to zero at u = 1. The bound is the distance of the polynomial of degree 7 from it in the last
+// of 16 cells, plus the errors of the derivatives at the ends multiplied by their factors in the Bernstein coefficients.
+TEST(Bounds, OfARisingWaveletExceedItByTheRemainderOfItsLastCell) {
+    constexpr double unit = 8.0 * std::numeric_limits<double>::epsilon();
+    const NetworkParameters hat{1, {1.0}, {0.0}, {1.0}, {0.0}, 0.0};
+    for (const double from : {0.5, 0.0}) {
+        const double h = (1.0 - from) / 16.0;
+        const Derivatives rounding = derivatives_rounding(hat, 1.0);
+        const Derivatives left = derivatives(hat, 1.0 - h);
+        const Derivatives right = derivatives(hat, 1.0);
+        const auto part = [&](std::size_t d) {
+            return rounding[d] + unit * std::max(std::abs(left[d]), std::abs(right[d]));
+        };
+        const double remainder = derivative_bounds(hat, 1.0 - h, 1.0)[8] * std::pow(h / 2.0, 8) / 40320.0 +
+                                 part(0) +
+                                 h * (part(1) * 3.0 / 7.0 + h * (part(2) + h * part(3) / 15.0) / 14.0);
+        ASSERT_EQ(right[0], 0.0);
+        EXPECT_NEAR(value_bounds(hat, from, 1.0).upper / remainder, 1.0, 1e-12);
+    }
+}
+
+/// Returns the largest value of the network over [0, 1], from a search over many positions and Newton's method.
+double largest_value(const NetworkParameters& network) {
+    double largest = -1e300;
+    for (int j = 0; j <= 500; ++j) {
+        double x = j / 500.0;
+        for (int step = 0; step < 6; ++step) {
+            const Derivatives f = derivatives(network, x);
+            largest = std::max(largest, f[0]);
+            x = f[2] < 0.0 ? std::clamp(x - f[1] / f[2], 0.0, 1.0) : x;
+        }
+    }
+    return largest;
+}
+
+TEST(Bounds, WithoutToleranceExceedTheMaximumByAtMostFourRoundingErrors) {
+    Random random{42};
+    for (int k = 0; k < cases(40); ++k) {
+        const NetworkParameters network = test::random_network(random, static_cast<std::size_t>(1 + k % 4));
+        const double rounding = derivatives_rounding(network, 1.0)[0];
+        const double largest = largest_value(network);
+        const double bound = value_bounds(network, 0.0, 1.0, 0.0).upper;
+        EXPECT_GE(bound, largest) << k;
+        EXPECT_LE(bound, largest + 4.1 * rounding) << k;
+    }
+}
+
+TEST(Bounds, ToleranceIsRelativeToTheSizeOfTheForce) {
+    Random random{43};
+    for (int k = 0; k < cases(40); ++k) {
+        NetworkParameters network = test::random_network(random, 4);
+        const double scale = k % 2 == 0 ? 0x1p-10 : 0x1p10;
+        const auto scaled = [&](double number) { return number * scale; };
+        NetworkParameters other = network;
+        std::transform(other.weight.begin(), other.weight.end(), other.weight.begin(), scaled);
+        other.linear[0] *= scale;
+        other.bias *= scale;
+        for (const double relative : {1e-4, 0.01, 0.3}) {
+            const Interval one = value_bounds(network, 0.0, 1.0, relative);
+            const Interval two = value_bounds(other, 0.0, 1.0, relative);
+            EXPECT_EQ(one.lower * scale, two.lower);
+            EXPECT_EQ(one.upper * scale, two.upper);
+        }
+        EXPECT_EQ(value_bounds(network, 0.0, 1.0).upper, value_bounds(network, 0.0, 1.0, 0.01).upper);
+        EXPECT_EQ(slope_bounds(network, 0.0, 1.0).upper, slope_bounds(network, 0.0, 1.0, 0.01).upper);
+        EXPECT_EQ(value_bounds(network, 0.0, 1.0).lower, value_bounds(network, 0.0, 1.0, 0.01).lower);
+        EXPECT_EQ(slope_bounds(network, 0.0, 1.0).lower, slope_bounds(network, 0.0, 1.0, 0.01).lower);
+    }
+}
+
+TEST(Bounds, OfForcesThatAreNotFiniteEndAtTheLargestNumberOfCells) {
+    const double infinity = std::numeric_limits<double>::infinity();
+    const NetworkParameters steep{1, {1e40}, {0.5}, {1.0}, {0.0}, 0.0};
+    EXPECT_EQ(value_bounds(steep, 0.0, 1.0).upper, infinity);
+    const NetworkParameters none{1, {}, {}, {}, {0.0}, std::nan("")};
+    EXPECT_TRUE(std::isnan(value_bounds(none, 0.0, 1.0).upper));
+}
+
+// One wavelet is as narrow as the distance between two neighbouring numbers, so the bounds of its cells stay uncertain.
+// The cells of the wider wavelet, with the smallest force, must still be divided.
+TEST(Bounds, CellsWithoutAPositionInsideAreNotDividedAgain) {
+    constexpr double step = 0x1p-53;  // distance between two numbers from 0.5 to 1
+    for (const double place : {2.0, 3.0}) {
+        const NetworkParameters network{
+            1, {1.0 / step, 0.3 / step}, {0.75 + place * step, 0.75 + 32.0 * step}, {-1.0, 2.0}, {0.0}, 10.0};
+        const Interval bounds = value_bounds(network, 0.75, 0.75 + 64.0 * step, 1e-6);
+        EXPECT_GE(bounds.upper, 11.0);
+        EXPECT_LE(bounds.upper, 11.001);
+        EXPECT_LE(bounds.lower, 8.0);
+        EXPECT_GE(bounds.lower, 8.0 - 2e-5);
     }
 }
 

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/compiled_network.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -220,6 +224,170 @@ TEST(CompiledCurve, EnergyIsTheAntiderivativeOfTheForce) {
         EXPECT_NEAR(curve.at(x).integral, network.curve().at(x).integral, 1e-13) << x;
         EXPECT_NEAR(curve.at(x).double_integral, network.curve().at(x).double_integral, 1e-13) << x;
     }
+}
+
+/// Two wavelets whose dilation and distance are so large that each one is zero where the other one is not, over a domain
+/// of length 2. The eighth derivative is largest at the centre of the first one: 945 times weight and dilation^8.
+struct TwoWavelets {
+    static constexpr double alpha = 64.0;
+    NetworkParameters network;
+    Domain domain{{-0.5}, {1.5}, {}, {}, std::nullopt};
+
+    TwoWavelets(double centre, double other, double weight)
+        : network{1, {alpha, alpha}, {centre, other}, {weight, -0.5 * weight}, {0.0}, 0.0} {}
+    [[nodiscard]] NetworkCurve curve() const { return {network, domain}; }
+};
+
+/// Returns the largest distance of a polynomial of degree 7 from a function with the eighth derivative 1 in a cell.
+double septic_error(double h) {
+    return std::pow(h / 2.0, 8) / 40320.0;
+}
+
+/// Checks that the table has cells of width h if the required error is ten times the error of such cells, and cells of
+/// half this width if it is less.
+void expect_widest(const NetworkCurve& curve, double eighth, double largest_force, double h) {
+    const double travel = curve.upper() - curve.lower();
+    const double required = 10.0 * eighth * septic_error(h) / largest_force;
+    const CompiledCurve coarse{curve, {required * (1.0 + 1e-6)}};
+    EXPECT_EQ(static_cast<double>(coarse.cells()), travel / h + 3.0);
+    EXPECT_NEAR(coarse.value_error() / (eighth * septic_error(h)), 1.0, 1e-5);
+    const double slope_error = eighth * std::pow(h, 7) / (64.0 * 720.0);
+    EXPECT_NEAR(coarse.slope_error() / slope_error, 1.0, 1e-5);
+    const CompiledCurve fine{curve, {required * (1.0 - 1e-6)}};
+    EXPECT_EQ(static_cast<double>(fine.cells()), 2.0 * travel / h + 3.0);
+}
+
+// The largest force is that of the first wavelet, at its centre: inside the domain or at one of its ends.
+TEST(CompiledCurve, UsesTheWidestCellsThatTheErrorPermits) {
+    for (const double weight : {0.125, -8.0}) {
+        for (const auto& [centre, other] :
+             {std::pair{0.25, 1.0}, std::pair{-0.5, 1.0}, std::pair{1.5, 0.0}}) {
+            const TwoWavelets two{centre, other, weight};
+            const double eighth = 945.0 * std::abs(weight) * std::pow(two.alpha, 8);
+            for (const double h : {0x1p-7, 0x1p-6}) {
+                expect_widest(two.curve(), eighth, std::abs(weight), h);
+            }
+        }
+    }
+}
+
+// The outermost cells extend beyond the domain by at most 1/16 of its length. Wavelets beyond this count by the bound of
+// their tails.
+TEST(CompiledCurve, BoundsTheEighthDerivativeBeyondTheDomain) {
+    constexpr double alpha = TwoWavelets::alpha;
+    const double scale = std::pow(alpha, 8);
+    const double tail = 1e4 * detail::hat_tails[8] * std::exp(-4.0);
+    for (const double other : {1.625 + 4.0 / alpha, -0.625 - 4.0 / alpha}) {
+        TwoWavelets two{0.25, other, 1.0};
+        two.network.weight[1] = 1e4;
+        expect_widest(two.curve(), tail * scale, 1.0, 0x1p-7);
+    }
+}
+
+TEST(CompiledCurve, HasAtLeast32CellsInTheDomain) {
+    TwoWavelets two{0.25, 1.0, 1.0};
+    two.network.alpha = {0.1, 0.1};
+    EXPECT_EQ(CompiledCurve(two.curve(), {1e-6}).cells(), 32u + 3u);
+}
+
+TEST(CompiledCurve, IsNotCompiledIfTheTableIsTooLargeOrTheNetworkTooSmall) {
+    const TwoWavelets two{0.25, 1.0, 1.0};
+    const std::size_t cells = CompiledCurve(two.curve(), {1e-6}).cells();
+    EXPECT_TRUE(CompiledCurve(two.curve(), {1e-6, cells + 1}).compiled());
+    EXPECT_FALSE(CompiledCurve(two.curve(), {1e-6, cells}).compiled());
+    EXPECT_TRUE(CompiledCurve(two.curve(), {1e-6, 8192, 2}).compiled());
+    EXPECT_FALSE(CompiledCurve(two.curve(), {1e-6, 8192, 3}).compiled());
+}
+
+// Cells have a width of 1/32. The largest position is 2^34, less one.
+TEST(CompiledCurve, IsNotCompiledIfPositionsAreTooLargeForItsCells) {
+    for (const double side : {-1.0, 1.0}) {
+        const auto compiled = [side](double farthest) {
+            const double other = farthest - side;
+            const double middle = farthest - 0.5 * side;
+            const NetworkParameters network{1, {1.0, 1.0}, {middle, middle}, {0.5, 0.5}, {0.0}, 0.0};
+            const Domain domain{
+                {std::min(farthest, other)}, {std::max(farthest, other)}, {}, {}, std::nullopt};
+            return CompiledCurve{NetworkCurve{network, domain}, {1e-3}}.compiled();
+        };
+        EXPECT_FALSE(compiled(side * 0x1p34));
+        EXPECT_TRUE(compiled(side * (0x1p34 - 1.0)));
+    }
+}
+
+TEST(CompiledCurve, IsNotCompiledIfPowersOfItsCellsLoseDigits) {
+    const auto compiled = [](double travel) {
+        const NetworkParameters network{
+            1, {1.0 / travel, 1.0 / travel}, {0.5 * travel, 0.5 * travel}, {0.5, 0.5}, {0.0}, 0.0};
+        return CompiledCurve{NetworkCurve{network, {{0.0}, {travel}, {}, {}, std::nullopt}}, {1e-3}}
+            .compiled();
+    };
+    EXPECT_TRUE(compiled(0x1p-94));
+    EXPECT_FALSE(compiled(0x1p-95));
+}
+
+// The table has the values of the same polynomials. The rounding errors of the derivatives at the borders are those at
+// positions up to twice the farthest end of the domain.
+TEST(CompiledCurve, ProvedErrorsIncludeTheRoundingErrors) {
+    for (const double slope : {-5.0, 5.0}) {
+        TwoWavelets two{0.25, 1.0, 1.0};
+        two.network.linear = {slope};
+        two.network.bias = slope < 0.0 ? 8.0 : 3.0;
+        const CompiledCurve curve{two.curve(), {2e-14}};
+        ASSERT_TRUE(curve.compiled());
+        const double h = 2.0 / (static_cast<double>(curve.cells()) - 3.0);
+        const auto last = static_cast<std::int64_t>(1.5 / h) + 1;
+        const PiecewiseSeptic table{last + 1 - static_cast<std::int64_t>(curve.cells()), last, h,
+                                    [&](double x) { return jet(two.network, x); }};
+        const Jet rounding = jet_rounding(two.network, 3.0);
+        double value = 0.0;
+        double of_slope = 0.0;
+        for (std::size_t k = 0; k < table.size(); ++k) {
+            value = std::max(value, table.rounding(k)[0]);
+            of_slope = std::max(of_slope, table.rounding(k)[1]);
+        }
+        const double eighth = 945.0 * std::pow(two.alpha, 8) * (1.0 + 1e-9);
+        value += eighth * septic_error(h);
+        of_slope += eighth * std::pow(h, 7) / (64.0 * 720.0);
+        for (std::size_t d = 0; d < rounding.size(); ++d) {
+            const double by_t = rounding[d] * std::pow(h, d);
+            value += detail::hermite_value[d] * by_t;
+            of_slope += detail::hermite_slope[d] * by_t / h;
+        }
+        EXPECT_NEAR(curve.value_error() / value, 1.0, 1e-9);
+        EXPECT_NEAR(curve.slope_error() / of_slope, 1.0, 1e-9);
+    }
+}
+
+// The two wavelets cancel, so the force is 1 and the error is that of rounding for any required error.
+TEST(CompiledCurve, IsCompiledIfTheProvedErrorIsTheRequiredError) {
+    const NetworkParameters network{1, {0.01, 0.01}, {0.5, 0.5}, {1e-3, -1e-3}, {0.0}, 1.0};
+    const NetworkCurve curve{network, test::unit_domain()};
+    const double error = CompiledCurve(curve, {1e-6}).value_error();
+    EXPECT_GT(error, 0.0);
+    const CompiledCurve compiled{curve, {error}};
+    EXPECT_TRUE(compiled.compiled());
+    EXPECT_EQ(compiled.value_error(), error);
+    const CompiledCurve refused{curve, {std::nextafter(error, 0.0)}};
+    EXPECT_FALSE(refused.compiled());
+    EXPECT_EQ(refused.value_error(), 0.0);
+    EXPECT_EQ(refused.slope_error(), 0.0);
+}
+
+TEST(CompiledNetwork, GivesForceSlopeAndEnergyOfItsCurve) {
+    Random random{50};
+    const WaveletNetwork network = random_scene(random, 6);
+    const CompiledNetwork compiled{network};
+    ASSERT_TRUE(compiled.curve().compiled());
+    for (const double x : {-0.5, 0.0, 0.3, 1.0, 1.5}) {
+        const EnvironmentSample sample = compiled.at(x, compiled.start(x));
+        const EnvironmentSample expected = network.at(x, {});
+        EXPECT_NEAR(sample.force, expected.force, 1e-11);
+        EXPECT_NEAR(sample.slope, expected.slope, 1e-8);
+        EXPECT_NEAR(sample.energy, expected.energy, 1e-11);
+        EXPECT_EQ(sample.extrapolated, expected.extrapolated);
+    }
+    EXPECT_FALSE(CompiledNetwork(network, {1e-12, 8192, 7}).curve().compiled());
 }
 
 TEST(CompiledHysteresis, AgreesWithTheNetwork) {

@@ -133,6 +133,25 @@ TEST(HatSum, IsSafeForEveryDouble) {
     }
 }
 
+#if defined(__GNUC__) && defined(__x86_64__)
+TEST(HatSum, EveryInstructionSetOfTheProcessorIsUsable) {
+    const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+    const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+                        __builtin_cpu_supports("avx512vl");
+    const std::vector<detail::HatKernel> kernels = detail::usable_hat_kernels();
+    ASSERT_EQ(kernels.size(), 2u + (avx2 ? 1u : 0u) + (avx512 ? 1u : 0u));
+    EXPECT_EQ(kernels[0].at, detail::plain::kernel().at);
+    EXPECT_EQ(kernels[1].at, detail::sse2::kernel().at);
+    if (avx2) {
+        EXPECT_EQ(kernels[2].at, detail::avx2::kernel().at);
+    }
+    if (avx512) {
+        EXPECT_EQ(kernels.back().at, detail::avx512::kernel().at);
+    }
+    EXPECT_EQ(detail::hat_kernel().at, kernels.back().at);
+}
+#endif
+
 TEST(HatSum, ExponentialIsAccurateToTheLastDigits) {
     for (const detail::HatKernel& kernel : detail::usable_hat_kernels()) {
         Random random{74};

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/wavelet.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -101,6 +103,40 @@ TEST(Wavelet, HugeArgumentsGiveZeroAndNanStaysNan) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     EXPECT_TRUE(std::isnan(mexican_hat(nan).value));
     EXPECT_TRUE(std::isnan(radial_mexican_hat(nan, 2.0).value));
+}
+
+TEST(Wavelet, HigherDerivativesOfHugeArgumentsAreZero) {
+    for (const double u : {50.0, -1e10, 1e300, std::numeric_limits<double>::infinity()}) {
+        EXPECT_EQ(mexican_hat(u).integral, 0.0);
+        EXPECT_EQ(mexican_hat(u).double_integral, 0.0);
+        EXPECT_EQ(mexican_hat_curvature(u), 0.0);
+        EXPECT_EQ(mexican_hat_jerk(u), 0.0);
+        EXPECT_EQ(radial_mexican_hat(u * u, 3.0).gradient_over_u, 0.0);
+    }
+    EXPECT_TRUE(std::isnan(mexican_hat_curvature(std::nan(""))));
+    EXPECT_TRUE(std::isnan(mexican_hat_jerk(std::nan(""))));
+}
+
+// Differences of value and gradient along each of three inputs
+TEST(Wavelet, RadialDerivativesAgreeWithDifferences) {
+    constexpr double h = 1e-5;
+    const auto hat = [](const std::array<double, 3>& u) {
+        return radial_mexican_hat(u[0] * u[0] + u[1] * u[1] + u[2] * u[2], 3.0);
+    };
+    for (const std::array<double, 3> u : {std::array{0.3, -0.8, 1.1}, {1.5, 0.2, -0.4}, {-2.0, 0.7, 0.0}}) {
+        for (std::size_t j = 0; j < 3; ++j) {
+            auto up = u;
+            auto down = u;
+            up[j] += h;
+            down[j] -= h;
+            EXPECT_NEAR((hat(up).value - hat(down).value) / (2.0 * h), hat(u).gradient_over_u * u[j], 1e-9);
+            for (std::size_t l = 0; l < 3; ++l) {
+                const double change = hat(up).gradient_over_u * up[l] - hat(down).gradient_over_u * down[l];
+                const double second = j == l ? hat(u).curvature(u[j]) : hat(u).mixed(u[j], u[l]);
+                EXPECT_NEAR(change / (2.0 * h), second, 1e-9);
+            }
+        }
+    }
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ class CompiledCurve {
     /// Returns force, slope and antiderivatives at a position outside the domain, or at any position if there is no
     /// table or the force is periodic.
     [[nodiscard, gnu::noinline]] Curve outside_table(double x) const noexcept {
-        if (!compiled() || !std::isfinite(x)) {
+        if (!compiled()) {
             return curve_.at(x);
         }
         // A periodic force moves a distant position x by whole periods; rounding can place the result just outside the

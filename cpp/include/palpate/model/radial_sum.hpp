@@ -79,7 +79,6 @@ class RadialSum {
           box_{lower.begin(), lower.end()} {
         box_.insert(box_.end(), upper.begin(), upper.end());
         const std::size_t d = dimension_;
-        std::fill_n(columns_.begin(), d * size_, 1.0);
         for (std::size_t i = 0; i < network.weight.size(); ++i) {
             for (std::size_t j = 0; j < d; ++j) {
                 columns_[j * size_ + i] = network.alpha[i * d + j];
