@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -183,6 +184,75 @@ TEST(LimitedResolvent, RefusesALoadLineThatIsNotFinite) {
         EXPECT_EQ(solver.solve(object, {}, {2000.0, q}, memory).status, Status::NonFinite);
     }
     EXPECT_EQ(solver.solve(object, {}, {2000.0, 1000.0}, memory).status, Status::Ok);
+}
+
+// A spring of 4 N/m, the force limit 2 N and the load line slope 4 N/m: all numbers are exact.
+TEST(LimitedResolvent, AddsOneEvaluationOnlyIfTheLimitIsActive) {
+    const LimitedEnvironment object{test::Spring{4.0}, 2.0};
+    const PiecewiseForce spring{
+        {1, {}, {}, {}, {4.0}, 0.0}, -1.0, 1.0, false, {{infinity, 4.0}}, {{infinity, 4.0}}};
+    using Solver = LimitedResolvent<CertifiedSolver>;
+    for (const double sign : {1.0, -1.0}) {
+        const Solver solver{CertifiedSolver{spring, 4.0}};
+        EXPECT_FALSE(solver.tabulated());
+        const auto solutions = [&](double q) {
+            Solver::Memory memory{0.0};
+            CertifiedSolver::Memory unlimited{0.0};
+            return std::pair{solver.solve(object, {}, {4.0, q}, memory),
+                             solver.unlimited().solve(object.unlimited(), {}, {4.0, q}, unlimited)};
+        };
+        for (const double q : {sign * 2.0, sign * 4.0}) {  // the force is 1 N, and exactly 2 N
+            const auto [limited, unlimited] = solutions(q);
+            EXPECT_EQ(limited.position, q / 8.0);
+            EXPECT_EQ(limited.environment.force, q / 2.0);
+            EXPECT_EQ(limited.environment.slope, 4.0);
+            EXPECT_EQ(limited.environment.energy, unlimited.environment.energy);
+            EXPECT_EQ(limited.evaluations, unlimited.evaluations);
+        }
+        const auto [limited, unlimited] = solutions(sign * 6.0);
+        EXPECT_EQ(limited.position, sign * 1.0);
+        EXPECT_EQ(limited.environment.force, sign * 2.0);
+        EXPECT_EQ(limited.environment.slope, 0.0);
+        EXPECT_TRUE(std::isnan(limited.environment.energy));
+        EXPECT_EQ(limited.residual, 0.0);
+        EXPECT_EQ(limited.status, Status::Ok);
+        EXPECT_EQ(limited.evaluations, unlimited.evaluations + 1);
+    }
+}
+
+TEST(LimitedResolvent, UsesTheProofForSmallSlopesOfTheLoadLineButNotForZero) {
+    const LimitedEnvironment object{test::Spring{4.0}, 2.0};
+    const PiecewiseForce spring{
+        {1, {}, {}, {}, {4.0}, 0.0}, -1.0, 1.0, false, {{infinity, 4.0}}, {{infinity, 4.0}}};
+    using Solver = LimitedResolvent<CertifiedSolver>;
+    const Solver solver{CertifiedSolver{spring, 0.0}};
+    ASSERT_TRUE(solver.unlimited().unique(0.0));
+    Solver::Memory memory{0.0};
+    // y = (3 - 2) / 0.25 m; the residual of a proved solution is not computed.
+    const Solution proved = solver.solve(object, {}, {0.25, 3.0}, memory);
+    EXPECT_EQ(proved.position, 4.0);
+    EXPECT_LE(proved.evaluations, 5);
+    EXPECT_EQ(memory.newton.position, 0.0) << "no search";
+    // With p = 0 no position has a force above the limit.
+    const Solution none = solver.solve(object, {}, {0.0, 3.0}, memory);
+    EXPECT_NE(none.status, Status::Ok);
+    const Solution inside = solver.solve(object, {}, {0.0, 1.0}, memory = Solver::Memory{0.125});
+    EXPECT_EQ(inside.status, Status::Ok);
+    EXPECT_EQ(inside.position, 0.25);
+    EXPECT_EQ(memory.newton.position, 0.25) << "a search, which starts at the last solution";
+}
+
+TEST(LimitedResolvent, ReturnsTheUnlimitedResultIfItIsNotFinite) {
+    const LimitedEnvironment object{test::Spring{4.0}, 2.0};
+    const PiecewiseForce spring{
+        {1, {}, {}, {}, {4.0}, 0.0}, -1.0, 1.0, false, {{infinity, 4.0}}, {{infinity, 4.0}}};
+    using Solver = LimitedResolvent<CertifiedSolver>;
+    const Solver solver{CertifiedSolver{spring, 4.0}};
+    Solver::Memory memory{0.75};  // with a force of 3 N, above the limit
+    const Solution solution = solver.solve(object, {}, {4.0, infinity}, memory);
+    EXPECT_EQ(solution.status, Status::NonFinite);
+    EXPECT_EQ(solution.position, 0.75);
+    EXPECT_FALSE(std::isfinite(solution.residual));
 }
 
 }  // namespace

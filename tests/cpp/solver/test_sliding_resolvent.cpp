@@ -280,5 +280,79 @@ TEST(Scheme, TablesRenderTheSameForceAsTheNetwork) {
     }
 }
 
+/// Returns a hysteresis network over [0, 1] whose hysteresis has the slope `linear`, apart from a bump.
+HysteresisNetwork sloped_pair(double linear, double bias, double radius) {
+    const NetworkParameters network{1, {9.0, 14.0}, {0.3, 0.7}, {0.5, -0.4}, {2.0}, 0.1};
+    return {network, {{0.15, -0.12}, linear, bias}, test::unit_domain(), radius};
+}
+
+TEST(SlidingResolvent, HasTheTablesOfBothSlidingDirections) {
+    const HysteresisNetwork pair = sloped_pair(0.0, 0.5, 0.01);
+    const double p = 200.0;
+    const SlidingResolvent both{pair, p};
+    const Resolvent press{piecewise(pair, 1.0), p};
+    const Resolvent release{piecewise(pair, -1.0), p};
+    ASSERT_TRUE(both.tabulated());
+    EXPECT_EQ(both.cells(), press.cells() + release.cells());
+    EXPECT_EQ(both.position_error(), std::max(press.position_error(), release.position_error()));
+    EXPECT_NE(press.position_error(), release.position_error());
+    EXPECT_TRUE(both.unique(p));
+    EXPECT_FALSE(both.unique(std::nextafter(p, 0.0)));
+}
+
+TEST(SlidingResolvent, IsTabulatedOnlyIfEveryLoadLineIsUniqueAndBothDirectionsHaveTables) {
+    // F rises by about 202 -+ 20 N over the domain. The widest cells have the width 1 N, so that between 182 and 222
+    // cells are needed.
+    const double p = 200.0;
+    int only_press = 0;
+    int only_release = 0;
+    for (const double linear : {20.0, -20.0}) {
+        const HysteresisNetwork pair = sloped_pair(linear, 0.5, 0.2);
+        for (const std::size_t most : {150U, 200U, 250U, 8192U}) {
+            const ResolventOptions options{1e-12, most};
+            const SlidingResolvent both{pair, p, options};
+            const bool press = Resolvent{piecewise(pair, 1.0), p, options}.tabulated();
+            const bool release = Resolvent{piecewise(pair, -1.0), p, options}.tabulated();
+            EXPECT_EQ(both.tabulated(), press && release) << most;
+            only_press += press && !release ? 1 : 0;
+            only_release += release && !press ? 1 : 0;
+        }
+    }
+    EXPECT_GT(only_press, 0);
+    EXPECT_GT(only_release, 0);
+    // The sticking force of a negative hysteresis falls with the slope h / r = -1000.
+    const SlidingResolvent falling{sloped_pair(0.0, -1.0, 0.001), p};
+    EXPECT_GT(falling.cells(), 0U);
+    EXPECT_FALSE(falling.unique(p));
+    EXPECT_FALSE(falling.tabulated());
+}
+
+TEST(SlidingResolvent, NeedsNoEvaluationWhereTheDirectionBeginsToSlide) {
+    const double p = 200.0;
+    const double radius = 0.015625;
+    const HysteresisNetwork pair = sloped_pair(0.0, 0.5, radius);
+    const SlidingResolvent resolvent{pair, p};
+    for (int k = 0; k < 20; ++k) {
+        const double q = 40.0 + 5.0 * k;
+        for (const double outward : {1.0, -1.0}) {
+            const Resolvent sliding{piecewise(pair, outward), p};
+            const double y = sliding.solve(pair, pair.start(0.5), {p, q}, 0.5).position;
+            const double play = y - outward * radius;
+            ASSERT_EQ(play + outward * radius, y) << "the play operator has no rounding error";
+            SlidingResolvent::Memory memory{0.5};
+            // Exactly at the position at which the play operator begins to move
+            const Solution at = resolvent.solve(pair, {play}, {p, q}, memory);
+            ASSERT_EQ(at.evaluations, 0) << q;
+            ASSERT_EQ(at.position, y);
+            ASSERT_EQ(memory.newton.position, y);
+            ASSERT_GT(memory.newton.low, memory.newton.high) << "no prediction";
+            // Slightly before it
+            const Solution before = resolvent.solve(pair, {play + outward * 1e-9}, {p, q}, memory);
+            ASSERT_GT(before.evaluations, 0) << q;
+            ASSERT_NEAR(before.position, y, 1e-9);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace palpate

@@ -351,27 +351,30 @@ class CertifiedSolver {
     /// Returns the cell that contains the solution of the load line, found by comparing q with F at the borders of the
     /// cells.
     [[nodiscard]] Place locate(LoadLine line, double play) const noexcept {
-        const Border& first = borders_.front();
         double turn_offset = 0.0;
         const auto lies_below = [&](const Border& border) {
             return value(border, turn_offset, line.slope, play) <= line.intercept;
         };
         if (period_ > 0.0) {
-            double turns = std::floor((line.intercept - first.force - line.slope * first.position) /
-                                      (line.slope * period_));
+            // F at the first border plus k repeat lengths rises with k. Without hysteresis it is linear in k, and the
+            // hysteresis changes it by at most |h|. Bisection finds the last k for which it is <= q.
+            const Border& first = borders_.front();
+            const double rise = line.slope * period_;
+            const double size = std::abs(first.hysteresis);
+            const double linear = line.intercept - first.force - line.slope * first.position;
+            double turns = std::floor((linear - size) / rise) - 1.0;
+            double past = std::floor((linear + size) / rise) + 2.0;
+            for (double middle = std::floor(0.5 * (turns + past)); middle > turns && middle < past;
+                 middle = std::floor(0.5 * (turns + past))) {
+                turn_offset = middle * period_;
+                (lies_below(first) ? turns : past) = middle;
+            }
             turn_offset = turns * period_;
-            // Hysteresis or rounding can make the computed number `turns` of repeat lengths wrong by a few; the loops
-            // correct it by at most 4.
-            constexpr int farthest = 4;
-            for (int k = 0; k < farthest && !lies_below(first); ++k) {
-                turn_offset = --turns * period_;
-            }
-            for (int k = 0; k < farthest && lies_below(borders_.back()); ++k) {
-                turn_offset = ++turns * period_;
-            }
         }
         const auto above = std::partition_point(borders_.begin(), borders_.end(), lies_below);
-        return {static_cast<std::size_t>(above - borders_.begin()), turn_offset};
+        const auto k = static_cast<std::size_t>(above - borders_.begin());
+        // Rounding can place a solution at an end of the period outside the period, but there is no infinite cell.
+        return {period_ > 0.0 ? std::clamp(k, std::size_t{1}, borders_.size() - 1) : k, turn_offset};
     }
 
     /// Returns the position in cell k at which linear interpolation of F between the borders of the cell gives q. In an
