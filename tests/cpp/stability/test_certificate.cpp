@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -707,6 +712,255 @@ TEST(ForceBounds, AMassBehindACouplingUsesTheMeanOfTheUnlimitedForce) {
     };
     EXPECT_EQ(of_pair(StructureKind::Implicit), 0.0);
     EXPECT_NEAR(of_pair(StructureKind::EnergyConsistent), 0.01, 1e-9);
+}
+
+/// Returns the certificate of a force behind a coupling on a device with different numbers.
+Certificate some_certificate(StructureKind kind) {
+    DeviceProfile device = smooth(1.0, 1);
+    device.jitter_s = 1e-5;
+    device.renderer = "device";
+    ForceBounds bounds = slopes(-3.0, 20.0);
+    bounds.hysteresis = true;
+    bounds.hysteresis_force = {0.1, 0.2};
+    bounds.hysteresis_per_play = 4.0;
+    Certificate certificate = certify(bounds, scheme_of(kind, {100.0, 0.02}, {0.001, 0.02}), device);
+    certificate.model = "model";
+    return certificate;
+}
+
+TEST(Fingerprint, OfACertificateChangesWithEveryStoredField) {
+    const Certificate certificate = some_certificate(StructureKind::EnergyConsistent);
+    const std::string before = fingerprint_of(certificate);
+    EXPECT_EQ(before.size(), 16U);
+    EXPECT_EQ(before.find_first_not_of("0123456789abcdef"), std::string::npos);
+    const auto changed = [&](auto change) {
+        Certificate other = certificate;
+        change(other);
+        return fingerprint_of(other) != before;
+    };
+    EXPECT_FALSE(changed([](Certificate&) {}));
+    EXPECT_TRUE(changed([](Certificate& c) { c.model = "x"; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.verdict = Verdict::StableLocally; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.longest_period_s *= 2.0; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.scheme.structure = StructureKind::Implicit; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.scheme.coupling.stiffness += 1.0; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.scheme.inertia.mass += 1.0; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.scheme.compensated = true; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.device.delay_s += 1e-5; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.device.id = "x"; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.device.renderer.reset(); }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.device.on_device = OnDevice{}; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.bounds.slope.lower -= 1.0; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.bounds.hysteresis_force.upper += 1.0; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.inequalities[1].left += 1.0; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.inequalities[1].right += 1.0; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.inequalities[1].id = "x"; }));
+    EXPECT_TRUE(changed([](Certificate& c) { c.inequalities.pop_back(); }));
+    EXPECT_FALSE(changed([](Certificate& c) { c.fingerprint = "x"; }));
+    EXPECT_FALSE(changed([](Certificate& c) { c.reason = "x"; }));
+    EXPECT_FALSE(changed([](Certificate& c) { c.inequalities[0].name = "x"; }));
+    EXPECT_FALSE(changed([](Certificate& c) { c.inequalities[0].basis = Basis::Linear; }));
+    EXPECT_FALSE(changed([](Certificate& c) { c.bounds.hysteresis = false; }));
+}
+
+TEST(Fingerprint, OfACertificateIgnoresNumbersThatItsStructureDoesNotUse) {
+    for (const StructureKind kind :
+         {StructureKind::Direct, StructureKind::Massless, StructureKind::Implicit}) {
+        const Certificate certificate = some_certificate(kind);
+        Certificate other = certificate;
+        other.scheme.coupling.stiffness += 1.0;
+        EXPECT_EQ(fingerprint_of(other) == fingerprint_of(certificate), kind == StructureKind::Direct);
+        other = certificate;
+        other.scheme.inertia.damping += 1.0;
+        EXPECT_EQ(fingerprint_of(other) == fingerprint_of(certificate), kind != StructureKind::Implicit);
+    }
+}
+
+TEST(Fingerprint, ChecksumOfADeviceChangesWithItsNumbersAndNames) {
+    const DeviceProfile device = smooth(0.1);
+    const std::uint32_t before = checksum(device);
+    EXPECT_EQ(checksum(device), before);
+    const auto changed = [&](auto change) {
+        DeviceProfile other = device;
+        change(other);
+        return checksum(other) != before;
+    };
+    EXPECT_TRUE(changed([](DeviceProfile& d) { d.id = "x"; }));
+    EXPECT_TRUE(changed([](DeviceProfile& d) { d.position_unit = "m"; }));
+    EXPECT_TRUE(changed([](DeviceProfile& d) { d.jitter_s = 1e-9; }));
+    EXPECT_TRUE(changed([](DeviceProfile& d) { d.viscous_damping = std::nextafter(0.1, 1.0); }));
+    EXPECT_TRUE(changed([](DeviceProfile& d) { d.renderer = "device"; }));
+    EXPECT_TRUE(changed([](DeviceProfile& d) { d.on_device = OnDevice{}; }));
+}
+
+/// Returns the longest period up to 100 times the longest period of the device for which a certificate holds, by
+/// bisection.
+double bisected_period(const ForceBounds& bounds, const Scheme& scheme, DeviceProfile device) {
+    const double T = device.longest_period_s();
+    const auto holds = [&](double factor) {
+        DeviceProfile later = device;
+        later.jitter_s = factor * T - device.period_s;
+        return all_hold(inequalities_of(bounds, scheme, later));
+    };
+    if (holds(100.0)) {
+        return 100.0 * T;
+    }
+    double low = 1.0;
+    double high = 100.0;
+    for (int k = 0; k < 50; ++k) {
+        const double middle = 0.5 * (low + high);
+        (holds(middle) ? low : high) = middle;
+    }
+    return low * T;
+}
+
+TEST(Certificate, LongestPeriodIsThatOfABisection) {
+    for (const StructureKind kind : {StructureKind::Direct, StructureKind::Massless, StructureKind::Implicit,
+                                     StructureKind::EnergyConsistent, StructureKind::Explicit}) {
+        for (const double delay : {0.0, 0.4, 1.0}) {
+            for (const auto& [b, jitter] : {std::pair{0.25, 0.0}, {0.6, 1e-4}, {5.0, 0.0}}) {
+                const ForceBounds bounds =
+                    slopes(delay > 0.0 && kind != StructureKind::Direct ? 0.0 : -6.0, 30.0);
+                const Scheme scheme = scheme_of(kind, {20.0, 0.01}, {0.001, 0.02});
+                DeviceProfile device = smooth(b);
+                device.delay_s = delay * device.period_s;
+                device.jitter_s = jitter;
+                const Certificate certificate = certify(bounds, scheme, device);
+                ASSERT_NE(certificate.verdict, Verdict::Refused) << certificate.reason;
+                const double expected = bisected_period(bounds, scheme, device);
+                EXPECT_NEAR(certificate.longest_period_s, expected, 1e-8 * expected)
+                    << name_of(kind) << " " << delay << " " << b;
+            }
+        }
+    }
+}
+
+// With a delay of 1.9 samples, a small jitter already raises the need of a falling force by 17 %.
+TEST(Certificate, LongestPeriodEndsWhereTheNeedJumps) {
+    const ForceBounds bounds = slopes(-60.0, 30.0);
+    const Scheme scheme = scheme_of(StructureKind::Direct);
+    for (const double delay : {0.9, 1.9}) {
+        for (const double reserve : {1.01, 1.2, 1.3}) {
+            DeviceProfile device = smooth(1.0);
+            device.delay_s = delay * device.period_s;
+            device.viscous_damping = reserve * inequalities_of(bounds, scheme, device)[0].right;
+            const double expected = bisected_period(bounds, scheme, device);
+            EXPECT_NEAR(certify(bounds, scheme, device).longest_period_s, expected, 1e-8 * expected)
+                << delay << " " << reserve;
+        }
+    }
+}
+
+TEST(Certificate, LongestPeriodIsAtMostAHundredTimesThePeriod) {
+    DeviceProfile device = smooth(0.03);
+    device.jitter_s = 0.5e-3;
+    // T M / 2 = b at the period 2 b / M
+    for (const double rising : {0.0, 0.3, 0.41, 10.0, 40.0}) {
+        const Certificate certificate =
+            certify(slopes(0.0, rising), scheme_of(StructureKind::Direct), device);
+        const double expected = rising > 0.0 ? std::min(0.06 / rising, 0.15) : 0.15;
+        EXPECT_NEAR(certificate.longest_period_s, expected, 1e-11 * expected) << rising;
+        EXPECT_LE(certificate.longest_period_s, expected * (1.0 + 1e-14)) << rising;
+        EXPECT_TRUE(certificate.certified());
+    }
+    const Certificate refused = certify(slopes(0.0, 41.0), scheme_of(StructureKind::Direct), device);
+    EXPECT_EQ(refused.longest_period_s, 0.0);
+    // At the very limit the period itself is the longest one.
+    DeviceProfile exact = smooth(0.03125);
+    exact.period_s = 1.0 / 1024.0;
+    const Certificate tight = certify(slopes(0.0, 64.0), scheme_of(StructureKind::Direct), exact);
+    EXPECT_TRUE(tight.certified());
+    EXPECT_NEAR(tight.longest_period_s, exact.period_s, 1e-12);
+}
+
+Inequality simple_line(const char* name, double left, double right, Basis basis = Basis::Proved) {
+    Inequality line{"id", name, "a >= b", left, right, basis, "advice"};
+    return line;
+}
+
+TEST(Certificate, TightestLineHasTheSmallestReserve) {
+    EXPECT_EQ(detail::tightest({}), nullptr);
+    const std::vector<Inequality> zero{simple_line("a", 0.0, -1.0)};
+    EXPECT_EQ(detail::tightest(zero), nullptr);
+    const std::vector<Inequality> lines{simple_line("a", 1.0, 0.5), simple_line("b", 10.0, 8.0),
+                                        simple_line("c", 0.0, 0.0), simple_line("d", 4.0, 3.0),
+                                        simple_line("e", 5.0, 4.0)};
+    EXPECT_EQ(detail::tightest(lines)->name, "b");
+}
+
+TEST(Certificate, ReasonIsTheFirstLineThatFailsOrTheSmallestReserve) {
+    const std::vector<Inequality> good{simple_line("a", 1.0, 0.5), simple_line("b", 10.0, 8.0)};
+    EXPECT_EQ(detail::reason(good, Verdict::Certified),
+              "every inequality is proved and holds; smallest reserve: b, 20 %");
+    EXPECT_EQ(detail::reason(good, Verdict::StableLocally),
+              "the linearised system is stable; energy is not accounted for; smallest reserve: b, 20 %");
+    EXPECT_EQ(detail::reason({}, Verdict::Certified), "every inequality is proved and holds");
+    const std::vector<Inequality> bad{simple_line("a", 1.0, 0.5), simple_line("b", 1.0, 3.0),
+                                      simple_line("c", 0.0, 2.0, Basis::None)};
+    EXPECT_EQ(detail::reason(bad, Verdict::Refused), "b: a >= b needs 3, there is 1, short by 2");
+    EXPECT_EQ(detail::reason({bad[2], bad[1]}, Verdict::Refused),
+              "no bound is known: c: a >= b, but the value is 2; advice");
+}
+
+TEST(Certificate, HoldsTheNumbersForWhichItWasComputed) {
+    DeviceProfile device = smooth(1.0);
+    device.on_device = OnDevice{};
+    const Scheme scheme = scheme_of(StructureKind::Massless, {100.0, 0.02});
+    const Certificate certificate = certify_rendered(slopes(-1.0, 20.0), scheme, device);
+    EXPECT_EQ(certificate.scheme.coupling.stiffness, 100.0);
+    EXPECT_EQ(certificate.device, certified_part(device));
+    EXPECT_FALSE(certificate.device.on_device.has_value());
+    EXPECT_EQ(certificate.bounds.slope.upper, 20.0);
+    EXPECT_EQ(certificate.inequalities.size(), inequalities_of(slopes(-1.0, 20.0), scheme, device).size());
+    EXPECT_EQ(certificate.fingerprint, fingerprint_of(certificate));
+    EXPECT_EQ(certificate.model, "");
+    EXPECT_TRUE(certificate.certified());
+    EXPECT_FALSE(Certificate{}.certified());
+    ForceBounds infinite = slopes(0.0, 1.0);
+    infinite.mean_force = std::numeric_limits<double>::infinity();
+    const Certificate refused = certify_rendered(infinite, scheme, device);
+    EXPECT_EQ(refused.reason, "a bound of the model is not a finite number");
+    EXPECT_EQ(refused.verdict, Verdict::Refused);
+    infinite.mean_force = 0.0;
+    infinite.drag = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(certify_rendered(infinite, scheme, device).verdict, Verdict::Refused);
+}
+
+TEST(Certificate, OfAModelChecksItsNumbersAndNamesTheModel) {
+    const ForceModel model{NetworkParameters{1, {}, {}, {}, {20.0}, 0.0}, test::unit_domain()};
+    const Certificate certificate = certify(model, scheme_of(StructureKind::Direct), smooth(1.0));
+    EXPECT_EQ(certificate.model, fingerprint(model));
+    EXPECT_EQ(certificate.fingerprint, fingerprint_of(certificate));
+    DeviceProfile device = smooth(1.0);
+    device.period_s = 0.0;
+    EXPECT_THROW((void)certify(model, scheme_of(StructureKind::Direct), device), std::invalid_argument);
+    Scheme scheme = scheme_of(StructureKind::Massless);
+    scheme.predict = 2;
+    EXPECT_THROW((void)certify(model, scheme, smooth(1.0)), std::invalid_argument);
+    // Compensation of the model's slope 20 by a coupling of 100: 100 * 20 / 80
+    scheme = scheme_of(StructureKind::Massless, {100.0, 0.02});
+    scheme.compensated = true;
+    EXPECT_NEAR(rendered_bounds(model, scheme, smooth(1.0)).slope.upper, 25.0, 0.01);
+    EXPECT_NEAR(certify(model, scheme, smooth(1.0)).bounds.slope.upper, 25.0, 0.01);
+    scheme.compensated = false;
+    EXPECT_NEAR(rendered_bounds(model, scheme, smooth(1.0)).slope.upper, 20.0, 0.01);
+    EXPECT_EQ(rendered_bounds(model, scheme_of(StructureKind::EnergyConsistent), smooth(1.0)).mean_force,
+              0.0);
+}
+
+TEST(Certificate, VelocityIsRefusedWhereNoProofExists) {
+    ForceBounds bounds = slopes(0.0, 10.0);
+    bounds.drag = 0.5;
+    const std::vector<Inequality> lines =
+        inequalities_of(bounds, scheme_of(StructureKind::Massless), smooth(1.0));
+    EXPECT_EQ(lines.back().id, "velocity-coupling");
+    EXPECT_EQ(lines.back().left, 0.0);
+    EXPECT_EQ(lines.back().right, 0.5);
+    EXPECT_EQ(lines.back().basis, Basis::None);
+    EXPECT_FALSE(lines.back().holds());
+    bounds.drag = 0.0;
+    EXPECT_NE(inequalities_of(bounds, scheme_of(StructureKind::Massless), smooth(1.0)).back().id,
+              "velocity-coupling");
 }
 
 TEST(Fingerprint, ChangesWithEveryNumber) {

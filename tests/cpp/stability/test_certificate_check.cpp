@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests the check of stored certificates: the check recomputes every number, and accepts bounds of the force only if
 // they are at least as wide as the recomputed bounds.
+#include <cstddef>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -196,6 +198,156 @@ TEST(CertificateCheck, NamesTheFirstFieldInWhichADeviceDiffers) {
     EXPECT_EQ(difference([](auto& d) { d.on_device = OnDevice{.delay_s = 1e-4}; }), "");
     EXPECT_TRUE(names(difference([](auto& d) { d = on_device(d, 4e4); }),
                       "with the model on the host at 1000 Hz, not on its motor controller at 40000 Hz"));
+}
+
+TEST(CertificateCheck, NumbersAgreeToABillionthOfTheLargerOne) {
+    for (const double sign : {-1.0, 1.0}) {
+        EXPECT_TRUE(agree(sign * 1.0, sign * (1.0 + 0.99e-9)));
+        EXPECT_TRUE(agree(sign * (1.0 + 0.99e-9), sign * 1.0));
+        EXPECT_FALSE(agree(sign * 1.0, sign * (1.0 + 1.01e-9)));
+        EXPECT_FALSE(agree(sign * (1.0 + 1.01e-9), sign * 1.0));
+    }
+    EXPECT_TRUE(agree(0.0, 0.0));
+    EXPECT_FALSE(agree(0.0, 1e-300));
+    EXPECT_FALSE(agree(1.0, -1.0));
+    const double infinite = std::numeric_limits<double>::infinity();
+    EXPECT_FALSE(agree(infinite, infinite));
+    const std::optional<double> none;
+    EXPECT_TRUE(agree(none, none));
+    EXPECT_FALSE(agree(std::optional{1.0}, none));
+    EXPECT_FALSE(agree(none, std::optional{1.0}));
+    EXPECT_TRUE(agree(std::optional{1.0}, std::optional{1.0}));
+    EXPECT_FALSE(agree(std::optional{1.0}, std::optional{2.0}));
+}
+
+TEST(CertificateCheck, MessagesNameFieldValueAndRule) {
+    EXPECT_EQ(
+        detail::disagrees("device.delay_s", 0.5, 0.25),
+        "certificate.device.delay_s is 0.5: must be 0.25, computed from model and device; plan the model "
+        "again");
+    ForceBounds stored;
+    ForceBounds now;
+    now.slope = {-2.0, 3.0};
+    stored.slope = {-1.0, 3.0};
+    EXPECT_EQ(detail::narrower_bound(stored, now),
+              "certificate.bounds.slope_min is -1: must be at most -2, computed from model and device; plan "
+              "the model again");
+    stored.slope = {-2.5, 2.0};
+    EXPECT_EQ(
+        detail::narrower_bound(stored, now),
+        "certificate.bounds.slope_max is 2: must be at least 3, computed from model and device; plan the "
+        "model again");
+    stored.slope = {-2.0 * (1.0 - 1e-10), 3.0 * (1.0 - 1e-10)};
+    EXPECT_EQ(detail::narrower_bound(stored, now), "");
+    stored.slope = now.slope;
+    now.hysteresis = true;
+    EXPECT_NE(detail::narrower_bound(stored, now), "");
+    Inequality line;
+    line.id = "one";
+    line.left = 1.0;
+    line.right = 0.5;
+    Inequality other = line;
+    EXPECT_EQ(detail::line_disagrees("inequalities[2]", line, other), "");
+    other.id = "two";
+    EXPECT_EQ(detail::line_disagrees("inequalities[2]", line, other),
+              "certificate.inequalities[2].id is \"one\": must be \"two\"");
+    other = line;
+    other.left = 2.0;
+    EXPECT_EQ(detail::line_disagrees("lines", line, other),
+              "certificate.lines.left is 1: must be 2, computed from model and device; plan the model again");
+    other = line;
+    other.right = 0.25;
+    EXPECT_EQ(detail::line_disagrees("lines", line, other),
+              "certificate.lines.right is 0.5: must be 0.25, computed from model and device; plan the model "
+              "again");
+}
+
+TEST(CertificateCheck, NamesTheFirstDifferenceOfAStoredCertificate) {
+    const ForceModel model = hysteretic();
+    const Certificate certificate = certify(model, direct(), strong());
+    const auto refusal = [&](const std::function<void(Certificate&)>& change) {
+        Certificate edited = certificate;
+        change(edited);
+        return disagreement(edited, model);
+    };
+    const auto starts = [&](const std::function<void(Certificate&)>& change, const std::string& text) {
+        const std::string wrong = refusal(change);
+        EXPECT_EQ(wrong.substr(0, text.size()), text);
+    };
+    starts(
+        [](auto& c) { c.model = "0123456789abcdef"; },
+        "certificate.model is \"0123456789abcdef\": must be \"" + certificate.model + "\", the fingerprint");
+    starts([](auto& c) { c.device.period_s = -1.0; },
+           "certificate has an invalid plan: device profile: period_s is -1");
+    starts([](auto& c) { c.scheme.predict = 99; }, "certificate has an invalid plan: predict is 99");
+    starts([](auto& c) { c.inequalities.pop_back(); }, "certificate.inequalities has 2 lines: must have 3");
+    starts([](auto& c) { c.inequalities.emplace_back(); },
+           "certificate.inequalities has 4 lines: must have 3");
+    starts([](auto& c) { c.inequalities[0].id = "x"; }, "certificate.inequalities[0].id is \"x\"");
+    starts([](auto& c) { c.inequalities[2].left *= 1.1; }, "certificate.inequalities[2].left is ");
+    starts([](auto& c) { c.longest_period_s *= 1.1; }, "certificate.longest_period_s is ");
+    starts([](auto& c) { c.fingerprint = "0"; },
+           "certificate.fingerprint is \"0\": must be \"" + certificate.fingerprint + "\"; the certificate");
+    starts([](auto& c) { c.verdict = Verdict::Refused; },
+           "certificate.verdict is \"refused\": must be \"certified\", every inequality");
+    starts([](auto& c) { c.verdict = Verdict::StableLocally; },
+           "certificate.verdict is \"stable-locally\": must be \"certified\", every inequality");
+}
+
+TEST(CertificateCheck, KeepsTheStoredNumbers) {
+    const ForceModel model = hysteretic();
+    Certificate stored = certify(model, direct(), strong());
+    for (Inequality& line : stored.inequalities) {
+        line.left *= 1.0 + 1e-15;
+        line.right *= 1.0 + 1e-15;
+    }
+    stored.longest_period_s *= 1.0 + 1e-15;
+    stored.fingerprint = fingerprint_of(stored);
+    const Certificate now = checked(stored, model);
+    EXPECT_EQ(now.model, stored.model);
+    EXPECT_EQ(now.fingerprint, stored.fingerprint);
+    EXPECT_EQ(now.longest_period_s, stored.longest_period_s);
+    for (std::size_t k = 0; k < now.inequalities.size(); ++k) {
+        EXPECT_EQ(now.inequalities[k].left, stored.inequalities[k].left);
+        EXPECT_EQ(now.inequalities[k].right, stored.inequalities[k].right);
+    }
+}
+
+TEST(CertificateCheck, StatesBothValuesOfADeviceThatDiffers) {
+    const DeviceProfile device = strong();
+    const auto difference = [&](const std::function<void(DeviceProfile&)>& change) {
+        DeviceProfile other = device;
+        change(other);
+        return device_difference(device, other);
+    };
+    EXPECT_EQ(
+        difference([](auto& d) { d.id = "other"; }),
+        "the certificate is for the device simulated-knob, not for other; plan the model again for this "
+        "device");
+    EXPECT_EQ(
+        difference([](auto& d) {
+            d.id = "other";
+            d.renderer = "device";
+        }),
+        "the certificate is for the device simulated-knob, not for other; plan the model again for this "
+        "device");
+    EXPECT_EQ(difference([](auto& d) { d.position_unit = "m"; }),
+              "the certificate is for the device simulated-knob in rad, not in m");
+    EXPECT_EQ(difference([](auto& d) { d.force_limit = 4.0; }),
+              "the certificate is for the device simulated-knob with force_limit = 5, not 4; plan the model "
+              "again");
+    EXPECT_EQ(
+        difference([](auto& d) {
+            d.period_s = 2e-3;
+            d.force_limit = 4.0;
+        }),
+        "the certificate is for the device simulated-knob with period_s = 0.001, not 0.002; plan the model "
+        "again");
+    EXPECT_EQ(difference([](auto& d) { d.force_limit *= 1.0 + 1e-10; }), "");
+    EXPECT_EQ(
+        difference([](auto& d) { d.renderer = "device"; }),
+        "the certificate is for the device simulated-knob with the model on the host at 1000 Hz, not on its "
+        "motor controller at 1000 Hz; plan the model again");
 }
 
 TEST(CertificateCheck, AnEditedRendererIsRefused) {

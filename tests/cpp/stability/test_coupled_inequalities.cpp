@@ -269,6 +269,218 @@ double optimised(test::Random& random, const CoupledScene& scene, int trials) {
     return least;
 }
 
+/// Returns bounds of a force whose slopes lie between two numbers, with a mean force.
+ForceBounds bounds_of(double lower, double upper) {
+    ForceBounds bounds;
+    bounds.slope = {lower, upper};
+    bounds.steepest = bounds.sliding = bounds.slope.largest();
+    bounds.mean_force = 0.003;
+    return bounds;
+}
+
+/// Returns a device with different steps and jitter, and a delay in periods.
+DeviceProfile coupled_device(double delay, double encoder_step = 1e-4) {
+    DeviceProfile device;
+    device.period_s = 0.5e-3;
+    device.jitter_s = 0.125e-3;
+    device.delay_s = delay * device.period_s;
+    device.encoder_step = encoder_step;
+    device.force_step = 0.002;
+    device.viscous_damping = 0.05;
+    device.coulomb_friction = 0.01;
+    return device;
+}
+
+constexpr double coupled_longest_period = 0.625e-3;
+
+/// Expected id, sides, basis and strictness of a line.
+struct Expected {
+    const char* id;
+    double left;
+    double right;
+    Basis basis = Basis::Proved;
+    bool strict = false;
+};
+
+void expect_lines(const std::vector<Inequality>& lines, const std::vector<Expected>& expected) {
+    ASSERT_EQ(lines.size(), expected.size());
+    for (std::size_t k = 0; k < lines.size(); ++k) {
+        EXPECT_EQ(lines[k].id, expected[k].id);
+        EXPECT_NEAR(lines[k].left, expected[k].left, 1e-12 * std::abs(expected[k].left)) << expected[k].id;
+        EXPECT_NEAR(lines[k].right, expected[k].right, 1e-12 * std::abs(expected[k].right)) << expected[k].id;
+        EXPECT_EQ(lines[k].basis, expected[k].basis) << expected[k].id;
+        EXPECT_EQ(lines[k].strict, expected[k].strict) << expected[k].id;
+    }
+}
+
+/// Returns the damping that a coupling needs, with the need of `coupling_need`, which has its own tests.
+double coupling_damping(VirtualCoupling coupling, double falling, const DeviceProfile& device) {
+    return coupled_longest_period *
+           coupling_need(coupling, 0.5e-3, device.whole_delay_samples(), device.delay_fraction(), falling);
+}
+
+constexpr VirtualCoupling stiff{100.0, 0.01};  // B_c / T = 20
+constexpr double force_step_and_mean = 0.001 + 0.003;
+
+template <class S>
+std::vector<Inequality> coupled_lines(S structure, const ForceBounds& bounds, const DeviceProfile& device,
+                                      VirtualCoupling coupling = stiff, Inertia inertia = {1e-4, 0.02}) {
+    Scheme scheme;
+    scheme.coupling = coupling;
+    scheme.inertia = inertia;
+    return inequalities(structure, bounds, scheme, device);
+}
+
+TEST(CoupledLines, OfTheMasslessStructureHaveTheSidesOfTheirFormulas) {
+    for (const double delay : {0.0, 1.5}) {
+        const DeviceProfile device = coupled_device(delay);
+        const ForceBounds bounds = bounds_of(-30.0, 300.0);
+        const double gain = massless_gain(bounds, stiff, 0.5e-3);
+        expect_lines(coupled_lines(MasslessStructure{}, bounds, device),
+                     {{"unique-solution", 120.0, 30.0, Basis::Proved, true},
+                      {"damping-coupling", 0.05, coupling_damping(stiff, 30.0, device)},
+                      {"friction-steps", 0.01, 0.5e-4 * gain + force_step_and_mean}});
+        expect_lines(coupled_lines(MasslessStructure{}, bounds_of(-120.0, 1.0), device),
+                     {{"unique-solution", 120.0, 120.0, Basis::Proved, true}});
+        // From K_c on, nothing is known about encoder steps.
+        for (const double falling : {100.0, 110.0}) {
+            expect_lines(coupled_lines(MasslessStructure{}, bounds_of(-falling, 1.0), device),
+                         {{"unique-solution", 120.0, falling, Basis::Proved, true},
+                          {"damping-coupling", 0.05, coupling_damping(stiff, falling, device)},
+                          {"encoder-step-coupling", 0.0, 1e-4, Basis::None},
+                          {"friction-force-step", 0.01, force_step_and_mean}});
+        }
+        ForceBounds play = bounds;
+        play.hysteresis = true;
+        play.hysteresis_force = {-0.25, 1.0};
+        for (const double damping : {0.0, 0.01}) {
+            const VirtualCoupling coupling{100.0, damping};
+            expect_lines(coupled_lines(MasslessStructure{}, play, device, coupling),
+                         {{"loss-nonnegative", -0.25, 0.0},
+                          {"unique-solution", 100.0 + 2000.0 * damping, 30.0, Basis::Proved, true},
+                          {"damping-coupling", 0.05, coupling_damping(coupling, 30.0, device)},
+                          {"encoder-step-coupling", 0.0, 1e-4, Basis::None},
+                          {"friction-force-step", 0.01, force_step_and_mean}});
+        }
+    }
+}
+
+TEST(CoupledLines, WithoutCouplingDampingAreThoseOfTheForceInSeries) {
+    const VirtualCoupling spring{100.0, 0.0};
+    for (const double delay : {0.0, 1.0}) {
+        const DeviceProfile device = coupled_device(delay);
+        const double rising = 100.0 * 300.0 / 400.0;
+        const double falling = 100.0 * 50.0 / 50.0;
+        const std::vector<Inequality> lines =
+            coupled_lines(MasslessStructure{}, bounds_of(-50.0, 300.0), device, spring);
+        expect_lines(lines,
+                     {{"unique-solution", 100.0, 50.0, Basis::Proved, true},
+                      {"damping-hold", 0.05, coupled_longest_period * device_need(device, {rising, falling})},
+                      {"friction-steps", 0.01, 0.5e-4 * 100.0 + force_step_and_mean}});
+        EXPECT_TRUE(lines[1].formula.ends_with(", M and L of K_c f' / (K_c + f')"));
+    }
+    ForceBounds wall = bounds_of(0.0, 1.0);
+    wall.slope.upper = std::numeric_limits<double>::infinity();
+    EXPECT_FALSE(all_hold(coupled_lines(MasslessStructure{}, wall, coupled_device(0.0), spring)));
+}
+
+TEST(CoupledLines, OfAMassHaveTheSidesOfTheirFormulas) {
+    for (const double delay : {0.0, 1.5}) {
+        DeviceProfile device = coupled_device(delay);
+        // m / T^2 = 400, B_o / T = 40, K_c + B_c / T = 120
+        const ForceBounds bounds = bounds_of(-90.0, 5.0);
+        const std::vector<Expected> no_quantisation{{"encoder-step-coupling", 0.0, 1e-4, Basis::None},
+                                                    {"friction-force-step", 0.01, force_step_and_mean}};
+        const auto with = [&](std::vector<Expected> lines) {
+            lines.insert(lines.end(), no_quantisation.begin(), no_quantisation.end());
+            return lines;
+        };
+        expect_lines(coupled_lines(ImplicitStructure{}, bounds, device),
+                     with({{"damping-coupling", 0.05, coupling_damping(stiff, 0.0, device)},
+                           {"falling-slope-limit", 80.0, 90.0, Basis::None},
+                           {"unique-solution", 440.0, 90.0, Basis::Proved, true}}));
+        expect_lines(coupled_lines(EnergyConsistentStructure{}, bounds, device),
+                     with({{"damping-coupling", 0.05, coupling_damping(stiff, 0.0, device)},
+                           {"solution-exists", 840.0, 45.0, Basis::Proved, true}}));
+        ForceBounds play = bounds;
+        play.hysteresis = true;
+        play.hysteresis_force = {0.5, 1.0};
+        EXPECT_EQ(coupled_lines(ImplicitStructure{}, play, device)[0].left, 0.5);
+        EXPECT_EQ(coupled_lines(EnergyConsistentStructure{}, play, device)[0].id, "loss-nonnegative");
+
+        device.force_limit = std::numeric_limits<double>::infinity();
+        expect_lines(coupled_lines(ImplicitStructure{}, bounds, device),
+                     with({{"falling-slope-coupling", 200.0, 90.0},
+                           {"damping-coupling", 0.05, coupling_damping(stiff, 10.0, device)},
+                           {"unique-solution", 560.0, 90.0, Basis::Proved, true}}));
+        EXPECT_NEAR(coupled_lines(ImplicitStructure{}, bounds_of(-70.0, 5.0), device)[1].right,
+                    coupling_damping(stiff, 0.0, device), 1e-15);
+        expect_lines(coupled_lines(EnergyConsistentStructure{}, bounds, device),
+                     with({{"damping-coupling", 0.05, coupling_damping(stiff, 0.0, device)},
+                           {"solution-exists", 960.0, 45.0, Basis::Proved, true}}));
+        // A spring has a bound of the encoder error; a force with hysteresis has none.
+        ForceBounds spring = bounds_of(30.0, 30.0);
+        const double gain = implicit_gain(30.0, {1e-4, 0.02}, stiff, 0.5e-3);
+        expect_lines(coupled_lines(ImplicitStructure{}, spring, device),
+                     {{"falling-slope-coupling", 200.0, 0.0},
+                      {"damping-coupling", 0.05, coupling_damping(stiff, 0.0, device)},
+                      {"unique-solution", 560.0, 0.0, Basis::Proved, true},
+                      {"friction-steps", 0.01, 0.5e-4 * gain + force_step_and_mean}});
+        spring.hysteresis = true;
+        EXPECT_EQ(coupled_lines(ImplicitStructure{}, spring, device).size(), 6U);
+    }
+}
+
+TEST(CoupledLines, NameTheDelayOnlyIfThereIsOne) {
+    for (const double delay : {0.0, 0.3, 1.0}) {
+        const Inequality line = detail::coupling_inequality(stiff, 0.0, coupled_device(delay));
+        EXPECT_EQ(line.name, delay > 0.0 ? "viscous damping against the held and delayed coupling"
+                                         : "viscous damping against the held coupling");
+        EXPECT_EQ(line.formula == "b >= K_c T / 2 + B_c", delay == 0.0);
+    }
+    EXPECT_EQ(coupled_lines(MasslessStructure{}, bounds_of(0.0, 1.0), coupled_device(0.0))[0].formula,
+              "K_c + B_c / T > s_");
+    EXPECT_EQ(
+        coupled_lines(MasslessStructure{}, bounds_of(0.0, 1.0), coupled_device(0.0), {100.0, 0.0})[0].formula,
+        "K_c > s_");
+    DeviceProfile device = coupled_device(0.0);
+    EXPECT_EQ(coupled_lines(EnergyConsistentStructure{}, bounds_of(0.0, 1.0), device)[1].formula,
+              "2 m / T^2 + B_o / T > s_ / 2");
+    device.force_limit = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(coupled_lines(EnergyConsistentStructure{}, bounds_of(0.0, 1.0), device)[1].formula,
+              "p > s_ / 2");
+    const Inequality friction =
+        coupled_lines(EnergyConsistentStructure{}, bounds_of(0.0, 1.0), device).back();
+    EXPECT_EQ(friction.name, "Coulomb friction against force steps");
+    EXPECT_EQ(friction.formula, "f_c >= 0 + Delta_F / 2 + |mean c(f)|");
+}
+
+TEST(CoupledLines, StiffestCouplingUsesItsShareOfTheDamping) {
+    DeviceProfile device = coupled_device(0.0);
+    // Without delay K_c T / 2 + B_c (T / period) = share * b.
+    const double B_c = 0.01;
+    for (const double share : {0.5, 0.95, 1.0}) {
+        const double expected = 2.0 * (share * 0.05 - 1.25 * B_c) / coupled_longest_period;
+        EXPECT_NEAR(stiffest_coupling(B_c, 0.0, device, share), expected, 1e-9 * expected);
+        EXPECT_NEAR(stiffest_coupling(0.0, 0.0, device, share), 2.0 * share * 0.05 / coupled_longest_period,
+                    1e-9 * 160.0);
+    }
+    EXPECT_EQ(stiffest_coupling(B_c, 0.0, device), stiffest_coupling(B_c, 0.0, device, 0.95));
+    EXPECT_EQ(stiffest_coupling(0.05, 0.0, device), 0.0);
+    // A falling slope above K_c + B_c / T has no bound for any stiffness that fits.
+    EXPECT_EQ(stiffest_coupling(B_c, 200.0, device), 0.0);
+    for (const double delay : {0.5, 1.0, 2.3}) {
+        device = coupled_device(delay);
+        const double stiffness = stiffest_coupling(0.001, 4.0, device, 0.8);
+        EXPECT_LE(coupling_damping({stiffness, 0.001}, 4.0, device), 0.8 * 0.05);
+        EXPECT_GT(coupling_damping({stiffness * (1.0 + 1e-9), 0.001}, 4.0, device), 0.8 * 0.05) << delay;
+    }
+    // A coupling much softer than 2 b / T is still found.
+    device = coupled_device(0.0);
+    const double nearly = 0.95 * 0.05 / 1.25 * (1.0 - 1e-6);
+    EXPECT_NEAR(stiffest_coupling(nearly, 0.0, device), 152.0 * 1e-6, 1e-9);
+}
+
 TEST(CoupledAccount, OptimisedMotionsTakeNoEnergyOutOfCertifiedScenes) {
     test::Random random{41};
     int tried = 0;

@@ -5,6 +5,7 @@
 #include <random>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -274,6 +275,222 @@ TEST(DirectLines, NoMotionTakesEnergyOutOfAQuantisedHysteresis) {
     }
     // With half of the required damping and friction the search finds motions that take energy out
     EXPECT_GE(found, 8);
+}
+
+/// Returns bounds that differ in every number.
+ForceBounds different_bounds() {
+    ForceBounds bounds;
+    bounds.slope = {-10.0, 60.0};
+    bounds.steepest = 65.0;
+    bounds.sliding = 20.0;
+    bounds.mean_force = 0.003;
+    bounds.hysteresis_force = {0.0, 1.0};
+    bounds.hysteresis_per_play = 40.0;
+    return bounds;
+}
+
+/// Returns a device whose damping and friction are far too small, with different steps, a delay and jitter.
+DeviceProfile weak_device(double delay) {
+    DeviceProfile profile = device(delay, 1e-4);
+    profile.period_s = 0.5e-3;
+    profile.delay_s = delay * profile.period_s;
+    profile.jitter_s = 0.125e-3;
+    profile.force_step = 0.002;
+    profile.viscous_damping = 1e-5;
+    profile.coulomb_friction = 1e-6;
+    return profile;
+}
+
+constexpr double weak_longest_period = 0.625e-3;
+constexpr double half_encoder_step = 0.5e-4;
+constexpr double other_friction = 0.001 + 0.003;  // half a force step, and the mean force
+
+/// Checks id and both sides of a line about damping and of a line about friction.
+void expect_sides(const std::vector<Inequality>& lines, std::size_t first, double damping, double friction) {
+    ASSERT_EQ(lines.size(), first + 2);
+    EXPECT_EQ(lines[first].id, "damping-hold");
+    EXPECT_EQ(lines[first].left, 1e-5);
+    EXPECT_NEAR(lines[first].right, damping, 1e-12 * damping);
+    EXPECT_EQ(lines[first + 1].id, "friction-steps");
+    EXPECT_EQ(lines[first + 1].left, 1e-6);
+    EXPECT_NEAR(lines[first + 1].right, friction, 1e-12 * friction);
+    for (const Inequality& line : lines) {
+        EXPECT_EQ(line.basis, Basis::Proved);
+        EXPECT_FALSE(line.strict);
+    }
+    if (first == 1) {
+        EXPECT_EQ(lines[0].id, "loss-nonnegative");
+        EXPECT_EQ(lines[0].right, 0.0);
+    }
+}
+
+TEST(DirectLines, OfAStaticForceHaveTheSidesOfTheirFormulas) {
+    const ForceBounds bounds = different_bounds();
+    for (const double delay : {0.0, 0.5, 1.0}) {
+        const DeviceProfile profile = weak_device(delay);
+        expect_sides(direct_inequalities(bounds, profile), 0,
+                     weak_longest_period * device_need(profile, {60.0, 10.0}),
+                     65.0 * half_encoder_step + other_friction);
+        expect_sides(direct_inequalities(bounds, profile, 3), 0,
+                     weak_longest_period * predicted_need(profile, 3, {60.0, 10.0}),
+                     65.0 * 1.5 * half_encoder_step + other_friction);
+    }
+}
+
+TEST(DirectLines, OfHysteresisHaveTheSidesOfTheirFormulas) {
+    ForceBounds bounds = different_bounds();
+    bounds.hysteresis_force.lower = -0.5;
+    for (const double delay : {0.0, 0.5, 1.0}) {
+        DeviceProfile profile = weak_device(delay);
+        const double hold = device_need(profile, {60.0, 10.0});
+        expect_sides(hysteresis_inequalities(bounds, profile, 3), 1,
+                     weak_longest_period * (hold + 60.0 / 2.0),
+                     (1.5 * 20.0 + 2.5 * 40.0) * half_encoder_step + other_friction);
+        EXPECT_EQ(hysteresis_inequalities(bounds, profile)[0].left, -0.5);
+        // The play radius is 1 / 40; e = max(|g'| + |h'|) Delta / (2 r)
+        const double more = 20.0 * 1e-4 / (2.0 * 0.025);
+        if (delay == 0.0) {
+            expect_sides(hysteresis_inequalities(bounds, profile), 1,
+                         weak_longest_period * 0.5 * (60.0 + more),
+                         (20.0 + more + 40.0) * half_encoder_step + other_friction);
+        } else {
+            expect_sides(hysteresis_inequalities(bounds, profile), 1, weak_longest_period * hold,
+                         (20.0 + 80.0) * half_encoder_step + other_friction);
+        }
+        // A play radius of exactly half an encoder step still counts h / r once.
+        bounds.hysteresis_force.upper = 40.0 * half_encoder_step;
+        const double sticks = delay == 0.0 ? 40.0 + 20.0 : 80.0;
+        EXPECT_NEAR(hysteresis_inequalities(bounds, profile)[2].right,
+                    (20.0 + sticks) * half_encoder_step + other_friction, 1e-15);
+        bounds.hysteresis_force.upper = 39.9 * half_encoder_step;
+        EXPECT_NEAR(hysteresis_inequalities(bounds, profile)[2].right,
+                    (20.0 + 80.0) * half_encoder_step + other_friction, 1e-15);
+        bounds.hysteresis_force.upper = 1.0;
+        // With sufficient friction for h / r twice, the damping needs no addition.
+        profile.coulomb_friction = (20.0 + 80.0) * half_encoder_step + other_friction + 1e-12;
+        EXPECT_NEAR(hysteresis_inequalities(bounds, profile)[1].right, weak_longest_period * hold, 1e-12);
+    }
+}
+
+TEST(DirectLines, OfVelocityAddTheDragOfTheLongerPeriod) {
+    ForceBounds bounds = different_bounds();
+    bounds.drag = 0.04;
+    for (const double delay : {0.0, 1.0}) {
+        const DeviceProfile profile = weak_device(delay);
+        expect_sides(velocity_inequalities(bounds, profile), 0,
+                     weak_longest_period * device_need(profile, {60.0, 10.0}) + 1.25 * 0.04,
+                     20.0 * half_encoder_step + 0.04 * 1e-4 / 0.5e-3 + 0.001);
+    }
+}
+
+TEST(DirectLines, OfAMemoryHaveTheSidesOfTheirFormulas) {
+    ForceBounds bounds = different_bounds();
+    bounds.memory = MemoryBounds{7.0, 3.0, 2000.0, 90.0};
+    const double bending = 3.0 + 1e-4 * 2000.0;
+    const double rising = 60.0 + 7.0 + bending;
+    const double steepest = 65.0 + 7.0 + bending;
+    expect_sides(memory_inequalities(bounds, weak_device(0.0)), 0, weak_longest_period * 0.5 * rising,
+                 (steepest + 7.0) * half_encoder_step + other_friction);
+    const double R = 90.0 * weak_longest_period;
+    for (const auto& [delay, n] : {std::pair{1.0, 2.0}, {2.0, 3.0}}) {
+        expect_sides(memory_inequalities(bounds, weak_device(delay)), 0,
+                     weak_longest_period * (0.5 * rising + n * steepest + (1.0 + 0.5 * n * n) * R),
+                     (steepest + 7.0 + 2.0 * n * (steepest + R)) * half_encoder_step + other_friction);
+    }
+}
+
+TEST(DirectLines, SamplesInADelayAreThoseThatJitterCanBringIntoIt) {
+    DeviceProfile profile = device(0.0);
+    profile.period_s = 0.5;
+    const auto most = [&](double delay, double jitter) {
+        profile.delay_s = 0.5 * delay;
+        profile.jitter_s = 0.5 * jitter;
+        return most_samples_in_delay(profile);
+    };
+    EXPECT_EQ(most(0.0, 3.0), 0.0);
+    EXPECT_EQ(most(1.0, 0.0), 1.0);
+    EXPECT_EQ(most(1.25, 0.0), 2.0);
+    EXPECT_EQ(most(0.5, 0.25), 1.0);
+    EXPECT_EQ(most(0.75, 0.25), 2.0);
+    EXPECT_EQ(most(1.5, 0.25), 2.0);
+    EXPECT_EQ(most(2.0, 1.0), 4.0);
+}
+
+TEST(DirectLines, WithoutEncoderStepsNeedNoFrictionAgainstThem) {
+    ForceBounds bounds = different_bounds();
+    bounds.steepest = std::numeric_limits<double>::infinity();
+    DeviceProfile profile = weak_device(0.0);
+    profile.encoder_step = 0.0;
+    EXPECT_DOUBLE_EQ(direct_inequalities(bounds, profile)[1].right, other_friction);
+    profile.encoder_step = 1e-300;
+    EXPECT_TRUE(std::isinf(direct_inequalities(bounds, profile)[1].right));
+}
+
+TEST(DirectLines, NameTheTermsThatTheyContain) {
+    ForceBounds bounds = different_bounds();
+    const auto formula = [&](const std::vector<Inequality>& lines, std::size_t k) {
+        return lines[k].formula;
+    };
+    EXPECT_EQ(formula(direct_inequalities(bounds, weak_device(0.0)), 0), "b >= T M / 2");
+    EXPECT_EQ(formula(direct_inequalities(bounds, weak_device(1.0)), 0), "b >= T B(M, s_, t_d)");
+    EXPECT_EQ(formula(direct_inequalities(bounds, weak_device(0.0)), 1),
+              "f_c >= L Delta / 2 + Delta_F / 2 + |mean c(f)|");
+    EXPECT_EQ(formula(direct_inequalities(bounds, weak_device(0.0), 2), 0), "b >= T B(M, s_, m)");
+    EXPECT_EQ(formula(direct_inequalities(bounds, weak_device(1.0), 2), 0), "b >= T B(M, s_, m, t_d)");
+    EXPECT_EQ(formula(hysteresis_inequalities(bounds, weak_device(0.0)), 1), "b >= T (M_h + e) / 2");
+    EXPECT_EQ(formula(hysteresis_inequalities(bounds, weak_device(1.0)), 1), "b >= T B(M_h, s_h, t_d)");
+    EXPECT_EQ(formula(hysteresis_inequalities(bounds, weak_device(0.0), 1), 1), "b >= T (M_h + L_h) / 2");
+    EXPECT_EQ(formula(hysteresis_inequalities(bounds, weak_device(1.0), 1), 1),
+              "b >= T (B(M_h, s_h, t_d) + L_h / 2)");
+    EXPECT_EQ(formula(velocity_inequalities(bounds, weak_device(0.0)), 0), "b >= T M / 2 + B_v T / period");
+    EXPECT_EQ(formula(velocity_inequalities(bounds, weak_device(1.0)), 0),
+              "b >= T B(M, s_, t_d) + B_v T / period");
+    EXPECT_EQ(direct_inequalities(bounds, weak_device(0.0))[0].source,
+              "Colgate and Schenkel 1997; docs/certificate.md");
+    EXPECT_EQ(direct_inequalities(bounds, weak_device(0.5))[0].source, "docs/certificate.md");
+    bounds.mean_force = 0.0;
+    EXPECT_EQ(formula(direct_inequalities(bounds, weak_device(0.0)), 1), "f_c >= L Delta / 2 + Delta_F / 2");
+    bounds.memory = MemoryBounds{};
+    EXPECT_EQ(formula(memory_inequalities(bounds, weak_device(0.0)), 0), "b >= T (M_g + K (P^2 + U P')) / 2");
+    EXPECT_EQ(formula(memory_inequalities(bounds, weak_device(1.0)), 0),
+              "b >= T (M / 2 + n L + (1 + n^2 / 2) R)");
+    EXPECT_EQ(formula(memory_inequalities(bounds, weak_device(0.0)), 1),
+              "f_c >= (L_g + K (2 P^2 + U P')) Delta / 2 + Delta_F / 2");
+    EXPECT_EQ(formula(memory_inequalities(bounds, weak_device(1.0)), 1),
+              "f_c >= (L_g + K (2 P^2 + U P') + 2 n (L + R)) Delta / 2 + Delta_F / 2");
+    EXPECT_EQ(memory_inequalities(bounds, weak_device(0.0))[0].name, "viscous damping against hold");
+    EXPECT_EQ(memory_inequalities(bounds, weak_device(1.0))[0].name,
+              "viscous damping against hold and delay");
+}
+
+TEST(DirectLines, FollowTheKindOfTheForce) {
+    const DeviceProfile profile = weak_device(0.0);
+    const auto count_and_first = [&](const ForceBounds& bounds, int predict) {
+        Scheme scheme = direct_scheme();
+        scheme.predict = predict;
+        const std::vector<Inequality> lines = inequalities(DirectStructure{}, bounds, scheme, profile);
+        return std::pair{lines.size(), lines[0].formula};
+    };
+    ForceBounds bounds = different_bounds();
+    EXPECT_EQ(count_and_first(bounds, 0), (std::pair<std::size_t, std::string>{2, "b >= T M / 2"}));
+    EXPECT_EQ(count_and_first(bounds, 2), (std::pair<std::size_t, std::string>{2, "b >= T B(M, s_, m)"}));
+    bounds.hysteresis = true;
+    EXPECT_EQ(count_and_first(bounds, 0), (std::pair<std::size_t, std::string>{3, "min h >= 0"}));
+    EXPECT_EQ(count_and_first(bounds, 2), (std::pair<std::size_t, std::string>{3, "min h >= 0"}));
+    bounds.hysteresis = false;
+    bounds.memory = MemoryBounds{};
+    EXPECT_EQ(count_and_first(bounds, 0).second, "b >= T (M_g + K (P^2 + U P')) / 2");
+    bounds.drag = 1e-9;
+    EXPECT_EQ(count_and_first(bounds, 0),
+              (std::pair<std::size_t, std::string>{2, "b >= T M / 2 + B_v T / period"}));
+    Scheme scheme = direct_scheme();
+    scheme.predict = 1;
+    const std::vector<Inequality> lines = inequalities(DirectStructure{}, bounds, scheme, profile);
+    ASSERT_EQ(lines.size(), 3U);
+    EXPECT_EQ(lines[2].id, "velocity-prediction");
+    EXPECT_EQ(lines[2].basis, Basis::None);
+    EXPECT_EQ(lines[2].left, 0.0);
+    EXPECT_EQ(lines[2].right, 1e-9);
 }
 
 /// Returns a soft spring with one slow branch of stiffness 4, for which the need of damping is known.

@@ -2,8 +2,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <limits>
+#include <numbers>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -71,6 +74,478 @@ TEST(HeldForce, StepEnergyIsTheLargestOverAllRatios) {
         }
         EXPECT_NEAR(detail::step_coefficient({M, s}, l, gamma), most, 1e-6);
     }
+}
+
+/// Returns the energy h of one sample divided by the square of the handle's step, for the ratio rho of position error
+/// and step: the integral of max(M (t + rho), -s (t + rho)) over t from 0 to 1, in 2000 steps.
+double energy_of_a_step(SlopeRange slopes, double rho) {
+    double sum = 0.0;
+    for (int k = 0; k < 2000; ++k) {
+        const double at = (k + 0.5) / 2000.0 + rho;
+        sum += std::max(slopes.rising * at, -slopes.falling * at) / 2000.0;
+    }
+    return sum;
+}
+
+TEST(HeldForce, StepEnergyIsTheLargestOfTheIntegratedSlopes) {
+    std::mt19937 random{12};
+    std::uniform_real_distribution<double> unit{0.0, 1.0};
+    for (int draw = 0; draw < 60; ++draw) {
+        const SlopeRange slopes{draw % 5 == 0 ? 0.0 : 2.0 * unit(random),
+                                draw % 7 == 0 ? 0.0 : 2.0 * unit(random)};
+        const double l = (2.0 * unit(random) - 1.0) * (slopes.rising + slopes.falling);
+        const double gamma = std::exp(5.0 * unit(random) - 2.0);
+        double most = -1e300;
+        for (double rho = -16.0; rho <= 16.0; rho += 0.02) {
+            most = std::max(most, energy_of_a_step(slopes, rho) - l * rho - gamma * rho * rho);
+        }
+        const double a = detail::step_coefficient(slopes, l, gamma);
+        EXPECT_GE(a, most - 1e-6) << draw;
+        EXPECT_LE(a, most + 1e-4 * (gamma + 4.0) + 1e-6) << draw;
+    }
+}
+
+TEST(HeldForce, ResponseIsTheSumOfTheDelays) {
+    const std::vector<double> taps{0.7, -1.3, 0.2, 2.0};
+    EXPECT_DOUBLE_EQ(detail::size_of(taps), 4.2);
+    for (const double theta : {0.0, 0.3, 1.0, 2.2, std::numbers::pi}) {
+        std::complex<double> sum;
+        for (std::size_t j = 0; j < taps.size(); ++j) {
+            sum += taps[j] * std::polar(1.0, static_cast<double>(j + 1) * theta);
+        }
+        EXPECT_NEAR(std::abs(detail::response(taps, theta) - sum), 0.0, 1e-14) << theta;
+    }
+}
+
+// The cosine of N theta with its maximum in the middle between two samples is the worst case of the proof: there the
+// bound is exact.
+TEST(HeldForce, ProvedMaximumIsExactForACosineBetweenTwoSamples) {
+    for (const int resolution : {2, 8, 64}) {
+        constexpr int degree = 3;
+        const std::size_t last = static_cast<std::size_t>(resolution) * degree;
+        const double half = 0.5 * std::numbers::pi / static_cast<double>(last);
+        const auto value = [&](std::size_t k) {
+            return 5.0 + 2.0 * std::cos(degree * (std::numbers::pi * static_cast<double>(k) /
+                                                      static_cast<double>(last) -
+                                                  (2.0 * half + half)));
+        };
+        const double bound = detail::maximum_of(detail::Maximum::Proved, resolution, last, 2.0, value);
+        EXPECT_GE(bound, 7.0);
+        EXPECT_LE(bound, 7.0 + 5e-12);
+    }
+}
+
+TEST(HeldForce, LikelyMaximumIsThatOfAParabola) {
+    for (const double peak : {3.0, 3.3, 3.49, 3.51, 4.2}) {
+        const auto parabola = [&](std::size_t k) {
+            const double off = static_cast<double>(k) - peak;
+            return 2.0 - 0.25 * off * off;
+        };
+        EXPECT_NEAR(detail::maximum_of(detail::Maximum::Likely, 8, 10, 100.0, parabola), 2.0, 1e-13) << peak;
+    }
+    const auto rises = [](std::size_t k) { return static_cast<double>(k * k); };
+    EXPECT_EQ(detail::maximum_of(detail::Maximum::Likely, 8, 10, 100.0, rises), 100.0);
+    const auto falls = [](std::size_t k) { return -static_cast<double>(k * k); };
+    EXPECT_EQ(detail::maximum_of(detail::Maximum::Likely, 8, 10, 100.0, falls), 0.0);
+    EXPECT_EQ(detail::maximum_of(detail::Maximum::Likely, 8, 10, 100.0, [](std::size_t) { return 3.0; }),
+              3.0);
+    // The last sample counts, and the maximum may be at the second or the last but one sample.
+    const auto second = [](std::size_t k) { return k == 1 ? 1.0 : 0.0; };
+    EXPECT_EQ(detail::maximum_of(detail::Maximum::Likely, 8, 4, 100.0, second), 1.0);
+    const auto last_but_one = [](std::size_t k) { return k == 3 ? 1.0 : k == 4 ? 0.5 : 0.0; };
+    EXPECT_NEAR(detail::maximum_of(detail::Maximum::Likely, 8, 4, 100.0, last_but_one),
+                1.0 + 0.125 * 0.25 / 1.5, 1e-15);
+}
+
+/// Returns the largest value over `count` + 1 equally spaced frequencies from 0 to pi.
+template <class Value>
+double most_over_frequencies(int count, Value value) {
+    double most = -std::numeric_limits<double>::infinity();
+    for (int k = 0; k <= count; ++k) {
+        most = std::max(most, value(std::numbers::pi * k / count));
+    }
+    return most;
+}
+
+/// Returns the frequency response of a filter of the handle's steps.
+std::complex<double> filter_response(const std::vector<double>& taps, double theta) {
+    std::complex<double> sum;
+    for (std::size_t j = 0; j < taps.size(); ++j) {
+        sum += taps[j] * std::polar(1.0, -static_cast<double>(j + 1) * theta);
+    }
+    return sum;
+}
+
+TEST(HeldForce, GainOfAFilterIsItsSampledMaximumPlusTheMarginOfTheProof) {
+    for (const std::vector<double>& taps :
+         {std::vector<double>{}, {0.5}, {1.0, 1.0, -0.4}, {-0.3, 0.1, 0.7, -0.2}}) {
+        for (const int resolution : {4, 32}) {
+            const int last = resolution * std::max(1, static_cast<int>(taps.size()));
+            const detail::FilterGain gain{taps, detail::Maximum::Proved, resolution};
+            EXPECT_EQ(gain.size(), detail::size_of(taps));
+            for (const auto& [l, gamma] : {std::pair{0.7, 0.3}, {-0.4, 1.5}, {0.0, 1.0}, {-2.0, 0.1}}) {
+                const double sampled = most_over_frequencies(last, [&](double theta) {
+                    const std::complex<double> Q = filter_response(taps, theta);
+                    return l * Q.real() + gamma * std::norm(Q);
+                });
+                const double size = detail::size_of(taps);
+                const double margin = (1.0 - std::cos(0.5 * std::numbers::pi / resolution)) *
+                                      (std::abs(l) * size + gamma * size * size);
+                EXPECT_NEAR(gain.most(l, gamma), sampled + margin, 1e-10);
+            }
+        }
+    }
+}
+
+TEST(HeldForce, MinimumOfAConvexFunctionIsFoundAnywhere) {
+    for (const double at : {-1.0, -0.9999, -0.3, 0.0, 0.4142, 1.999, 2.0}) {
+        int calls = 0;
+        const detail::Minimum found = detail::minimum_between(-1.0, 2.0, [&](double x) {
+            ++calls;
+            return 3.0 + std::abs(x - at);
+        });
+        EXPECT_NEAR(found.at, at, 2e-8) << at;
+        EXPECT_DOUBLE_EQ(found.value, 3.0 + std::abs(found.at - at)) << at;
+        EXPECT_EQ(calls, 42);
+    }
+}
+
+/// Returns the minimum of a convex function of one number between two numbers, by thirds.
+template <class Function>
+double least_between(double low, double high, int steps, Function function) {
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < steps; ++k) {
+        const double left = low + (high - low) / 3.0;
+        const double right = high - (high - low) / 3.0;
+        const double at_left = function(left);
+        const double at_right = function(right);
+        least = std::min({least, at_left, at_right});
+        (at_left < at_right ? high : low) = at_left < at_right ? right : left;
+    }
+    return least;
+}
+
+/// Returns the minimum over l and gamma of `cost`, by a search that shares no code with the header.
+template <class Cost>
+double least_over_factors(SlopeRange slopes, Cost cost, int steps = 36) {
+    const double reach = slopes.rising + slopes.falling;
+    return least_between(-reach, reach, steps, [&](double l) {
+        return least_between(-9.0, 3.0, steps,
+                             [&](double log_gamma) { return cost(l, reach * std::exp(log_gamma)); });
+    });
+}
+
+TEST(HeldForce, FilteredNeedIsTheMinimumOverBothFactors) {
+    for (const SlopeRange slopes : {SlopeRange{1.0, 1.0}, {0.3, 1.0}, {0.0, 2.0}, {1.0, 0.2}}) {
+        for (const std::vector<double>& taps :
+             {std::vector<double>{1.0}, {1.0, 1.0}, {-1.0 / 3.0, -1.0 / 6.0}, {1.0, -0.5}}) {
+            const double size = detail::size_of(taps);
+            const double least = least_over_factors(slopes, [&](double l, double gamma) {
+                const double sum = most_over_frequencies(96, [&](double theta) {
+                    const std::complex<double> Q = filter_response(taps, theta);
+                    return l * Q.real() + gamma * std::norm(Q);
+                });
+                return detail::step_coefficient(slopes, l, gamma) + sum;
+            });
+            const double expected = std::min(least, held_need(size, slopes));
+            EXPECT_NEAR(filtered_need(taps, slopes), expected, 3e-4 * expected) << slopes.falling;
+        }
+    }
+}
+
+TEST(HeldForce, NeedIsProportionalToTheSlopes) {
+    const std::vector<double> taps{1.0, -0.5};
+    const auto needs = [&](double size) {
+        const SlopeRange slopes{0.4 * size, size};
+        return std::array{filtered_need(taps, slopes),
+                          filtered_need(taps, 0.3, slopes, 0.7),
+                          delayed_need(1, 0.4, slopes),
+                          detail::roughly_filtered_need(taps, 1.3, 0.1, slopes),
+                          detail::jittered_need(1.2, 1.0, 0.1, slopes),
+                          held_need(1.4, slopes)};
+    };
+    const auto unit = needs(1.0);
+    for (const double size : {1e-6, 1e6}) {
+        const auto scaled = needs(size);
+        for (std::size_t k = 0; k < unit.size(); ++k) {
+            EXPECT_NEAR(scaled[k] / size, unit[k], 1e-9 * unit[k]) << size << " " << k;
+        }
+    }
+}
+
+TEST(HeldForce, NeedWithoutASlopeOrAFilterIsTheClosedForm) {
+    const std::vector<double> taps{1.0, 0.5};
+    const double infinite = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(filtered_need(taps, {0.0, 0.0}), 0.0);
+    EXPECT_EQ(filtered_need(taps, {infinite, 0.0}), infinite);
+    EXPECT_TRUE(std::isinf(filtered_need(taps, {0.0, infinite})));
+    EXPECT_EQ(filtered_need({}, {3.0, 1.0}), 1.5);
+    EXPECT_EQ(filtered_need(std::vector<double>{0.0, 0.0}, {3.0, 1.0}), 1.5);
+    EXPECT_EQ(filtered_need(taps, 0.5, {0.0, 0.0}, 0.5), 0.0);
+    EXPECT_EQ(filtered_need(taps, 0.5, {infinite, 0.0}, 0.5), infinite);
+    EXPECT_EQ(filtered_need(taps, 0.0, {1.0, 0.5}, 1.0), filtered_need(taps, {1.0, 0.5}));
+    EXPECT_EQ(delayed_need(1, 0.5, {0.0, 0.0}), 0.0);
+    EXPECT_EQ(delayed_need(1, 0.5, {infinite, 0.0}), infinite);
+    EXPECT_EQ((SlopeRange{2.0, 3.0}).steepest(), 3.0);
+    EXPECT_EQ((SlopeRange{4.0, 3.0}).steepest(), 4.0);
+}
+
+TEST(HeldForce, ClosedFormHasTheValuesOfItsThreeBranches) {
+    EXPECT_DOUBLE_EQ(held_need(2.0, {3.0, 4.5}), 7.5);   // Lambda s = (1 + Lambda) M
+    EXPECT_DOUBLE_EQ(held_need(3.0, {2.0, 3.0}), 7.5);   // (Lambda - 1) s = Lambda M, where both others agree
+    EXPECT_DOUBLE_EQ(held_need(3.0, {1.0, 4.0}), 10.0);  // s (Lambda - 1/2)
+    EXPECT_DOUBLE_EQ(held_need(1.0, {1.0, 3.0}), 1.75);  // (M + M^2 / (s - M) + Lambda^2 (s - M)) / 2
+    EXPECT_DOUBLE_EQ(held_need(0.5, {1.0, 5.0}), 0.5 * (1.0 + 0.25 + 1.0));
+    EXPECT_EQ(held_need(0.0, {2.0, 7.0}), 1.0);
+    EXPECT_EQ(held_need(5.0, {0.0, 0.0}), 0.0);
+}
+
+/// Returns the largest eigenvalue of a Hermitian form of two complex numbers against |u|^2 / first + |v|^2 / second.
+/// The matrix is computed from values of the form.
+template <class Form>
+double largest_eigenvalue(double first, double second, Form form) {
+    const double uu = form(1.0, 0.0) * first;
+    const double vv = form(0.0, 1.0) * second;
+    const double real = 0.5 * (form(1.0, 1.0) - form(1.0, 0.0) - form(0.0, 1.0));
+    const double imaginary =
+        0.5 * (form(1.0, std::complex<double>{0.0, 1.0}) - form(1.0, 0.0) - form(0.0, 1.0));
+    const double across = first * second * (real * real + imaginary * imaginary);
+    return 0.5 * (uu + vv) + std::sqrt(0.25 * (uu - vv) * (uu - vv) + across);
+}
+
+// The handle moves by u in the first part of a sample, tau of it, and by v in the rest; d = u + v. The filtered motion is
+// D = (z^-1 + ... + z^-n) d + z^-(n+1) u. The energy is at most a |d|^2 + l Re(d* D) + gamma |D|^2.
+TEST(HeldForce, NeedOfASplitSampleIsTheMinimumOverBothFactors) {
+    for (const SlopeRange slopes : {SlopeRange{1.0, 1.0}, {0.2, 1.5}, {0.0, 1.0}}) {
+        for (const auto& [whole, tau] : {std::pair{0, 0.25}, {1, 0.4}, {2, 0.7}}) {
+            const double least = least_over_factors(
+                slopes,
+                [&, whole = whole, tau = tau](double l, double gamma) {
+                    const double a = detail::step_coefficient(slopes, l, gamma);
+                    return most_over_frequencies(72, [&](double theta) {
+                        std::complex<double> late;
+                        for (int j = 1; j <= whole; ++j) {
+                            late += std::polar(1.0, j * theta);
+                        }
+                        const std::complex<double> one_more = std::polar(1.0, (whole + 1) * theta);
+                        return largest_eigenvalue(
+                            tau, 1.0 - tau, [&](std::complex<double> u, std::complex<double> v) {
+                                const std::complex<double> d = u + v;
+                                const std::complex<double> D = late * d + one_more * u;
+                                return a * std::norm(d) + l * (std::conj(d) * D).real() +
+                                       gamma * std::norm(D);
+                            });
+                    });
+                },
+                30);
+            const double lag = std::sqrt(whole * (whole + 2.0 * tau) + tau);
+            const double expected = std::min(least, held_need(lag, slopes));
+            EXPECT_NEAR(detail::split_sample_need(whole, tau, slopes), expected, 2e-3 * expected)
+                << whole << " " << slopes.falling;
+            EXPECT_GE(detail::split_sample_need(whole, tau, slopes), expected * (1.0 - 2e-5));
+        }
+    }
+    // The bound R(Lambda) is the smaller one for a spring that is late by almost no time.
+    EXPECT_LE(detail::split_sample_need(3, 0.5, {1.0, 0.0}), held_need(std::sqrt(12.5), {1.0, 0.0}));
+}
+
+TEST(HeldForce, ALaterFallingForceNeedsAtLeastTheDampingOfAnEarlierOne) {
+    // Just after one whole sample, the need of exactly n + tau samples of a falling force is below the need of n.
+    const SlopeRange falling{1.0, 3.0};
+    bool smaller = false;
+    for (const double tau : {0.01, 0.03, 0.1, 0.2}) {
+        const double exact = detail::split_sample_need(1, tau, falling);
+        const double earlier = delayed_need(1, 0.0, falling);
+        smaller = smaller || exact < earlier * (1.0 - 1e-6);
+        EXPECT_EQ(delayed_need(1, tau, falling), std::max(exact, earlier));
+    }
+    RecordProperty("smaller", smaller ? 1 : 0);
+}
+
+/// Returns the energy of both parts of a sample, as a form of the handle's motions u and v. The previous force acts in
+/// the first part; its position error is q' = (1 + Q) z^-1 (u + v). The new force acts in the second part, at q + u.
+double split_form(const std::vector<double>& taps, double theta, SlopeRange slopes, double l,
+                  double gamma_first, double gamma_second, std::complex<double> u, std::complex<double> v) {
+    const std::complex<double> q = filter_response(taps, theta) * (u + v);
+    const std::complex<double> before = std::polar(1.0, -theta) * (u + v + q);
+    const std::complex<double> now = q + u;
+    return detail::step_coefficient(slopes, l, gamma_first) * std::norm(u) +
+           l * (std::conj(u) * before).real() + gamma_first * std::norm(before) +
+           detail::step_coefficient(slopes, l, gamma_second) * std::norm(v) +
+           l * (std::conj(v) * now).real() + gamma_second * std::norm(now);
+}
+
+TEST(HeldForce, GainOfASplitFilterIsTheLargestEigenvalueOfBothParts) {
+    const SlopeRange slopes{1.0, 0.7};
+    for (const std::vector<double>& taps : {std::vector<double>{}, {-0.5}, {1.0, -0.3}}) {
+        const int resolution = 16;
+        const int last = resolution * (static_cast<int>(taps.size()) + 1);
+        const detail::SplitGain gain{taps, detail::Maximum::Proved, resolution};
+        EXPECT_EQ(gain.size(), 1.0 + detail::size_of(taps));
+        for (const auto& [l, first, second] :
+             {std::array{0.4, 0.3, 0.6}, std::array{-0.7, 1.0, 0.2}, std::array{0.0, 0.5, 0.5}}) {
+            for (const auto& [tau, rest] : {std::pair{0.3, 0.7}, {0.8, 0.25}}) {
+                const double sampled = most_over_frequencies(last, [&, l = l, first = first, second = second,
+                                                                    tau = tau, rest = rest](double theta) {
+                    return largest_eigenvalue(tau, rest, [&](std::complex<double> u, std::complex<double> v) {
+                        return split_form(taps, theta, slopes, l, first, second, u, v);
+                    });
+                });
+                const double size = 1.0 + detail::size_of(taps);
+                const double margin = (1.0 - std::cos(0.5 * std::numbers::pi / resolution)) *
+                                      (2.0 * std::abs(l) + (first + second) * size) * size;
+                EXPECT_NEAR(gain.most(tau, rest, slopes, l, first, second), sampled + margin, 1e-10);
+            }
+        }
+    }
+}
+
+TEST(HeldForce, NeedOfASplitFilterIsTheSmallerOfTwoMinima) {
+    for (const SlopeRange slopes : {SlopeRange{1.0, 1.0}, {0.2, 1.0}}) {
+        for (const double tau : {0.2, 0.6}) {
+            const std::vector<double> taps{-0.5};
+            const auto least = [&](double first, double second) {
+                return least_over_factors(
+                    slopes,
+                    [&](double l, double gamma) {
+                        return most_over_frequencies(48, [&](double theta) {
+                            return largest_eigenvalue(
+                                tau, 1.0 - tau, [&](std::complex<double> u, std::complex<double> v) {
+                                    return split_form(taps, theta, slopes, l, first * gamma, second * gamma,
+                                                      u, v);
+                                });
+                        });
+                    },
+                    26);
+            };
+            const double expected =
+                std::min(least(tau, 1.0 - tau), least(std::sqrt(tau), std::sqrt(1.0 - tau)));
+            EXPECT_NEAR(filtered_need(taps, tau, slopes, 1.0 - tau), expected, 2e-3 * expected) << tau;
+        }
+    }
+}
+
+TEST(HeldForce, UnknownMotionAddsItsShareToTheFilter) {
+    for (const SlopeRange slopes : {SlopeRange{1.0, 1.0}, {0.1, 1.0}, {0.0, 1.0}}) {
+        for (const double nu : {0.01, 0.3}) {
+            const std::vector<double> taps{1.0, 1.0};
+            const double gain = 1.4;
+            const double off = gain * std::sqrt(nu);
+            const double eta = off / 2.0;
+            const double expected = least_over_factors(slopes, [&](double l, double gamma) {
+                const double sum = most_over_frequencies(96, [&](double theta) {
+                    const std::complex<double> Q = filter_response(taps, theta);
+                    return l * Q.real() + gamma * (1.0 + eta) * std::norm(Q);
+                });
+                return detail::step_coefficient(slopes, l, gamma) + sum +
+                       gamma * (1.0 + 1.0 / eta) * gain * gain * nu + std::abs(l) * off;
+            });
+            EXPECT_NEAR(detail::roughly_filtered_need(taps, gain, nu, slopes), expected, 1e-3 * expected)
+                << nu;
+        }
+    }
+}
+
+/// Returns the largest number of intervals that contain one instant. Interval k lies between the time k + `whole` of
+/// a sample and the time k + `delay` at which a force begins to act; each of both is late by 0 to `jitter`.
+int most_intervals_at_once(double delay, double jitter, int whole) {
+    int most = 0;
+    for (double at = 0.005; at < 1.0; at += 0.01) {
+        int count = 0;
+        for (int k = -30; k <= 30; ++k) {
+            const double lower = std::min(k + whole + 0.0, k + delay);
+            const double upper = std::max(k + whole + jitter, k + delay + jitter);
+            count += lower < at && at < upper ? 1 : 0;
+        }
+        most = std::max(most, count);
+    }
+    return most;
+}
+
+TEST(HeldForce, UncertainTimeCountsTheIntervalsThatOverlap) {
+    // Off by 0.25 of the period with a jitter of 0.125: one interval of 0.375 in each period of 1.125.
+    EXPECT_DOUBLE_EQ(detail::uncertain_time(1.25, 1.0, 0.125, 1), 0.375 / 1.125);
+    EXPECT_DOUBLE_EQ(detail::uncertain_time(0.75, 1.0, 0.125, 1), 0.375 / 1.125);
+    // Off by 0.125, jitter 0.25: the span is 0.125 + 0.25 + 0.125 = 0.5 of a shortest distance of 0.75.
+    EXPECT_DOUBLE_EQ(detail::uncertain_time(2.125, 1.0, 0.25, 2), 0.375 / 1.25);
+    // Off by 0.25, jitter 0.5: a span of 1 needs two intervals at a shortest distance of 0.5.
+    EXPECT_DOUBLE_EQ(detail::uncertain_time(1.25, 1.0, 0.5, 1), 2.0 * 0.75 / 1.5);
+    EXPECT_DOUBLE_EQ(detail::uncertain_time(2.5, 2.0, 1.0, 1), 2.0 * 1.5 / 3.0);
+    for (const double delay : {0.9, 1.2, 1.4, 2.1, 2.45}) {
+        for (const double jitter : {0.05, 0.2, 0.4, 0.6}) {
+            const int whole = static_cast<int>(std::lround(delay));
+            const double one = std::abs(delay - whole) + jitter;
+            EXPECT_GE(detail::uncertain_time(delay, 1.0, jitter, whole) * (1.0 + jitter),
+                      one * most_intervals_at_once(delay, jitter, whole) * (1.0 - 1e-12))
+                << delay << " " << jitter;
+        }
+    }
+}
+
+/// Returns the time that all delays share with one delay, the largest over the times of the samples. Each sample is
+/// late by 0 or by `jitter`; a delay begins at its sample.
+double shared_time(double delay, double jitter) {
+    double most = 0.0;
+    for (const double own : {0.0, jitter}) {
+        double sum = delay;
+        for (int k = -30; k <= 30; ++k) {
+            double shared = 0.0;
+            for (const double late : {0.0, jitter}) {
+                shared = std::max(shared, delay - std::abs(k + late - own));
+            }
+            // A delay inside the other one cannot share more than its own length.
+            sum += k == 0 ? 0.0 : std::min(delay, shared);
+        }
+        most = std::max(most, sum);
+    }
+    return most;
+}
+
+TEST(HeldForce, JitterNeedsTheSmallerOfTheSharedTimeAndTheNearestSample) {
+    for (const double delay : {0.7, 1.0, 1.3, 1.75, 2.0, 2.6, 3.1}) {
+        for (const double jitter : {0.05, 0.3, 0.45}) {
+            for (const SlopeRange slopes : {SlopeRange{1.0, 0.0}, {0.0, 1.0}, {0.3, 1.0}}) {
+                if (delay <= 1.0 - jitter) {
+                    continue;
+                }
+                const double T = 1.0 + jitter;
+                const double shared = held_need(std::sqrt(shared_time(delay, jitter) / T), slopes);
+                const int whole = static_cast<int>(std::lround(delay));
+                const double nearest = detail::roughly_filtered_need(
+                    std::vector<double>(static_cast<std::size_t>(whole), 1.0), 1.0,
+                    detail::uncertain_time(delay, 1.0, jitter, whole), slopes);
+                EXPECT_NEAR(detail::jittered_need(0.25 * delay, 0.25, 0.25 * jitter, slopes),
+                            std::min(shared, nearest), 1e-9)
+                    << delay << " " << jitter << " " << slopes.rising;
+            }
+        }
+    }
+}
+
+TEST(HeldForce, JitterChangesTheFormulaWhereAForceCanMeetTheNextSample) {
+    const SlopeRange slopes{1.0, 0.5};
+    EXPECT_EQ(detail::jittered_need(0.75, 1.0, 0.25, slopes), delayed_need(0, 0.6, slopes));
+    // One step later the force can act after the next sample, so the time that delays share decides.
+    const double later = std::nextafter(0.75, 1.0);
+    EXPECT_NEAR(detail::jittered_need(later, 1.0, 0.25, slopes), held_need(std::sqrt(0.75 / 1.25), slopes),
+                1e-9);
+    // With a jitter of a period or more, or without a nearest sample, only the shared time gives a bound.
+    EXPECT_NEAR(detail::jittered_need(1.0, 1.0, 1.0, slopes), held_need(std::sqrt(2.0 / 2.0), slopes), 1e-12);
+    EXPECT_NEAR(detail::jittered_need(0.4, 1.0, 0.8, slopes), held_need(std::sqrt(0.6 / 1.8), slopes), 1e-12);
+    EXPECT_EQ(detail::jittered_need(1.0, 1.0, 0.5, {0.0, 0.0}), 0.0);
+    EXPECT_TRUE(
+        std::isinf(detail::jittered_need(1.0, 1.0, 0.5, {std::numeric_limits<double>::infinity(), 0.0})));
+}
+
+TEST(HeldForce, JitterWithoutDelayNeedsOnlyTheHold) {
+    DeviceProfile device;
+    device.jitter_s = 1.5 * device.period_s;
+    EXPECT_EQ(device_need(device, {1.0, 4.0}), 0.5);
+    device.delay_s = 1.25 * device.period_s;
+    device.jitter_s = 0.0;
+    EXPECT_EQ(device_need(device, {1.0, 4.0}), delayed_need(1, 0.25, {1.0, 4.0}));
+    device.jitter_s = 0.5 * device.period_s;
+    EXPECT_EQ(device_need(device, {1.0, 4.0}), detail::jittered_need(1.25e-3, 1e-3, 0.5e-3, {1.0, 4.0}));
 }
 
 TEST(HeldForce, FallingSlopesNeedLessThanRisingOnesWithDelay) {

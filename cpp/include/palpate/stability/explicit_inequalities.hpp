@@ -40,8 +40,8 @@ namespace palpate {
 }
 
 /// Returns the largest device damping that the linearised explicit structure needs over all frequencies and all slopes
-/// in `slopes` [N*s/m]. It is the largest of many samples, refined by smaller steps around the largest sample, so the
-/// error of the result has no proved bound.
+/// in `slopes` [N*s/m]. It is the largest of many samples, refined by smaller steps around the largest sample of each
+/// slope and around the largest of all, so the error of the result has no proved bound.
 [[nodiscard]] inline double explicit_need(Interval slopes, Inertia inertia, VirtualCoupling coupling,
                                           double period_s, int delay_samples) noexcept {
     constexpr int frequencies = 512;
@@ -49,6 +49,8 @@ namespace palpate {
     // Number of refinements around the largest needed damping; each one halves the distance between the tried
     // frequencies, and between the tried slopes
     constexpr int halvings = 20;
+    // Number of steps of each size, because the largest need can depend on frequency and slope together
+    constexpr int repeats = 4;
     constexpr double lowest = 1e-4;  // lowest tried frequency, as angular frequency times the period T [rad]
     const double log_range = std::log(std::numbers::pi / lowest);
     const auto need = [&](double along, double slope) noexcept {
@@ -61,20 +63,39 @@ namespace palpate {
     const auto try_sample = [&](double along, double slope) noexcept {
         along = std::clamp(along, 0.0, 1.0);
         slope = std::clamp(slope, slopes.lower, slopes.upper);
-        if (const double value = need(along, slope); value > best) {
+        const double value = need(along, slope);
+        if (value > best) {
             best = value;
             best_along = along;
             best_slope = slope;
         }
+        return value;
     };
     const double across = slopes.upper - slopes.lower;
     for (int i = 0; i <= slope_steps; ++i) {
+        // The largest need at this slope is refined first, because a narrow maximum between two frequencies can be the
+        // largest of all
+        const double slope = slopes.lower + across * i / slope_steps;
+        double largest = -std::numeric_limits<double>::infinity();
+        double at = 0.0;
+        const auto try_frequency = [&](double along) noexcept {
+            if (const double value = try_sample(along, slope); value > largest) {
+                largest = value;
+                at = along;
+            }
+        };
         for (int k = 0; k <= frequencies; ++k) {
-            try_sample(static_cast<double>(k) / frequencies, slopes.lower + across * i / slope_steps);
+            try_frequency(static_cast<double>(k) / frequencies);
+        }
+        for (int halving = 0; halving < halvings; ++halving) {
+            const double step = std::ldexp(1.0, -1 - halving) / frequencies;
+            const double middle = at;
+            try_frequency(middle - step);
+            try_frequency(middle + step);
         }
     }
-    for (int halving = 0; halving < halvings; ++halving) {
-        const double share = std::ldexp(1.0, -1 - halving);
+    for (int step = 0; step < repeats * halvings; ++step) {
+        const double share = std::ldexp(1.0, -1 - step / repeats);
         const double along = best_along;
         const double slope = best_slope;
         for (const double i : {-1.0, 0.0, 1.0}) {
