@@ -161,7 +161,7 @@ void throughput_batch(benchmark::State& state) {
     const std::vector<double> motion = palpate::bench::hand_motion(4000);
     std::vector<double> force(motion.size());
     for (auto _ : state) {
-        network.curve().at(palpate::HatQuantity::Value, motion, force);
+        network.curve().at(palpate::HatQuantity::Force, motion, force);
         benchmark::DoNotOptimize(force.data());
         benchmark::ClobberMemory();
     }

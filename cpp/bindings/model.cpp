@@ -79,7 +79,7 @@ void require_inputs(const ForceModel& model, bool direction, bool play) {
 }
 
 constexpr HatQuantity quantity_of(Member member) {
-    return member == &EnvironmentSample::force   ? HatQuantity::Value
+    return member == &EnvironmentSample::force   ? HatQuantity::Force
            : member == &EnvironmentSample::slope ? HatQuantity::Slope
                                                  : HatQuantity::Integral;
 }
@@ -291,7 +291,7 @@ py::array_t<double> predict(const ForceModel& model, const ArrayLike& rows) {
     const py::gil_scoped_release unlocked;
     in_parts(static_cast<std::size_t>(x.shape(0)), [&](std::size_t first, std::size_t count) {
         if (const WaveletNetwork* network = model.network()) {
-            network->curve().at(HatQuantity::Value, {in + first, count}, {out + first, count});
+            network->curve().at(HatQuantity::Force, {in + first, count}, {out + first, count});
             return;
         }
         for (std::size_t k = first; k < first + count; ++k) {

@@ -91,7 +91,7 @@ TEST(HatSum, BatchesAgreeWithSinglePositions) {
             for (std::size_t j = 0; j < x.size(); ++j) {
                 x[j] = position(random, static_cast<int>(j));
             }
-            for (const auto quantity : {HatQuantity::Value, HatQuantity::Slope, HatQuantity::Integral}) {
+            for (const auto quantity : {HatQuantity::Force, HatQuantity::Slope, HatQuantity::Integral}) {
                 // The array of results has one extra element, which detects writes past the end of the results.
                 std::vector<double> sums(x.size() + 1, 1.0);
                 hats.add(quantity, x, std::span{sums}.first(x.size()));
@@ -99,11 +99,11 @@ TEST(HatSum, BatchesAgreeWithSinglePositions) {
                 for (std::size_t j = 0; j < x.size(); ++j) {
                     Curve one;
                     hats.add(x[j], one);
-                    const double expected = quantity == HatQuantity::Value   ? one.value
+                    const double expected = quantity == HatQuantity::Force   ? one.value
                                             : quantity == HatQuantity::Slope ? one.slope
                                                                              : one.integral;
                     const Curve absolute = plain(network, x[j]).absolute;
-                    const double size = quantity == HatQuantity::Value   ? absolute.value
+                    const double size = quantity == HatQuantity::Force   ? absolute.value
                                         : quantity == HatQuantity::Slope ? absolute.slope
                                                                          : absolute.integral;
                     ASSERT_NEAR(sums[j] - 1.0, expected, 1e-13 * size + 1e-15 * (2.0 + std::abs(expected)));
@@ -198,7 +198,7 @@ TEST(NetworkCurve, BatchesAcrossTheEdgesAgreeWithSinglePositions) {
                 }
             }
         };
-        check(HatQuantity::Value, &Curve::value);
+        check(HatQuantity::Force, &Curve::value);
         check(HatQuantity::Slope, &Curve::slope);
         check(HatQuantity::Integral, &Curve::integral);
     }

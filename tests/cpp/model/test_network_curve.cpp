@@ -156,7 +156,7 @@ TEST(NetworkCurve, BatchesReplaceEveryPositionOutsideTheDomain) {
             const std::array<double, 1> x{place};
             std::array<double, 1> result{};
             const Curve expected = curve.at(place);
-            curve.at(HatQuantity::Value, x, result);
+            curve.at(HatQuantity::Force, x, result);
             EXPECT_NEAR(result[0], expected.value, 1e-12 * std::abs(expected.value) + 1e-13);
             curve.at(HatQuantity::Slope, x, result);
             EXPECT_NEAR(result[0], expected.slope, 1e-11 * std::abs(expected.slope) + 1e-12);

@@ -225,5 +225,174 @@ TEST(EnergyConsistent, NanGivesZeroForceAndTheNextStepContinues) {
     test::expect_nan_is_refused(EnergyConsistent{Hardening{}, inertia, coupling, 1e-3});
 }
 
+/// Object whose force is a rising polynomial of degree five.
+struct Quintic {
+    using State = Stateless;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        const double x2 = x * x;
+        return {8.0 * x + 3.0 * x2 + 2.0 * x * x2 + x2 * x2 * x, 8.0 + 6.0 * x + 6.0 * x2 + 5.0 * x2 * x2,
+                4.0 * x2 + x * x2 + 0.5 * x2 * x2 + x2 * x2 * x2 / 6.0, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+// Three Gauss points integrate polynomials up to degree five exactly, so both ways to compute the mean force agree.
+TEST(EnergyConsistent, MeanForceFromGaussPointsIsThatFromTheEnergy) {
+    test::Random random{17};
+    for (const bool switched : {false, true}) {
+        constexpr double period = 0.1;
+        constexpr double always = 1e9;
+        EnergyConsistent by_points{Quintic{}, {0.5, 0.3}, {20.0, 0.02}, period, always, switched};
+        EnergyConsistent by_energy{Quintic{}, {0.5, 0.3}, {20.0, 0.02}, period, 0.0, switched};
+        double farthest = 0.0;
+        for (int k = 0; k < 300; ++k) {
+            const double device = test::uniform(random, -1.5, 1.5);
+            const Rendered points = by_points.step(device);
+            const Rendered energy = by_energy.step(device);
+            ASSERT_NEAR(points.environment_position, energy.environment_position, 1e-7) << k;
+            ASSERT_NEAR(points.force, energy.force, 1e-5) << k;
+            farthest = std::max(farthest, std::abs(energy.environment_position));
+        }
+        EXPECT_GT(farthest, 0.3);
+    }
+}
+
+/// Environment that counts the evaluations of another environment.
+template <class E>
+struct Counted {
+    using State = typename E::State;
+    E environment;
+    int* count;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
+        ++*count;
+        return environment.at(x, state);
+    }
+    void advance(double x, State& state) const noexcept { environment.advance(x, state); }
+    [[nodiscard]] State start(double x) const noexcept { return environment.start(x); }
+};
+
+/// Moves a handle over a wide range and compares the stated evaluations with the counted ones; returns their mean. A
+/// structure does not state the `hidden` points from which it computes one mean force of a short step.
+template <class S>
+double mean_evaluations(S structure, const int& count, int hidden = 0) {
+    test::Random random{23};
+    structure.reset(0.0);
+    int all = 0;
+    constexpr int ticks = 400;
+    for (int k = 0; k < ticks; ++k) {
+        const int before = count;
+        const Rendered rendered = structure.step(test::uniform(random, -0.5, 0.5));
+        const int missing = count - before - rendered.evaluations;
+        EXPECT_GE(missing, 0) << k;
+        EXPECT_EQ(hidden > 0 ? missing % hidden : missing, 0) << k << ": " << missing;
+        all += rendered.evaluations;
+    }
+    return static_cast<double>(all) / ticks;
+}
+
+// The largest means are 5 % above the means at the time of writing. Newton's method needs more with a wrong slope.
+TEST(EnergyConsistent, StatesItsEvaluationsAndNeedsFew) {
+    constexpr double period = 1e-2;
+    constexpr double none = std::numeric_limits<double>::infinity();
+    int count = 0;
+    const Counted<Hardening> object{{}, &count};
+    const auto mean = [&](bool switched, double limit) {
+        return mean_evaluations(EnergyConsistent{object, inertia, coupling, period, 0.0, switched, limit},
+                                count, 3);
+    };
+    EXPECT_LT(mean(false, none), 5.12);
+    EXPECT_LT(mean(true, none), 10.5);
+    EXPECT_LT(mean(false, 3.0), 9.14);
+    EXPECT_LT(mean(true, 3.0), 14.6);
+    const auto implicit = [&](double limit) {
+        return mean_evaluations(Implicit<Counted<Hardening>>{object, inertia, coupling, period, {}, limit},
+                                count);
+    };
+    EXPECT_LT(implicit(none), 4.23);
+    EXPECT_LT(implicit(3.0), 7.83);
+    EXPECT_LT(mean_evaluations(Massless{object, coupling, period}, count), 5.62);
+    EXPECT_EQ(mean_evaluations(Explicit{object, inertia, coupling, 1e-3}, count), 1.0);
+}
+
+// A step that is shorter than `shortest` uses the slope f' / 2 of the mean force.
+TEST(EnergyConsistent, ShortStepsNeedFewEvaluations) {
+    EnergyConsistent structure{Hardening{}, inertia, coupling, 1e-2, 1e9, false};
+    test::Random random{23};
+    int all = 0;
+    for (int k = 0; k < 400; ++k) {
+        all += structure.step(test::uniform(random, -0.5, 0.5)).evaluations;
+    }
+    EXPECT_LT(all / 400.0, 7.07);
+}
+
+/// Object without force up to the position 0.5, whose force is not a number beyond.
+struct BrokenBeyond {
+    using State = Stateless;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        return {x > 0.5 ? std::numeric_limits<double>::quiet_NaN() : 0.0, 0.0, 0.0, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+// A fast mass, which the limited force of the coupling cannot stop, moves to a position without a force.
+template <class S>
+void expect_a_failed_limited_step_is_refused(S structure) {
+    structure.reset(0.0);
+    EXPECT_EQ(structure.drive(10.0).status, Status::Ok);
+    const double reached = structure.drive(10.0).environment_position;
+    EXPECT_GT(reached, 0.25);
+    EXPECT_LT(reached, 0.5);
+    S reference = structure;
+    for (const double device : {-100.0, -50.0}) {
+        const Rendered refused = structure.step(device);
+        EXPECT_EQ(refused.status, Status::NonFinite);
+        EXPECT_EQ(refused.force, 0.0);
+        EXPECT_EQ(refused.environment_position, reached);
+    }
+    EXPECT_EQ(structure.drive(10.0).status, Status::NonFinite);
+    const Rendered expected = reference.drive(-30.0);
+    const Rendered now = structure.drive(-30.0);
+    EXPECT_EQ(expected.status, Status::Ok);
+    EXPECT_EQ(now.status, Status::Ok);
+    EXPECT_EQ(now.environment_position, expected.environment_position);
+    EXPECT_EQ(now.force, -30.0);
+    EXPECT_EQ(structure.step(0.0).force, reference.step(0.0).force);
+}
+
+TEST(EnergyConsistent, FailedLimitedStepIsRefusedAndKeepsTheState) {
+    constexpr Inertia mass{1.0, 0.0};
+    constexpr VirtualCoupling stiff{1e4, 0.5};
+    constexpr double period = 0.125;
+    expect_a_failed_limited_step_is_refused(
+        EnergyConsistent{BrokenBeyond{}, mass, stiff, period, 1e-4, true, 0.5});
+    expect_a_failed_limited_step_is_refused(Implicit<BrokenBeyond>{{}, mass, stiff, period, {}, 0.5});
+}
+
+// With the mass 1, the period 1/2 and the coupling stiffness 8, the object moves to half of the handle's position.
+TEST(EnergyConsistent, ForceAtTheLimitIsNotLimited) {
+    constexpr Inertia mass{1.0, 0.0};
+    const auto status = [&](double limit) {
+        EnergyConsistent structure{test::Spring{0.0}, mass, {8.0, 0.0}, 0.5, 0.0, true, limit};
+        const Rendered rendered = structure.step(1.0);
+        EXPECT_NEAR(rendered.force, 4.0, 1e-12);
+        return rendered.status;
+    };
+    EXPECT_EQ(status(4.0), Status::Ok);
+    EXPECT_EQ(status(std::nextafter(4.0, 0.0)), Status::Limited);
+    const auto implicit = [&](double limit) {
+        Implicit<test::Spring> structure{test::Spring{0.0}, mass, {4.0, 0.0}, 0.5, {}, limit};
+        const Rendered rendered = structure.step(1.0);
+        EXPECT_NEAR(rendered.force, 2.0, 1e-12);
+        return rendered.status;
+    };
+    EXPECT_EQ(implicit(2.0), Status::Ok);
+    EXPECT_EQ(implicit(std::nextafter(2.0, 0.0)), Status::Limited);
+}
+
 }  // namespace
 }  // namespace palpate

@@ -675,5 +675,215 @@ TEST(Scheme, RendersHysteresisWithItsPlayRadius) {
     EXPECT_NEAR(rendered[3].force, 0.5 - 0.2, 1e-12);
 }
 
+/// Spring with a wave, f = 20 x + 3 sin(4 x), whose slope is between 8 and 32.
+struct Wavy {
+    using State = Stateless;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        return {20.0 * x + 3.0 * std::sin(4.0 * x), 20.0 + 12.0 * std::cos(4.0 * x),
+                10.0 * x * x + 0.75 * (1.0 - std::cos(4.0 * x)), false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+// The energy is the integral of the stiffer force, and the slope is its derivative.
+TEST(Compensated, EnergyIsTheIntegralOfTheForce) {
+    const Compensated<Wavy> object{Wavy{}, 50.0};
+    EXPECT_EQ(object.stiffness(), 50.0);
+    EXPECT_NEAR(object.at(0.0, {}).energy, 0.0, 1e-12);
+    for (double x = -0.5; x < 0.5; x += 0.037) {
+        constexpr double h = 1e-5;
+        const EnvironmentSample before = object.at(x - h, {});
+        const EnvironmentSample after = object.at(x + h, {});
+        const EnvironmentSample here = object.at(x, {});
+        EXPECT_NEAR((after.energy - before.energy) / (2.0 * h), here.force,
+                    1e-5 * (1.0 + std::abs(here.force)));
+        EXPECT_NEAR((after.force - before.force) / (2.0 * h), here.slope,
+                    1e-5 * (1.0 + std::abs(here.slope)));
+        EXPECT_FALSE(here.extrapolated);
+    }
+    EXPECT_TRUE(std::isnan(object.at(std::numeric_limits<double>::quiet_NaN(), {}).force));
+}
+
+TEST(Compensated, ResolventSolvesTheLoadLineOfTheStifferForce) {
+    const WaveletNetwork network{{1, {4.0, 9.0}, {0.5, 0.2}, {0.2, 0.05}, {8.0}, 0.1}, test::unit_domain()};
+    const Compensated<WaveletNetwork> object{network, 100.0};
+    for (const double p : {20.0, 100.0, 900.0}) {
+        const CompensatedResolvent resolvent{piecewise(network.curve()), 100.0, p};
+        EXPECT_TRUE(resolvent.unique(p));
+        EXPECT_FALSE(resolvent.unique(2.0 * p)) << "only for its slope";
+        EXPECT_TRUE(resolvent.tabulated());
+        CompensatedResolvent::Memory memory{0.0};
+        for (double q = -0.5 * p; q < 1.5 * p; q += 0.01 * p) {
+            const Solution found = resolvent.solve(object, {}, {p, q}, memory);
+            const EnvironmentSample there = object.at(found.position, {});
+            EXPECT_EQ(found.status, Status::Ok);
+            EXPECT_NEAR(there.force + p * found.position, q, 1e-8 * p);
+            EXPECT_NEAR(found.environment.force, there.force, 1e-8);
+            EXPECT_EQ(found.environment.extrapolated, there.extrapolated);
+            EXPECT_GE(found.evaluations, 1);
+        }
+    }
+}
+
+TEST(ExplicitLimit, ObjectForALimitIsTheInverse) {
+    test::Random random{6};
+    for (int k = 0; k < 100; ++k) {
+        const VirtualCoupling spring{test::uniform(random, 0.0, 300.0), test::uniform(random, 0.0, 0.2)};
+        const double ratio = test::uniform(random, 0.0, 1.5);
+        const double T = test::uniform(random, 2e-4, 2e-3);
+        const double limit = test::uniform(random, 10.0, 5000.0);
+        const Inertia object = explicit_object(limit, spring, ratio, T);
+        EXPECT_NEAR(explicit_slope_limit(object, spring, T), limit, 1e-9 * (limit + spring.stiffness));
+        EXPECT_NEAR(object.damping * T, ratio * object.mass, 1e-12 * object.mass);
+        EXPECT_GT(object.mass, 0.0);
+    }
+}
+
+// The limit is the stiffness at which the linearised step has a pole at -1. The characteristic polynomial of the
+// explicit step behind a held device is z^2 - (2 - a) z + (1 - d), a = (K + K_c) T^2 / m + d, d = (B_o + B_c) T / m.
+TEST(ExplicitLimit, IsThePoleAtMinusOne) {
+    const Inertia object{0.002, 0.3};
+    const VirtualCoupling spring{80.0, 0.04};
+    constexpr double T = 5e-4;
+    const double d = (object.damping + spring.damping) * T / object.mass;
+    const double a = (explicit_slope_limit(object, spring, T) + spring.stiffness) * T * T / object.mass + d;
+    EXPECT_NEAR(1.0 + (2.0 - a) + (1.0 - d), 0.0, 1e-12);
+}
+
+/// Spring that marks positions below 0 as outside its domain.
+struct HalfSpring {
+    using State = Stateless;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        return {5.0 * x, 5.0, 2.5 * x * x, x < 0.0};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+TEST(Structure, MarksPositionsOfTheObjectOutsideTheDomain) {
+    const auto expect_marked = [](auto structure, const char* name) {
+        for (const double at : {0.2, -0.2}) {
+            structure.reset(at);
+            for (int k = 0; k < 3; ++k) {
+                EXPECT_EQ(structure.step(at).extrapolated, at < 0.0) << name;
+            }
+        }
+    };
+    expect_marked(Direct{HalfSpring{}}, "direct");
+    expect_marked(PredictedDirect{HalfSpring{}, 2}, "predicted");
+    expect_marked(Massless{HalfSpring{}, coupling, period}, "massless");
+    expect_marked(Implicit{HalfSpring{}, Inertia{}, coupling, period}, "implicit");
+    expect_marked(Explicit{HalfSpring{}, Inertia{}, coupling, period}, "explicit");
+    expect_marked(EnergyConsistent{HalfSpring{}, Inertia{}, coupling, period}, "energy-consistent");
+    expect_marked(Massless{Compensated{HalfSpring{}, 100.0}, coupling, period}, "compensated");
+}
+
+TEST(Structure, DirectNeedsOneEvaluationAndStatesItsPosition) {
+    Direct direct{Spring{5.0}};
+    PredictedDirect predicted{Spring{5.0}, 2};
+    DirectVelocity velocity{
+        *ForceModel::of_velocity({2, {}, {}, {}, {5.0, 0.2}, 0.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}})
+             .velocity(),
+        period};
+    const auto expect_one = [](auto& structure) {
+        structure.reset(0.5);
+        const Rendered rendered = structure.step(0.5);
+        EXPECT_EQ(rendered.evaluations, 1);
+        EXPECT_EQ(rendered.environment_position, 0.5);
+        EXPECT_EQ(rendered.status, Status::Ok);
+        EXPECT_NEAR(rendered.force, 2.5, 1e-12);
+    };
+    expect_one(direct);
+    expect_one(predicted);
+    expect_one(velocity);
+}
+
+/// Object with the same force everywhere, also at infinity.
+struct ConstantForce {
+    using State = Stateless;
+
+    [[nodiscard]] EnvironmentSample at(double /*x*/, const State& /*stateless*/) const noexcept {
+        return {1.0, 0.0, 0.0, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+TEST(Structure, PositionThatIsNotFiniteIsRefusedAlsoIfTheForceIsFinite) {
+    const auto expect_refused = [](auto structure) {
+        for (const double bad :
+             {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+              -std::numeric_limits<double>::infinity()}) {
+            structure.reset(0.2);
+            const Rendered refused = structure.step(bad);
+            EXPECT_EQ(refused.status, Status::NonFinite);
+            EXPECT_EQ(refused.force, 0.0);
+            EXPECT_EQ(refused.evaluations, 0);
+            EXPECT_FALSE(refused.extrapolated);
+        }
+    };
+    expect_refused(Direct{ConstantForce{}});
+    expect_refused(PredictedDirect{ConstantForce{}, 3});
+    expect_refused(Massless{ConstantForce{}, coupling, period});
+    expect_refused(Implicit{ConstantForce{}, Inertia{}, coupling, period});
+    expect_refused(Explicit{ConstantForce{}, Inertia{}, coupling, period});
+    expect_refused(EnergyConsistent{ConstantForce{}, Inertia{}, coupling, period});
+}
+
+// An infinite force on the object is refused, and the step after it is that of an object that was never pushed.
+TEST(Structure, DriveWithAForceThatIsNotFiniteIsRefused) {
+    const auto expect_refused = [](auto structure) {
+        structure.reset(0.1);
+        (void)structure.drive(1.0);
+        auto reference = structure;
+        const Rendered refused = structure.drive(std::numeric_limits<double>::infinity());
+        EXPECT_EQ(refused.status, Status::NonFinite);
+        EXPECT_EQ(refused.force, 0.0);
+        for (int k = 0; k < 3; ++k) {
+            const Rendered expected = reference.drive(1.0);
+            const Rendered now = structure.drive(1.0);
+            EXPECT_EQ(now.environment_position, expected.environment_position);
+            EXPECT_EQ(now.evaluations, expected.evaluations) << "the search starts at the same position";
+        }
+    };
+    expect_refused(Implicit{test::Hardening{}, test::inertia, test::coupling, period});
+    expect_refused(Explicit{test::Hardening{}, test::inertia, test::coupling, period});
+    expect_refused(EnergyConsistent{test::Hardening{}, test::inertia, test::coupling, period});
+}
+
+TEST(Structure, ResetForgetsTheMotionBefore) {
+    const HysteresisNetwork object =
+        *ForceModel{NetworkParameters{1, {}, {}, {}, {5.0}, 0.5}, {{}, 0.0, 0.2}, test::unit_domain(), 0.05}
+             .hysteresis();
+    const auto expect_forgotten = [](const auto& fresh) {
+        for (const double start : {0.0, 0.4}) {
+            auto reference = fresh;  // a new structure is at rest at 0
+            auto used = fresh;
+            for (int k = 0; k < 30; ++k) {
+                (void)used.step(0.01 * k);
+            }
+            used.reset(start);
+            if (start > 0.0) {
+                reference.reset(start);
+            }
+            for (int k = 0; k < 30; ++k) {
+                const double device = start + 0.1 * std::sin(0.4 * k);
+                const Rendered expected = reference.step(device);
+                const Rendered now = used.step(device);
+                EXPECT_EQ(now.force, expected.force) << k;
+                EXPECT_EQ(now.evaluations, expected.evaluations) << k;
+            }
+        }
+    };
+    expect_forgotten(Direct{object});
+    expect_forgotten(Massless{object, coupling, period});
+    expect_forgotten(Implicit{object, Inertia{}, coupling, period});
+    expect_forgotten(Explicit{object, Inertia{}, coupling, period});
+    expect_forgotten(EnergyConsistent{object, Inertia{}, coupling, period});
+}
+
 }  // namespace
 }  // namespace palpate

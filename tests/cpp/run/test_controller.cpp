@@ -21,6 +21,9 @@ namespace {
 
 using test::ClockFault;
 
+constexpr double inf = std::numeric_limits<double>::infinity();
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
 /// A device that returns prescribed readings, some of them invalid, to test the controller.
 class ScriptedDevice {
   public:
@@ -113,11 +116,170 @@ TEST(Controller, SendsZeroForceAtOnceAfterAFailedStep) {
     }
 }
 
+/// A structure that counts its resets, and whose force and status a test chooses.
+struct ChosenStructure {
+    Rendered* next;
+    std::vector<double>* resets;
+
+    void reset(double position) noexcept { resets->push_back(position); }
+    [[nodiscard]] Rendered step(double /*position*/) noexcept { return *next; }
+};
+
+TEST(Controller, PutsTheObjectUnderTheHandleOnceAtTheFirstValidReading) {
+    ScriptedDevice device;
+    Rendered next;
+    std::vector<double> resets;
+    Controller controller{device, ChosenStructure{&next, &resets}, Guards{}};
+    device.next.position = 0.1;
+    device.next.status = Status::Timeout;
+    EXPECT_EQ(controller.start(), Status::Timeout);
+    device.next.position = 0.2;
+    device.next.status = Status::Ok;
+    EXPECT_EQ(controller.tick().status, Status::Timeout);
+    EXPECT_TRUE(resets.empty());
+    device.next.position = 0.3;
+    for (int k = 0; k < 4; ++k) {
+        (void)controller.tick();
+    }
+    EXPECT_EQ(resets, std::vector<double>{0.2});
+}
+
+TEST(Controller, SendsZeroForceIfTheStructureReportsAFailedStepWithAForce) {
+    ScriptedDevice device;
+    Rendered next{1.5, 0.0, 0, Status::NonFinite, false};
+    std::vector<double> resets;
+    Controller controller{device, ChosenStructure{&next, &resets}, Guards{.slew = {0.5, 0.0}}};
+    (void)controller.start();
+    const Tick failed = controller.tick();
+    EXPECT_EQ(failed.command.force, 0.0);
+    EXPECT_EQ(failed.status, Status::NonFinite);
+    EXPECT_EQ(device.sent, 0.0);
+    next.status = Status::Ok;
+    EXPECT_EQ(controller.tick().command.force, 0.5) << "the force rises from zero with the slew limit";
+}
+
+/// Guards that all change a force of 100.
+Guards all_guards() {
+    Guards guards{.limit = {10.0}, .ramp = {1000, 500}, .slew = {1.0, 0.0}};
+    guards.limit_cycle = LimitCycleDetector{{.force_swing = 0.0, .longest_swing = 1000}};
+    for (int k = 0; k < 14; ++k) {
+        guards.limit_cycle.watch(k % 2 == 0 ? 0.0 : 1.0, 0.0);
+    }
+    guards.tank = EnergyTank{{.stored = {.within = 8.0}}};
+    guards.tank.book(1.0, -9.0);  // 9 J given: half of the reserve of 2 J is used
+    return guards;
+}
+
+TEST(Controller, ReportsTheFirstOfItsStatusesInTheirOrder) {
+    ASSERT_EQ(all_guards().limit_cycle.limit_cycles(), 1U);
+    Guards guards = all_guards();
+    Rendered next{100.0, 0.0, 0, Status::MaxIterations, false};
+    std::vector<double> resets;
+    const auto tick = [&](Status reported = Status::Ok) {
+        ScriptedDevice device;
+        device.next.status = reported;
+        Controller controller{device, ChosenStructure{&next, &resets}, guards};
+        (void)controller.start();
+        return controller.tick();
+    };
+    // Limited to 10, scaled by 0.7, by half a ramp, limited to a change of 1, and halved by the tank
+    EXPECT_EQ(tick().status, Status::MaxIterations);
+    EXPECT_NEAR(tick().command.force, 0.5, 1e-12);
+    next.status = Status::Ok;
+    EXPECT_EQ(tick().status, Status::Ramp);
+    guards.slew.largest_step = inf;
+    EXPECT_NEAR(tick().command.force, 10.0 * 0.7 * 0.5 * 0.5, 1e-12);
+    guards.ramp = {};
+    EXPECT_EQ(tick().status, Status::EnergyLimited);
+    EXPECT_NEAR(tick().command.force, 10.0 * 0.7 * 0.5, 1e-12);
+    guards.tank = {};
+    EXPECT_EQ(tick().status, Status::LimitCycleScaled);
+    EXPECT_NEAR(tick().command.force, 10.0 * 0.7, 1e-12);
+    guards.limit_cycle = {};
+    EXPECT_EQ(tick().status, Status::Limited);
+    EXPECT_EQ(tick().command.force, 10.0);
+    guards.limit.largest = 200.0;
+    EXPECT_EQ(tick().status, Status::Ok);
+    EXPECT_EQ(tick(Status::Limited).status, Status::Limited) << "the device limits the force";
+    guards.slew.largest_step = 99.0;
+    EXPECT_EQ(tick().status, Status::Limited);
+    EXPECT_EQ(tick().command.force, 99.0);
+}
+
+// The work of the motor counts only between two valid readings, and in the ramp in a separate account.
+TEST(Controller, AddsUpTheWorkOfTheMotorBetweenValidReadings) {
+    ScriptedDevice device;
+    Rendered next{0.0, 5.0, 0, Status::Ok, false};
+    std::vector<double> resets;
+    Guards guards{.ramp = {2, 0}};
+    guards.tank = EnergyTank{{.stored = {.within = 1.0, .lower = 0.0, .upper = 2.0, .force_limit = 10.0}}};
+    Controller controller{device, ChosenStructure{&next, &resets}, guards};
+    const auto then = [&](double position, double applied, Status status = Status::Ok) {
+        device.next.position = position;
+        device.next.applied = applied;
+        device.next.status = status;
+        (void)controller.tick();
+    };
+    device.next.position = 1.0;
+    (void)controller.start();
+    then(1.5, 2.0);
+    then(1.25, 4.0);                  // the motor absorbed 0.5 * 2 in the ramp
+    then(1.0, 0.0, Status::Timeout);  // then gave 0.25 * 4 after the ramp
+    EXPECT_DOUBLE_EQ(controller.guards().ramp_observer.energy(), 1.0);
+    then(0.25, 8.0);
+    then(0.5, 8.0);
+    EXPECT_DOUBLE_EQ(controller.guards().observer.energy(), -1.0) << "the motion before the first reading";
+    then(0.75, nan);  // absorbed 0.25 * 8
+    then(1.0, 2.0);
+    then(-0.5, 2.0);  // absorbed 0.25 * 2; the force that is not a number does not count
+    EXPECT_DOUBLE_EQ(controller.guards().observer.energy(), -1.0 + 2.0 + 0.5);
+    EXPECT_DOUBLE_EQ(controller.guards().observer.least(), -1.0);
+    EXPECT_DOUBLE_EQ(controller.guards().tank.most_given(), 1.0);
+    EXPECT_DOUBLE_EQ(controller.guards().ramp_observer.energy(), 1.0);
+    EXPECT_DOUBLE_EQ(controller.guards().tank.stored().most(), 1.0 + 10.0 * 3.0) << "the object is at 5";
+    (void)controller.tick();
+    EXPECT_DOUBLE_EQ(controller.guards().tank.stored().most(), 1.0 + 10.0 * 3.5) << "the handle is at -0.5";
+}
+
+TEST(Controller, LimitsTheForceOfATickToTheGivenLimit) {
+    ScriptedDevice device;
+    Rendered next{-100.0, 0.0, 0, Status::Ok, false};
+    std::vector<double> resets;
+    Controller controller{device, ChosenStructure{&next, &resets}, ForceLimit{3.0}};
+    (void)controller.start();
+    EXPECT_EQ(controller.tick().command.force, -3.0);
+}
+
+/// A device whose clock sets the rate, if a test chooses so.
+struct PacingDevice : ScriptedDevice {
+    bool paces = false;
+    [[nodiscard]] bool sets_pace() const noexcept { return paces; }
+};
+
+/// A device whose clock always sets the rate.
+struct AlwaysPacingDevice : ScriptedDevice {
+    static constexpr bool paces_host = true;
+};
+
+TEST(Controller, KnowsWhetherTheClockOfTheDeviceSetsTheRate) {
+    Rendered next;
+    std::vector<double> resets;
+    const auto paced = [&](auto& device) {
+        return Controller{device, ChosenStructure{&next, &resets}, Guards{}}.paced_by_device();
+    };
+    ScriptedDevice plain;
+    EXPECT_FALSE(paced(plain));
+    AlwaysPacingDevice always;
+    EXPECT_TRUE(paced(always));
+    PacingDevice chosen;
+    EXPECT_FALSE(paced(chosen));
+    chosen.paces = true;
+    EXPECT_TRUE(paced(chosen));
+}
+
 // ------------------------------------------------------------- every state, every event, every structure
 
 constexpr double period_s = 1e-3;
-constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint64_t tolerated = 3;
 
 GuardSettings guard_settings(bool certified) {

@@ -83,7 +83,7 @@ class NetworkCurve {
         const double c = network_.linear[0];
         const double b = network_.bias;
         for (std::size_t k = 0; k < x.size(); ++k) {
-            result[k] = quantity == HatQuantity::Value   ? c * x[k] + b
+            result[k] = quantity == HatQuantity::Force   ? c * x[k] + b
                         : quantity == HatQuantity::Slope ? c
                                                          : (0.5 * c * x[k] + b) * x[k];
         }
@@ -91,7 +91,7 @@ class NetworkCurve {
         for (std::size_t k = 0; k < x.size(); ++k) {
             if (!(x[k] >= lower_ && x[k] <= upper_) || periodic_) {
                 const Curve curve = at(x[k]);
-                result[k] = quantity == HatQuantity::Value   ? curve.value
+                result[k] = quantity == HatQuantity::Force   ? curve.value
                             : quantity == HatQuantity::Slope ? curve.slope
                                                              : curve.integral;
             }

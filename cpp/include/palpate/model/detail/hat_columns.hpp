@@ -11,8 +11,8 @@
 
 namespace palpate {
 
-/// Quantity of a sum of wavelets that one call computes for many positions: value, slope or antiderivative.
-enum class HatQuantity : std::uint8_t { Value, Slope, Integral };
+/// Quantity of a sum of wavelets that one call computes for many positions: force, slope or antiderivative.
+enum class HatQuantity : std::uint8_t { Force, Slope, Integral };
 
 namespace detail {
 

@@ -99,7 +99,7 @@ PALPATE_TARGET inline void sum_at(const HatColumns& of, const Lanes& position, L
     for (std::size_t i = 0; i < of.count; ++i) {
         Lanes u = of.alpha[i] * (position - of.beta[i]);
         Lanes square, e;
-        if constexpr (quantity == HatQuantity::Value) {
+        if constexpr (quantity == HatQuantity::Force) {
             square = u * u;
             gaussian(square, e);
             sum += of.weight[i] * ((square - 1.0) * e);
@@ -314,7 +314,7 @@ PALPATE_TARGET inline void gaussians(const double* square, std::size_t n, double
 /// Returns the functions that compute sums of Mexican hats with this instruction set of the processor.
 [[nodiscard]] inline HatKernel kernel() noexcept {
     return {at,
-            {batch<HatQuantity::Value>, batch<HatQuantity::Slope>, batch<HatQuantity::Integral>},
+            {batch<HatQuantity::Force>, batch<HatQuantity::Slope>, batch<HatQuantity::Integral>},
             radial,
             expansion,
             gaussians};

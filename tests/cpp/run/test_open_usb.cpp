@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests of the messages without libusb and Boost. tests/usb and the Python tests use an
+// emulated device.
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "palpate/run/controller.hpp"
+#include "palpate/run/open_inverse3.hpp"
+#include "palpate/run/open_usb.hpp"
+
+namespace palpate {
+namespace {
+
+PlannedModel line() {
+    NetworkParameters network;
+    network.linear = {1.0};
+    return {"a.json",     {network, {{0.0}, {1.0}, Continuation::Linear, Continuation::Linear, std::nullopt}},
+            "mm",         "N",
+            std::nullopt, std::nullopt,
+            std::nullopt};
+}
+
+/// Returns the message of an exception; empty without one.
+[[maybe_unused]] std::string refusal(const std::function<void()>& call) {
+    try {
+        call();
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "";
+}
+
+TEST(Refuse, ThrowsTheSentence) {
+    EXPECT_EQ(refusal([] { refuse("a sentence"); }), "a sentence");
+}
+
+#ifndef PALPATE_HAS_USB
+
+TEST(OpenUsb, NamesThePackageThatIsMissing) {
+    const std::string missing =
+        "device usb:5: palpate was built without libusb; install libusb-1.0-0-dev and build palpate again";
+    RenderOptions options;
+    options.device = "usb:5";
+    EXPECT_EQ(refusal([&] { (void)open_usb(options, line()); }), missing);
+    MeasureOptions measuring;
+    measuring.device = "usb:5";
+    EXPECT_EQ(refusal([&] { (void)usb_to_measure(measuring); }), missing);
+}
+
+#endif
+
+#ifndef PALPATE_HAS_INVERSE3
+
+TEST(OpenInverse3, NamesThePackageThatIsMissing) {
+    RenderOptions options;
+    options.device = "inverse3:x";
+    EXPECT_EQ(
+        refusal([&] { (void)open_inverse3(options, line()); }),
+        "device inverse3:x: palpate was built without Boost; install libboost-dev and build palpate again");
+}
+
+#else
+
+TEST(OpenInverse3, RefusesAModelInOtherUnits) {
+    RenderOptions options;
+    options.device = "inverse3";
+    EXPECT_EQ(refusal([&] { (void)open_inverse3(options, line()); }),
+              "a.json is in mm and N; an Inverse3 moves along a line and needs a model in m and N");
+}
+
+#endif
+
+}  // namespace
+}  // namespace palpate
