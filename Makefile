@@ -29,7 +29,7 @@ PYTHON ?= python3
 test test-cpp test-python: export PALPATE_TEST_SCALE ?= 1
 test-full test-full-native: export PALPATE_TEST_SCALE ?= 100
 bench figures: export PALPATE_BENCH_SCALE ?= 1
-# Test processes share the processors: with threads of their own, matrix products of one test take up to forty times as long.
+# Test processes share the processors: with more threads, matrix products of one test take up to forty times as long.
 test-python docs: export OPENBLAS_NUM_THREADS ?= 1
 # Seconds for each fuzz target: a sample for every change.
 FUZZ_SECONDS ?= 3

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/run/controller.hpp"
 #include "palpate/run/live_device.hpp"
 
 namespace palpate {

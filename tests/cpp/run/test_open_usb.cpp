@@ -8,7 +8,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/run/controller.hpp"
 #include "palpate/run/open_inverse3.hpp"
 #include "palpate/run/open_usb.hpp"
 

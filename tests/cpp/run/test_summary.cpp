@@ -11,7 +11,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/run/session.hpp"
 #include "palpate/run/summary.hpp"
 
 namespace palpate {
