@@ -61,7 +61,7 @@ STATEMENTS = {
 CONSTANTS = {CursorKind.STATIC_ASSERT, CursorKind.FIELD_DECL, CursorKind.ENUM_CONSTANT_DECL}
 """Nodes without mutants: constant expressions, and defaults of members, which Python tests compare."""
 WITH_CLOCK = {"realtime"}
-"""Folders of tests/cpp whose tests wait for a clock: they could fail without a mutant if the machine is busy."""
+"""Folders of tests/cpp whose tests wait for a clock, and can fail without a mutant on a busy machine."""
 COUNTS = "Tick.ExecutesABoundedNumberOfInstructions"
 """Test that fails without a mutant, because the copy has more instructions."""
 FEW_SECONDS = 5.0
