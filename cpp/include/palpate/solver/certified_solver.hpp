@@ -364,8 +364,12 @@ class CertifiedSolver {
             const double linear = line.intercept - first.force - line.slope * first.position;
             double turns = std::floor((linear - size) / rise) - 1.0;
             double past = std::floor((linear + size) / rise) + 2.0;
-            for (double middle = std::floor(0.5 * (turns + past)); middle > turns && middle < past;
-                 middle = std::floor(0.5 * (turns + past))) {
+            constexpr int most_halvings = 64;
+            for (int halving = 0; halving < most_halvings; ++halving) {
+                const double middle = std::floor(0.5 * (turns + past));
+                if (!(middle > turns && middle < past)) {
+                    break;
+                }
                 turn_offset = middle * period_;
                 (lies_below(first) ? turns : past) = middle;
             }
