@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <numbers>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -113,5 +114,16 @@ struct ClickAndWall {
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
+
+/// Returns the message with which a call refuses its arguments; empty if it accepts them.
+template <class Call>
+std::string refusal(const Call& call) {
+    try {
+        call();
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "";
+}
 
 }  // namespace palpate::test

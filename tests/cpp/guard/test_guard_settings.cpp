@@ -21,12 +21,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Returns the message with which `validate` refuses the settings, or nothing.
 std::string refusal(const GuardSettings& settings) {
-    try {
-        validate(settings);
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
+    return test::refusal([&] { validate(settings); });
 }
 
 TEST(GuardSettings, RefusalNamesTheFieldItsValueAndTheRule) {

@@ -49,16 +49,7 @@ Scheme scheme_of(StructureKind kind) {
     return scheme;
 }
 
-/// Returns the message with which `check` refuses its scheme, or nothing.
-template <class Check>
-std::string refusal(const Check& check) {
-    try {
-        check();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
-}
+using test::refusal;
 
 std::string refused(const Scheme& scheme, const ForceModel& model) {
     return refusal([&] { validate(scheme, model); });

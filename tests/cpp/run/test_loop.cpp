@@ -18,6 +18,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/guard/guards.hpp"
+#include "support.hpp"
 
 namespace palpate {
 namespace {
@@ -43,12 +44,7 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 std::string refusal(const std::function<void(LoopSettings&)>& change) {
     LoopSettings settings;
     change(settings);
-    try {
-        validate(settings);
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
+    return test::refusal([&] { validate(settings); });
 }
 
 std::string refusal(double LoopSettings::* field, double value) {

@@ -23,6 +23,7 @@
 #include "moved_device.hpp"
 #include "palpate/rendering/measuring.hpp"
 #include "palpate/simulation/simulated_device.hpp"
+#include "support.hpp"
 
 namespace palpate {
 namespace {
@@ -203,15 +204,7 @@ TEST(SimulatedRig, MovesAgainstItsMountedObject) {
 
 // -------------------------------------------------------------------------------------------- measurement
 
-/// Returns the message of an exception; empty without one.
-std::string refusal(const std::function<void()>& call) {
-    try {
-        call();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
-}
+using test::refusal;
 
 TEST(MeasureOptions, MoveTheHandleWithAProbeOrPushes) {
     MeasureOptions options;

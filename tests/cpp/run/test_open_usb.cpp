@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests of the messages without libusb and Boost. tests/usb and the Python tests use an
 // emulated device.
-#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -10,6 +9,7 @@
 
 #include "palpate/run/open_inverse3.hpp"
 #include "palpate/run/open_usb.hpp"
+#include "support.hpp"
 
 namespace palpate {
 namespace {
@@ -23,15 +23,7 @@ PlannedModel line() {
             std::nullopt};
 }
 
-/// Returns the message of an exception; empty without one.
-[[maybe_unused]] std::string refusal(const std::function<void()>& call) {
-    try {
-        call();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
-}
+using test::refusal;
 
 TEST(Refuse, ThrowsTheSentence) {
     EXPECT_EQ(refusal([] { refuse("a sentence"); }), "a sentence");

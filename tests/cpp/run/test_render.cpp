@@ -12,7 +12,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <initializer_list>
 #include <iterator>
 #include <memory>
@@ -28,6 +27,7 @@
 #include "palpate/io/model_file.hpp"
 #include "palpate/simulation/simulated_device.hpp"
 #include "palpate/simulation/test_rig.hpp"
+#include "support.hpp"
 
 namespace palpate {
 namespace {
@@ -170,15 +170,7 @@ PlannedModel proved_model() {
     return stored("certificate_massless.json");
 }
 
-/// Returns the message of an exception; empty without one.
-std::string refusal(const std::function<void()>& call) {
-    try {
-        call();
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
-}
+using test::refusal;
 
 TEST(PlannedModel, StatesItsUnitsAndTheModelOfItsPlan) {
     PlannedModel model = proved_model();
