@@ -10,6 +10,7 @@
 
 #include "palpate/io/json_field.hpp"
 #include "palpate/stability/certificate_check.hpp"
+#include "support.hpp"
 
 namespace palpate {
 
@@ -35,12 +36,7 @@ Motor read(const std::string& text) {
 }
 
 std::string refusal(const std::string& text) {
-    try {
-        (void)read(text);
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
+    return test::refusal([&] { (void)read(text); });
 }
 
 std::string hash_of(const Motor& motor) {

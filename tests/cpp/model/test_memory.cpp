@@ -476,19 +476,13 @@ TEST(Memory, LimitedForceReducesAllStretchesByOneFactor) {
 }
 
 TEST(Memory, RefusesWrongParametersByName) {
-    const auto refusal = [](const MemoryParameters& memory,
-                            const Domain& domain = test::unit_domain()) -> std::string {
-        try {
-            validate(memory, domain);
-        } catch (const std::invalid_argument& error) {
-            return error.what();
-        }
-        return "accepted";
+    const auto refusal = [](const MemoryParameters& memory, const Domain& domain = test::unit_domain()) {
+        return test::refusal([&] { validate(memory, domain); });
     };
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    EXPECT_EQ(refusal(one_branch(0.0, 1.0)), "accepted");
-    EXPECT_EQ(refusal(one_branch(1.0, std::numeric_limits<double>::denorm_min())), "accepted");
+    EXPECT_EQ(refusal(one_branch(0.0, 1.0)), "");
+    EXPECT_EQ(refusal(one_branch(1.0, std::numeric_limits<double>::denorm_min())), "");
     EXPECT_EQ(refusal(one_branch(-1.0, 1.0)), "stiffness[0] is -1.000000, must be >= 0");
     EXPECT_EQ(refusal(one_branch(infinity, 1.0)), "stiffness[0] is inf, must be >= 0");
     EXPECT_EQ(refusal(one_branch(nan, 1.0)), "stiffness[0] is nan, must be >= 0");
@@ -496,7 +490,7 @@ TEST(Memory, RefusesWrongParametersByName) {
     EXPECT_EQ(refusal(one_branch(1.0, infinity)), "time_constant_s[0] is inf, must be > 0");
     EXPECT_EQ(refusal(one_branch(1.0, nan)), "time_constant_s[0] is nan, must be > 0");
     MemoryParameters memory = eight_branches();
-    EXPECT_EQ(refusal(memory), "accepted");
+    EXPECT_EQ(refusal(memory), "");
     memory.stiffness[7] = -1.0;
     EXPECT_EQ(refusal(memory), "stiffness[7] is -1.000000, must be >= 0");
     memory.stiffness.push_back(1.0);
@@ -517,7 +511,7 @@ TEST(Memory, RefusesWrongParametersByName) {
     memory.stiffness.reserve(2);
     memory.stiffness.push_back(-1.0);
     memory.stiffness.pop_back();
-    EXPECT_EQ(refusal(memory), "accepted");
+    EXPECT_EQ(refusal(memory), "");
 }
 
 TEST(Memory, RefusesWrongParameters) {

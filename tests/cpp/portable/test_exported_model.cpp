@@ -70,12 +70,7 @@ ExportTarget random_target(Random& random, Precision precision) {
 
 /// Returns the message with which an export is refused; empty if it is accepted.
 std::string refusal(const ForceModel& model, const Scheme& scheme, const ExportTarget& target) {
-    try {
-        const ExportedModel exported{model, scheme, target};
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
-    return "";
+    return test::refusal([&] { const ExportedModel exported{model, scheme, target}; });
 }
 
 class ExportedModelOf : public testing::TestWithParam<Precision> {};
