@@ -12,6 +12,8 @@
 
 #include <gtest/gtest.h>
 
+#include "support.hpp"
+
 namespace palpate {
 namespace {
 
@@ -102,13 +104,8 @@ TEST(Probe, ReversesBeyondItsForceLimit) {
 }
 
 TEST(Probe, RefusalNamesTheFieldItsValueAndTheRule) {
-    const auto refusal = [](const ProbeSettings& given) -> std::string {
-        try {
-            const Probe probe{given, period};
-        } catch (const std::invalid_argument& error) {
-            return error.what();
-        }
-        return "";
+    const auto refusal = [](const ProbeSettings& given) {
+        return test::refusal([&] { const Probe probe{given, period}; });
     };
     EXPECT_EQ(refusal(settings), "");
     EXPECT_EQ(refusal({.lower = infinity}), "probe: lower is inf, must be a finite number");

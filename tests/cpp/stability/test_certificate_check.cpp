@@ -43,12 +43,7 @@ DeviceProfile strong() {
 
 /// Returns the message with which `checked` refuses a stored certificate; empty if it accepts the certificate.
 std::string disagreement(const Certificate& stored, const ForceModel& model) {
-    try {
-        (void)checked(stored, model);
-        return "";
-    } catch (const std::invalid_argument& error) {
-        return error.what();
-    }
+    return test::refusal([&] { (void)checked(stored, model); });
 }
 
 /// Returns a copy of a certificate that is computed again from its force bounds after `change` has changed these
