@@ -7,10 +7,13 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/model/limited_environment.hpp"
+#include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/energy_consistent.hpp"
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
+#include "palpate/solver/limited_resolvent.hpp"
 #include "palpate/solver/resolvent.hpp"
 #include "rendering/time_step_checks.hpp"
 #include "support.hpp"
@@ -33,17 +36,25 @@ TEST(EnergyConsistent, IsOfSecondOrderAndSwitchedOfFirstOrder) {
 
 // An object without damping that oscillates keeps its amplitude.
 TEST(EnergyConsistent, KeepsTheEnergyOfAnUndampedObject) {
-    const Hardening object;
-    EnergyConsistent structure{object, {0.001, 0.0}, coupling, 1e-3, 1e-4, false};
-    structure.reset(0.3);
-    const double start = object.at(0.3, {}).energy;
-    for (int k = 0; k < 20'000; ++k) {
-        const Rendered rendered = structure.drive(0.0);
-        ASSERT_EQ(rendered.status, Status::Ok);
-        const double energy = object.at(rendered.environment_position, {}).energy +
-                              0.5 * 0.001 * structure.velocity() * structure.velocity();
-        ASSERT_NEAR(energy, start, 1e-8 * start) << k;
-    }
+    const Inertia mass{0.001, 0.0};
+    const auto expect_kept = [&](const auto& object, auto structure) {
+        structure.reset(0.3);
+        const double start = object.at(0.3, {}).energy;
+        for (int k = 0; k < 20'000; ++k) {
+            const Rendered rendered = structure.drive(0.0);
+            ASSERT_EQ(rendered.status, Status::Ok);
+            const double energy = object.at(rendered.environment_position, {}).energy +
+                                  0.5 * mass.mass * structure.velocity() * structure.velocity();
+            ASSERT_NEAR(energy, start, 1e-8 * std::abs(start)) << k;
+        }
+    };
+    expect_kept(Hardening{}, EnergyConsistent{Hardening{}, mass, coupling, 1e-3, 1e-4, false});
+    const WaveletNetwork network{{1, {4.0}, {0.5}, {0.2}, {8.0}, 0.0}, test::unit_domain()};
+    const double p = EnergyConsistent<WaveletNetwork>::load_line_slope(mass, {0.0, 0.0}, 1e-3);
+    const Resolvent resolvent{network.curve(), p};
+    ASSERT_TRUE(resolvent.unique(p));
+    expect_kept(network, EnergyConsistent{network, mass, coupling, 1e-3, 1e-4, false,
+                                          std::numeric_limits<double>::infinity(), resolvent});
 }
 
 TEST(EnergyConsistent, SwitchedStepNeverGivesEnergy) {
@@ -118,12 +129,13 @@ struct SwitchedStep {
 };
 
 // If the steepest falling slope s is 1.5 times the slope p of the load line, the energy-consistent step has up to
-// three solutions.
-TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRuleAmongThree) {
+// three solutions. If s is 0.9 times p, it has one.
+TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRule) {
     test::Random random{91};
     int three = 0;
     int tried = 0;
     for (int k = 0; k < test::cases(12); ++k) {
+        const double fall_by_slope = k % 2 == 0 ? 1.5 : 0.9;
         const WaveletNetwork object{test::random_network(random, static_cast<std::size_t>(1 + k % 6)),
                                     test::unit_domain()};
         const PiecewiseForce force = piecewise(object.curve());
@@ -131,9 +143,11 @@ TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRuleAmongThree) {
         if (!(fall > 0.1)) {
             continue;
         }
-        const Inertia mass{0.5e-6 * fall / 1.5, 0.0};
+        const Inertia mass{0.5e-6 * fall / fall_by_slope, 0.0};
         const double p = EnergyConsistent<WaveletNetwork>::load_line_slope(mass, {0.0, 0.0}, 1e-3);
-        EnergyConsistent structure{object, mass, coupling, 1e-3, 1e-4, true, 1e300, Resolvent{force, p}};
+        const Resolvent resolvent{force, p};
+        ASSERT_EQ(resolvent.unique(p), fall_by_slope < 1.0);
+        EnergyConsistent structure{object, mass, coupling, 1e-3, 1e-4, true, 1e300, resolvent};
         for (int j = 0; j < 60; ++j) {
             const double from = test::uniform(random, 0.05, 0.95);
             const double to = test::uniform(random, -0.2, 1.2);
@@ -151,25 +165,31 @@ TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRuleAmongThree) {
             ++tried;
             ASSERT_NEAR(rendered.environment_position, expected, 1e-9)
                 << k << " " << j << " from " << from << " push " << push;
-            three += step.roots(far) >= 3 ? 1 : 0;
+            const int roots = step.roots(far);
+            three += roots >= 3 ? 1 : 0;
+            ASSERT_TRUE(fall_by_slope > 1.0 || roots == 1) << k << " " << j;
         }
     }
     EXPECT_GT(tried, test::cases(12) * 20);
-    EXPECT_GT(three, tried / 300) << "the case is about steps with several roots";
+    EXPECT_GT(three, tried / 600) << "the case is about steps with several roots";
 }
 
 // docs/certificate.md, behind a coupling: in every step, G eta (force times displacement) is at least the increase of
-// stored and kinetic energy, for any slope and any solution.
+// stored and kinetic energy, for any slope and any solution, also at a force limit. The mean force D replaces the force
+// f only where f would generate energy. With a free continuation the slope of f jumps, and the mean force of a short step has an error.
 TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
     test::Random random{92};
     int most = 0;
     int most_without_tables = 0;
+    int most_limited = 0;
+    int limited = 0;
     for (int k = 0; k < test::cases(40); ++k) {
         const auto continuation = k % 2 == 0 ? Continuation::Free : Continuation::Linear;
         const WaveletNetwork object{test::random_network(random, static_cast<std::size_t>(1 + k % 12)),
                                     test::unit_domain(continuation, continuation)};
         const PiecewiseForce force = piecewise(object.curve());
         const double fall = std::max(0.1, test::steepest_fall(force));
+        const double steepest = slope_bounds(object.parameters(), 0.0, 1.0).largest() + fall;
         const double about = fall * std::exp(test::uniform(random, std::log(0.505), 1.0));
         const double share = test::uniform(random, 0.1, 0.9);
         const Inertia mass{0.5e-6 * share * about, 1e-3 * 0.1 * (1.0 - share) * about};
@@ -179,7 +199,7 @@ TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
         for (const double alpha : object.parameters().alpha) {
             finest = std::min(finest, 1.0 / alpha);
         }
-        const auto check = [&](auto structure, int& worst) {
+        const auto check = [&](auto structure, Inertia body, int& worst) {
             structure.reset(0.5);
             double y = 0.5;
             double velocity = 0.0;
@@ -188,14 +208,27 @@ TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
                 device = j % 3 == 0 ? test::uniform(random, -0.2, 1.2)
                                     : device + test::uniform(random, -0.02, 0.02);
                 const Rendered rendered = structure.step(device);
-                ASSERT_EQ(rendered.status, Status::Ok) << k << " " << j;
+                ASSERT_TRUE(rendered.status == Status::Ok || rendered.status == Status::Limited)
+                    << k << " " << j;
+                limited += rendered.status == Status::Limited ? 1 : 0;
                 const double eta = rendered.environment_position - y;
+                const EnvironmentSample end = object.at(rendered.environment_position, {});
+                const double stored = end.energy - object.at(y, {}).energy;
                 const double gain =
-                    object.at(rendered.environment_position, {}).energy - object.at(y, {}).energy +
-                    0.5 * mass.mass * (structure.velocity() * structure.velocity() - velocity * velocity);
-                const double work = rendered.force * eta - mass.damping * eta * eta / 1e-3;
-                const double size = 1.0 + p * (1.0 + y * y) + mass.mass * velocity * velocity;
-                ASSERT_GE(work - gain, -1e-11 * size) << k << " " << j << " p / s = " << p / fall;
+                    stored +
+                    0.5 * body.mass * (structure.velocity() * structure.velocity() - velocity * velocity);
+                const double work = rendered.force * eta - body.damping * eta * eta / 1e-3;
+                const double size = 1.0 + p * (1.0 + y * y) + body.mass * velocity * velocity;
+                const bool jumps = continuation == Continuation::Free && std::abs(eta) <= 1e-2 * finest;
+                const double by_jumps = jumps ? 0.018 * 2.0 * steepest * eta * eta : 0.0;
+                ASSERT_GE(work - gain, -1e-11 * size - by_jumps) << k << " " << j << " p / s = " << p / fall;
+                if (std::abs(eta) > 1e-2) {
+                    const double used = rendered.force - body.damping * eta / 1e-3 -
+                                        2e3 * body.mass * (eta / 1e-3 - velocity);
+                    const double mean = stored / eta;
+                    const double expected = (end.force - mean) * eta < 0.0 ? mean : end.force;
+                    ASSERT_NEAR(used, expected, 1e-9 * size) << k << " " << j;
+                }
                 y = rendered.environment_position;
                 velocity = structure.velocity();
                 worst = std::max(worst, rendered.evaluations);
@@ -204,13 +237,19 @@ TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
         const double infinity = std::numeric_limits<double>::infinity();
         check(
             EnergyConsistent{object, mass, spring, 1e-3, 1e-2 * finest, true, infinity, Resolvent{force, p}},
-            most);
-        check(EnergyConsistent{object, mass, spring, 1e-3, 1e-2 * finest}, most_without_tables);
+            mass, most);
+        check(EnergyConsistent{object, mass, spring, 1e-3, 1e-2 * finest}, mass, most_without_tables);
+        const Inertia heavy{0.5e-6 * about, 0.0};
+        check(EnergyConsistent{object, heavy, spring, 1e-3, 1e-2 * finest, true, 0.1 * about}, heavy,
+              most_limited);
     }
     RecordProperty("most_evaluations", most);
     RecordProperty("most_evaluations_without_tables", most_without_tables);
-    EXPECT_LE(most, 24);
-    EXPECT_LE(most_without_tables, 48);
+    RecordProperty("most_evaluations_limited", most_limited);
+    EXPECT_GT(limited, test::cases(40) * 30);
+    EXPECT_LE(most, 48);
+    EXPECT_LE(most_without_tables, 80);
+    EXPECT_LE(most_limited, 80);
 }
 
 TEST(EnergyConsistent, BothStepsReachTheSameForceBehindTheCoupling) {
@@ -274,10 +313,10 @@ struct Counted {
     [[nodiscard]] State start(double x) const noexcept { return environment.start(x); }
 };
 
-/// Moves a handle over a wide range and compares the stated evaluations with the counted ones; returns their mean. A
-/// structure does not state the `hidden` points from which it computes one mean force of a short step.
+/// Moves a handle over a wide range, and compares the stated evaluations of each tick with the counted ones. Returns
+/// the mean number of evaluations in a tick.
 template <class S>
-double mean_evaluations(S structure, const int& count, int hidden = 0) {
+double mean_evaluations(S structure, const int& count) {
     test::Random random{23};
     structure.reset(0.0);
     int all = 0;
@@ -285,10 +324,13 @@ double mean_evaluations(S structure, const int& count, int hidden = 0) {
     for (int k = 0; k < ticks; ++k) {
         const int before = count;
         const Rendered rendered = structure.step(test::uniform(random, -0.5, 0.5));
-        const int missing = count - before - rendered.evaluations;
-        EXPECT_GE(missing, 0) << k;
-        EXPECT_EQ(hidden > 0 ? missing % hidden : missing, 0) << k << ": " << missing;
+        EXPECT_EQ(rendered.evaluations, count - before) << k;
         all += rendered.evaluations;
+    }
+    if constexpr (requires { structure.drive(1.0); }) {
+        const int before = count;
+        const Rendered rendered = structure.drive(1.0);
+        EXPECT_EQ(rendered.evaluations, count - before);
     }
     return static_cast<double>(all) / ticks;
 }
@@ -299,14 +341,18 @@ TEST(EnergyConsistent, StatesItsEvaluationsAndNeedsFew) {
     constexpr double none = std::numeric_limits<double>::infinity();
     int count = 0;
     const Counted<Hardening> object{{}, &count};
-    const auto mean = [&](bool switched, double limit) {
-        return mean_evaluations(EnergyConsistent{object, inertia, coupling, period, 0.0, switched, limit},
-                                count, 3);
+    const auto mean = [&](bool switched, double limit, double shortest = 0.0) {
+        return mean_evaluations(
+            EnergyConsistent{object, inertia, coupling, period, shortest, switched, limit}, count);
     };
-    EXPECT_LT(mean(false, none), 5.12);
-    EXPECT_LT(mean(true, none), 10.5);
-    EXPECT_LT(mean(false, 3.0), 9.14);
-    EXPECT_LT(mean(true, 3.0), 14.6);
+    EXPECT_LT(mean(false, none), 8.27);
+    EXPECT_LT(mean(true, none), 13.7);
+    EXPECT_LT(mean(false, 3.0), 12.3);
+    EXPECT_LT(mean(true, 3.0), 17.8);
+    // A mean force from Gauss points needs three more; its slope is about f' / 2.
+    EXPECT_LT(mean(false, none, 1e9), 25.2);
+    EXPECT_LT(mean(true, none, 1e9), 36.3);
+    EXPECT_LT(mean(true, 3.0, 1e9), 46.8);
     const auto implicit = [&](double limit) {
         return mean_evaluations(Implicit<Counted<Hardening>>{object, inertia, coupling, period, {}, limit},
                                 count);
@@ -314,26 +360,99 @@ TEST(EnergyConsistent, StatesItsEvaluationsAndNeedsFew) {
     EXPECT_LT(implicit(none), 4.23);
     EXPECT_LT(implicit(3.0), 7.83);
     EXPECT_LT(mean_evaluations(Massless{object, coupling, period}, count), 5.62);
+    EXPECT_LT(mean_evaluations(Massless{LimitedEnvironment{object, 3.0}, coupling, period,
+                                        LimitedResolvent{LoadLineSolver{}}},
+                               count),
+              5.62);
     EXPECT_EQ(mean_evaluations(Explicit{object, inertia, coupling, 1e-3}, count), 1.0);
+    EXPECT_EQ(mean_evaluations(Direct{object}, count), 1.0);
+    EXPECT_EQ(mean_evaluations(PredictedDirect{object, 4}, count), 1.0);
 }
 
-// A step that is shorter than `shortest` uses the slope f' / 2 of the mean force.
-TEST(EnergyConsistent, ShortStepsNeedFewEvaluations) {
-    EnergyConsistent structure{Hardening{}, inertia, coupling, 1e-2, 1e9, false};
-    test::Random random{23};
-    int all = 0;
-    for (int k = 0; k < 400; ++k) {
-        all += structure.step(test::uniform(random, -0.5, 0.5)).evaluations;
+// A force that rises generates no energy, so its table is sufficient. Two evaluations check this.
+TEST(EnergyConsistent, StatesTheEvaluationsOfStepsWithTables) {
+    constexpr double period = 1e-3;
+    constexpr double none = std::numeric_limits<double>::infinity();
+    int count = 0;
+    const WaveletNetwork network{{1, {4.0, 9.0}, {0.5, 0.2}, {0.2, 0.05}, {8.0}, 0.1}, test::unit_domain()};
+    const Counted<WaveletNetwork> object{network, &count};
+    const Inertia mass{1e-5, 0.0};
+    const VirtualCoupling spring{20.0, 0.0};
+    const double p = EnergyConsistent<WaveletNetwork>::load_line_slope(mass, spring, period);
+    const auto mean = [&](double slope, bool switched, double shortest, double limit) {
+        return mean_evaluations(EnergyConsistent{object, mass, spring, period, shortest, switched, limit,
+                                                 Resolvent{network.curve(), slope}},
+                                count);
+    };
+    EXPECT_EQ(mean(p, true, 0.0, none), 2.0);
+    for (const double shortest : {0.0, 1e-3, 1e9}) {
+        for (const double limit : {1.0, none}) {
+            for (const bool switched : {false, true}) {
+                EXPECT_GT(mean(p, switched, shortest, limit), 1.0);
+                EXPECT_GT(mean(2.0 * p, switched, shortest, limit), 1.0) << "a table for another slope";
+            }
+        }
     }
-    EXPECT_LT(all / 400.0, 7.07);
 }
 
-/// Object without force up to the position 0.5, whose force is not a number beyond.
+/// Solver with a table that contains one solution, which may be wrong. It does not prove that there is one solution.
+struct OneAnswer {
+    using Memory = WarmStart;
+    Solution answer;
+
+    [[nodiscard]] static bool tabulated() noexcept { return true; }
+    [[nodiscard]] static bool unique(double) noexcept { return false; }
+    template <Environment E>
+    [[nodiscard]] Solution solve(const E& /*environment*/, const typename E::State& /*state*/,
+                                 LoadLine /*line*/, Memory& /*memory*/) const noexcept {
+        return answer;
+    }
+};
+
+// With the mass 1/2 and the period 1, the slope p is 1. A spring of stiffness 2 moves to 4 / (2 + 1) under the force 4.
+// With its mean force it would move to 4 / (1 + 1) = 2.
+TEST(EnergyConsistent, UsesATableOnlyBetweenTheLastPositionAndThatOfTheMeanForce) {
+    const auto position = [](double answer, Status status) {
+        int count = 0;
+        const Counted<test::Spring> object{{2.0}, &count};
+        EnergyConsistent structure{object,
+                                   {0.5, 0.0},
+                                   coupling,
+                                   1.0,
+                                   0.0,
+                                   true,
+                                   std::numeric_limits<double>::infinity(),
+                                   OneAnswer{{answer, {}, 0.0, 7, status}}};
+        const Rendered rendered = structure.drive(4.0);
+        EXPECT_EQ(rendered.status, Status::Ok);
+        EXPECT_EQ(rendered.evaluations, count + 7) << answer;
+        return rendered.environment_position;
+    };
+    constexpr double by_force = 4.0 / 3.0;
+    for (const double inside : {0.0, 0.5, 1.0, 2.0}) {
+        EXPECT_EQ(position(inside, Status::Ok), inside);
+        EXPECT_NEAR(position(inside, Status::MaxIterations), by_force, 1e-12);
+    }
+    for (const double outside : {-0.1, 2.1, std::numeric_limits<double>::quiet_NaN()}) {
+        EXPECT_NEAR(position(outside, Status::Ok), by_force, 1e-12);
+    }
+}
+
+TEST(EnergyConsistent, StatesThatALoadLineIsNotUnique) {
+    EnergyConsistent structure{test::Spring{-8.0}, {0.5, 0.0}, coupling, 1.0};
+    EXPECT_EQ(structure.drive(0.0).status, Status::NotUnique);
+}
+
+/// Spring that hardens against negative positions. Its force is 0 at positive positions, and beyond 0.5 it is not a
+/// number.
 struct BrokenBeyond {
     using State = Stateless;
 
     [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
-        return {x > 0.5 ? std::numeric_limits<double>::quiet_NaN() : 0.0, 0.0, 0.0, false};
+        const double x2 = x * x;
+        return x > 0.5   ? EnvironmentSample{.force = std::numeric_limits<double>::quiet_NaN()}
+               : x > 0.0 ? EnvironmentSample{}
+                         : EnvironmentSample{10.0 * x * x2, 30.0 * x2, 2.5 * x2 * x2, false};
     }
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
@@ -354,6 +473,10 @@ void expect_a_failed_limited_step_is_refused(S structure) {
         EXPECT_EQ(refused.force, 0.0);
         EXPECT_EQ(refused.environment_position, reached);
     }
+    S fresh = reference;
+    S refused = structure;
+    EXPECT_EQ(refused.step(0.2).evaluations, fresh.step(0.2).evaluations)
+        << "the search starts at the same position";
     EXPECT_EQ(structure.drive(10.0).status, Status::NonFinite);
     const Rendered expected = reference.drive(-30.0);
     const Rendered now = structure.drive(-30.0);

@@ -227,7 +227,7 @@ int expect_equal_forces(A prepared, B reference, const std::string& name) {
 
 // `with_structure` prepares polynomials and tables. The forces are those of the exact model and of Newton's method.
 TEST(Scheme, PreparedStructureGivesTheForcesOfTheExactModel) {
-    const NetworkParameters network{1, {4.0, 9.0}, {0.5, 0.2}, {0.2, 0.05}, {8.0}, 0.1};
+    const NetworkParameters network{1, {4.0, 40.0}, {0.5, 0.2}, {0.2, 0.05}, {8.0}, 0.1};
     const ForceModel plain{network, test::unit_domain()};
     const ForceModel loss{network, {{0.02, 0.01}, 0.0, 0.2}, test::unit_domain(), 0.05};
     for (std::size_t k = 0; k < structure_names.size(); ++k) {
@@ -247,8 +247,10 @@ TEST(Scheme, PreparedStructureGivesTheForcesOfTheExactModel) {
             };
             compare(*plain.network(), plain, scheme, "");
             if (kind == StructureKind::Direct) {
-                scheme.predict = 3;
-                compare(*plain.network(), plain, scheme, ", predicted");
+                for (const int predict : {1, 3}) {
+                    scheme.predict = predict;
+                    compare(*plain.network(), plain, scheme, ", predicted");
+                }
                 scheme.predict = 0;
                 EXPECT_EQ(limited, 0) << "the guards limit this structure";
             } else {
@@ -263,6 +265,14 @@ TEST(Scheme, PreparedStructureGivesTheForcesOfTheExactModel) {
             EXPECT_EQ(limited > 100, has_limit) << structure_names[k] << " " << limited;
         }
     }
+}
+
+TEST(Scheme, StructureOfARefusedSchemeIsNotBuilt) {
+    Scheme scheme = scheme_of(StructureKind::Direct);
+    const auto build = [&] { with_structure(spring(5.0), scheme, period, infinity, [](const auto&) {}); };
+    EXPECT_EQ(refusal(build), "");
+    scheme.predict = 17;
+    EXPECT_EQ(refusal(build), "predict is 17, must be 0 to 16");
 }
 
 TEST(Scheme, NamesTheSolverOfItsLoadLine) {

@@ -885,5 +885,138 @@ TEST(Structure, ResetForgetsTheMotionBefore) {
     expect_forgotten(EnergyConsistent{object, Inertia{}, coupling, period});
 }
 
+/// Object whose force depends on its last position, f = 20 x + 4 (x - last).
+struct Dragging {
+    struct State {
+        double last = 1e3;
+    };
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
+        return {24.0 * x - 4.0 * state.last, 24.0, 12.0 * x * x - 4.0 * state.last * x, false};
+    }
+    void advance(double x, State& state) const noexcept { state.last = x; }
+    [[nodiscard]] State start(double x) const noexcept { return {x}; }
+};
+
+// The equation of each structure, with the state of the object at its last position. A new structure is at rest at 0.
+TEST(Structure, StateOfTheObjectFollowsItsPosition) {
+    constexpr Inertia mass{0.01, 0.05};
+    test::Random random{41};
+    double x = 0.0;       // position of the device
+    double x1 = 0.0;      // position of the device, one tick before
+    double y1 = 0.0;      // position of the object, one tick before
+    double y2 = 0.0;      // position of the object, two ticks before
+    double force1 = 0.0;  // force, one tick before
+    double speed1 = 0.0;  // velocity by the midpoint rule, one tick before
+    const auto check = [&](auto structure, const auto& residual, const char* name) {
+        x1 = y1 = y2 = force1 = speed1 = 0.0;
+        for (int k = 0; k < 50; ++k) {
+            x = x1 + test::uniform(random, -0.05, 0.05);
+            const Rendered now = structure.step(x);
+            EXPECT_NEAR(residual(now.environment_position, now.force), 0.0, 1e-9) << name << " " << k;
+            speed1 = 2.0 * (now.environment_position - y1) / period - speed1;
+            y2 = std::exchange(y1, now.environment_position);
+            x1 = x;
+            force1 = now.force;
+        }
+    };
+    const auto f = [](double at, double last) { return 24.0 * at - 4.0 * last; };
+    check(Direct{Dragging{}}, [&](double, double force) { return force - f(x, x1); }, "direct");
+    check(
+        PredictedDirect{Dragging{}, 1},
+        [&](double, double force) { return force - f(x + 0.5 * (x - x1), x); }, "predicted");
+    check(
+        Massless{Dragging{}, coupling, period}, [&](double y, double force) { return force - f(y, y1); },
+        "massless");
+    check(
+        Implicit{Dragging{}, mass, coupling, period},
+        [&](double y, double force) {
+            return mass.mass * (y - 2.0 * y1 + y2) / (period * period) + mass.damping * (y - y1) / period +
+                   f(y, y1) - force;
+        },
+        "implicit");
+    check(
+        Explicit{Dragging{}, mass, coupling, period},
+        [&](double y, double) {
+            return mass.mass * (y - 2.0 * y1 + y2) / (period * period) + mass.damping * (y1 - y2) / period +
+                   f(y1, y1) - force1;
+        },
+        "explicit");
+    check(
+        EnergyConsistent{Dragging{}, mass, coupling, period, 0.0, false},
+        [&](double y, double force) {
+            return 2.0 * mass.mass / period * ((y - y1) / period - speed1) +
+                   mass.damping * (y - y1) / period + 12.0 * (y + y1) - 4.0 * y1 - force;
+        },
+        "energy-consistent");
+}
+
+/// Object without force up to the position 0.5, whose force is not a number beyond.
+struct BrokenBeyond {
+    using State = Stateless;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        return {x > 0.5 ? std::numeric_limits<double>::quiet_NaN() : 0.0, 0.0, 0.0, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+TEST(Structure, ForceThatIsNotFiniteIsRefused) {
+    const auto expect_refused = [](auto structure) {
+        structure.reset(0.6);
+        const Rendered refused = structure.step(0.6);
+        EXPECT_EQ(refused.status, Status::NonFinite);
+        EXPECT_EQ(refused.force, 0.0);
+        if constexpr (requires { structure.drive(1.0); }) {
+            EXPECT_EQ(structure.drive(1.0).status, Status::NonFinite);
+        }
+    };
+    expect_refused(Direct{BrokenBeyond{}});
+    expect_refused(PredictedDirect{BrokenBeyond{}, 3});
+    expect_refused(Massless{BrokenBeyond{}, coupling, period});
+    expect_refused(Implicit{BrokenBeyond{}, Inertia{}, coupling, period});
+    expect_refused(Explicit{BrokenBeyond{}, Inertia{}, coupling, period});
+    expect_refused(EnergyConsistent{BrokenBeyond{}, Inertia{}, coupling, period});
+}
+
+// The load line f(y) + 0.2 y = 0 has the solutions -5, 0 and 5.
+TEST(Massless, SearchStartsAtTheResetPosition) {
+    Massless structure{PushingOut{1.0, 0.31, 100.0}, VirtualCoupling{0.2, 0.0}, period};
+    for (const double start : {6.0, -6.0}) {
+        structure.reset(start);
+        EXPECT_NEAR(structure.step(0.0).environment_position, std::copysign(5.0, start), 1e-9);
+    }
+}
+
+TEST(Massless, StatesThatItsSearchEndedAlsoAtTheForceLimit) {
+    const auto status = [](int max_evaluations) {
+        Massless structure{LimitedEnvironment{Spring{50.0}, 1.0}, coupling, period,
+                           LimitedResolvent{LoadLineSolver{.max_evaluations = max_evaluations}}};
+        structure.reset(1.0);
+        return structure.step(2.0).status;
+    };
+    EXPECT_EQ(status(1), Status::MaxIterations);
+    EXPECT_EQ(status(64), Status::Limited);
+}
+
+// The load line (1 - p / K_c) f + p x = q with f = -30 x, p = 20 and K_c = 100 falls by 4 in 1.
+TEST(Compensated, ResolventStatesThatALoadLineIsNotUnique) {
+    const WaveletNetwork falling{{1, {}, {}, {}, {-30.0}, 0.0}, test::unit_domain()};
+    EXPECT_FALSE((CompensatedResolvent{piecewise(falling.curve()), 100.0, 20.0}.unique(20.0)));
+    EXPECT_TRUE((CompensatedResolvent{piecewise(falling.curve()), 100.0, 25.0}.unique(25.0)));
+}
+
+TEST(DirectVelocity, PositionThatIsNotFiniteIsRefusedAlsoWithoutForce) {
+    const ForceModel model =
+        ForceModel::of_velocity({2, {}, {}, {}, {0.0, 0.0}, 1.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}});
+    for (const double bad :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+        DirectVelocity structure{*model.velocity(), period};
+        EXPECT_EQ(structure.step(bad).status, Status::NonFinite);
+        EXPECT_EQ(structure.step(0.5).force, 1.0);
+    }
+}
+
 }  // namespace
 }  // namespace palpate

@@ -37,7 +37,8 @@ template <Environment E, class Solver = LoadLineSolver>
 class EnergyConsistent {
   public:
     /// Makes the structure. If the object moves less than `shortest` in a step, D is computed from three Gauss points
-    /// of f, because a quotient of small differences loses digits; 1e-2 of the finest wavelet's width is suitable.
+    /// of f, because a quotient of small differences loses digits; 1e-2 of the finest wavelet's width is suitable. If the
+    /// slope of f jumps inside such a step, the step can generate up to 0.018 |jump| (y - y_{k-1})^2.
     EnergyConsistent(E environment, Inertia inertia, VirtualCoupling coupling, double period,
                      double shortest = 1e-4, bool switched = true,
                      double force_limit = std::numeric_limits<double>::infinity(), Solver solver = {})
@@ -113,9 +114,10 @@ class EnergyConsistent {
         double energy;
         double shortest;
         bool switched;
+        int& evaluations;  ///< number of evaluations of the environment; counts up
 
         [[nodiscard]] EnvironmentSample at(double y, const State& state) const noexcept {
-            EnvironmentSample sample = environment.at(y, state);
+            EnvironmentSample sample = counted(y, state);
             const double moved = y - from;
             const double quotient = mean(y, sample, state);
             if (!switched || (sample.force - quotient) * moved < 0.0) {
@@ -131,7 +133,7 @@ class EnergyConsistent {
 
         /// Returns true if a step to y with the force f(y) would generate energy.
         [[nodiscard]] bool generates(double y, const State& state) const noexcept {
-            const EnvironmentSample sample = environment.at(y, state);
+            const EnvironmentSample sample = counted(y, state);
             return (sample.force - mean(y, sample, state)) * (y - from) < 0.0;
         }
 
@@ -143,10 +145,14 @@ class EnergyConsistent {
             }
             const double middle = 0.5 * (from + y);
             const double offset = 0.7745966692414834 * 0.5 * (y - from);
-            return (5.0 * environment.at(middle - offset, state).force +
-                    8.0 * environment.at(middle, state).force +
-                    5.0 * environment.at(middle + offset, state).force) /
+            return (5.0 * counted(middle - offset, state).force + 8.0 * counted(middle, state).force +
+                    5.0 * counted(middle + offset, state).force) /
                    18.0;
+        }
+
+        [[nodiscard]] EnvironmentSample counted(double y, const State& state) const noexcept {
+            ++evaluations;
+            return environment.at(y, state);
         }
     };
 
@@ -159,66 +165,63 @@ class EnergyConsistent {
     }
 
     /// Returns the force of the next step as an environment: the mean force D. If `switched`: the force f where f does
-    /// not generate energy, otherwise D.
-    [[nodiscard]] Stepped stepped(bool switched) const noexcept {
-        return {environment_, position_, environment_.at(position_, state_).energy, shortest_, switched};
+    /// not generate energy, otherwise D. Its evaluations of the environment are added to `evaluations`.
+    [[nodiscard]] Stepped stepped(bool switched, int& evaluations) const noexcept {
+        ++evaluations;
+        return {environment_, position_, environment_.at(position_, state_).energy,
+                shortest_,    switched,  evaluations};
     }
 
     /// Returns the first solution of the step's load line that a search from the position `start` finds.
     [[nodiscard]] Solution search(VirtualCoupling coupling, double driving_force,
                                   double start) const noexcept {
-        Solution solution =
-            LoadLineSolver{}.solve(stepped(switched_), state_, line_of(coupling, driving_force), start);
-        ++solution.evaluations;
+        int evaluations = 0;
+        Solution solution = LoadLineSolver{}.solve(stepped(switched_, evaluations), state_,
+                                                   line_of(coupling, driving_force), start);
+        solution.evaluations = evaluations;
         return solution;
     }
 
     /// Returns the solution of the next step: the position of the object at the end of the step.
     [[nodiscard]] Solution solve(VirtualCoupling coupling, double driving_force) const noexcept {
         const LoadLine line = line_of(coupling, driving_force);
-        const Stepped quotient = stepped(false);
+        int evaluations = 0;
+        const Stepped quotient = stepped(false, evaluations);
         const LoadLineSolver newton;
-        int evaluations = 1;
-        const auto generates = [&](const Solution& solution) {
-            evaluations += solution.evaluations + 1;
-            return quotient.generates(solution.position, state_);
+        const auto by_force = [&](Solution solution) {
+            evaluations += solution.evaluations;
+            return solution;
+        };
+        const auto end = [&](Solution solution) {
+            solution.evaluations = evaluations;
+            return solution;
         };
         const auto bracket_to = [&](double y) {
             return Bracket{std::fmin(position_, y), std::fmax(position_, y)};
         };
-        const auto end = [&](Solution solution, int more) {
-            solution.evaluations = evaluations + more;
-            return solution;
-        };
         typename Solver::Memory memory{position_};
         if (switched_ && solver_.unique(line.slope)) {
-            const Solution by_force = solver_.solve(environment_, state_, line, memory);
-            if (by_force.status != Status::Ok || !generates(by_force)) {
-                return end(by_force, 0);
+            const Solution unique = by_force(solver_.solve(environment_, state_, line, memory));
+            if (unique.status != Status::Ok || !quotient.generates(unique.position, state_)) {
+                return end(unique);
             }
             // With the force f the step would generate energy, so y_D, the solution with the mean force D, is used.
-            const Solution by_energy =
-                newton.solve(quotient, state_, line, by_force.position, bracket_to(by_force.position));
-            return end(by_energy, by_energy.evaluations);
+            return end(newton.solve(quotient, state_, line, unique.position, bracket_to(unique.position)));
         }
         const Solution by_energy = newton.solve(quotient, state_, line, position_);
-        if (!switched_ || by_energy.status != Status::Ok) {
-            return end(by_energy, by_energy.evaluations);
-        }
-        if (generates(by_energy)) {
-            return end(by_energy, 0);
+        if (!switched_ || by_energy.status != Status::Ok || quotient.generates(by_energy.position, state_)) {
+            return end(by_energy);
         }
         const Bracket between = bracket_to(by_energy.position);
         if (solver_.tabulated()) {
-            const Solution nearest = solver_.solve(environment_, state_, line, memory);
+            const Solution nearest = by_force(solver_.solve(environment_, state_, line, memory));
             if (nearest.status == Status::Ok && nearest.position >= between.low &&
                 nearest.position <= between.high) {
-                return end(nearest, nearest.evaluations);
+                return end(nearest);
             }
-            evaluations += nearest.evaluations;
         }
-        const Solution any = newton.solve(environment_, state_, line, by_energy.position, between);
-        return generates(any) ? end(by_energy, 0) : end(any, 0);
+        const Solution any = by_force(newton.solve(environment_, state_, line, by_energy.position, between));
+        return end(quotient.generates(any.position, state_) ? by_energy : any);
     }
 
     /// Moves the object to the solution of a step and returns the result of the tick.

@@ -128,8 +128,8 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
     with_kind(scheme.structure, [&](auto structure) {
         if constexpr (requires(StructureNumbers numbers) { structure.slope_limit(numbers); }) {
             const double steepest = steepest_slope(scheme, model);
-            const double limit =
-                structure.slope_limit({scheme.coupling, scheme.inertia, 0, period_s, 0.0, 0.0});
+            const double limit = structure.slope_limit(
+                {.coupling = scheme.coupling, .inertia = scheme.inertia, .period_s = period_s});
             detail::require(steepest < limit, "structure is " + std::string(structure.traits.name) +
                                                   ", which diverges: the model's steepest slope is " +
                                                   readable(steepest) + ", must be below " + readable(limit) +
