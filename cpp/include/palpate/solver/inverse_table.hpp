@@ -57,6 +57,63 @@ struct InverseTable {
 
 namespace detail {
 
+/// Returns the position y and the derivatives of the inverse of a rising function at its value f[0]; f contains value
+/// and derivatives of the function at y.
+[[nodiscard]] inline Jet inverse_jet(double y, const Jet& f) noexcept {
+    const double s = f[1];
+    const double s3 = s * s * s;
+    return {y, 1.0 / s, -f[2] / s3, (3.0 * f[2] * f[2] - s * f[3]) / (s3 * s * s)};
+}
+
+/// Returns bounds of the changes of `inverse_jet`, to first order. `change` has bounds of the change of y (element 0) and
+/// of each derivative in f.
+[[nodiscard]] inline Jet inverse_change(const Jet& f, const Jet& change) noexcept {
+    const double s = f[1];
+    const double s3 = s * s * s;
+    const double f2 = std::abs(f[2]);
+    const double by_slope = (15.0 * f2 * f2 / s + 4.0 * std::abs(f[3])) * change[1];
+    return {change[0], change[1] / (s * s), (change[2] + 3.0 * f2 * change[1] / s) / s3,
+            (change[3] + (6.0 * f2 * change[2] + by_slope) / s) / (s3 * s)};
+}
+
+/// Bounds of the Taylor coefficients |P^(j)| / j! of a function P over one cell; element 0 is not used.
+using TaylorBounds = std::array<double, 9>;
+
+/// Returns bounds of the Taylor coefficients of the polynomial with the coefficients c, for |t| <= 1/2.
+[[nodiscard]] inline TaylorBounds taylor_bounds(const std::array<double, 8>& c) noexcept {
+    TaylorBounds bounds{};
+    std::transform(c.begin(), c.end(), bounds.begin(), [](double each) { return std::abs(each); });
+    // Horner's method: the Taylor coefficients at t = 1/2 of the polynomial with absolute coefficients
+    for (std::size_t j = 0; j < c.size(); ++j) {
+        for (std::size_t k = c.size() - 1; k > j; --k) {
+            bounds[k - 1] += 0.5 * bounds[k];
+        }
+    }
+    return bounds;
+}
+
+/// Returns a bound of the eighth Taylor coefficient of F(P(t)) for a polynomial P of degree 7: the coefficient of t^8 in
+/// sum_n |F^(n)| / n! (sum_j inner_j t^j)^n. `outer` has bounds of |F^(n)|. The term n = 1 adds 0.
+[[nodiscard]] inline double eighth_coefficient(const DerivativeBounds& outer,
+                                               const TaylorBounds& inner) noexcept {
+    constexpr std::size_t order = 8;
+    TaylorBounds composed = inner;
+    double eighth = 0.0;
+    double factorial = 1.0;
+    for (std::size_t n = 2; n <= order; ++n) {
+        TaylorBounds product{};
+        for (std::size_t a = n - 1; a < order; ++a) {
+            for (std::size_t b = 1; a + b <= order; ++b) {
+                product[a + b] += composed[a] * inner[b];
+            }
+        }
+        composed = product;
+        factorial *= static_cast<double>(n);
+        eighth += outer[n] / factorial * composed[order];
+    }
+    return eighth;
+}
+
 /// The inverse function of a rising function F as polynomials on cells of equal width.
 ///
 /// The error of each cell is proved separately by the residual r(q) = F(P(q)) - q of its polynomial P. At both borders
@@ -128,20 +185,18 @@ class InverseCells {
     [[nodiscard]] bool certified(std::size_t k) const noexcept { return errors_[k] <= largest_error_; }
 
     /// Returns the position y with F(y) = q, exact to rounding, and its derivatives. Applies Newton's method with a
-    /// bracket; outside the interval of F the result is NaN if F has a fold there.
+    /// bracket, from the position of the previous border. At a value that F does not reach, the result has no meaning,
+    /// and the error of its cell is not proved.
     [[nodiscard]] InverseJet invert(double q) const noexcept {
         constexpr double infinity = std::numeric_limits<double>::infinity();
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
+        const auto [lower, upper] = force_.positions;
         const bool below = q < force_.values.lower;
         const bool above = q > force_.values.upper;
-        constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-        InverseJet at{{nan, nan, nan, nan}, {}, nan};
-        if ((below && force_.folds_below) || (above && force_.folds_above)) {
-            return at;
-        }
-        double low = below ? -infinity : above ? force_.positions.upper : force_.positions.lower;
-        double high = above ? infinity : below ? force_.positions.lower : force_.positions.upper;
-        double y = first_guess(q, low, high);
+        double low = below ? -infinity : above ? upper : lower;
+        double high = above ? infinity : below ? lower : upper;
+        double y = std::fmin(std::fmax(borders_.empty() ? lower : borders_.back().inverse[0], low), high);
+        InverseJet at{};
         for (int evaluations = 0; evaluations < 100; ++evaluations) {
             at.forward = jet(force_.network, y);
             at.forward[0] += force_.p * y;
@@ -152,32 +207,13 @@ class InverseCells {
             if (!(next >= low && next <= high)) {
                 next = 0.5 * (low + high);
             }
-            if (!(std::abs(next - y) > 2.0 * epsilon * std::abs(y)) ||
-                std::abs(at.residual) <= 4.0 * epsilon * std::abs(q)) {
+            if (!(std::abs(next - y) > 2.0 * epsilon * std::abs(y))) {
                 break;
             }
             y = next;
         }
-        const auto& f = at.forward;
-        const double s = f[1];
-        const double s3 = s * s * s;
-        at.inverse = {y, 1.0 / s, -f[2] / s3, (3.0 * f[2] * f[2] - s * f[3]) / (s3 * s * s)};
+        at.inverse = inverse_jet(y, at.forward);
         return at;
-    }
-
-    /// Returns a first position for Newton's method at the value q: the Taylor polynomial of the previous border if
-    /// there is one, otherwise the middle or an end of the bracket from `low` to `high`.
-    [[nodiscard]] double first_guess(double q, double low, double high) const noexcept {
-        if (!borders_.empty()) {
-            const InverseJet& last = borders_.back();
-            const auto& [y, first, second, third] = last.inverse;
-            const double d = q - (last.forward[0] - last.residual);
-            const double guess = y + d * (first + d * (0.5 * second + d * third / 6.0));
-            if (guess > low && guess < high) {
-                return guess;
-            }
-        }
-        return std::isfinite(low) ? (std::isfinite(high) ? 0.5 * (low + high) : low) : high;
     }
 
     /// Number stored as the error of a cell in which rounding alone exceeds the required error. Such a cell is not
@@ -188,47 +224,19 @@ class InverseCells {
     /// `rounding_limited` if rounding alone exceeds the required error. `of_f` has bounds of the rounding errors of f
     /// and its derivatives.
     [[nodiscard]] double cell_error(std::size_t k, const Jet& of_f) noexcept {
-        constexpr std::size_t order = 8;
         const auto c = table_.coefficients(k);
         if (!std::all_of(c.begin(), c.end(), [](double one) { return std::isfinite(one); })) {
             return std::numeric_limits<double>::infinity();
         }
-        // Element j is an upper bound of |P^(j)| / j! over one cell, rounding included. P^(j) is derivative j of the
-        // polynomial P of the cell.
-        std::array<double, order + 1> inner{};
-        for (std::size_t j = 1; j < c.size(); ++j) {
-            double binomial = 1.0;
-            double power = 1.0;
-            for (std::size_t m = j; m < c.size(); ++m) {
-                inner[j] += binomial * std::abs(c[m]) * power;
-                binomial *= static_cast<double>(m + 1) / static_cast<double>(m + 1 - j);
-                power *= 0.5;
-            }
-            inner[j] *= 1.0 + 1e-9;
-        }
+        // `derivative_bounds` exceeds the true bounds by a factor that also covers the rounding of the sums below.
+        const TaylorBounds inner = taylor_bounds(c);
         const double spread = 0.5 * inner[1] + largest_error_;
         const DerivativeBounds outer = derivative_bounds(force_.network, c[0] - spread, c[0] + spread);
         const double least_slope = force_.p + jet(force_.network, c[0])[1] - of_f[1] - outer[2] * spread;
         if (!(least_slope > 0.0)) {
             return std::numeric_limits<double>::infinity();
         }
-        // Bound of the eighth Taylor coefficient of F(P): the coefficient of t^8 in sum_k |f^(k)| / k! (sum_j inner_j
-        // t^j)^k. The term k = 1 adds 0, because P has degree 7.
-        std::array<double, order + 1> composed = inner;
-        double eighth = 0.0;
-        double factorial = 1.0;
-        for (std::size_t n = 2; n <= order; ++n) {
-            std::array<double, order + 1> product{};
-            for (std::size_t a = n - 1; a <= order; ++a) {
-                for (std::size_t b = 1; a + b <= order; ++b) {
-                    product[a + b] += composed[a] * inner[b];
-                }
-            }
-            composed = product;
-            factorial *= static_cast<double>(n);
-            eighth += outer[n] / factorial * composed[order];
-        }
-        const double truncation = (1.0 + 1e-9) * eighth / 256.0 / least_slope;
+        const double truncation = eighth_coefficient(outer, inner) / 256.0 / least_slope;
         const double rounding =
             table_.rounding(k)[0] + std::max(border_rounding(borders_[k], of_f, least_slope),
                                              border_rounding(borders_[k + 1], of_f, least_slope));
@@ -240,25 +248,18 @@ class InverseCells {
     [[nodiscard]] double border_rounding(const InverseJet& at, const Jet& of_f,
                                          double least_slope) const noexcept {
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
-        const auto& [y, s, second, third] = at.forward;
-        const double argument =
-            4.0 * epsilon * (std::abs(at.forward[0]) + std::abs(force_.p * at.inverse[0]));
+        const auto& f = at.forward;
+        const double argument = 4.0 * epsilon * (std::abs(f[0]) + std::abs(force_.p * at.inverse[0]));
         const double offset = (std::abs(at.residual) + of_f[0] + argument) / least_slope;
         // A position error `offset` changes each derivative of F by `offset` times the next derivative; the change of
-        // the third derivative is below rounding.
-        const double f2 = std::abs(second);
-        const double f3 = std::abs(third);
-        const double d1 = of_f[1] + f2 * offset + 2.0 * epsilon * s;
-        const double d2 = of_f[2] + f3 * offset;
-        const double d3 = 2.0 * of_f[3];
-        const Jet derivative_errors{offset, d1 / (s * s), d2 / (s * s * s) + 3.0 * f2 * d1 / (s * s * s * s),
-                                    (6.0 * f2 * d2 + s * d3 + f3 * d1) / std::pow(s, 5) +
-                                        5.0 * (3.0 * f2 * f2 + s * f3) * d1 / std::pow(s, 6)};
+        // the third derivative is below rounding. Two epsilon of F' cover the rounding of the quotients.
+        const Jet errors =
+            inverse_change(f, {offset, of_f[1] + std::abs(f[2]) * offset + 2.0 * epsilon * f[1],
+                               of_f[2] + std::abs(f[3]) * offset, 2.0 * of_f[3]});
         double sum = 0.0;
         double power = 1.0;
-        for (std::size_t d = 0; d < derivative_errors.size(); ++d) {
-            sum += detail::hermite_value[d] *
-                   (derivative_errors[d] + 16.0 * epsilon * std::abs(at.inverse[d])) * power;
+        for (std::size_t d = 0; d < errors.size(); ++d) {
+            sum += hermite_value[d] * errors[d] * power;
             power *= table_.width();
         }
         return sum;
@@ -276,34 +277,26 @@ class InverseCells {
 }  // namespace detail
 
 /// Returns tables of the inverse of a rising function F. The cell width is halved until no cell could be improved (near
-/// folds: at most 1/32 of the cells), or until a narrower cell width would need more than `largest_table` cells.
-/// Returns the tables of the cell width with the largest share of proved cells. Near a fold of F the inverse is a
-/// square root, which polynomials do not approximate well, so the tables omit some cells there. The tables also omit
-/// cells in which F is so flat that rounding alone exceeds the required error.
+/// folds: at most 1/32 of the cells), or until a narrower cell width would need more than `largest_table` cells. Near a
+/// fold of F the inverse is a square root, which polynomials do not approximate well, so the tables omit some cells
+/// there. The tables also omit cells in which F is so flat that rounding alone exceeds the required error.
 [[nodiscard]] inline std::vector<InverseTable> inverse_tables(const RisingForce& force, double largest_error,
                                                               std::size_t largest_table) {
     const double range = force.values.upper - force.values.lower;
     const double size = std::max(std::abs(force.values.lower), std::abs(force.values.upper));
     const double left_out = force.folds_below || force.folds_above ? 1.0 / 32.0 : 0.0;
-    std::vector<InverseTable> best;
-    double covered = 0.0;
+    std::vector<InverseTable> tables;
     double width = std::exp2(std::floor(std::log2(range / 128.0)));
     while (range / width + 2.0 <= static_cast<double>(largest_table) && size / width < 0x1p40 &&
            PiecewiseSeptic::is_sound(width)) {
         const detail::InverseCells cells{force, largest_error, width};
-        const auto share = [&](std::size_t count) {
-            return static_cast<double>(count) / static_cast<double>(cells.size());
-        };
-        if (share(cells.certified()) > covered) {
-            covered = share(cells.certified());
-            best = cells.runs();
-        }
-        if (share(cells.improvable()) <= left_out) {
+        tables = cells.runs();
+        if (static_cast<double>(cells.improvable()) <= left_out * static_cast<double>(cells.size())) {
             break;
         }
         width *= 0.5;
     }
-    return best;
+    return tables;
 }
 
 }  // namespace palpate

@@ -106,14 +106,14 @@ struct LoadLineSolver {
                                   double start, Bracket within) const noexcept {
         constexpr double infinity = std::numeric_limits<double>::infinity();
         constexpr double rounding = 4.0 * std::numeric_limits<double>::epsilon();
-        Solution at{start, {}, 0.0, 0, Status::Ok};
+        Solution at;
+        at.position = start;
         auto [low, high] = within;
         double last_step = infinity;
         double last_residual = infinity;
-        while (true) {
+        for (at.evaluations = 1;; ++at.evaluations) {
             at.environment = environment.at(at.position, state);
             at.residual = at.environment.force + (line.slope * at.position - line.intercept);
-            ++at.evaluations;
             const double slope = line.slope + at.environment.slope;
             if (!std::isfinite(at.residual) || !std::isfinite(slope)) {
                 at.status = Status::NonFinite;
@@ -133,8 +133,7 @@ struct LoadLineSolver {
                 at.status = Status::MaxIterations;
                 return at;
             }
-            const bool bracketed = std::isfinite(low) && std::isfinite(high);
-            if (bracketed && high - low <= tolerated) {
+            if (high - low <= tolerated) {
                 return at;
             }
             // Newton's step is used while the slope p + f' of the residual is > 0, the step stays inside the bracket,
@@ -142,10 +141,9 @@ struct LoadLineSolver {
             const double newton = slope > 0.0 ? -at.residual / slope : 0.0;
             const double direction = at.residual < 0.0 ? 1.0 : -1.0;
             double step = newton;
-            if (bracketed) {
+            if (std::isfinite(low) && std::isfinite(high)) {
                 const double target = at.position + newton;
-                const bool inside = newton != 0.0 && target > low && target < high;
-                if (!inside || std::abs(at.residual) > 0.5 * last_residual) {
+                if (!(target > low && target < high) || std::abs(at.residual) > 0.5 * last_residual) {
                     step = 0.5 * (low + high) - at.position;
                 }
             } else {

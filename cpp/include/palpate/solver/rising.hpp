@@ -27,8 +27,15 @@ namespace palpate {
     constexpr int first_cells = 61;
     constexpr int budget = 20'000;
     const Jet rounding = jet_rounding(network, std::max(std::abs(lower), std::abs(upper)));
-    const double margin = rounding[1] + std::numeric_limits<double>::epsilon() * std::abs(p);
+    // Twice the rounding error of a slope, so that the sign that the middle of a cell proves is also computed at its ends
+    const double margin = 2.0 * (rounding[1] + std::numeric_limits<double>::epsilon() * std::abs(p));
     const auto slope = [&](double y) { return p + jet(network, y)[1]; };
+    const auto rises_at = [&](double y) { return slope(y) > 0.0; };
+    for (const double edge : {lower, upper}) {
+        if (!(std::abs(slope(edge)) > margin)) {
+            return std::nullopt;
+        }
+    }
 
     // Cells (intervals of positions) that are not examined yet; the cell with the lowest positions is the last element
     std::vector<Interval> cells;
@@ -37,11 +44,7 @@ namespace palpate {
         cells.push_back({k == 1 ? lower : border(k - 1), k == first_cells ? upper : border(k)});
     }
     std::vector<Interval> intervals;
-    const double first_slope = slope(lower);
-    if (!(std::abs(first_slope) > margin)) {
-        return std::nullopt;
-    }
-    bool rises = first_slope > 0.0;
+    bool rises = rises_at(lower);
     // If F rises at the lower end of the examined cell: lower end of the interval over which F rises up to this cell
     double start = lower;
     for (int examined = 0; !cells.empty(); ++examined) {
@@ -58,27 +61,23 @@ namespace palpate {
         if (curvature - rounding[2] > jerk * radius) {
             double left = cell.lower;
             double right = cell.upper;
-            const double at_left = slope(left);
-            const double at_right = slope(right);
-            if (std::abs(at_left) > margin && std::abs(at_right) > margin) {
-                if ((at_left > 0.0) == (at_right > 0.0)) {
-                    continue;
-                }
-                double fold = middle;
-                while (fold > left && fold < right) {
-                    ((slope(fold) > 0.0) == (at_left > 0.0) ? left : right) = fold;
-                    fold = 0.5 * (left + right);
-                }
-                rises = at_right > 0.0;
-                if (rises) {
-                    start = right;
-                } else {
-                    intervals.push_back({start, left});
-                }
+            if (rises_at(left) == rises_at(right)) {
                 continue;
             }
+            double fold = middle;
+            while (fold > left && fold < right) {
+                (rises_at(fold) == rises ? left : right) = fold;
+                fold = 0.5 * (left + right);
+            }
+            rises = !rises;
+            if (rises) {
+                start = right;
+            } else {
+                intervals.push_back({start, left});
+            }
+            continue;
         }
-        if (examined >= budget || !(radius > 1e-12 * (upper - lower))) {
+        if (examined >= budget) {
             return std::nullopt;
         }
         cells.push_back({middle, cell.upper});
