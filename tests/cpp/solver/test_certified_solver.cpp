@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -82,16 +83,18 @@ double sampled(const NetworkParameters& network, double p, double low, double hi
     return of.ratio();
 }
 
-/// Returns the largest max|F''| / (2 min F') of press, release, and sticking with |s| <= 1 + width / r, by samples.
+/// Returns the largest max|F''| / (2 min F') of press, release, and sticking, by samples. Of the positions of the play
+/// operator at which it can stick, the extreme ones are at the distance r from an end of the cell.
 double sampled(const HysteresisNetwork& pair, double p, double low, double high) {
     const double r = pair.play_radius();
     double worst = 0.0;
     for (const bool sticks : {false, true}) {
         for (const double sign : {-1.0, 1.0}) {
-            const double s = sign * (sticks ? 1.0 + (high - low) / r : 1.0);
+            const double play = sign > 0.0 ? low - r : high + r;
             Steepness of;
             for (int j = 0; j <= samples; ++j) {
                 const double y = sample_of(low, high, j);
+                const double s = sticks ? (y - play) / r : sign;
                 const Jet g = jet(pair.force().parameters(), y);
                 const Jet h = jet(pair.hysteresis_force().parameters(), y);
                 of.add(p + g[1] + s * h[1] + (sticks ? h[0] / r : 0.0),
@@ -135,15 +138,44 @@ std::size_t fewest_cells(double lower, double upper, Ratio ratio) {
     return count;
 }
 
-TEST(CertifiedSolver, HasTightCellsThatSatisfyItsCondition) {
-    Random random{321};
-    std::size_t all = 0;
+/// Numbers of cells and sums of their curvatures, compared with the fewest possible cells and the true curvatures.
+struct Tightness {
+    std::size_t cells = 0;
     std::size_t fewest = 0;
     double proved = 0.0;
-    double true_sum = 0.0;
+    double sampled = 0.0;
+
+    /// Adds the cells of one force over [0, 1], and tests that they are adjacent and satisfy condition (C).
+    template <class Ratio>
+    void add(const std::vector<CertifiedSolver::Memory>& added, Ratio ratio) {
+        double last = 0.0;
+        for (const auto& cell : added) {
+            ASSERT_NEAR(cell.low, last, 1e-14) << "the cells are adjacent";
+            last = cell.high;
+            const double width = cell.high - cell.low;
+            const double expected = ratio(cell.low, cell.high);
+            ASSERT_LE(8.0 * width * cell.curvature, 1.0);
+            ASSERT_GE(cell.curvature, expected * (1.0 - 1e-9));
+            proved += width * cell.curvature;
+            sampled += width * expected;
+        }
+        ASSERT_NEAR(last, 1.0, 1e-14);
+        cells += added.size();
+        fewest += fewest_cells(0.0, 1.0, ratio);
+    }
+    /// Tests that the proof needs few more cells than possible, and that its curvatures are near the true ones.
+    void expect_at_most(double more_cells, double more_curvature) const {
+        EXPECT_GE(cells, fewest);
+        EXPECT_LE(static_cast<double>(cells), more_cells * static_cast<double>(fewest));
+        EXPECT_LE(proved, more_curvature * sampled);
+    }
+};
+
+TEST(CertifiedSolver, HasTightCellsThatSatisfyItsCondition) {
+    Random random{321};
+    Tightness tightness;
     for (int k = 0; k < cases(16); ++k) {
         const WaveletNetwork network = random_scene(random, k);
-        const NetworkParameters& parameters = network.parameters();
         const double fall = std::max(0.1, test::steepest_fall(piecewise(network.curve())));
         const double p = fall * (1.01 + std::exp(uniform(random, -4.0, 2.0)));
         const CertifiedSolver solver{piecewise(network.curve()), p};
@@ -155,68 +187,33 @@ TEST(CertifiedSolver, HasTightCellsThatSatisfyItsCondition) {
             EXPECT_LE(memory.low, y);
             return memory;
         });
-        double last = 0.0;
-        for (const auto& cell : cells) {
-            ASSERT_NEAR(cell.low, last, 1e-14) << "the cells are adjacent";
-            last = cell.high;
-            const double expected = sampled(parameters, p, cell.low, cell.high);
-            ASSERT_LE(8.0 * (cell.high - cell.low) * cell.curvature, 1.0);
-            ASSERT_GE(cell.curvature, expected * (1.0 - 1e-9)) << k;
-            proved += (cell.high - cell.low) * cell.curvature;
-            true_sum += (cell.high - cell.low) * expected;
-        }
-        ASSERT_NEAR(last, 1.0, 1e-14);
-        ASSERT_LE(cells.size(), solver.cells()) << "outside the domain are other cells";
-        ASSERT_LE(solver.cells(), cells.size() + 20);
-        all += cells.size();
-        fewest += fewest_cells(0.0, 1.0,
-                               [&](double low, double high) { return sampled(parameters, p, low, high); });
+        ASSERT_LE(cells.size(), solver.cells());
+        ASSERT_LE(solver.cells(), cells.size() + (k % 2 == 0 ? 20 : 0))
+            << "other cells are on the lines to zero force outside the domain";
+        tightness.add(cells,
+                      [&](double low, double high) { return sampled(network.parameters(), p, low, high); });
     }
-    // The proof needs at most 1.45 times the fewest possible cells, and its c is at most 1.25 times the true one on average.
-    EXPECT_GE(all, fewest);
-    EXPECT_LE(static_cast<double>(all), 1.45 * static_cast<double>(fewest));
-    EXPECT_LE(proved, 1.25 * true_sum);
+    tightness.expect_at_most(1.45, 1.25);
 }
 
 TEST(CertifiedSolver, HasTightCellsForPressReleaseAndSticking) {
     Random random{322};
-    std::size_t all = 0;
-    std::size_t fewest = 0;
-    double proved = 0.0;
-    double true_sum = 0.0;
+    Tightness tightness;
     for (int k = 0; k < cases(16); ++k) {
         const HysteresisNetwork pair = random_pair(random, k);
         const double p = rising_slope(random, pair);
         const CertifiedSolver solver{pair, p};
-        if (!solver.unique(p)) {
-            continue;
-        }
+        ASSERT_TRUE(solver.unique(p)) << k;
         const double r = pair.play_radius();
-        // A play operator far above or far below every position
-        std::vector<CertifiedSolver::Memory> cells;
-        for (const double play : {-5.0, 5.0}) {
-            cells = all_cells(0.0, 1.0, [&](double y) {
-                CertifiedSolver::Memory memory;
-                EXPECT_EQ(solver.solve(pair, {play}, {p, pair.at(y, {play}).force + p * y}, memory).status,
-                          Status::Ok);
-                EXPECT_EQ(memory.play, play);
-                return memory;
-            });
-            double last = 0.0;
-            for (const auto& cell : cells) {
-                ASSERT_NEAR(cell.low, last, 1e-14);
-                last = cell.high;
-                const double expected = sampled(pair, p, cell.low, cell.high);
-                ASSERT_LE(8.0 * (cell.high - cell.low) * cell.curvature, 1.0);
-                ASSERT_GE(cell.curvature, expected * (1.0 - 1e-9)) << k;
-                proved += (cell.high - cell.low) * cell.curvature;
-                true_sum += (cell.high - cell.low) * expected;
-            }
-            ASSERT_NEAR(last, 1.0, 1e-14);
-        }
-        all += cells.size();
-        fewest +=
-            fewest_cells(0.0, 1.0, [&](double low, double high) { return sampled(pair, p, low, high); });
+        const double far = k % 2 == 0 ? -5.0 : 5.0;
+        const auto cells = all_cells(0.0, 1.0, [&](double y) {
+            CertifiedSolver::Memory memory;
+            EXPECT_EQ(solver.solve(pair, {far}, {p, pair.at(y, {far}).force + p * y}, memory).status,
+                      Status::Ok);
+            EXPECT_EQ(memory.play, far);
+            return memory;
+        });
+        tightness.add(cells, [&](double low, double high) { return sampled(pair, p, low, high); });
         // With the play operator inside, the interval of the memory also ends at play - r and play + r.
         for (int j = 0; j < 200; ++j) {
             const double play = uniform(random, 0.0, 1.0);
@@ -250,10 +247,259 @@ TEST(CertifiedSolver, HasTightCellsForPressReleaseAndSticking) {
             ASSERT_EQ(memory.position, solution.position);
         }
     }
-    // The proof needs at most 1.55 times the fewest possible cells, and its c is at most 1.3 times the true one on average.
-    EXPECT_GE(all, fewest);
-    EXPECT_LE(static_cast<double>(all), 1.55 * static_cast<double>(fewest));
-    EXPECT_LE(proved, 1.3 * true_sum);
+    tightness.expect_at_most(1.55, 1.3);
+}
+
+// g = 2 y and h = 0.3 + h1 y: while sticking, F' = p + 2 + s h1 + h / r with |s| <= 1 + w / r, and F'' = 2 h1 / r.
+TEST(CertifiedSolver, HasTheExactCurvatureOfALinearHysteresis) {
+    constexpr double p = 1.0;
+    constexpr double r = 0.25;
+    for (const double h1 : {0.2, -0.2}) {
+        const HysteresisNetwork pair{{1, {}, {}, {}, {2.0}, 0.5}, {{}, h1, 0.3}, test::unit_domain(), r};
+        const CertifiedSolver solver{pair, p};
+        ASSERT_TRUE(solver.unique(p));
+        for (double y = 1e-9; y < 1.0;) {
+            CertifiedSolver::Memory memory;
+            ASSERT_EQ(solver.solve(pair, {-9.0}, {p, pair.at(y, {-9.0}).force + p * y}, memory).status,
+                      Status::Ok);
+            const double width = memory.high - memory.low;
+            const double h = 0.3 + h1 * (h1 > 0.0 ? memory.low : memory.high);
+            const double least = p + 2.0 - (1.0 + width / r) * std::abs(h1) + h / r;
+            ASSERT_NEAR(memory.curvature * least, std::abs(h1) / r, 1e-12);
+            y = memory.high + 1e-9;
+        }
+    }
+}
+
+// The polynomials g and h with the coefficients a and b: derivative n at 0 is n! times coefficient n. A sheet is g + (s +
+// y / r) h.
+TEST(Sheet, HasTheDerivativesOfTheProduct) {
+    const Derivatives a{0.5, -2.0, 3.0, 0.25, -7.0};
+    const Derivatives b{1.5, 4.0, -0.5, 2.0, 0.75};
+    const Derivatives factorials{1.0, 1.0, 2.0, 6.0, 24.0};
+    detail::Expansion g;
+    detail::Expansion h;
+    for (std::size_t n = 0; n < a.size(); ++n) {
+        g.middle[n] = factorials[n] * a[n];
+        h.middle[n] = factorials[n] * b[n];
+        // Much larger than the rounding of the sum
+        g.rounding[n] = 0.01 * static_cast<double>(n + 1);
+        h.rounding[n] = 0.03 * static_cast<double>(5 - n);
+    }
+    g.over[5] = 11.0;
+    h.over[5] = 13.0;
+    h.over[4] = 17.0;
+    for (const double by_radius : {0.0, 4.0}) {
+        for (const double s : {-1.5, 1.0}) {
+            const detail::Expansion f = detail::sheet(g, h, s, by_radius);
+            for (std::size_t n = 1; n < a.size(); ++n) {
+                const double times = static_cast<double>(n) * by_radius;
+                EXPECT_NEAR(f.middle[n], factorials[n] * (a[n] + s * b[n] + by_radius * b[n - 1]), 1e-11);
+                EXPECT_NEAR(f.rounding[n],
+                            g.rounding[n] + std::abs(s) * h.rounding[n] + times * h.rounding[n - 1], 1e-11);
+            }
+            EXPECT_EQ(f.over[5], 11.0 + std::abs(s) * 13.0 + 5.0 * by_radius * 17.0);
+        }
+    }
+}
+
+// Two of the three terms nearly cancel, so the rounding error is much larger than the last digit of the sum.
+TEST(Sheet, BoundsTheRoundingOfItsSum) {
+    Random random{327};
+    for (int k = 0; k < cases(3000); ++k) {
+        detail::Expansion g;
+        detail::Expansion h;
+        const double s = uniform(random, 1.0, 1.5);
+        const double by_radius = uniform(random, 1.0, 5.0);
+        h.middle[k % 2] = uniform(random, 1.0, 2.0);
+        g.middle[1] = -s * h.middle[1] - by_radius * h.middle[0] + uniform(random, -1e-15, 1e-15);
+        if (k % 3 == 0) {
+            g.middle[1] = uniform(random, -1e-15, 1e-15);
+            h.middle = {s / by_radius, -1.0, 0.0, 0.0, 0.0};
+        }
+        const detail::Expansion f = detail::sheet(g, h, s, by_radius);
+        const long double exact = static_cast<long double>(g.middle[1]) +
+                                  static_cast<long double>(s) * h.middle[1] +
+                                  static_cast<long double>(by_radius) * h.middle[0];
+        ASSERT_LE(std::abs(f.middle[1] - exact), f.rounding[1]) << k;
+    }
+}
+
+// Slopes F' that are polynomials of degree 2 have an exact bound; of higher terms, the lowest slope and the largest
+// curvature are at an end of the cell.
+TEST(Sheet, HasTheExactCurvatureOfACubic) {
+    Random random{328};
+    for (int k = 0; k < cases(2000); ++k) {
+        const double r = uniform(random, 0.02, 0.1);
+        const double p = uniform(random, 1.0, 2.0);
+        detail::Expansion f;
+        f.middle = {0.0, uniform(random, 0.5, 1.0), uniform(random, -1.0, 1.0), uniform(random, -20.0, 20.0),
+                    0.0};
+        double least = infinity;
+        double most = 0.0;
+        const double lowest = std::clamp(-f.middle[2] / f.middle[3], -r, r);
+        for (const double y : {-r, r, lowest}) {
+            least = std::min(least, p + f.middle[1] + f.middle[2] * y + 0.5 * f.middle[3] * y * y);
+            most = std::max(most, std::abs(f.middle[2] + f.middle[3] * y));
+        }
+        const double c = detail::proved_curvature(f, p, r);
+        if (8.0 * r * most < least * (1.0 - 1e-9)) {
+            ASSERT_NEAR(c, 0.5 * most / least, 1e-12 * c);
+        } else if (8.0 * r * most > least * (1.0 + 1e-9)) {
+            ASSERT_EQ(c, infinity);
+        }
+    }
+    EXPECT_EQ(detail::proved_curvature({}, 0.0, 1.0), infinity);
+}
+
+// With one more term than the slope 1000, the lowest slope and the largest curvature have closed forms.
+TEST(Sheet, CountsEachTermOfTaylorsFormula) {
+    constexpr double r = 0.5;
+    const auto expect = [&](const detail::Expansion& f, double fall, double most) {
+        EXPECT_NEAR(detail::proved_curvature(f, 1000.0, r), 0.5 * most / (1000.0 - fall), 1e-12);
+    };
+    for (const double sign : {1.0, -1.0}) {
+        detail::Expansion fourth;
+        fourth.middle[4] = sign * 48.0;
+        expect(fourth, 48.0 * r * r * r / 6.0, 48.0 * r * r / 2.0);
+    }
+    detail::Expansion fifth;
+    fifth.over[5] = 96.0;
+    expect(fifth, 96.0 * r * r * r * r / 24.0, 96.0 * r * r * r / 6.0);
+    // An error e_n of derivative n changes F' by e_n r^(n-1) / (n-1)! and F'' by e_n r^(n-2) / (n-2)!.
+    const Derivatives falls{0.0, 1.0, r, r * r / 2.0, r * r * r / 6.0};
+    const Derivatives bends{0.0, 0.0, 1.0, r, r * r / 2.0};
+    for (std::size_t n = 1; n < falls.size(); ++n) {
+        detail::Expansion rounded;
+        rounded.middle[2] = 1.0;
+        rounded.rounding[n] = 24.0;
+        expect(rounded, r + 24.0 * falls[n], 1.0 + 24.0 * bends[n]);
+    }
+    // The sum of slopes p + f' has a rounding error.
+    detail::Expansion cancelled;
+    cancelled.middle[1] = -1000.0 + 1e-13;
+    EXPECT_EQ(detail::proved_curvature(cancelled, 1000.0, r), infinity);
+}
+
+/// An object that records the positions at which its force is evaluated.
+struct Recorded {
+    using State = Stateless;
+    const WaveletNetwork& network;
+    std::vector<double>& visited;
+
+    [[nodiscard]] EnvironmentSample at(double y, const State& state) const noexcept {
+        visited.push_back(y);
+        return network.at(y, state);
+    }
+    void advance(double /*y*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*y*/) const noexcept { return {}; }
+};
+
+// Also around position 0, at which a force without hysteresis has no kink
+TEST(CertifiedSolver, EvaluatesOnlyTheCellsOfTheLastAndTheNewSolution) {
+    const NetworkParameters parameters{1, {3.0, 9.0}, {0.2, -0.4}, {0.5, 0.2}, {1.0}, 0.0};
+    const WaveletNetwork network{parameters,
+                                 {{-1.0}, {1.0}, Continuation::Linear, Continuation::Linear, std::nullopt}};
+    const double p = 1.2 * test::steepest_fall(piecewise(network.curve()));
+    const CertifiedSolver solver{piecewise(network.curve()), p};
+    ASSERT_TRUE(solver.unique(p));
+    std::vector<double> visited;
+    const Recorded object{network, visited};
+    const auto solve = [&](double y, CertifiedSolver::Memory& memory) {
+        visited.clear();
+        return solver.solve(object, {}, {p, network.at(y, {}).force + p * y}, memory).position;
+    };
+    std::size_t cells = 0;
+    CertifiedSolver::Memory cell;
+    for (double y = -1.0 + 1e-9; y < 1.0; y = cell.high + 1e-9) {
+        cell = {};
+        ASSERT_NEAR(solve(y, cell), y, 1e-12);
+        ++cells;
+        for (int j = 0; j <= 100; ++j) {
+            const double target = -1.4 + 2.8 * j / 100.0;
+            CertifiedSolver::Memory memory = cell;
+            ASSERT_NEAR(solve(target, memory), target, 1e-12);
+            for (const double position : visited) {
+                ASSERT_TRUE((position > cell.low && position < cell.high) ||
+                            (position >= memory.low - 1e-14 && position <= memory.high + 1e-14));
+            }
+        }
+    }
+    EXPECT_EQ(cells, solver.cells());
+    for (const double q : {std::nan(""), infinity, -infinity}) {
+        visited.clear();
+        CertifiedSolver::Memory memory{0.5};
+        EXPECT_EQ(solver.solve(object, {}, {p, q}, memory).status, Status::NonFinite);
+        EXPECT_EQ(visited, std::vector<double>{0.5});
+    }
+    EXPECT_FALSE(CertifiedSolver::tabulated());
+}
+
+// The last tangent is 10^4 times too steep, so a correction by this tangent is small at positions far from the solution.
+TEST(CertifiedSolver, IsExactAfterALargeChangeOfTheLoadLine) {
+    const WaveletNetwork line{{1, {}, {}, {}, {0.001}, 0.0},
+                              {{-1.0}, {1.0}, Continuation::Linear, Continuation::Linear, std::nullopt}};
+    const CertifiedSolver solver{piecewise(line.curve()), 0.01};
+    for (const double q : {2e-12, -2e-12, 1e-9}) {
+        CertifiedSolver::Memory memory;
+        ASSERT_EQ(solver.solve(line, {}, {100.0, 0.0}, memory).position, 0.0);
+        EXPECT_NEAR(solver.solve(line, {}, {0.01, q}, memory).position, q / 0.011, 2e-13);
+    }
+}
+
+// Positions inside the domain, on the lines that end at zero force, and beyond these lines
+TEST(CertifiedSolver, SolvesAtEveryPositionOfTheLinesOutsideTheDomain) {
+    Random random{329};
+    for (int k = 0; k < cases(20); ++k) {
+        const HysteresisNetwork pair = random_pair(random, k);
+        const double p = rising_slope(random, pair);
+        const CertifiedSolver solver{pair, p};
+        ASSERT_TRUE(solver.unique(p));
+        CertifiedSolver::Memory memory;
+        for (int j = 0; j < 300; ++j) {
+            const double y = uniform(random, -1.5, 2.5);
+            const HysteresisNetwork::State state{y + pair.play_radius() * uniform(random, -1.5, 1.5)};
+            const double q = pair.at(y, state).force + p * y;
+            const Solution solution = solver.solve(pair, state, {p, q}, memory);
+            ASSERT_NEAR(solution.position, y, 1e-11) << k << " " << j;
+            ASSERT_LE(solution.evaluations, 4);
+        }
+    }
+}
+
+// The slope of g is 2 and rises to 12 in the last 2 % of the domain, so the line outside has a slope near 2. There h / r
+// is -10, and the sticking sheet rises only for p > 8; inside the domain it rises for p > 0.
+TEST(CertifiedSolver, NeedsARisingStickingSheetOutsideTheDomain) {
+    const double u = -std::sqrt(3.0 + std::sqrt(6.0));
+    const double slope = (3.0 - u * u) * u * std::exp(-0.5 * u * u);
+    const double value = (u * u - 1.0) * std::exp(-0.5 * u * u);
+    const HysteresisNetwork pair{{1, {200.0}, {1.0 - u / 200.0}, {10.0 / (200.0 * slope)}, {2.0}, 0.5},
+                                 {{-0.01 / value}, 0.0, 0.0},
+                                 test::unit_domain(),
+                                 0.001};
+    const double outside = pair.force().above().at_edge.slope;
+    ASSERT_NEAR(outside, 2.0, 0.1);
+    EXPECT_FALSE((CertifiedSolver{pair, 9.9 - outside}.unique(9.9 - outside)));
+    EXPECT_TRUE((CertifiedSolver{pair, 10.1 - outside}.unique(10.1 - outside)));
+}
+
+// Each wavelet adds a few dozen cells to a load line that is close to non-unique.
+TEST(CertifiedSolver, HasNoCellsIfMoreThan4096AreNeeded) {
+    const auto solver = [](int wavelets) {
+        NetworkParameters network{1, {}, {}, {}, {0.0}, 0.0};
+        for (int k = 0; k < wavelets; ++k) {
+            network.alpha.push_back(8.0 * wavelets);
+            network.beta.push_back((k + 0.5) / wavelets);
+            network.weight.push_back(1.0 / wavelets);
+        }
+        const WaveletNetwork all{network, test::unit_domain()};
+        const PiecewiseForce force = piecewise(all.curve());
+        return CertifiedSolver{force, 1.01 * test::steepest_fall(force)};
+    };
+    const std::size_t of_ten = solver(10).cells();
+    EXPECT_GT(of_ten, 200U);
+    EXPECT_EQ(solver(static_cast<int>(60000 / of_ten)).cells(), 0U);
+    EXPECT_GT(solver(static_cast<int>(30000 / of_ten)).cells(), 2000U);
 }
 
 // The solver is exact to its tolerance 1e-13 and rounding, and most steps of a motion need one evaluation.
@@ -309,15 +555,16 @@ TEST(CertifiedSolver, FindsTheTurnOfAKnobWithHysteresis) {
             ASSERT_EQ(solution.status, Status::Ok);
             ASSERT_LE(solution.evaluations, 4);
             ASSERT_NEAR(solution.position, y, 1e-11) << k << " " << j;
+            ASSERT_TRUE(std::isfinite(memory.low) && std::isfinite(memory.high));
         }
     }
 }
 
-// Press and release force differ by 2 N. The load line of slope 0.125 N/m rises by this in 16 turns.
+// Press and release force differ by 2 N. The load line rises by this in 16 turns of 2 rad.
 TEST(CertifiedSolver, FindsTheTurnOfAKnobWhoseHysteresisIsLargeForTheLoadLine) {
-    const double p = 0.125;
-    const Domain knob{{0.0}, {1.0}, Continuation::Linear, Continuation::Linear, 1.0};
-    const HysteresisNetwork pair{{1, {10.0}, {0.5}, {0.005}, {0.0}, 0.5}, {{0.0}, 0.0, 1.0}, knob, 0.125};
+    const double p = 0.0625;
+    const Domain knob{{37.25}, {39.25}, Continuation::Linear, Continuation::Linear, 2.0};
+    const HysteresisNetwork pair{{1, {10.0}, {37.75}, {0.002}, {0.0}, 0.5}, {{0.0}, 0.0, 1.0}, knob, 0.125};
     const CertifiedSolver solver{pair, p};
     ASSERT_TRUE(solver.unique(p));
     for (const double play : {-3.0, 0.5, 2.25, 9.0, 400.0}) {
@@ -338,7 +585,7 @@ TEST(CertifiedSolver, SearchesWithStepsShorterThanEveryDetail) {
         const std::size_t n = alpha.size();
         const NetworkParameters network{
             1, std::move(alpha), std::vector<double>(n, 0.5), std::vector<double>(n, 0.1), {1.0}, 0.0};
-        const Domain domain{{0.0}, {2.0}, Continuation::Linear, Continuation::Linear, std::nullopt};
+        const Domain domain{{0.0}, {8.0}, Continuation::Linear, Continuation::Linear, std::nullopt};
         if (radius > 0.0) {
             const HysteresisNetwork pair{network, {std::vector<double>(n, 0.0), 0.0, 0.1}, domain, radius};
             return CertifiedSolver{pair, 100.0}.uncertified().longest_step;
@@ -347,7 +594,7 @@ TEST(CertifiedSolver, SearchesWithStepsShorterThanEveryDetail) {
             .uncertified()
             .longest_step;
     };
-    EXPECT_EQ(longest({}, 0.0), 0.5);             // a quarter of the domain
+    EXPECT_EQ(longest({}, 0.0), 2.0);             // a quarter of the domain
     EXPECT_EQ(longest({4.0, 2.0}, 0.0), 0.0625);  // a quarter of the narrowest wavelet's width
     EXPECT_EQ(longest({2.0, 4.0}, 0.0), 0.0625);
     EXPECT_EQ(longest({2.0, 4.0}, 0.25), 0.0625);

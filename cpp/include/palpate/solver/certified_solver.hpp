@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -19,6 +18,54 @@
 #include "palpate/status.hpp"
 
 namespace palpate {
+
+namespace detail {
+
+/// Derivatives of a function in the middle of a cell, bounds of their rounding errors, and bounds of the derivatives over
+/// the cell.
+struct Expansion {
+    Derivatives middle{};
+    Derivatives rounding{};
+    DerivativeBounds over{};
+};
+
+/// Returns the derivatives of the force g + s h, in which the direction state s changes with the position by `by_radius`
+/// (1 / r while the play operator sticks, otherwise 0). Fills the elements 1 to 4 and `over[5]`.
+[[nodiscard]] inline Expansion sheet(const Expansion& g, const Expansion& h, double s,
+                                     double by_radius) noexcept {
+    constexpr double epsilon = std::numeric_limits<double>::epsilon();
+    Expansion f;
+    for (std::size_t n = 1; n < f.middle.size(); ++n) {
+        const double times = static_cast<double>(n) * by_radius;
+        f.middle[n] = g.middle[n] + s * h.middle[n] + times * h.middle[n - 1];
+        f.rounding[n] =
+            g.rounding[n] + std::abs(s) * h.rounding[n] + times * h.rounding[n - 1] +
+            8.0 * epsilon *
+                (std::abs(g.middle[n]) + std::abs(s * h.middle[n]) + times * std::abs(h.middle[n - 1]));
+    }
+    f.over[5] = g.over[5] + std::abs(s) * h.over[5] + 5.0 * by_radius * h.over[4];
+    return f;
+}
+
+/// Returns c = max|F''| / (2 min F') of F(y) = f(y) + p y over a cell of half width r, by Taylor's formula about its
+/// middle. Returns infinity if 8 r max|F''| < min F', condition (C) of `CertifiedSolver`, is not proved.
+[[nodiscard]] inline double proved_curvature(const Expansion& f, double p, double r) noexcept {
+    const auto& [force, f1, f2, f3, f4] = f.middle;
+    const auto& [of_force, e1, e2, e3, e4] = f.rounding;
+    double lowest = -std::abs(f2) * r + 0.5 * f3 * r * r;
+    if (std::abs(f2) < f3 * r) {
+        lowest = -0.5 * f2 * f2 / f3;
+    }
+    const double fourth = std::abs(f4) + e4;
+    const double fifth = f.over[5];
+    const double of_slope = e1 + 8.0 * std::numeric_limits<double>::epsilon() * std::abs(p);
+    const double least =
+        p + f1 + lowest - of_slope - r * (e2 + r * (0.5 * e3 + r * (fourth / 6.0 + r * fifth / 24.0)));
+    const double most = std::abs(f2) + e2 + r * (std::abs(f3) + e3 + r * (0.5 * fourth + r * fifth / 6.0));
+    return 8.0 * r * most < least ? 0.5 * most / least : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace detail
 
 /// Solves the load line f(y) + p y = q for the position y in at most four evaluations of the force f, for every start
 /// and every q. This requires a slope p for which F(y) = f(y) + p y is proved to rise everywhere. For other slopes
@@ -214,10 +261,10 @@ class CertifiedSolver {
         return radius_ > 0.0 && cell.low < play + radius_ && cell.high > play - radius_;
     }
 
-    /// Returns the direction state of positions in a cell without sticking: 1 (press) if the cell lies above play + r,
-    /// otherwise -1 (release).
-    [[nodiscard]] double direction(const Cell& cell, double play) const noexcept {
-        return cell.low >= play + radius_ ? 1.0 : -1.0;
+    /// Returns the direction state of positions in a cell without sticking: 1 (press) above `play`, otherwise -1
+    /// (release).
+    [[nodiscard]] static double direction(const Cell& cell, double play) noexcept {
+        return cell.low >= play ? 1.0 : -1.0;
     }
 
     /// Returns F at a border of a cell that is moved by `turn_offset` (whole periods), for the position `play` of the
@@ -250,7 +297,8 @@ class CertifiedSolver {
             const auto g = environment.force().at(y);
             const auto h = environment.hysteresis_force().at(y);
             constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-            Trial trial{0.0, 0.0, 0.0, 0.0, {g.value, unknown, unknown, environment.force().extrapolated(y)}};
+            Trial trial{};
+            trial.sample = {g.value, unknown, unknown, environment.force().extrapolated(y)};
             const auto step = [&](double s, double gain) {
                 const double slope = line.slope + g.slope + s * h.slope + gain;
                 trial.steepest = std::max(trial.steepest, slope);
@@ -365,11 +413,8 @@ class CertifiedSolver {
             double turns = std::floor((linear - size) / rise) - 1.0;
             double past = std::floor((linear + size) / rise) + 2.0;
             constexpr int most_halvings = 64;
-            for (int halving = 0; halving < most_halvings; ++halving) {
+            for (int halving = 0; past - turns > 1.0 && halving < most_halvings; ++halving) {
                 const double middle = std::floor(0.5 * (turns + past));
-                if (!(middle > turns && middle < past)) {
-                    break;
-                }
                 turn_offset = middle * period_;
                 (lies_below(first) ? turns : past) = middle;
             }
@@ -385,10 +430,13 @@ class CertifiedSolver {
     /// infinite cell F is a straight line, so its finite end is a sufficient start.
     [[nodiscard]] double interpolated(std::size_t k, double turn_offset, LoadLine line,
                                       double play) const noexcept {
-        if (k == 0 || k == borders_.size()) {
-            return borders_[k == 0 ? 0 : k - 1].position + turn_offset;
-        }
         const Cell cell = cell_at(k, turn_offset);
+        if (k == 0) {
+            return cell.high;
+        }
+        if (k == borders_.size()) {
+            return cell.low;
+        }
         const Border& from = borders_[k - 1];
         const Border& to = borders_[k];
         const double width = to.position - from.position;
@@ -396,17 +444,16 @@ class CertifiedSolver {
         const double rise = to.force - from.force + line.slope * width;
         const auto chord = [&](double from_s, double to_s) {
             const double at_from = from_s * from.hysteresis;
-            return cell.low + width * (slope_mismatch - at_from) / (rise + to_s * to.hysteresis - at_from);
+            const double y =
+                cell.low + width * (slope_mismatch - at_from) / (rise + to_s * to.hysteresis - at_from);
+            return std::clamp(y, cell.low, cell.high);
         };
-        double start = 0.0;
         if (may_stick(cell, play)) {
-            start = median(chord(1.0, 1.0), chord(-1.0, -1.0),
-                           chord((cell.low - play) * by_radius_, (cell.high - play) * by_radius_));
-        } else {
-            const double s = direction(cell, play);
-            start = chord(s, s);
+            return median(chord(1.0, 1.0), chord(-1.0, -1.0),
+                          chord((cell.low - play) * by_radius_, (cell.high - play) * by_radius_));
         }
-        return std::clamp(start, cell.low, cell.high);
+        const double s = direction(cell, play);
+        return chord(s, s);
     }
 
     /// Returns a network without wavelets: a straight line of this slope with the force `at_zero` at position 0.
@@ -450,66 +497,25 @@ class CertifiedSolver {
     }
 
     /// Returns c = max|F''| / (2 min F') of a cell if condition (C) of the class is proved for every sheet in it;
-    /// otherwise infinity.
+    /// otherwise infinity. F' and F'' are linear in s, so bounds for s and for -s also hold for all direction states
+    /// between.
     [[nodiscard]] double certified_curvature(const Piece& piece, double from, double to,
                                              double p) const noexcept {
-        const double reach = std::max(std::abs(from), std::abs(to));
         const double middle = 0.5 * (from + to);
-        const double radius = 0.5 * (to - from);
-        const Expansion g{derivatives(piece.force, middle), derivatives_rounding(piece.force, reach),
-                          derivative_bounds(piece.force, from, to)};
-        const Expansion h{derivatives(piece.hysteresis, middle),
-                          derivatives_rounding(piece.hysteresis, reach),
-                          derivative_bounds(piece.hysteresis, from, to)};
-        if (!(radius_ > 0.0)) {
-            return sheet_curvature(g, h, 0.0, 0.0, radius, p);
-        }
-        const double s = 1.0 + 2.0 * radius * by_radius_;
-        return std::max({sheet_curvature(g, h, 1.0, 0.0, radius, p),
-                         sheet_curvature(g, h, -1.0, 0.0, radius, p),
-                         sheet_curvature(g, h, s, by_radius_, radius, p),
-                         sheet_curvature(g, h, -s, by_radius_, radius, p)});
-    }
-
-    /// Derivatives of a network in the middle of a cell, bounds of their rounding errors, and bounds of the derivatives
-    /// over the cell.
-    struct Expansion {
-        Derivatives middle;
-        Derivatives rounding;
-        DerivativeBounds over;
-    };
-
-    /// Returns c = max|F''| / (2 min F') over a cell for the force g + s h with a fixed direction state s. With
-    /// `by_radius` = 1 / r the direction state grows with the position (the play operator sticks). F' and F'' are
-    /// linear in s, so bounds for s and for -s also hold for all direction states between. Returns infinity if
-    /// condition (C) is not proved.
-    [[nodiscard]] static double sheet_curvature(const Expansion& g, const Expansion& h, double s,
-                                                double by_radius, double radius, double p) noexcept {
-        // Element n is derivative n of the force in the middle of the cell, and a bound of the rounding error of this
-        // derivative.
-        std::array<double, 5> f{};
-        std::array<double, 5> rounding{};
-        for (std::size_t n = 1; n < f.size(); ++n) {
-            const double times = static_cast<double>(n) * by_radius;
-            f[n] = g.middle[n] + s * h.middle[n] + times * h.middle[n - 1];
-            rounding[n] =
-                g.rounding[n] + std::abs(s) * h.rounding[n] + times * h.rounding[n - 1] +
-                8.0 * epsilon *
-                    (std::abs(g.middle[n]) + std::abs(s * h.middle[n]) + times * std::abs(h.middle[n - 1]));
-        }
-        const double fifth = g.over[5] + std::abs(s) * h.over[5] + 5.0 * by_radius * h.over[4];
-        const double r = radius;
-        double lowest = -std::abs(f[2]) * r + 0.5 * f[3] * r * r;
-        if (f[3] > 0.0 && std::abs(f[2]) < f[3] * r) {
-            lowest = -0.5 * f[2] * f[2] / f[3];
-        }
-        const double least = p + f[1] + lowest - r * r * r * (std::abs(f[4]) / 6.0 + fifth * r / 24.0) -
-                             (rounding[1] + 8.0 * epsilon * std::abs(p) +
-                              r * (rounding[2] + r * (0.5 * rounding[3] + r * rounding[4] / 6.0)));
-        const double most_steps =
-            std::abs(f[2]) + rounding[2] +
-            r * (std::abs(f[3]) + rounding[3] + r * (0.5 * (std::abs(f[4]) + rounding[4]) + r * fifth / 6.0));
-        return least > 0.0 && 8.0 * r * most_steps <= least ? 0.5 * most_steps / least : infinity;
+        const auto expansion = [&](const NetworkParameters& network) {
+            return detail::Expansion{derivatives(network, middle),
+                                     derivatives_rounding(network, std::max(std::abs(from), std::abs(to))),
+                                     derivative_bounds(network, from, to)};
+        };
+        const detail::Expansion g = expansion(piece.force);
+        const detail::Expansion h = expansion(piece.hysteresis);
+        const auto curvature = [&](double s, double by_radius) {
+            return detail::proved_curvature(detail::sheet(g, h, s, by_radius), p, 0.5 * (to - from));
+        };
+        // Direction state in the middle of a cell that overlaps the positions of sticking by its end only
+        const double s = 1.0 + 0.5 * (to - from) * by_radius_;
+        return std::max(
+            {curvature(1.0, 0.0), curvature(-1.0, 0.0), curvature(s, by_radius_), curvature(-s, by_radius_)});
     }
 
     /// Makes the cells in the order of position, each about as wide as condition (C) can be proved. Makes no cells if
@@ -525,12 +531,10 @@ class CertifiedSolver {
         for (const Piece& piece : pieces) {
             const auto [lower, upper] = piece.positions;
             if (!std::isfinite(lower) || !std::isfinite(upper)) {
-                // In an infinite interval, F must be a straight line: the hysteresis h must be constant over the
-                // interval.
+                // In an infinite interval, the hysteresis h is constant, so each sheet is a straight line.
                 const double edge = std::isfinite(lower) ? lower : upper;
-                const double slope = piece.force.linear[0];
                 const double gain = by_radius_ * jet(piece.hysteresis, edge)[0];
-                if (!(p + slope + std::min(0.0, gain) > 0.0) || piece.hysteresis.linear[0] != 0.0) {
+                if (!(p + piece.force.linear[0] + std::min(0.0, gain) > 0.0)) {
                     return;
                 }
                 continue;
@@ -551,7 +555,7 @@ class CertifiedSolver {
             }
         }
         const auto last = std::find_if(pieces.rbegin(), pieces.rend(), [](const Piece& piece) {
-            return std::isfinite(piece.positions.lower) && std::isfinite(piece.positions.upper);
+            return std::isfinite(piece.positions.upper);
         });
         borders.push_back(border(*last, last->positions.upper, 0.0));
         borders_ = std::move(borders);
