@@ -121,7 +121,7 @@ TEST(CertificateCheck, RefusesABoundTooWideForACertificate) {
     Certificate weak = with_bounds(certificate, [](ForceBounds& bounds) { bounds.slope.upper = 1e9; });
     weak.verdict = Verdict::Certified;
     const std::string wrong = disagreement(weak, model);
-    EXPECT_EQ(wrong.rfind("certificate.verdict is ", 0), 0U) << wrong;
+    EXPECT_EQ(wrong.rfind("certificate.verdict is \"certified\": must be \"refused\", ", 0), 0U) << wrong;
 }
 
 TEST(CertificateCheck, RefusesAStoredRefusalWithTheVerdictsThatAreAllowed) {
@@ -232,9 +232,13 @@ TEST(CertificateCheck, MessagesNameFieldValueAndRule) {
         detail::narrower_bound(stored, now),
         "certificate.bounds.slope_max is 2: must be at least 3, computed from model and device; plan the "
         "model again");
+    stored.slope = {-1.0, 2.0};
+    EXPECT_NE(detail::narrower_bound(stored, now).find("slope_min"), std::string::npos) << "the first one";
     stored.slope = {-2.0 * (1.0 - 1e-10), 3.0 * (1.0 - 1e-10)};
     EXPECT_EQ(detail::narrower_bound(stored, now), "");
-    stored.slope = now.slope;
+    const double infinite = std::numeric_limits<double>::infinity();
+    stored.slope = now.slope = {-infinite, infinite};
+    EXPECT_EQ(detail::narrower_bound(stored, now), "");
     now.hysteresis = true;
     EXPECT_NE(detail::narrower_bound(stored, now), "");
     Inequality line;
@@ -356,6 +360,8 @@ TEST(CertificateCheck, AnEditedRendererIsRefused) {
     Certificate edited = stored;
     edited.device.renderer.reset();
     EXPECT_THROW((void)checked(edited, model), std::invalid_argument);
+    edited.device.renderer = "other";
+    EXPECT_NE(fingerprint_of(edited), fingerprint_of(stored));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <cstddef>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -130,6 +131,7 @@ TEST(CouplingNeed, GainOfAMasslessObjectBoundsEveryErrorOfTheForce) {
         }
     }
     EXPECT_EQ(massless_gain(slopes(-100.0, 1.0), {K, 0.02}, 1e-3), infinite);
+    EXPECT_EQ(massless_gain(slopes(-100.0, 1.0), {K, 0.0}, 1e-3), infinite);
     EXPECT_LT(massless_gain(slopes(std::nextafter(-100.0, 0.0), 1.0), {K, 0.02}, 1e-3), infinite);
     EXPECT_EQ(massless_gain(slopes(0.0, 0.0), {K, 0.02}, 1e-3), 0.0);
 }
@@ -185,6 +187,24 @@ TEST(CouplingNeed, GainOfAnImplicitSpringIsTightWhereTheRemainderCounts) {
     const double exact = summed_response(K, {2e-5, 0.4}, {100.0, beta * T}, T, 100'000);
     EXPECT_GE(two, exact * (1.0 - 1e-12));
     EXPECT_LE(two, exact * 1.0101);
+}
+
+TEST(CouplingNeed, NeedAndGainAreProportionalToTheUnitOfForce) {
+    constexpr double T = 1e-3;
+    const auto all = [](double unit) {
+        const VirtualCoupling coupling{100.0 * unit, 0.02 * unit};
+        return std::array{
+            coupling_need(coupling, T, 2, 0.25, 30.0 * unit) / unit,
+            massless_gain(slopes(-40.0 * unit, 70.0 * unit), coupling, T) / unit,
+            implicit_gain(20.0 * unit, {1e-3 * unit, 0.05 * unit}, coupling, T) / unit,
+        };
+    };
+    const auto expected = all(1.0);
+    for (const double unit : {1e-6, 1e6}) {
+        for (std::size_t k = 0; k < expected.size(); ++k) {
+            EXPECT_NEAR(all(unit)[k], expected[k], 1e-9 * expected[k]) << unit << " " << k;
+        }
+    }
 }
 
 TEST(CouplingNeed, GainOfAnUnstableSpringIsInfinite) {

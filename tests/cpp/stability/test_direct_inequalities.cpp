@@ -392,6 +392,12 @@ TEST(DirectLines, OfAMemoryHaveTheSidesOfTheirFormulas) {
     const double steepest = 65.0 + 7.0 + bending;
     expect_sides(memory_inequalities(bounds, weak_device(0.0)), 0, weak_longest_period * 0.5 * rising,
                  (steepest + 7.0) * half_encoder_step + other_friction);
+    DeviceProfile steady = weak_device(0.5);
+    steady.jitter_s = 0.0;
+    const double steady_R = 90.0 * steady.period_s;
+    expect_sides(memory_inequalities(bounds, steady), 0,
+                 steady.period_s * (0.5 * rising + steepest + 1.5 * steady_R),
+                 (steepest + 7.0 + 2.0 * (steepest + steady_R)) * half_encoder_step + other_friction);
     const double R = 90.0 * weak_longest_period;
     for (const auto& [delay, n] : {std::pair{1.0, 2.0}, {2.0, 3.0}}) {
         expect_sides(memory_inequalities(bounds, weak_device(delay)), 0,

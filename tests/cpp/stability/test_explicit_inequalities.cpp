@@ -122,12 +122,17 @@ TEST(ExplicitNeed, FindsTheLargestNeedBetweenBothSlopes) {
     for (const auto& [slopes, inertia, coupling, delay] :
          {std::tuple{Interval{-16.84, 595.6}, Inertia{3.87e-4, 0.1062}, VirtualCoupling{134.1, 0.0458}, 1},
           std::tuple{Interval{-44.5, 851.6}, Inertia{1.295e-3, 0.0879}, VirtualCoupling{59.8, 0.0445}, 2},
-          std::tuple{Interval{-19.7, 512.9}, Inertia{4.29e-4, 0.0311}, VirtualCoupling{33.7, 0.045}, 3}}) {
+          std::tuple{Interval{-19.7, 512.9}, Inertia{4.29e-4, 0.0311}, VirtualCoupling{33.7, 0.045}, 3},
+          std::tuple{Interval{-9.6, 374.3}, Inertia{3.579e-4, 0.022}, VirtualCoupling{26.37, 0.0656}, 2},
+          std::tuple{Interval{-22.4, 861.1}, Inertia{3.946e-4, 0.13}, VirtualCoupling{115.1, 0.0732}, 1},
+          std::tuple{Interval{-45.8, 453.8}, Inertia{5.222e-4, 0.0549}, VirtualCoupling{37.68, 0.04}, 3},
+          std::tuple{Interval{-20.1, 858.6}, Inertia{4.639e-4, 0.2}, VirtualCoupling{148.4, 0.0823}, 1}}) {
         const double need = explicit_need(slopes, inertia, coupling, T, delay);
         const double expected = largest_need(slopes, inertia, coupling, delay);
-        EXPECT_NEAR(need, expected, 1e-5 * expected) << slopes.upper;
+        EXPECT_GE(need, expected * (1.0 - 1e-9)) << slopes.upper;
+        EXPECT_LE(need, expected * (1.0 + 1e-5)) << slopes.upper;
         for (const double end : {slopes.lower, slopes.upper}) {
-            EXPECT_GT(need, 1.01 * explicit_need({end, end}, inertia, coupling, T, delay))
+            EXPECT_GT(need, 1.001 * explicit_need({end, end}, inertia, coupling, T, delay))
                 << "inside the range";
         }
     }

@@ -175,9 +175,6 @@ namespace detail {
     } else {
         high = guess;
     }
-    if (low > 1.0 && holds(high)) {
-        return high * T;
-    }
     for (int k = 0; k < 40; ++k) {
         const double middle = 0.5 * (low + high);
         (holds(middle) ? low : high) = middle;

@@ -59,9 +59,7 @@ inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBound
                                 const DeviceProfile& device, const char* name, const char* cure) {
     lines.push_back(unknown("encoder-step-coupling", name, "proved only for an encoder step Delta = 0", 0.0,
                             device.encoder_step, cure));
-    DeviceProfile smooth = device;
-    smooth.encoder_step = 0.0;
-    Inequality friction = friction_inequality(smooth, 0.0, bounds.mean_force, "0");
+    Inequality friction = friction_inequality(device, 0.0, bounds.mean_force, "0");
     friction.id = "friction-force-step";
     friction.name = "Coulomb friction against force steps";
     lines.push_back(friction);

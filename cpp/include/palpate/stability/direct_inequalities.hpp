@@ -161,7 +161,7 @@ namespace detail {
     const double n = most_samples_in_delay(device);
     const double relaxation = device.longest_period_s() * memory.relaxation_per_s;
     const double late = n > 0.0 ? n * steepest + (1.0 + 0.5 * n * n) * relaxation : 0.0;
-    const double encoder = steepest + memory.stiffness + (n > 0.0 ? 2.0 * n * (steepest + relaxation) : 0.0);
+    const double encoder = steepest + memory.stiffness + 2.0 * n * (steepest + relaxation);
     return {
         {"damping-hold", n > 0.0 ? "viscous damping against hold and delay" : "viscous damping against hold",
          n > 0.0 ? "b >= T (M / 2 + n L + (1 + n^2 / 2) R)" : "b >= T (M_g + K (P^2 + U P')) / 2",

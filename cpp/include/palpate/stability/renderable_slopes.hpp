@@ -54,8 +54,7 @@ template <class Holds>
     bounds.sliding = sliding.steepest();
     bounds.steepest = bounds.sliding + stick;
     bounds.hysteresis_per_play = stick;
-    return all_hold(stick > 0.0 ? hysteresis_inequalities(bounds, device)
-                                : direct_inequalities(bounds, device));
+    return all_hold(hysteresis_inequalities(bounds, device));
 }
 
 /// Returns the upper end of the slopes in which the largest renderable slope is searched [N/m]. It is larger than any
