@@ -576,12 +576,16 @@ TEST(Branch, GuessesAParabolaInTheTenthNextToAFold) {
               3.0 - std::sqrt(2.0 * (200.0 - std::nextafter(190.0, 200.0)) / 32.0));
     EXPECT_EQ(branch.first_guess(101.0, 1.5), 1.5);
     branch.curvature_low = 8.0;
-    EXPECT_EQ(branch.first_guess(101.0, 2.5), 1.5);  // 1 = 8 / 2 (1/2)^2
+    EXPECT_EQ(branch.first_guess(104.0, 2.5), 2.0);  // 4 = 8 / 2 1^2
     EXPECT_EQ(branch.first_guess(110.0, 2.5), 2.5);
     EXPECT_EQ(branch.first_guess(199.0, 1.5), 2.75);
     branch.curvature_high = 0.0;
     EXPECT_EQ(branch.first_guess(199.0, 1.5), 1.5);
     EXPECT_EQ(branch.first_guess(100.0, 2.5), 2.0) << "the fold itself is not inside";
+    branch.curvature_low = 0.5;
+    EXPECT_EQ(branch.first_guess(100.25, 2.5), 2.0);
+    branch.curvature_high = 0.5;
+    EXPECT_EQ(branch.first_guess(199.75, 1.5), 2.0);
 }
 
 /// Returns f(y) + p y.
@@ -706,9 +710,14 @@ TEST(Branches, AreRememberedAndForgottenByTheSolver) {
         ASSERT_NEAR(solution.environment.force, q - solution.position, 1e-12);
         // A value that is not finite changes nothing; another slope forgets the branch.
         const Resolvent::Memory before = memory;
-        ASSERT_EQ(resolvent.solve(network, {}, {1.0, std::nan("")}, memory).status, Status::NonFinite);
-        ASSERT_EQ(memory.branch, before.branch);
-        ASSERT_EQ(memory.newton.position, before.newton.position);
+        for (const double invalid : {std::nan(""), infinity, -infinity}) {
+            ASSERT_EQ(resolvent.solve(network, {}, {1.0, invalid}, memory).status, Status::NonFinite);
+            ASSERT_EQ(memory.branch, before.branch);
+            ASSERT_EQ(memory.newton.position, before.newton.position);
+        }
+        Resolvent::Memory near = memory;
+        const double steeper = resolvent.solve(network, {}, {1.125, q}, near).position;
+        ASSERT_NEAR(total(network, 1.125, steeper), q, 1e-11) << "the table is for another slope";
         const Solution other = resolvent.solve(network, {}, {200.0, 200.0 * y}, memory);
         ASSERT_EQ(other.status, Status::Ok);
         ASSERT_NEAR(total(network, 200.0, other.position), 200.0 * y, 1e-9);
@@ -716,6 +725,7 @@ TEST(Branches, AreRememberedAndForgottenByTheSolver) {
         ASSERT_EQ(memory.turns, 0.0);
         ASSERT_EQ(memory.newton.position, other.position);
     }
+    EXPECT_EQ(resolvent.solve(network, {}, {1.0, 1.0}, std::nan("")).status, Status::NonFinite);
 }
 
 TEST(Branches, GiveSolutionsWithoutEvaluationsOnlyForTheirSlope) {
@@ -729,14 +739,105 @@ TEST(Branches, GiveSolutionsWithoutEvaluationsOnlyForTheirSlope) {
         EXPECT_NEAR(first.position, y, 2e-12);
         EXPECT_EQ(first.evaluations, 0);
         EXPECT_EQ(first.environment.extrapolated, y < 0.0 || y > 1.0);
-        EXPECT_EQ(resolvent.without_evaluation({60.0, q}, memory).position, first.position);
+        const Solution again = resolvent.without_evaluation({60.0, q}, memory);
+        EXPECT_EQ(again.position, first.position);
+        EXPECT_EQ(again.environment.extrapolated, first.environment.extrapolated);
         EXPECT_TRUE(std::isnan(resolvent.without_evaluation({61.0, q}, memory).position));
         EXPECT_TRUE(std::isnan(resolvent.without_evaluation({60.0, infinity}, memory).position));
-        EXPECT_EQ(resolvent.solve(network, {}, {60.0, q}, y).evaluations, 0);
+        Resolvent::Memory solved;
+        for (int k = 0; k < 2; ++k) {
+            const Solution solution = resolvent.solve(network, {}, {60.0, q}, solved);
+            EXPECT_EQ(solution.evaluations, 0);
+            EXPECT_EQ(solution.position, first.position);
+            EXPECT_EQ(solution.environment.extrapolated, first.environment.extrapolated);
+            EXPECT_EQ(solved.newton.position, first.position);
+        }
         const Solution other = resolvent.solve(network, {}, {61.0, q + y}, y);
         EXPECT_GT(other.evaluations, 0);
         EXPECT_NEAR(other.position, y, 1e-11);
     }
+    // Outside the domain F has a slope below 1.
+    const WaveletNetwork line{{1, {}, {}, {}, {0.25}, 0.0}, test::unit_domain()};
+    const Resolvent flat{line.curve(), 0.25};
+    for (const double y : {-3.0, 0.5, 7.0}) {
+        Resolvent::Memory memory;
+        EXPECT_NEAR(flat.without_evaluation({0.25, 0.5 * y}, memory).position, y, 1e-12);
+    }
+}
+
+// A knob with a period of 2 whose function falls in one or two places, also at the end of the period. The first solution
+// in the direction of -residual is found by small steps and bisection.
+TEST(Branches, LeadToTheFirstSolutionFromAnyTurn) {
+    Random random{343};
+    int at_end = 0;
+    for (int k = 0; k < cases(12); ++k) {
+        const double lower = 5.25;
+        NetworkParameters parameters{1, {5.0, 6.0}, {lower + 0.3, lower + 1.2}, {1.0, -0.7}, {0.0}, 0.0};
+        for (double& beta : parameters.beta) {
+            beta = lower + std::fmod(beta - lower + 0.17 * k, 2.0);
+        }
+        const Domain knob{{lower}, {lower + 2.0}, Continuation::Linear, Continuation::Linear, 2.0};
+        const WaveletNetwork network{parameters, knob};
+        const double p = -uniform(random, 0.3, 0.6) * network.curve().slope_bounds().lower;
+        const Resolvent resolvent{network.curve(), p};
+        ASSERT_GT(resolvent.branches().size(), 2U);
+        at_end += resolvent.branches().back().positions.upper < lower + 2.0 - 1e-6 ? 1 : 0;
+        for (int j = 0; j < 150; ++j) {
+            const double start =
+                lower + uniform(random, 0.0, 2.0) + 2.0 * std::floor(uniform(random, -20.0, 20.0));
+            const double jump = j % 3 == 0 ? uniform(random, -3.0, 3.0) : uniform(random, -0.3, 0.3);
+            const double q = total(network, p, start) + p * jump;
+            const auto residual = [&](double y) { return total(network, p, y) - q; };
+            const double direction = residual(start) < 0.0 ? 1.0 : -1.0;
+            constexpr double step = 1e-3;
+            double before = start;
+            while (direction * residual(before + direction * step) < 0.0) {
+                before += direction * step;
+            }
+            double after = before + direction * step;
+            for (int i = 0; i < 60; ++i) {
+                const double middle = 0.5 * (before + after);
+                (direction * residual(middle) < 0.0 ? before : after) = middle;
+            }
+            if (p + network.at(before, {}).slope < 0.2 * p) {
+                continue;  // so near a fold that a step of 1e-3 may miss it
+            }
+            Resolvent::Memory memory{start};
+            const Solution solution = resolvent.solve(network, {}, {p, q}, memory);
+            ASSERT_EQ(solution.status, Status::Ok);
+            ASSERT_NEAR(solution.position, before, 1e-9) << k << " " << j << " from " << start;
+        }
+        // The number of turns is not exact at these positions, but the search ends.
+        for (double far = 1e9; far < 1e300; far *= 7.3) {
+            for (const double q : {far, -far}) {
+                EXPECT_TRUE(std::isfinite(resolvent.solve(network, {}, {p, q}, 0.0).position));
+            }
+        }
+    }
+    EXPECT_GT(at_end, 0);
+}
+
+// Beyond the end of a table, Newton's method solves between the ends of its branch.
+TEST(Branches, AreContinuousAtTheEndsOfATable) {
+    const WaveletNetwork network = click();
+    const Resolvent resolvent{network.curve(), 1.0};
+    const auto& branches = resolvent.branches();
+    int ends = 0;
+    for (std::size_t b = 1; b < branches.size(); ++b) {
+        if (branches[b].table.empty()) {
+            continue;
+        }
+        const Interval values = branches[b].values;
+        const Interval positions = branches[b].positions;
+        for (const double q :
+             {std::nextafter(values.lower, -infinity), std::nextafter(values.upper, infinity)}) {
+            const double y = q < values.lower ? positions.lower : positions.upper;
+            const Solution solution = resolvent.solve(network, {}, {1.0, q}, y);
+            ends += solution.evaluations > 0 ? 1 : 0;
+            EXPECT_NEAR(solution.position, y, 1e-11);
+        }
+    }
+    EXPECT_GE(ends, 2);
 }
 
 TEST(Branches, AreNoneIfTheFunctionFallsOutsideTheDomain) {
@@ -745,6 +846,10 @@ TEST(Branches, AreNoneIfTheFunctionFallsOutsideTheDomain) {
     EXPECT_EQ((Resolvent{line.curve(), -1.0}.branches().size()), 1U);
     EXPECT_EQ((Resolvent{line.curve(), -0.5}.branches().size()), 1U);
     EXPECT_GT((Resolvent{line.curve(), 0.0}.branches().size()), 3U - 1U);
+    // A fold at the edge of the domain
+    const WaveletNetwork folded = click();
+    const double fold = -jet(folded.parameters(), 0.0)[1];
+    EXPECT_EQ((Resolvent{folded.curve(), fold}.branches().size()), 1U);
     for (const bool above : {false, true}) {
         // The force falls on one side only.
         const PiecewiseForce falling{
@@ -762,14 +867,14 @@ TEST(Branches, AreNoneIfTheFunctionFallsOutsideTheDomain) {
     EXPECT_GT((Resolvent{periodic.curve(), 0.5}.branches().size()), 1U);
 }
 
-// Short lines outside the domain, of which one falls: the falling line is not a branch.
-TEST(Branches, OmitALineAlongWhichTheFunctionFalls) {
+// Short lines outside the domain, along some of which the function falls or is constant: they are not branches.
+TEST(Branches, OmitALineAlongWhichTheFunctionDoesNotRise) {
     const PiecewiseForce force{{1, {}, {}, {}, {0.5}, 0.25},
                                0.0,
                                1.0,
                                false,
                                {{0.5, -3.0}, {0.25, 1.0}, {infinity, 0.0}},
-                               {{0.5, 2.0}, {0.25, -3.0}, {infinity, 1.0}}};
+                               {{0.5, 2.0}, {0.125, -4.0}, {0.125, -1.0}, {infinity, 1.0}}};
     const Resolvent resolvent{force, 1.0};
     std::vector<Branch> lines;
     for (const Branch& branch : resolvent.branches()) {
@@ -778,9 +883,10 @@ TEST(Branches, OmitALineAlongWhichTheFunctionFalls) {
         }
     }
     ASSERT_EQ(lines.size(), 4U);
-    // F(0) = 0.25 and F(1) = 1.75. Below: slopes -2 over 0.5, then 2 over 0.25, then 1. Above: 3 over 0.5, -2, 2.
+    // F(0) = 0.25 and F(1) = 1.75. Below: slopes -2 over 0.5, then 2 over 0.25, then 1. Above: 3 over 0.5, -3 over
+    // 0.125, 0 over 0.125, 2.
     const std::vector<Interval> positions{{-infinity, -0.75}, {-0.75, -0.5}, {1.0, 1.5}, {1.75, infinity}};
-    const std::vector<Interval> values{{-infinity, 0.75}, {0.75, 1.25}, {1.75, 3.25}, {2.75, infinity}};
+    const std::vector<Interval> values{{-infinity, 0.75}, {0.75, 1.25}, {1.75, 3.25}, {2.875, infinity}};
     const std::vector<double> slopes{1.0, 2.0, 3.0, 2.0};
     for (std::size_t k = 0; k < 4; ++k) {
         EXPECT_EQ(lines[k].positions.lower, positions[k].lower);

@@ -126,11 +126,9 @@ class Resolvent {
     [[nodiscard, gnu::always_inline]] inline Solution solve(const E& environment,
                                                             const typename E::State& state, LoadLine line,
                                                             Memory& memory) const noexcept {
-        const Branch& branch = branches_[memory.branch];
-        const double q = line.intercept;
-        if (branch.table.covers(q) && memory.turns == 0.0 && line.slope == slope_) {
-            memory.newton.position = branch.table.at(q);
-            return solution_at(memory.newton.position, q, false);
+        if (in_last_table(line, memory)) {
+            memory.newton.position = branches_[memory.branch].table.at(line.intercept);
+            return solution_at(memory.newton.position, line.intercept, false);
         }
         return solve_outside_table(environment, state, line, memory);
     }
@@ -139,10 +137,8 @@ class Resolvent {
     /// evaluation of the force; otherwise the position NaN.
     [[nodiscard, gnu::always_inline]] inline Solution without_evaluation(LoadLine line,
                                                                          Memory& memory) const noexcept {
-        const Branch& branch = branches_[memory.branch];
-        const double q = line.intercept;
-        if (branch.table.covers(q) && memory.turns == 0.0 && line.slope == slope_) {
-            return solution_at(branch.table.at(q), q, false);
+        if (in_last_table(line, memory)) {
+            return solution_at(branches_[memory.branch].table.at(line.intercept), line.intercept, false);
         }
         return from_any_branch(line, memory);
     }
@@ -156,6 +152,20 @@ class Resolvent {
     }
 
   private:
+    /// Returns true if the table of the last branch, in the first period, contains the solution.
+    [[nodiscard, gnu::always_inline]] inline bool in_last_table(LoadLine line,
+                                                                const Memory& memory) const noexcept {
+        return branches_[memory.branch].table.covers(line.intercept) && memory.turns == 0.0 &&
+               line.slope == slope_;
+    }
+
+    /// Returns the position NaN, for a load line that neither a table nor a straight line solves.
+    [[nodiscard]] static Solution no_solution() noexcept {
+        Solution solution;
+        solution.position = std::numeric_limits<double>::quiet_NaN();
+        return solution;
+    }
+
     /// Returns the solution y with its force q - p y. Slope and energy are NaN: they would double the computing time,
     /// and no structure uses them.
     [[nodiscard]] Solution solution_at(double y, double q, bool extrapolated) const noexcept {
@@ -181,7 +191,7 @@ class Resolvent {
             if (std::isnan(solution.position)) {
                 return solver_.solve(environment, state, line, memory.newton);
             }
-            memory.newton = CertifiedSolver::Memory{solution.position};
+            memory.newton.position = solution.position;
             return solution;
         }
         Memory next = memory;
@@ -211,8 +221,7 @@ class Resolvent {
     /// NaN if that branch has neither, or if the load line has another slope than the branches.
     [[nodiscard, gnu::noinline]] Solution from_any_branch(LoadLine line, Memory& memory) const noexcept {
         if (!(branches_.size() > 1 && line.slope == slope_ && std::isfinite(line.intercept))) {
-            constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-            return solution_at(nan, nan, false);
+            return no_solution();
         }
         memory.branch = std::max(memory.branch, std::size_t{1});
         find_branch(line.intercept, memory);
@@ -232,8 +241,7 @@ class Resolvent {
         if (branch.line_slope > 0.0) {
             return solution_at(branch.on_line(q), q, true);
         }
-        constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-        return solution_at(nan, nan, false);
+        return no_solution();
     }
 
     /// Sets `memory.branch` to the branch that contains the last position. If F falls at this position, sets it to the
@@ -303,8 +311,7 @@ class Resolvent {
         const auto rises = [&](const std::vector<OuterLine>& side) {
             return side.empty() || slope_ + side.back().slope > 0.0;
         };
-        if (!intervals || !rises(force.below) || !rises(force.above) ||
-            (force.periodic && (intervals->empty() || !(slope_ > 0.0)))) {
+        if (!intervals || !rises(force.below) || !rises(force.above) || (force.periodic && !(slope_ > 0.0))) {
             return;
         }
         add_lines(force.below, force.lower, total(force, force.lower), -1.0);
