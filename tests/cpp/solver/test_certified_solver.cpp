@@ -445,6 +445,12 @@ TEST(CertifiedSolver, IsExactAfterALargeChangeOfTheLoadLine) {
         ASSERT_EQ(solver.solve(line, {}, {100.0, 0.0}, memory).position, 0.0);
         EXPECT_NEAR(solver.solve(line, {}, {0.01, q}, memory).position, q / 0.011, 2e-13);
     }
+    // A load line without proof has the same solution, and leaves no prediction.
+    CertifiedSolver::Memory memory;
+    ASSERT_EQ(solver.solve(line, {}, {0.01, 0.0}, memory).position, 0.0);
+    ASSERT_LT(memory.low, memory.high);
+    EXPECT_EQ(solver.solve(line, {}, {0.0099, 0.0}, memory).position, 0.0);
+    EXPECT_GT(memory.low, memory.high);
 }
 
 // Positions inside the domain, on the lines that end at zero force, and beyond these lines
