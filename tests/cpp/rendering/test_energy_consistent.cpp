@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/model/limited_environment.hpp"
+#include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/energy_consistent.hpp"
 #include "palpate/rendering/explicit.hpp"
@@ -385,6 +386,11 @@ TEST(EnergyConsistent, StatesTheEvaluationsOfStepsWithTables) {
                                 count);
     };
     EXPECT_EQ(mean(p, true, 0.0, none), 2.0);
+    const Compensated compensated{object, 100.0};
+    EXPECT_GE(mean_evaluations(Massless{compensated, VirtualCoupling{100.0, 0.0}, period,
+                                        CompensatedResolvent{piecewise(network.curve()), 100.0, 100.0}},
+                               count),
+              1.0);
     for (const double shortest : {0.0, 1e-3, 1e9}) {
         for (const double limit : {1.0, none}) {
             for (const bool switched : {false, true}) {
@@ -443,16 +449,12 @@ TEST(EnergyConsistent, StatesThatALoadLineIsNotUnique) {
     EXPECT_EQ(structure.drive(0.0).status, Status::NotUnique);
 }
 
-/// Spring that hardens against negative positions. Its force is 0 at positive positions, and beyond 0.5 it is not a
-/// number.
+/// Object without force up to the position 0.5, whose force is not a number beyond.
 struct BrokenBeyond {
     using State = Stateless;
 
     [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
-        const double x2 = x * x;
-        return x > 0.5   ? EnvironmentSample{.force = std::numeric_limits<double>::quiet_NaN()}
-               : x > 0.0 ? EnvironmentSample{}
-                         : EnvironmentSample{10.0 * x * x2, 30.0 * x2, 2.5 * x2 * x2, false};
+        return {x > 0.5 ? std::numeric_limits<double>::quiet_NaN() : 0.0, 0.0, 0.0, false};
     }
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
@@ -473,10 +475,6 @@ void expect_a_failed_limited_step_is_refused(S structure) {
         EXPECT_EQ(refused.force, 0.0);
         EXPECT_EQ(refused.environment_position, reached);
     }
-    S fresh = reference;
-    S refused = structure;
-    EXPECT_EQ(refused.step(0.2).evaluations, fresh.step(0.2).evaluations)
-        << "the search starts at the same position";
     EXPECT_EQ(structure.drive(10.0).status, Status::NonFinite);
     const Rendered expected = reference.drive(-30.0);
     const Rendered now = structure.drive(-30.0);

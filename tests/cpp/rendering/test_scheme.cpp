@@ -229,6 +229,7 @@ int expect_equal_forces(A prepared, B reference, const std::string& name) {
 TEST(Scheme, PreparedStructureGivesTheForcesOfTheExactModel) {
     const NetworkParameters network{1, {4.0, 40.0}, {0.5, 0.2}, {0.2, 0.05}, {8.0}, 0.1};
     const ForceModel plain{network, test::unit_domain()};
+    const ForceModel bump{{1, {40.0}, {0.5}, {1.0}, {8.0}, 0.0}, test::unit_domain()};
     const ForceModel loss{network, {{0.02, 0.01}, 0.0, 0.2}, test::unit_domain(), 0.05};
     for (std::size_t k = 0; k < structure_names.size(); ++k) {
         const auto kind = static_cast<StructureKind>(k);
@@ -254,6 +255,11 @@ TEST(Scheme, PreparedStructureGivesTheForcesOfTheExactModel) {
                 scheme.predict = 0;
                 EXPECT_EQ(limited, 0) << "the guards limit this structure";
             } else {
+                Scheme light = scheme;
+                light.inertia = {1e-6, 0.0};
+                if (kind == StructureKind::EnergyConsistent) {
+                    compare(*bump.network(), bump, light, ", steps across a bump");
+                }
                 scheme.compensated = true;
                 compare(Compensated{*plain.network(), scheme.coupling.stiffness}, plain, scheme,
                         ", compensated");

@@ -937,7 +937,8 @@ TEST(Structure, StateOfTheObjectFollowsItsPosition) {
         "implicit");
     check(
         Explicit{Dragging{}, mass, coupling, period},
-        [&](double y, double) {
+        [&](double y, double force) {
+            EXPECT_NEAR(force, coupling.force(x - y, (x - x1 - (y - y1)) / period), 1e-9);
             return mass.mass * (y - 2.0 * y1 + y2) / (period * period) + mass.damping * (y1 - y2) / period +
                    f(y1, y1) - force1;
         },
@@ -987,6 +988,42 @@ TEST(Massless, SearchStartsAtTheResetPosition) {
         structure.reset(start);
         EXPECT_NEAR(structure.step(0.0).environment_position, std::copysign(5.0, start), 1e-9);
     }
+}
+
+// After a drive by the force 3, the slope of the load line is 0.21, and it has solutions on both sides of 0.
+TEST(Implicit, SearchStartsWhereADriveEnded) {
+    Implicit structure{PushingOut{1.0, 0.31, 100.0}, Inertia{0.01, 0.0}, VirtualCoupling{0.2, 0.0}, 1.0};
+    structure.reset(-6.0);
+    const double driven = structure.drive(3.0).environment_position;
+    EXPECT_GT(driven, 100.0);
+    const double q = 0.2 * -10.0 + 0.01 * (2.0 * driven + 6.0);
+    EXPECT_LT(std::abs(q), 1.0);
+    EXPECT_NEAR(structure.step(-10.0).environment_position, (q + 1.0) / 0.21, 1e-9);
+}
+
+/// Spring that hardens, f = 10 x^3, whose force is not a number between 0.1 and 0.9.
+struct BrokenBetween {
+    using State = Stateless;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        const bool broken = x > 0.1 && x < 0.9;
+        return {broken ? std::numeric_limits<double>::quiet_NaN() : 10.0 * x * x * x, 30.0 * x * x, 0.0,
+                false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+// The coupled step ends near 1. With the limited force 32 the object would end between 0.1 and 0.9.
+TEST(Implicit, SearchAfterAFailedLimitedStepStartsAtTheObject) {
+    Implicit structure{BrokenBetween{}, Inertia{1.0, 0.0}, VirtualCoupling{1e4, 0.0},
+                       0.125,           LoadLineSolver{},  32.0};
+    auto reference = structure;
+    EXPECT_EQ(structure.step(1.0).status, Status::NonFinite);
+    const Rendered expected = reference.step(0.01);
+    const Rendered now = structure.step(0.01);
+    EXPECT_EQ(now.status, Status::Ok);
+    EXPECT_EQ(now.evaluations, expected.evaluations);
 }
 
 TEST(Massless, StatesThatItsSearchEndedAlsoAtTheForceLimit) {
