@@ -9,7 +9,9 @@ include(CheckPIESupported)
 check_pie_supported(LANGUAGES CXX)
 
 function(palpate_harden target)
-  # The last two protect jumps and returns: the first on x86-64, the second on aarch64.
+  # The last two protect jumps and returns: the first on x86-64, the second on aarch64. clang only warns of a flag that
+  # it does not use on this processor.
+  set(CMAKE_REQUIRED_FLAGS -Werror)
   foreach(flag IN ITEMS -fstack-protector-strong -fstack-clash-protection -fcf-protection=full
                         -mbranch-protection=standard)
     string(MAKE_C_IDENTIFIER "palpate_has${flag}" known)

@@ -5,9 +5,14 @@
 #include <limits>
 #include <numbers>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#if __has_include(<libusb-1.0/libusb.h>)
+#include <libusb-1.0/libusb.h>
+#endif
 
 #include "palpate/device/packet_stream.hpp"
 #include "palpate/device/wire.hpp"
@@ -117,6 +122,67 @@ TEST(Wire, ReadsInfoAndRefusesInvalidFields) {
         EXPECT_NE(wire::decode(other, info).find(", must be "), std::string::npos) << at;
     }
 }
+
+TEST(Wire, ReadsTheModelOfADeviceAndRefusesInvalidFields) {
+    const Bytes good{1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 13, 14, 15, 16, 17, 18, 0xE8, 3, 0, 0, 1, 0, 0, 0};
+    wire::DeviceModel model;
+    ASSERT_EQ(wire::decode(good, model), "");
+    EXPECT_EQ(model.fingerprint, 0x0807'0605'0403'0201U);
+    EXPECT_EQ(model.certificate, 0x1211'100F'0E0D'0C0BU);
+    EXPECT_EQ(model.rate_hz, 1000U);
+    EXPECT_EQ(model.renderer, wire::Renderer::Device);
+    const auto changed = [&](std::size_t at, std::uint8_t value) {
+        Bytes other = good;
+        other[at] = value;
+        return other;
+    };
+    for (const std::size_t size : {std::size_t{0}, good.size() - 1, good.size() + 1}) {
+        Bytes other = good;
+        other.resize(size);
+        EXPECT_EQ(wire::decode(other, model),
+                  "the answer to GET_MODEL has " + std::to_string(size) + " bytes, must have 24");
+    }
+    Bytes at_rest = changed(16, 0);
+    at_rest[17] = 0;
+    EXPECT_EQ(wire::decode(at_rest, model), "the answer to GET_MODEL: rate_hz is 0, must be > 0");
+    EXPECT_EQ(wire::decode(changed(20, 2), model), "the answer to GET_MODEL: renderer is 2, must be 0 or 1");
+    EXPECT_EQ(wire::decode(changed(23, 1), model),
+              "the answer to GET_MODEL: renderer is 16777217, must be 0 or 1");
+    ASSERT_EQ(wire::decode(changed(20, 0), model), "");
+    EXPECT_EQ(model.renderer, wire::Renderer::Host);
+}
+
+TEST(Wire, NamesTheFirstDifferenceBetweenTheModelOfADeviceAndThePlan) {
+    const wire::DeviceModel planned{0x12, 0xAB, 1000, wire::Renderer::Host};
+    EXPECT_EQ(wire::difference({0x12, 0xAB, 1000, wire::Renderer::Device}, planned), "");
+    EXPECT_EQ(wire::difference({0x13, 0xAC, 500}, planned),
+              "contains the model 0000000000000013, but the plan is for the model 0000000000000012");
+    EXPECT_EQ(wire::difference({0x12, 0xAC, 500}, planned),
+              "contains this model with the certificate 00000000000000ac, but that of the plan is "
+              "00000000000000ab");
+    EXPECT_EQ(wire::difference({0x12, 0xAB, 500}, planned),
+              "renders this model at 500 Hz, but the certificate of the plan is for 1000 Hz");
+}
+
+#if __has_include(<libusb-1.0/libusb.h>)
+TEST(Wire, HasACauseForTheErrorsOfLibusbThatADeviceCanHave) {
+    for (const auto& [code, word] :
+         std::vector<std::pair<int, std::string>>{{LIBUSB_ERROR_IO, "failed on the bus"},
+                                                  {LIBUSB_ERROR_ACCESS, "permission"},
+                                                  {LIBUSB_ERROR_NO_DEVICE, "unplugged"},
+                                                  {LIBUSB_ERROR_NOT_FOUND, "unplugged"},
+                                                  {LIBUSB_ERROR_BUSY, "another program"},
+                                                  {LIBUSB_ERROR_TIMEOUT, "not answer"},
+                                                  {LIBUSB_ERROR_PIPE, "refused"},
+                                                  {LIBUSB_ERROR_NO_MEM, "memory"}}) {
+        EXPECT_NE(wire::usb_cause(code).find(word), std::string::npos) << code;
+    }
+    for (const int code :
+         {int{LIBUSB_SUCCESS}, int{LIBUSB_ERROR_INVALID_PARAM}, int{LIBUSB_ERROR_OTHER}, 1}) {
+        EXPECT_EQ(wire::usb_cause(code), "") << code;
+    }
+}
+#endif
 
 TEST(Wire, ForceOutOfTheObjectIsATorqueTowardsSmallerCounts) {
     EXPECT_EQ(wire::torque_of(0.5, 5'000'000), -500'000);

@@ -147,7 +147,10 @@ inline std::vector<ClockFault> random_clock_faults(Random& random, std::uint64_t
 /// Renders one random scene in several runs. Returns the first promise that did not hold, or "".
 inline std::string run_scene(std::uint64_t seed, Totals& totals) {
     Random random{seed};
-    const auto [scene, certificate] = random_scene(random);
+    const auto drawn = random_scene(random);
+    // References, because clang before version 16 cannot capture the names of a structured binding.
+    const auto& scene = drawn.first;
+    const auto& certificate = drawn.second;
     const double period_s = scene.device.period_s;
     const std::string name = name_of_scene(scene, certificate.certified());
     std::string broken;
