@@ -84,14 +84,14 @@ $(stamps)/control $(stamps)/test-cpp $(stamps)/fuzz: $(stamps)/build
 	$(system_packages) "$(@F)"
 	touch $@
 
-# Tools by their group in pyproject.toml: tests, linters, tests of the packages and of the MuJoCo plugin, coverage.
-$(stamps)/test $(stamps)/lint $(stamps)/package $(stamps)/simulators $(stamps)/coverage: $(stamps)/%: tools/locked/%.txt $(stamps)/build
+# Tools by their group in pyproject.toml: tests, linters, tests of the packages and of the MuJoCo plugin.
+$(stamps)/test $(stamps)/lint $(stamps)/package $(stamps)/simulators: $(stamps)/%: tools/locked/%.txt $(stamps)/build
 	$(install_locked) "$<"
 	touch $@
 
-# The programs that build the documentation site.
-$(stamps)/docs: tools/locked/docs.txt $(stamps)/build
-	$(system_packages) docs
+# The programs that build the documentation site, and those that count executed lines and branches.
+$(stamps)/docs $(stamps)/coverage: $(stamps)/%: tools/locked/%.txt $(stamps)/build
+	$(system_packages) "$(@F)"
 	$(install_locked) "$<"
 	touch $@
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the missing Debian or Ubuntu packages, or prints one line with the packages to install.
 #
-#   tools/system_packages.sh PYTHON build|control|test-cpp|docs|guest|browser|portable|fuzz
+#   tools/system_packages.sh PYTHON build|control|test-cpp|docs|guest|browser|portable|fuzz|coverage
 set -euo pipefail
 
 python=$1
@@ -13,6 +13,7 @@ python_says() { "$python" -c "$1" >/dev/null 2>&1; }
 
 fuzzes() { echo 'extern "C" int LLVMFuzzerTestOneInput(const char*, unsigned long) { return 0; }' |
     clang++ -fsanitize=fuzzer,address,undefined -o /dev/null -x c++ - 2>/dev/null; }
+counts() { echo 'int main() {}' | clang++ -fprofile-instr-generate -o /dev/null -x c++ - 2>/dev/null; }
 # The version of clang, also before it is installed.
 clang_version() { clang -dumpversion 2>/dev/null | cut -d. -f1 | grep . ||
     apt-cache depends clang 2>/dev/null | sed -n 's/.*Depends: clang-\([0-9]*\)$/\1/p' | head -1; }
@@ -62,6 +63,12 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         command -v clang >/dev/null || echo clang
         fuzzes || apt-cache pkgnames 2>/dev/null | grep -x "libclang-rt-$(clang_version)-dev" || true
         compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
+    fi
+    if [ "$purpose" = coverage ]; then
+        # clang with the runtime library and the programs that count executed lines and branches
+        command -v clang >/dev/null || echo clang
+        counts || apt-cache pkgnames 2>/dev/null | grep -x "libclang-rt-$(clang_version)-dev" || true
+        command -v llvm-cov >/dev/null || echo llvm
     fi
     if [ "$purpose" = browser ]; then
         # for the tests that open a report
