@@ -576,16 +576,16 @@ TEST(Branch, GuessesAParabolaInTheTenthNextToAFold) {
               3.0 - std::sqrt(2.0 * (200.0 - std::nextafter(190.0, 200.0)) / 32.0));
     EXPECT_EQ(branch.first_guess(101.0, 1.5), 1.5);
     branch.curvature_low = 8.0;
-    EXPECT_EQ(branch.first_guess(104.0, 2.5), 2.0);  // 4 = 8 / 2 1^2
+    EXPECT_EQ(branch.first_guess(109.0, 2.25), 2.5);  // 9 = 8 / 2 (3/2)^2
     EXPECT_EQ(branch.first_guess(110.0, 2.5), 2.5);
     EXPECT_EQ(branch.first_guess(199.0, 1.5), 2.75);
     branch.curvature_high = 0.0;
     EXPECT_EQ(branch.first_guess(199.0, 1.5), 1.5);
     EXPECT_EQ(branch.first_guess(100.0, 2.5), 2.0) << "the fold itself is not inside";
     branch.curvature_low = 0.5;
-    EXPECT_EQ(branch.first_guess(100.25, 2.5), 2.0);
+    EXPECT_EQ(branch.first_guess(100.5625, 1.25), 2.5);  // 9/16 = 1/4 (3/2)^2
     branch.curvature_high = 0.5;
-    EXPECT_EQ(branch.first_guess(199.75, 1.5), 2.0);
+    EXPECT_EQ(branch.first_guess(199.4375, 1.25), 1.5);
 }
 
 /// Returns f(y) + p y.
@@ -815,6 +815,20 @@ TEST(Branches, LeadToTheFirstSolutionFromAnyTurn) {
         }
     }
     EXPECT_GT(at_end, 0);
+}
+
+// The function falls inside one edge of the domain, so branches on both sides of the edge contain the same values.
+TEST(Branches, KeepASolutionOnALineOutsideTheDomain) {
+    for (const bool above : {false, true}) {
+        const WaveletNetwork network{{1, {10.0}, {above ? 0.9 : 0.1}, {above ? -1.0 : 1.0}, {2.0}, 0.0},
+                                     test::unit_domain()};
+        const Resolvent resolvent{network.curve(), 1.0};
+        ASSERT_GT(resolvent.branches().size(), 2U);
+        for (int k = 1; k <= 50; ++k) {
+            const double y = above ? 1.0 + 0.01 * k : -0.01 * k;
+            EXPECT_NEAR(resolvent.solve(network, {}, {1.0, total(network, 1.0, y)}, y).position, y, 1e-12);
+        }
+    }
 }
 
 // Beyond the end of a table, Newton's method solves between the ends of its branch.
