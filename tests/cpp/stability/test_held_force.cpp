@@ -502,8 +502,8 @@ double shared_time(double delay, double jitter) {
 }
 
 TEST(HeldForce, JitterNeedsTheSmallerOfTheSharedTimeAndTheNearestSample) {
-    for (const double delay : {0.7, 1.0, 1.3, 1.75, 2.0, 2.6, 3.1}) {
-        for (const double jitter : {0.05, 0.3, 0.45}) {
+    for (const double delay : {0.7, 0.9999, 1.0, 1.3, 1.75, 2.0, 2.6, 3.1}) {
+        for (const double jitter : {1e-4, 0.05, 0.3, 0.45}) {
             for (const SlopeRange slopes : {SlopeRange{1.0, 0.0}, {0.0, 1.0}, {0.3, 1.0}}) {
                 if (delay <= 1.0 - jitter) {
                     continue;
