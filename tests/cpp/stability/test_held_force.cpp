@@ -184,7 +184,8 @@ TEST(HeldForce, GainOfAFilterIsItsSampledMaximumPlusTheMarginOfTheProof) {
             const detail::FilterGain gain{taps, detail::Maximum::Proved, resolution};
             EXPECT_EQ(gain.size(), detail::size_of(taps));
             for (const auto& [l, gamma] : {std::pair{0.7, 0.3}, {-0.4, 1.5}, {0.0, 1.0}, {-2.0, 0.1}}) {
-                const double sampled = most_over_frequencies(last, [&](double theta) {
+                // clang before version 16 cannot capture the names of a structured binding.
+                const double sampled = most_over_frequencies(last, [&, l = l, gamma = gamma](double theta) {
                     const std::complex<double> Q = filter_response(taps, theta);
                     return l * Q.real() + gamma * std::norm(Q);
                 });
