@@ -192,27 +192,6 @@ TEST(LimitedMean, EnclosesTheSummedMeanNarrowly) {
     }
 }
 
-// Near an edge of the wave at which the limit begins, the slope is almost as steep as its bound.
-TEST(LimitedMean, OfASteepEdgeIsExact) {
-    NetworkParameters edge;
-    edge.alpha = {1.0};
-    edge.beta = {3.0};
-    edge.weight = {4.0};
-    edge.linear = {0.0};
-    const NetworkCurve g = periodic_curve(edge, 0.0, turn);
-    const Interval slope = slope_bounds(g.parameters(), 0.0, turn, 1e-6);
-    const detail::PeriodicStrokes strokes{g, nullptr, slope.largest()};
-    for (const double limit : {0.7, 0.9, 1.1}) {
-        constexpr int steps = 1'000'000;
-        double sum = 0.0;
-        for (int k = 0; k < steps; ++k) {
-            sum += std::clamp(g.at(turn * (k + 0.5) / steps).value, -limit, limit) / steps;
-        }
-        const Interval mean = detail::limited_mean(strokes, 1.0, 0.0, limit);
-        EXPECT_NEAR(0.5 * (mean.lower + mean.upper), sum, 1e-10) << limit;
-    }
-}
-
 // A slope bound that is far too large leaves all cells open until there are more than 100 000: then 65 536 cells of
 // the width w remain, each with an error of at most L w^2 / 4.
 TEST(LimitedMean, WidthIsTheErrorOfTheOpenCells) {
