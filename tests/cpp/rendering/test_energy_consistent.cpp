@@ -175,9 +175,44 @@ TEST(EnergyConsistent, SwitchedStepChoosesTheRootOfItsRule) {
     EXPECT_GT(three, tried / 600) << "the case is about steps with several roots";
 }
 
+/// Spring whose stiffness jumps from 1 to 100 at position 0.
+struct TwoSprings {
+    using State = Stateless;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        const double k = x < 0.0 ? 1.0 : 100.0;
+        return {k * x, k, 0.5 * k * x * x, false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+TEST(EnergyConsistent, ShortStepAcrossAJumpOfTheSlopeGeneratesNoEnergy) {
+    constexpr double shortest = 0.01;
+    constexpr Inertia body{1e-4, 0.0};
+    int across = 0;
+    for (const bool switched : {true, false}) {
+        for (int k = -20; k <= 20; ++k) {
+            for (int j = -40; j <= 40; ++j) {
+                const double from = 5e-4 * k;
+                const double force = 0.1 * j;
+                EnergyConsistent structure{TwoSprings{}, body, {1.0, 0.0}, 1e-3, shortest, switched};
+                structure.reset(from);
+                const double moved = structure.drive(force).environment_position - from;
+                const double stored =
+                    TwoSprings{}.at(from + moved, {}).energy - TwoSprings{}.at(from, {}).energy;
+                const double kinetic = 0.5 * body.mass * structure.velocity() * structure.velocity();
+                EXPECT_GE(force * moved - stored - kinetic, -1e-12) << from << " " << force;
+                across += std::abs(moved) < shortest && from * (from + moved) < 0.0 ? 1 : 0;
+            }
+        }
+    }
+    EXPECT_GT(across, 100);
+}
+
 // docs/certificate.md, behind a coupling: in every step, G eta (force times displacement) is at least the increase of
 // stored and kinetic energy, for any slope and any solution, also at a force limit. The mean force D replaces the force
-// f only where f would generate energy. With a free continuation the slope of f jumps, and the mean force of a short step has an error.
+// f only where f would generate energy. At the end of a free continuation the slope of f jumps.
 TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
     test::Random random{92};
     int most = 0;
@@ -190,7 +225,6 @@ TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
                                     test::unit_domain(continuation, continuation)};
         const PiecewiseForce force = piecewise(object.curve());
         const double fall = std::max(0.1, test::steepest_fall(force));
-        const double steepest = slope_bounds(object.parameters(), 0.0, 1.0).largest() + fall;
         const double about = fall * std::exp(test::uniform(random, std::log(0.505), 1.0));
         const double share = test::uniform(random, 0.1, 0.9);
         const Inertia mass{0.5e-6 * share * about, 1e-3 * 0.1 * (1.0 - share) * about};
@@ -220,9 +254,7 @@ TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
                     0.5 * body.mass * (structure.velocity() * structure.velocity() - velocity * velocity);
                 const double work = rendered.force * eta - body.damping * eta * eta / 1e-3;
                 const double size = 1.0 + p * (1.0 + y * y) + body.mass * velocity * velocity;
-                const bool jumps = continuation == Continuation::Free && std::abs(eta) <= 1e-2 * finest;
-                const double by_jumps = jumps ? 0.018 * 2.0 * steepest * eta * eta : 0.0;
-                ASSERT_GE(work - gain, -1e-11 * size - by_jumps) << k << " " << j << " p / s = " << p / fall;
+                ASSERT_GE(work - gain, -1e-11 * size) << k << " " << j << " p / s = " << p / fall;
                 if (std::abs(eta) > 1e-2) {
                     const double used = rendered.force - body.damping * eta / 1e-3 -
                                         2e3 * body.mass * (eta / 1e-3 - velocity);

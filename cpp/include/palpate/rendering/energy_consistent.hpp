@@ -37,8 +37,9 @@ template <Environment E, class Solver = LoadLineSolver>
 class EnergyConsistent {
   public:
     /// Makes the structure. If the object moves less than `shortest` in a step, D is computed from three Gauss points
-    /// of f, because a quotient of small differences loses digits; 1e-2 of the finest wavelet's width is suitable. If the
-    /// slope of f jumps inside such a step, the step can generate up to 0.018 |jump| (y - y_{k-1})^2.
+    /// of f, because a quotient of small differences loses digits; 1e-2 of the finest wavelet's width is suitable. The
+    /// Gauss points are not used if the work of their mean force differs from the change of energy by more than 1e-12
+    /// of the stored energy, as when the slope of f jumps inside the step.
     EnergyConsistent(E environment, Inertia inertia, VirtualCoupling coupling, double period,
                      double shortest = 1e-4, bool switched = true,
                      double force_limit = std::numeric_limits<double>::infinity(), Solver solver = {})
@@ -140,14 +141,21 @@ class EnergyConsistent {
         /// Returns the mean force D(y); for a y near `from` it is computed from three Gauss points.
         [[nodiscard]] double mean(double y, const EnvironmentSample& at_y,
                                   const State& state) const noexcept {
-            if (std::abs(y - from) > shortest) {
-                return (at_y.energy - energy) / (y - from);
+            const double moved = y - from;
+            const double gained = at_y.energy - energy;
+            if (std::abs(moved) > shortest) {
+                return gained / moved;
             }
             const double middle = 0.5 * (from + y);
-            const double offset = 0.7745966692414834 * 0.5 * (y - from);
-            return (5.0 * counted(middle - offset, state).force + 8.0 * counted(middle, state).force +
-                    5.0 * counted(middle + offset, state).force) /
-                   18.0;
+            const double offset = 0.7745966692414834 * 0.5 * moved;
+            const double gauss =
+                (5.0 * counted(middle - offset, state).force + 8.0 * counted(middle, state).force +
+                 5.0 * counted(middle + offset, state).force) /
+                18.0;
+            // Over a ten-thousandth of `shortest`, a jump of the slope cannot generate more than rounding errors.
+            const bool exact = std::abs(gauss * moved - gained) <=
+                               1e-12 * std::fmax(std::abs(energy), std::abs(at_y.energy));
+            return exact || std::abs(moved) < 1e-4 * shortest ? gauss : gained / moved;
         }
 
         [[nodiscard]] EnvironmentSample counted(double y, const State& state) const noexcept {
