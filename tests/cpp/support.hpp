@@ -115,6 +115,21 @@ struct ClickAndWall {
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
 };
 
+/// Environment that counts the evaluations of another environment.
+template <class E>
+struct Counted {
+    using State = typename E::State;
+    E environment;
+    int* count;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
+        ++*count;
+        return environment.at(x, state);
+    }
+    void advance(double x, State& state) const noexcept { environment.advance(x, state); }
+    [[nodiscard]] State start(double x) const noexcept { return environment.start(x); }
+};
+
 /// Returns the message with which a call refuses its arguments; empty if it accepts them.
 template <class Call>
 std::string refusal(const Call& call) {

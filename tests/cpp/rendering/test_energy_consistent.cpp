@@ -331,21 +331,6 @@ TEST(EnergyConsistent, MeanForceFromGaussPointsIsThatFromTheEnergy) {
     }
 }
 
-/// Environment that counts the evaluations of another environment.
-template <class E>
-struct Counted {
-    using State = typename E::State;
-    E environment;
-    int* count;
-
-    [[nodiscard]] EnvironmentSample at(double x, const State& state) const noexcept {
-        ++*count;
-        return environment.at(x, state);
-    }
-    void advance(double x, State& state) const noexcept { environment.advance(x, state); }
-    [[nodiscard]] State start(double x) const noexcept { return environment.start(x); }
-};
-
 /// Moves a handle over a wide range, and compares the stated evaluations of each tick with the counted ones. Returns
 /// the mean number of evaluations in a tick.
 template <class S>
@@ -373,7 +358,7 @@ TEST(EnergyConsistent, StatesItsEvaluationsAndNeedsFew) {
     constexpr double period = 1e-2;
     constexpr double none = std::numeric_limits<double>::infinity();
     int count = 0;
-    const Counted<Hardening> object{{}, &count};
+    const test::Counted<Hardening> object{{}, &count};
     const auto mean = [&](bool switched, double limit, double shortest = 0.0) {
         return mean_evaluations(
             EnergyConsistent{object, inertia, coupling, period, shortest, switched, limit}, count);
@@ -387,8 +372,8 @@ TEST(EnergyConsistent, StatesItsEvaluationsAndNeedsFew) {
     EXPECT_LT(mean(true, none, 1e9), 36.3);
     EXPECT_LT(mean(true, 3.0, 1e9), 46.8);
     const auto implicit = [&](double limit) {
-        return mean_evaluations(Implicit<Counted<Hardening>>{object, inertia, coupling, period, {}, limit},
-                                count);
+        return mean_evaluations(
+            Implicit<test::Counted<Hardening>>{object, inertia, coupling, period, {}, limit}, count);
     };
     EXPECT_LT(implicit(none), 4.23);
     EXPECT_LT(implicit(3.0), 7.83);
@@ -408,7 +393,7 @@ TEST(EnergyConsistent, StatesTheEvaluationsOfStepsWithTables) {
     constexpr double none = std::numeric_limits<double>::infinity();
     int count = 0;
     const WaveletNetwork network{{1, {4.0, 9.0}, {0.5, 0.2}, {0.2, 0.05}, {8.0}, 0.1}, test::unit_domain()};
-    const Counted<WaveletNetwork> object{network, &count};
+    const test::Counted<WaveletNetwork> object{network, &count};
     const Inertia mass{1e-5, 0.0};
     const VirtualCoupling spring{20.0, 0.0};
     const double p = EnergyConsistent<WaveletNetwork>::load_line_slope(mass, spring, period);
@@ -452,7 +437,7 @@ struct OneAnswer {
 TEST(EnergyConsistent, UsesATableOnlyBetweenTheLastPositionAndThatOfTheMeanForce) {
     const auto position = [](double answer, Status status) {
         int count = 0;
-        const Counted<test::Spring> object{{2.0}, &count};
+        const test::Counted<test::Spring> object{{2.0}, &count};
         EnergyConsistent structure{object,
                                    {0.5, 0.0},
                                    coupling,

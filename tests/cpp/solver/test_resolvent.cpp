@@ -803,9 +803,12 @@ TEST(Branches, LeadToTheFirstSolutionFromAnyTurn) {
                 continue;  // so near a fold that a step of 1e-3 may miss it
             }
             Resolvent::Memory memory{start};
-            const Solution solution = resolvent.solve(network, {}, {p, q}, memory);
+            int evaluations = 0;
+            const test::Counted<WaveletNetwork> counted{network, &evaluations};
+            const Solution solution = resolvent.solve(counted, {}, {p, q}, memory);
             ASSERT_EQ(solution.status, Status::Ok);
             ASSERT_NEAR(solution.position, before, 1e-9) << k << " " << j << " from " << start;
+            ASSERT_EQ(solution.evaluations, evaluations);
         }
         // The number of turns is not exact at these positions, but the search ends.
         for (double far = 1e9; far < 1e300; far *= 7.3) {

@@ -195,9 +195,7 @@ class Resolvent {
             return solution;
         }
         Memory next = memory;
-        if (next.branch == 0) {
-            locate_branch(environment, state, line, next);
-        }
+        const int located = next.branch == 0 ? locate_branch(environment, state, line, next) : 0;
         find_branch(line.intercept, next);
         Solution solution = on_branch(line.intercept, next);
         if (std::isnan(solution.position)) {
@@ -210,6 +208,7 @@ class Resolvent {
                 branch.first_guess(q, next.newton.position - turn_offset) + turn_offset,
                 {branch.positions.lower + turn_offset, branch.positions.upper + turn_offset});
         }
+        solution.evaluations += located;
         if (solution.status != Status::NonFinite) {
             next.newton = CertifiedSolver::Memory{solution.position};
             memory = next;
@@ -245,10 +244,10 @@ class Resolvent {
     }
 
     /// Sets `memory.branch` to the branch that contains the last position. If F falls at this position, sets it to the
-    /// nearest branch in the direction of -residual, that is of q - F.
+    /// nearest branch in the direction of -residual, that is of q - F. Returns the number of evaluations of the force.
     template <Environment E>
-    void locate_branch(const E& environment, const typename E::State& state, LoadLine line,
-                       Memory& memory) const noexcept {
+    int locate_branch(const E& environment, const typename E::State& state, LoadLine line,
+                      Memory& memory) const noexcept {
         const double y = memory.newton.position;
         memory.turns = repeats_ ? std::floor((y - branches_[1].positions.lower) / period_) : 0.0;
         double along = y - memory.turns * period_;
@@ -261,10 +260,13 @@ class Resolvent {
             memory.turns += 1.0;
             along -= period_;
         }
-        if (along < branches_[memory.branch].positions.lower &&
-            environment.at(y, state).force + line.slope * y > line.intercept) {
+        if (!(along < branches_[memory.branch].positions.lower)) {
+            return 0;
+        }
+        if (environment.at(y, state).force + line.slope * y > line.intercept) {
             to_previous_branch(memory);
         }
+        return 1;
     }
 
     void to_next_branch(Memory& memory) const noexcept {
