@@ -2,8 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
-#include <initializer_list>
 #include <random>
 
 #include "identity.hpp"
@@ -19,8 +19,8 @@ namespace emulator {
     };
     const auto yes = [&] { return below(2) == 1; };
     const auto one_of = [&](auto... values) {
-        const std::initializer_list all{values...};
-        return *(all.begin() + below(all.size()));
+        const std::array all{values...};
+        return all[below(all.size())];
     };
     Identity device;
     device.firmware = static_cast<std::uint16_t>(below(0x10000));
