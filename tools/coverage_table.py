@@ -28,15 +28,19 @@ def add_lines(report: Path, table: dict[str, list[int]]) -> None:
 
 
 def add_branches(report: Path, table: dict[str, list[int]]) -> list[str]:
-    """Adds both values of each condition; returns one line for each value that no instance of a template has."""
+    """Adds both values of each condition; returns one line for each value that no instance of a template has.
+
+    The conditions of ``if constexpr`` are left out: the compiler evaluates them.
+    """
     missed = []
     for file in json.loads(report.read_text())["data"][0]["files"]:
         path = Path(file["filename"])
         conditions: dict[tuple[int, ...], list[int]] = defaultdict(lambda: [0, 0])
-        for *place, true, false, _, _, _ in file["branches"]:
-            conditions[tuple(place)][0] += true
-            conditions[tuple(place)][1] += false
         text = path.read_text().splitlines()
+        for *place, true, false, _, _, _ in file["branches"]:
+            if "if constexpr" not in text[place[0] - 1]:
+                conditions[tuple(place)][0] += true
+                conditions[tuple(place)][1] += false
         for place, counts in sorted(conditions.items()):
             table[folder_of(path)][2] += sum(count > 0 for count in counts)
             table[folder_of(path)][3] += 2
@@ -59,6 +63,7 @@ def main() -> None:
         totals = json.loads(identification.read_text())["totals"]
         names = ("covered_lines", "num_statements", "covered_branches", "num_branches")
         table["identification"] = [totals[name] for name in names]
+    table["all"] = [sum(column) for column in zip(*table.values(), strict=True)]
     for folder, (lines, all_lines, branches, all_branches) in sorted(table.items()):
         print(
             f"{folder:14} lines {lines:5d} of {all_lines:5d} {100 * lines / all_lines:5.1f} %   "
