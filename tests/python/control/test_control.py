@@ -4,16 +4,28 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
+import subprocess
 import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from conftest import ROOT
-from control_program import ANY_RATE, MODEL, control, every_row, needs_program, start_control, wait_for_rows
-from palpate import read_recording
+from control_program import (
+    ANY_RATE,
+    MODEL,
+    PROGRAM,
+    control,
+    every_row,
+    needs_program,
+    start_control,
+    wait_for_rows,
+)
+from palpate import load_model, read_recording
 from palpate._core.rendering import structure_names
 
 pytestmark = needs_program
@@ -140,6 +152,28 @@ def test_column_names_contain_the_units_of_the_model(tmp_path: Path) -> None:
     model = changed_model(tmp_path, units={"position": "m", "force": "N"})
     assert control(model, "--duration-s", 0.3, "--record", out, *ANY_RATE).returncode == 0
     assert read_recording(out).units == {"position": "m", "force": "N"}
+
+
+def test_a_model_of_position_and_velocity_renders_its_force(tmp_path: Path) -> None:
+    out = tmp_path / "rendered.csv"
+    path = MODEL.with_name("certificate_velocity.json")
+    completed = control(path, "--duration-s", 1.0, "--record", out, "--json", *ANY_RATE)
+    assert completed.returncode == 0, completed.stderr
+    rows = every_row(out)
+    full = rows[rows["status"] == "Ok"]  # without the start ramp
+    assert len(rows) == json.loads(completed.stdout)["ticks"]
+    assert len(full) > 100
+    expected = load_model(path).predict(full[["position_rad", "velocity_radps"]].to_numpy())
+    np.testing.assert_allclose(full["force_Nm"], expected, rtol=0.0, atol=1e-9)
+
+
+def test_a_closed_standard_input_does_not_change_the_recording(tmp_path: Path) -> None:
+    out = tmp_path / "rendered.csv"
+    command = [PROGRAM, MODEL, "--duration-s", "0.2", "--record", out, "--json", *ANY_RATE]
+    completed = subprocess.run(
+        [*map(str, command)], stdout=subprocess.PIPE, text=True, check=True, preexec_fn=lambda: os.close(0)
+    )
+    assert len(every_row(out)) == json.loads(completed.stdout)["ticks"]
 
 
 @pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])

@@ -115,6 +115,14 @@ def test_the_live_line_is_not_wrapped_in_a_narrow_terminal(columns: int) -> None
             assert all(re.match(r"[\d.]+ s", line) for line in lines)
 
 
+def test_a_terminal_without_a_known_width_has_80_columns() -> None:
+    with terminal(0, MODEL, "--duration-s", 0.8) as session:
+        session.watch()
+        assert session.process.wait() == 0
+        assert len(session.lines) >= 2
+        assert all(LIVE_LINE.fullmatch(line) and len(line) < 80 for line in session.lines)
+
+
 def test_ctrl_c_in_a_terminal_exits_with_code_0_and_a_summary() -> None:
     with terminal(80, MODEL, "--duration-s", "inf") as session:
         session.watch(until_lines=2)
