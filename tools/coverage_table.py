@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prints the table of tools/coverage.sh from the files in its build folder: python tools/coverage_table.py BUILD."""
+"""Prints the table of tools/coverage.sh from its build folder: python tools/coverage_table.py BUILD."""
 
 import json
 import sys
