@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <stdexcept>
@@ -110,6 +111,17 @@ struct ClickAndWall {
         const double wall_slope = 60.0 / (1.0 + std::exp(-z));
         return {2.0 * x + click + 60.0 * 0.004 * softplus, 2.0 - 2.0 * u / 0.03 * click + wall_slope, 0.0,
                 false};
+    }
+    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
+    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
+};
+
+/// Object without force up to the position 0.5, whose force is not a number beyond.
+struct BrokenBeyond {
+    using State = Stateless;
+
+    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+        return {x > 0.5 ? std::numeric_limits<double>::quiet_NaN() : 0.0, 0.0, 0.0, false};
     }
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }

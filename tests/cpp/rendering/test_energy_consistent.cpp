@@ -466,17 +466,6 @@ TEST(EnergyConsistent, StatesThatALoadLineIsNotUnique) {
     EXPECT_EQ(structure.drive(0.0).status, Status::NotUnique);
 }
 
-/// Object without force up to the position 0.5, whose force is not a number beyond.
-struct BrokenBeyond {
-    using State = Stateless;
-
-    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
-        return {x > 0.5 ? std::numeric_limits<double>::quiet_NaN() : 0.0, 0.0, 0.0, false};
-    }
-    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
-    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
-};
-
 // A fast mass, which the limited force of the coupling cannot stop, moves to a position without a force.
 template <class S>
 void expect_a_failed_limited_step_is_refused(S structure) {
@@ -507,8 +496,8 @@ TEST(EnergyConsistent, FailedLimitedStepIsRefusedAndKeepsTheState) {
     constexpr VirtualCoupling stiff{1e4, 0.5};
     constexpr double period = 0.125;
     expect_a_failed_limited_step_is_refused(
-        EnergyConsistent{BrokenBeyond{}, mass, stiff, period, 1e-4, true, 0.5});
-    expect_a_failed_limited_step_is_refused(Implicit<BrokenBeyond>{{}, mass, stiff, period, {}, 0.5});
+        EnergyConsistent{test::BrokenBeyond{}, mass, stiff, period, 1e-4, true, 0.5});
+    expect_a_failed_limited_step_is_refused(Implicit<test::BrokenBeyond>{{}, mass, stiff, period, {}, 0.5});
 }
 
 // With the mass 1, the period 1/2 and the coupling stiffness 8, the object moves to half of the handle's position.

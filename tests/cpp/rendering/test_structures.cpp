@@ -952,17 +952,6 @@ TEST(Structure, StateOfTheObjectFollowsItsPosition) {
         "energy-consistent");
 }
 
-/// Object without force up to the position 0.5, whose force is not a number beyond.
-struct BrokenBeyond {
-    using State = Stateless;
-
-    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
-        return {x > 0.5 ? std::numeric_limits<double>::quiet_NaN() : 0.0, 0.0, 0.0, false};
-    }
-    void advance(double /*x*/, State& /*stateless*/) const noexcept {}
-    [[nodiscard]] State start(double /*x*/) const noexcept { return {}; }
-};
-
 TEST(Structure, ForceThatIsNotFiniteIsRefused) {
     const auto expect_refused = [](auto structure) {
         structure.reset(0.6);
@@ -973,12 +962,12 @@ TEST(Structure, ForceThatIsNotFiniteIsRefused) {
             EXPECT_EQ(structure.drive(1.0).status, Status::NonFinite);
         }
     };
-    expect_refused(Direct{BrokenBeyond{}});
-    expect_refused(PredictedDirect{BrokenBeyond{}, 3});
-    expect_refused(Massless{BrokenBeyond{}, coupling, period});
-    expect_refused(Implicit{BrokenBeyond{}, Inertia{}, coupling, period});
-    expect_refused(Explicit{BrokenBeyond{}, Inertia{}, coupling, period});
-    expect_refused(EnergyConsistent{BrokenBeyond{}, Inertia{}, coupling, period});
+    expect_refused(Direct{test::BrokenBeyond{}});
+    expect_refused(PredictedDirect{test::BrokenBeyond{}, 3});
+    expect_refused(Massless{test::BrokenBeyond{}, coupling, period});
+    expect_refused(Implicit{test::BrokenBeyond{}, Inertia{}, coupling, period});
+    expect_refused(Explicit{test::BrokenBeyond{}, Inertia{}, coupling, period});
+    expect_refused(EnergyConsistent{test::BrokenBeyond{}, Inertia{}, coupling, period});
 }
 
 // The load line f(y) + 0.2 y = 0 has the solutions -5, 0 and 5.
