@@ -17,6 +17,12 @@ counts() { echo 'int main() {}' | clang++ -fprofile-instr-generate -o /dev/null 
 # The version of clang, also before it is installed.
 clang_version() { clang -dumpversion 2>/dev/null | cut -d. -f1 | grep . ||
     apt-cache depends clang 2>/dev/null | sed -n 's/.*Depends: clang-\([0-9]*\)$/\1/p' | head -1; }
+# clang with its runtime library, whose package has the version of clang in its name on some systems; the argument is a
+# function that tries the library.
+missing_clang() {
+    command -v clang >/dev/null || echo clang
+    "$1" || apt-cache pkgnames 2>/dev/null | grep -x "libclang-rt-$(clang_version)-dev" || true
+}
 
 missing_packages() {
     command -v "${CXX:-g++}" >/dev/null || echo g++
@@ -59,15 +65,12 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         command -v clang >/dev/null || echo clang
     fi
     if [ "$purpose" = fuzz ]; then
-        # clang with libFuzzer, whose package has the version of clang in its name on some systems
-        command -v clang >/dev/null || echo clang
-        fuzzes || apt-cache pkgnames 2>/dev/null | grep -x "libclang-rt-$(clang_version)-dev" || true
+        missing_clang fuzzes
         compiles '#include <CLI/CLI.hpp>' || echo libcli11-dev
     fi
     if [ "$purpose" = coverage ]; then
-        # clang with the runtime library and the programs that count executed lines and branches
-        command -v clang >/dev/null || echo clang
-        counts || apt-cache pkgnames 2>/dev/null | grep -x "libclang-rt-$(clang_version)-dev" || true
+        missing_clang counts
+        # for the programs that print the counts of executed lines and branches
         command -v llvm-cov >/dev/null || echo llvm
     fi
     if [ "$purpose" = browser ]; then

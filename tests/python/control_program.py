@@ -34,9 +34,9 @@ def control(*arguments: Any, timeout: float = 60.0, **options: Any) -> subproces
     )
 
 
-def start_control(*arguments: Any) -> subprocess.Popen[str]:
+def start_control(*arguments: Any, **options: Any) -> subprocess.Popen[str]:
     command = [str(PROGRAM), *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
 
 def every_row(recording: Path) -> pd.DataFrame:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,6 @@ from conftest import ROOT
 from control_program import (
     ANY_RATE,
     MODEL,
-    PROGRAM,
     control,
     every_row,
     needs_program,
@@ -167,13 +165,16 @@ def test_a_model_of_position_and_velocity_renders_its_force(tmp_path: Path) -> N
     np.testing.assert_allclose(full["force_Nm"], expected, rtol=0.0, atol=1e-9)
 
 
-def test_a_closed_standard_input_does_not_change_the_recording(tmp_path: Path) -> None:
+def test_the_recording_does_not_take_the_place_of_a_closed_standard_input(tmp_path: Path) -> None:
     out = tmp_path / "rendered.csv"
-    command = [PROGRAM, MODEL, "--duration-s", "0.2", "--record", out, "--json", *ANY_RATE]
-    completed = subprocess.run(
-        [*map(str, command)], stdout=subprocess.PIPE, text=True, check=True, preexec_fn=lambda: os.close(0)
-    )
-    assert len(every_row(out)) == json.loads(completed.stdout)["ticks"]
+    options = ["--duration-s", "inf", "--record", out, "--json", *ANY_RATE]
+    process = start_control(MODEL, *options, preexec_fn=lambda: os.close(0))
+    wait_for_rows(tmp_path / "rendered.csv.part", process)
+    assert os.readlink(f"/proc/{process.pid}/fd/0") == "/dev/null"
+    process.send_signal(signal.SIGINT)
+    output, messages = process.communicate(timeout=20)
+    assert process.returncode == 0, messages
+    assert len(every_row(out)) == json.loads(output)["ticks"]
 
 
 @pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])
