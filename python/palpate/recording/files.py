@@ -28,6 +28,9 @@ from .table import Cells
 
 _BLOCK_BYTES = 1 << 20
 
+MEMORY_LIMIT = 4 << 30
+"""Largest memory for the content of a recording file [bytes]: 10^8 rows of 5 columns."""
+
 
 def sha256_of_file(path: Path) -> str:
     """Returns the SHA-256 of a file in hexadecimal digits."""
@@ -54,6 +57,24 @@ def require_file(path: Path) -> None:
         raise InputError(f"{path} cannot be read: {error.strerror}") from None
     if not first:
         raise InputError(f"{path} is empty")
+
+
+def require_memory(path: Path, needed: float) -> None:
+    """Raises InputError if the content of a file needs more memory than `MEMORY_LIMIT`.
+
+    Readers call it before they allocate memory.
+
+    Parameters
+    ----------
+    path : Path
+    needed : float
+        Memory for all cells of the file that are needed, or for those found so far [bytes].
+    """
+    if needed > MEMORY_LIMIT:
+        raise InputError(
+            f"{path} needs at least {needed / 2**30:.3g} GiB of memory, and the limit is "
+            f"{MEMORY_LIMIT >> 30} GiB; remove rows or columns, or read CSV or Parquet with --out-of-core"
+        )
 
 
 @contextmanager
