@@ -344,14 +344,21 @@ class Inverse3Device {
         for (bool answered = !link.sending; answered && Clock::now() < until;) {
             (void)skip_waiting_states();
             answered = !link.disconnected && is_answered(0.0);
-            if (answered && !link.is_wrong) {
-                read_state();
-                if (std::abs(link.state.force) < least_visible_force) {
-                    return ZeroForce::Confirmed;
-                }
+            if (answered && reports_zero_force()) {
+                return ZeroForce::Confirmed;
             }
         }
         return link.disconnected || link.sending ? ZeroForce::NotSent : ZeroForce::Sent;
+    }
+
+    /// Returns true if the newest message of the service is a state of this device without a force.
+    [[nodiscard]] bool reports_zero_force() {
+        try {
+            read_state();
+        } catch (const std::exception&) {
+            return false;
+        }
+        return std::abs(link_->state.force) < least_visible_force;
     }
 
     /// Reads position, velocity and force from the newest message of the service. Throws if the message differs from
