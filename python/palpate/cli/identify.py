@@ -279,7 +279,9 @@ def identify(
         for note in model.notes["identification"]:
             talk(f"  {note}")
     seconds = time.perf_counter() - start
-    verified = [(recording, verify(model, recording)) for recording in judged_on]
+    verified = []
+    if hold_out_every is not None or plot is not None:
+        verified = [(recording, verify(model, recording)) for recording in judged_on]
     nrmse = model.fit.nrmse if hold_out_every is None else _pooled_nrmse(verified)
     compared = sum(verification.n for _, verification in verified)
     verdict = model.verdict
@@ -304,7 +306,10 @@ def identify(
         result["baselines"] = [asdict(each) for each in others]
     rows = sum(len(recording) for recording in judged_on)
     of_rows = str(rows) if compared == rows else f"{compared} of {rows}"
-    judged = "the rows of the identification" if hold_out_every is None else f"{of_rows} rows held out"
+    judged = f"{of_rows} rows held out"
+    if hold_out_every is None:
+        fitted = model.data.rows
+        judged = f"{fitted} of {rows} rows" if fitted < rows else "the rows of the identification"
     if hold_out_every is None and settings["loss"] == "huber":
         judged += ", where rows far from the model have less weight"
     # The NRMSE of the fit leaves out wrong readings, which `verify` compares.
