@@ -115,11 +115,6 @@ class EmulatedDevice {
         store(deviating(firmware_->in()));
     }
 
-    /// Returns true if an IN packet belongs to this version of the protocol.
-    [[nodiscard]] static bool is_whole(const Bytes& packet) {
-        return packet.size() == 32 && packet[0] == 'H' && packet[1] == 1;
-    }
-
     /// Answers a poll of the IN endpoint.
     Handshake in(Bytes& packet) {
         if (naks_ || mute_ || packets_.empty()) {
@@ -174,10 +169,6 @@ class EmulatedDevice {
     void inject(FaultKind kind, std::uint32_t count) { faults_.inject(kind, count); }
     void end_faults() { faults_.end(); }
     [[nodiscard]] bool is_unplugged() const { return unplugged_; }
-    /// Returns true while the device refuses transfers. Frames in this state last a real millisecond, because the
-    /// timeouts of the host are in real time. A halted endpoint does not count: the host receives the halt and clears
-    /// it.
-    [[nodiscard]] bool withholds_packets() const { return naks_ || mute_; }
     [[nodiscard]] bool is_slow() const { return slow_; }
 
     // ----------------------------------------------------------------------------- state that the tests read

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs sessions on the emulated USB device for a given time, in real time at 1 kHz, with a random fault every second:
+// Runs sessions on the emulated USB device for a given time, at 1 kHz, with a random fault every second:
 //
 //     tests/usb/run_emulated.py --firmware c -- build/dev/tests/usb/soak [SECONDS [SEED]]
 //

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -96,9 +95,7 @@ struct Result {
 
 /// Runs the loop for 0.1 s with a fault.
 Result run_with(const std::string& fault, int tick, int allowed = allowed_samples) {
-    UsbOptions options;
-    options.wait = std::chrono::seconds{20};
-    NumberingDevice device{UsbDevice{options}};
+    NumberingDevice device;
     EXPECT_EQ(device.open().reason, "");
     Controller controller{device, ConstantForce{},
                           Guards{.reading = ReadingGuard{{.longest_delay = 1e-3 * allowed}}}};

@@ -60,11 +60,12 @@ class UsbTransfers {
                         [](const Read& read) { return read.transfer == nullptr; })) {
             return LIBUSB_ERROR_NO_MEM;
         }
-        runs_.store(true, std::memory_order_release);
-        events_ = std::thread{[this] { handle_events(); }};
+        // Before the event thread starts, because it submits all reads again if the first one finds a halted endpoint
         for (Read& read : reads_) {
             submit(read);
         }
+        runs_.store(true, std::memory_order_release);
+        events_ = std::thread{[this] { handle_events(); }};
         return error_.load(std::memory_order_acquire);
     }
 
