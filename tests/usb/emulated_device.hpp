@@ -167,7 +167,12 @@ class EmulatedDevice {
     // -------------------------------------------------------------------------------------------------- faults
 
     void inject(FaultKind kind, std::uint32_t count) { faults_.inject(kind, count); }
-    void end_faults() { faults_.end(); }
+    /// Ends all active faults, and drops the packets that they held back.
+    void end_faults() {
+        faults_.end();
+        held_back_.clear();
+        packets_.clear();
+    }
     [[nodiscard]] bool is_unplugged() const { return unplugged_; }
     [[nodiscard]] bool is_slow() const { return slow_; }
 
