@@ -54,6 +54,15 @@ def open_table(path: Path) -> Table:
     InputError
         The file does not have that format, or the library that reads it is not installed.
     """
+    return _reader_of(path)(path)
+
+
+def is_read_in_parts(path: Path) -> bool:
+    """Returns True for a CSV or Parquet file, which may be larger than memory."""
+    return _reader_of(path) in (CsvFile, ParquetFile)
+
+
+def _reader_of(path: Path) -> Callable[[Path], Table]:
     readers: dict[str, Callable[[Path], Table]] = {
         ".parquet": ParquetFile,
         ".xlsx": _excel,
@@ -62,7 +71,7 @@ def open_table(path: Path) -> Table:
         ".mat": _matlab,
         ".mcap": read_mcap,
     }
-    return readers.get(path.suffix.lower(), CsvFile)(path)
+    return readers.get(path.suffix.lower(), CsvFile)
 
 
 class ParquetFile(LongTable):
