@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -111,7 +112,10 @@ enum class Ending : std::uint8_t { TimeUp, Stop, Guard, LateTick };
 /// Runs the loop and gives orders to the emulator in a tick; an ending other than TimeUp comes in the same tick.
 Result run_with(const std::vector<std::string>& orders, int tick, int allowed = allowed_samples,
                 Ending ending = Ending::TimeUp) {
-    NumberingDevice device;
+    UsbOptions options;
+    options.wait =
+        std::chrono::milliseconds{ending == Ending::TimeUp ? 100 : 5};  // a connection fails within 100 ms
+    NumberingDevice device{UsbDevice{options}};
     EXPECT_EQ(device.open().reason, "");
     ConstantForce force;
     EveryMillisecond clock;
