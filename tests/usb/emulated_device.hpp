@@ -86,6 +86,9 @@ class EmulatedDevice {
         if (faults_.used(FaultKind::Reset)) {
             restart();
         }
+        if (faults_.used(FaultKind::NoWatchdog) && !last_out_.empty()) {
+            firmware_->out(last_out_, clock_us_);
+        }
         std::uint16_t present = 0;
         for (const auto& [kind, bit] : {std::pair{FaultKind::Encoder, encoder_fault},
                                         {FaultKind::OverTemperature, over_temperature},
@@ -155,6 +158,7 @@ class EmulatedDevice {
         out_seen_ = true;
         if (identity_.accepts_while_disabled || firmware_->state().is_enabled()) {
             ++outs_;
+            last_out_ = packet;
             firmware_->out(packet, clock_us_);
             firmware_->tick(last_sample_);  // the command acts from the beginning of the next frame
         }
@@ -164,6 +168,12 @@ class EmulatedDevice {
     // -------------------------------------------------------------------------------------------------- faults
 
     void inject(FaultKind kind, std::uint32_t count) { faults_.inject(kind, count); }
+    /// Ends all active faults, and drops the packets that they held back.
+    void end_faults() {
+        faults_.end();
+        held_back_.clear();
+        packets_.clear();
+    }
     [[nodiscard]] bool is_unplugged() const { return unplugged_; }
     [[nodiscard]] bool is_slow() const { return slow_; }
 
@@ -221,6 +231,11 @@ class EmulatedDevice {
             inject(static_cast<FaultKind>(setup.value - 1), get<std::uint16_t>(data, 0));
             return {};
         }
+        if (setup.type == 0x41 && setup.request == enable && setup.value == 0 &&
+            faults_.used(FaultKind::Refuse)) {
+            return stalled();
+        }
+        last_out_.clear();
         Answer answer = firmware_->control(bytes);
         if (setup.type == 0xC1 && setup.request == get_info && answer.data.size() == 32) {
             answer.data[0] = identity_.magic;
@@ -274,11 +289,35 @@ class EmulatedDevice {
             echo = identity_.first_out_sequence;
             replace(packet, 24, identity_.first_out_age_us);
         }
-        replace(packet, 22, static_cast<std::uint16_t>(echo - (faults_.used(FaultKind::OldEcho) ? 3 : 0)));
+        echo = static_cast<std::uint16_t>(echo - (faults_.used(FaultKind::OldEcho) ? 3 : 0));
+        last_echo_ = faults_.used(FaultKind::StuckEcho) ? last_echo_ : echo;
+        replace(packet, 22, last_echo_);
+        clock_error_us_ += faults_.used(FaultKind::ClockJump) ? 50'000 : 0;
+        last_clock_us_ = faults_.used(FaultKind::StuckClock)
+                             ? last_clock_us_
+                             : get<std::uint32_t>(packet, 4) + clock_error_us_;
+        replace(packet, 4, last_clock_us_);
         return packet;
     }
 
     void store(Bytes packet) {
+        if (faults_.used(FaultKind::Drop)) {
+            return;
+        }
+        if (faults_.used(FaultKind::Burst) || (held_back_.empty() && faults_.used(FaultKind::Swap))) {
+            held_back_.push_back(std::move(packet));
+            return;
+        }
+        if (held_back_.size() == 1) {  // the packets of a swap
+            packets_ = {std::move(packet), std::move(held_back_.front())};
+            held_back_.clear();
+            return;
+        }
+        if (!held_back_.empty()) {
+            packets_ = std::exchange(held_back_, {});
+            packets_.push_back(std::move(packet));
+            return;
+        }
         if (packets_.size() < std::max<std::size_t>(1, identity_.held_packets)) {
             packets_.push_back(std::move(packet));
         } else if (identity_.held_packets == 0) {
@@ -305,8 +344,13 @@ class EmulatedDevice {
     /// The host has sent an OUT packet, so the frames of the fault script are counted
     bool out_seen_ = false;
 
-    std::deque<Bytes> packets_;  ///< IN packets that the host has not yet read
+    std::deque<Bytes> packets_;    ///< IN packets that the host has not yet read
+    std::deque<Bytes> held_back_;  ///< IN packets of a fault that sends them later
     Bytes last_sent_;
+    Bytes last_out_;  ///< last OUT packet that the firmware has received
+    std::uint16_t last_echo_ = 0;
+    std::uint32_t last_clock_us_ = 0;
+    std::uint32_t clock_error_us_ = 0;
     Sample last_sample_;
     bool naks_ = false;
     bool mute_ = false;

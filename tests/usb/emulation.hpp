@@ -154,7 +154,7 @@ inline constexpr const char* options_text =
     return settings;
 }
 
-/// Executes an order of a test ("fault KIND COUNT" or "state") and returns the answer of the emulator.
+/// Executes an order of a test ("fault KIND COUNT", "heal" to end all faults, or "state") and returns the answer of the emulator.
 [[nodiscard]] inline std::string execute_order(Port& port, const std::string& order) {
     const std::size_t space = order.find(' ');
     const std::string verb = order.substr(0, space);
@@ -163,6 +163,10 @@ inline constexpr const char* options_text =
         const std::size_t second = rest.find(' ');
         const auto times = second == std::string::npos ? 1 : std::stoul(rest.substr(second + 1));
         port.device().inject(fault_named(rest.substr(0, second)), static_cast<std::uint32_t>(times));
+        return "ok";
+    }
+    if (verb == "heal") {
+        port.device().end_faults();
         return "ok";
     }
     if (verb == "state") {

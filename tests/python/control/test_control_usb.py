@@ -133,8 +133,8 @@ def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: P
     model = planned(tmp_path, delay_s=0.25e-3)
     completed = control("--duration-s", 0.3, device=["--trace", str(trace)], model=model)
     assert completed.returncode == 1
-    assert "stopped by a fault of the device: Timeout" in completed.stderr
-    assert " later than certified" in completed.stdout
+    assert "stopped because the device applied a force" in completed.stderr
+    assert "the certificate holds for at most 0.25 ms" in completed.stderr
     assert frames(trace)[-1].torque == 0.0
     assert not frames(trace)[-1].enabled
 
@@ -255,7 +255,7 @@ def test_after_kill_the_watchdog_of_the_device_sets_zero_torque(tmp_path: Path) 
 SAME_FRAME = 1
 NEXT_FRAME = 2
 WATCHDOG_FRAMES = 10
-FAULT_STATUSES = {"Timeout", "Lost", "Fault", "NonFinite", "Jump", "Frozen"}
+FAULT_STATUSES = {"Timeout", "Lost", "Fault", "NonFinite", "Jump", "Frozen", "Stale"}
 FAULTS: dict[str, tuple[int, bool, int]] = {
     "stall-in": (1, False, NEXT_FRAME),
     "stall-out": (1, False, WATCHDOG_FRAMES),
