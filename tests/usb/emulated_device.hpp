@@ -41,7 +41,8 @@ class EmulatedDevice {
           first_count_{identity_.first_count},
           sequence_offset_{identity_.first_sequence},
           clock_us_{identity_.first_us} {
-        last_sample_.clock_us = clock_us_;
+        last_sample_ = sample(first_count_, false);
+        firmware_->tick(last_sample_);  // a request may come before the first frame
     }
 
     [[nodiscard]] const Identity& identity() const { return identity_; }
