@@ -39,6 +39,7 @@ struct ForceBounds {
     double hysteresis_per_play = 0.0;
     double mean_force = 0.0;
     double drag = 0.0;
+    double force_error = 0.0;
     bool hysteresis = false;
     std::optional<MemoryBounds> memory = std::nullopt;
 
@@ -74,6 +75,11 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
                                     "Mean of a limited periodic force above its hysteresis [N]; 0: passive."},
     Field<&ForceBounds::drag>{"drag", "B_v = max |f(x, v) - f(x, 0)| / |v|; 0 for a force of position alone.",
                               Rule::NotNegative},
+    Field<&ForceBounds::force_error>{
+        "force_error",
+        "epsilon, largest difference of the rendered force from the force with these bounds [N]; 0 unless\n"
+        "another program renders the model.",
+        Rule::NotNegative, false},
     Field<&ForceBounds::hysteresis>{"hysteresis", "True if the model has hysteresis.", Rule::Any, false}};
 
 /// Returns true if every bound of the force is finite. A model with an infinite bound cannot be certified.
