@@ -40,12 +40,11 @@ struct Counters {
     explicit Counters(const StreamHealth& health)
         : packets{health.packets + health.malformed},
           lost{health.lost},
-          rare{health.repeated, health.late_echoes, health.watchdog_trips, health.refused_commands,
-               health.late_commands} {}
+          rare{health.repeated, health.late_echoes, health.watchdog_trips, health.refused_commands} {}
 
     std::uint64_t packets;
     std::uint64_t lost;
-    std::array<std::uint64_t, 5> rare;
+    std::array<std::uint64_t, 4> rare;
 };
 
 void check_health(const Counters& before, const Counters& now) {
@@ -70,7 +69,7 @@ void run(Input& input) {
         require(model.rate_hz > 0 && model.renderer <= wire::Renderer::Device, "a model has a rate");
         require(wire::difference(model, model).empty(), "a model does not differ from itself");
     }
-    PacketStream stream{info, input.take<std::uint32_t>()};
+    PacketStream stream{info};
     Nanoseconds now = 0;
     while (!input.empty()) {
         now += input.take<std::uint32_t>();

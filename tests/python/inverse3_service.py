@@ -26,6 +26,7 @@ class Service:
     """Simulated server of an Inverse3: handle, hand, received commands; a fault occurs at message `after`."""
 
     devices: int = 1
+    device_id: str = "049D"
     calibrated: bool = True
     force_key: str = "vector"
     mass: float = 0.2
@@ -36,11 +37,16 @@ class Service:
     unplug_after: int | None = None
     close_after: int | None = None
     garbage_after: int | None = None
+    garbage_messages: int = 1
+    renamed_after: int | None = None
+    extra_after: int | None = None
+    extra_states: int = 0
     silent_after: int | None = None
     messages: list[dict[str, Any]] = field(default_factory=list)
     forces: list[dict[str, float]] = field(default_factory=list)
     positions: list[float] = field(default_factory=list)
     closed: bool = False
+    close_code: int | None = None
     port: int = 0
 
     def answer(self, connection: ServerConnection) -> None:
@@ -66,9 +72,13 @@ class Service:
                     return
                 if self.silent_after is not None and number >= self.silent_after:
                     continue
-                if self.garbage_after == number:
+                if self.garbage_after is not None and 0 <= number - self.garbage_after < self.garbage_messages:
                     connection.send("{")
                     continue
+                if self.renamed_after == number:
+                    self.device_id = "0000"
+                for _ in range(self.extra_states if self.extra_after == number else 0):
+                    connection.send(json.dumps(self.state_message(position, velocity, force)))
                 unplugged = self.unplug_after is not None and number >= self.unplug_after
                 connection.send(
                     json.dumps(self.state_message(position, velocity, force, unplugged=unplugged))
@@ -77,6 +87,7 @@ class Service:
             pass
         finally:
             self.closed = True
+            self.close_code = connection.close_code
 
     def state_message(
         self,
@@ -89,7 +100,7 @@ class Service:
     ) -> dict[str, Any]:
         zero_force = {"x": 0.0, "y": 0.0, "z": 0.0}
         device: dict[str, Any] = {
-            "device_id": "049D",
+            "device_id": self.device_id,
             "state": {
                 "cursor_position": {"x": 0.01, "y": -0.12, "z": position},
                 "cursor_velocity": {"x": 0.0, "y": 0.0, "z": velocity},

@@ -32,8 +32,11 @@ needs_emulation = pytest.mark.skipif(bool(MISSING), reason=MISSING or "emulation
 def emulated(
     *command: Any, device: Sequence[str] = (), timeout: float = 120.0
 ) -> subprocess.CompletedProcess[str]:
-    """Runs a command with the emulated USB device; `device` are options of tests/usb/run_emulated.py."""
-    words = [sys.executable, RUNNER, *device, "--", *command]
+    """Runs a command with the emulated USB device; `device` are options of tests/usb/run_emulated.py.
+
+    The clock of the command shows the time of the device, so a busy machine has no effect.
+    """
+    words = [sys.executable, RUNNER, "--lock-step", *device, "--", *command]
     return subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=timeout)
 
 

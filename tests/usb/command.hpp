@@ -8,17 +8,17 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
-#include <cstdlib>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
-#include <iostream>
 #include <stdexcept>
 #include <string>
-#include <system_error>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -26,7 +26,7 @@
 namespace emulator {
 
 /// Receives the orders of a test to the emulator as datagrams and answers each order. The code is independent of the
-/// tested library. The environment variable PALPATE_EMULATOR names the socket.
+/// tested library.
 class Orders {
   public:
     explicit Orders(std::function<std::string(const std::string&)> execute_order)
@@ -41,7 +41,6 @@ class Orders {
             throw std::runtime_error("cannot open a socket at " + path_.string());
         }
         ::chmod(path_.c_str(), 0777);
-        ::setenv("PALPATE_EMULATOR", path_.c_str(), 1);
         executor_ = std::thread{[this] { execute_all(); }};
     }
     ~Orders() {
@@ -52,6 +51,9 @@ class Orders {
     }
     Orders(const Orders&) = delete;
     Orders& operator=(const Orders&) = delete;
+
+    /// Returns the environment variable that names the socket of the orders.
+    [[nodiscard]] std::string variable() const { return "PALPATE_EMULATOR=" + path_.string(); }
 
   private:
     void execute_all() {
@@ -85,19 +87,27 @@ class Orders {
 /// and ends when this process ends.
 class Command {
   public:
-    /// Starts the command in a child process, which first runs `prepare`.
-    Command(std::vector<std::string> words, const std::function<void()>& prepare) {
+    /// Starts the command in a child process, which first runs `prepare`. Each of the `variables` is NAME=VALUE and
+    /// replaces a variable of this process. This process has other threads, so its own environment does not change,
+    /// and the child calls only functions that a signal handler may call.
+    Command(std::vector<std::string> words, std::vector<std::string> variables,
+            const std::function<void()>& prepare) {
+        for (char** entry = environ; *entry != nullptr; ++entry) {
+            const std::string_view variable{*entry};
+            const std::string_view name = variable.substr(0, variable.find('=') + 1);
+            if (std::none_of(variables.begin(), variables.end(),
+                             [&](const std::string& own) { return own.starts_with(name); })) {
+                variables.emplace_back(variable);
+            }
+        }
+        const std::vector<char*> arguments = pointers(words);
+        const std::vector<char*> environment = pointers(variables);
         child() = ::fork();
         if (child() == 0) {
             ::prctl(PR_SET_PDEATHSIG, SIGKILL);
             prepare();
-            std::vector<char*> pointers;
-            for (std::string& word : words) {
-                pointers.push_back(word.data());
-            }
-            pointers.push_back(nullptr);
-            ::execvp(pointers[0], pointers.data());
-            std::cerr << words[0] << ": " << std::generic_category().message(errno) << "\n";
+            ::execvpe(arguments[0], arguments.data(), environment.data());
+            ::perror(arguments[0]);
             ::_exit(127);
         }
         for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
@@ -114,6 +124,16 @@ class Command {
     }
 
   private:
+    /// Returns the addresses of the texts, and a null pointer at the end.
+    static std::vector<char*> pointers(std::vector<std::string>& texts) {
+        std::vector<char*> addresses;
+        for (std::string& text : texts) {
+            addresses.push_back(text.data());
+        }
+        addresses.push_back(nullptr);
+        return addresses;
+    }
+
     static std::atomic<pid_t>& child() {
         static std::atomic<pid_t> process{0};
         return process;

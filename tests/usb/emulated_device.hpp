@@ -22,8 +22,8 @@
 
 namespace emulator {
 
-/// Answer of the emulated device to one packet on the USB bus: accepted, not ready (Nak), or refused.
-enum class Handshake : std::uint8_t { Ack, Nak, Stall };
+/// Answer of the emulated device to one packet on the USB bus: accepted, not ready (Nak), refused, or damaged.
+enum class Handshake : std::uint8_t { Ack, Nak, Stall, Error };
 
 /// Emulates the device of protocol version 1: a firmware with its mechanics, its USB endpoints and their faults, one
 /// frame for each millisecond. It is independent of the transport and shares no code with the tested library.
@@ -41,7 +41,8 @@ class EmulatedDevice {
           first_count_{identity_.first_count},
           sequence_offset_{identity_.first_sequence},
           clock_us_{identity_.first_us} {
-        last_sample_.clock_us = clock_us_;
+        last_sample_ = sample(first_count_, false);
+        firmware_->tick(last_sample_);  // a request may come before the first frame
     }
 
     [[nodiscard]] const Identity& identity() const { return identity_; }
@@ -85,6 +86,9 @@ class EmulatedDevice {
         if (faults_.used(FaultKind::Reset)) {
             restart();
         }
+        if (faults_.used(FaultKind::NoWatchdog) && !last_out_.empty()) {
+            firmware_->out(last_out_, clock_us_);
+        }
         std::uint16_t present = 0;
         for (const auto& [kind, bit] : {std::pair{FaultKind::Encoder, encoder_fault},
                                         {FaultKind::OverTemperature, over_temperature},
@@ -112,11 +116,6 @@ class EmulatedDevice {
         store(deviating(firmware_->in()));
     }
 
-    /// Returns true if an IN packet belongs to this version of the protocol.
-    [[nodiscard]] static bool is_whole(const Bytes& packet) {
-        return packet.size() == 32 && packet[0] == 'H' && packet[1] == 1;
-    }
-
     /// Answers a poll of the IN endpoint.
     Handshake in(Bytes& packet) {
         if (naks_ || mute_ || packets_.empty()) {
@@ -125,6 +124,9 @@ class EmulatedDevice {
         if (halts_.in || faults_.used(FaultKind::StallIn)) {
             halts_.in = true;
             return Handshake::Stall;
+        }
+        if (faults_.used(FaultKind::ErrorIn)) {
+            return Handshake::Error;
         }
         packet = faults_.used(FaultKind::Repeat) ? last_sent_ : packets_.front();
         packets_.pop_front();
@@ -153,12 +155,14 @@ class EmulatedDevice {
             halts_.out = true;
             return Handshake::Stall;
         }
+        last_bus_out_ = packet;
         if (faults_.used(FaultKind::Deaf)) {
             return Handshake::Ack;
         }
         out_seen_ = true;
         if (identity_.accepts_while_disabled || firmware_->state().is_enabled()) {
             ++outs_;
+            last_out_ = packet;
             firmware_->out(packet, clock_us_);
             firmware_->tick(last_sample_);  // the command acts from the beginning of the next frame
         }
@@ -168,11 +172,15 @@ class EmulatedDevice {
     // -------------------------------------------------------------------------------------------------- faults
 
     void inject(FaultKind kind, std::uint32_t count) { faults_.inject(kind, count); }
+    /// Ends all active faults, and drops the packets that they held back.
+    void end_faults() {
+        faults_.end();
+        present_faults_ = 0;
+        firmware_->fault(0);
+        held_back_.clear();
+        packets_.clear();
+    }
     [[nodiscard]] bool is_unplugged() const { return unplugged_; }
-    /// Returns true while the device refuses transfers. Frames in this state last a real millisecond, because the
-    /// timeouts of the host are in real time. A halted endpoint does not count: the host receives the halt and clears
-    /// it.
-    [[nodiscard]] bool withholds_packets() const { return naks_ || mute_; }
     [[nodiscard]] bool is_slow() const { return slow_; }
 
     // ----------------------------------------------------------------------------- state that the tests read
@@ -187,6 +195,10 @@ class EmulatedDevice {
     [[nodiscard]] FirmwareState state() const { return firmware_->state(); }
     /// Number of OUT packets that the firmware has received.
     [[nodiscard]] std::uint64_t outs() const { return outs_; }
+    /// Torque of the last OUT packet that the device has acknowledged [uN*m].
+    [[nodiscard]] std::int32_t commanded_uNm() const {
+        return last_bus_out_.size() == 16 ? get<std::int32_t>(last_bus_out_, 4) : 0;
+    }
     /// Torque that acts on the handle [uN*m].
     [[nodiscard]] std::int32_t applied_uNm() const {
         const std::int32_t step = identity_.torque_step_uNm;
@@ -229,6 +241,11 @@ class EmulatedDevice {
             inject(static_cast<FaultKind>(setup.value - 1), get<std::uint16_t>(data, 0));
             return {};
         }
+        if (setup.type == 0x41 && setup.request == enable && setup.value == 0 &&
+            faults_.used(FaultKind::Refuse)) {
+            return stalled();
+        }
+        last_out_.clear();
         Answer answer = firmware_->control(bytes);
         if (setup.type == 0xC1 && setup.request == get_info && answer.data.size() == 32) {
             answer.data[0] = identity_.magic;
@@ -282,11 +299,35 @@ class EmulatedDevice {
             echo = identity_.first_out_sequence;
             replace(packet, 24, identity_.first_out_age_us);
         }
-        replace(packet, 22, static_cast<std::uint16_t>(echo - (faults_.used(FaultKind::OldEcho) ? 3 : 0)));
+        echo = static_cast<std::uint16_t>(echo - (faults_.used(FaultKind::OldEcho) ? 3 : 0));
+        last_echo_ = faults_.used(FaultKind::StuckEcho) ? last_echo_ : echo;
+        replace(packet, 22, last_echo_);
+        clock_error_us_ += faults_.used(FaultKind::ClockJump) ? 50'000 : 0;
+        last_clock_us_ = faults_.used(FaultKind::StuckClock)
+                             ? last_clock_us_
+                             : get<std::uint32_t>(packet, 4) + clock_error_us_;
+        replace(packet, 4, last_clock_us_);
         return packet;
     }
 
     void store(Bytes packet) {
+        if (faults_.used(FaultKind::Drop)) {
+            return;
+        }
+        if (faults_.used(FaultKind::Burst) || (held_back_.empty() && faults_.used(FaultKind::Swap))) {
+            held_back_.push_back(std::move(packet));
+            return;
+        }
+        if (held_back_.size() == 1) {  // the packets of a swap
+            packets_ = {std::move(packet), std::move(held_back_.front())};
+            held_back_.clear();
+            return;
+        }
+        if (!held_back_.empty()) {
+            packets_ = std::exchange(held_back_, {});
+            packets_.push_back(std::move(packet));
+            return;
+        }
         if (packets_.size() < std::max<std::size_t>(1, identity_.held_packets)) {
             packets_.push_back(std::move(packet));
         } else if (identity_.held_packets == 0) {
@@ -313,8 +354,14 @@ class EmulatedDevice {
     /// The host has sent an OUT packet, so the frames of the fault script are counted
     bool out_seen_ = false;
 
-    std::deque<Bytes> packets_;  ///< IN packets that the host has not yet read
+    std::deque<Bytes> packets_;    ///< IN packets that the host has not yet read
+    std::deque<Bytes> held_back_;  ///< IN packets of a fault that sends them later
     Bytes last_sent_;
+    Bytes last_bus_out_;  ///< last OUT packet that the device has acknowledged
+    Bytes last_out_;      ///< last OUT packet that the firmware has received
+    std::uint16_t last_echo_ = 0;
+    std::uint32_t last_clock_us_ = 0;
+    std::uint32_t clock_error_us_ = 0;
     Sample last_sample_;
     bool naks_ = false;
     bool mute_ = false;

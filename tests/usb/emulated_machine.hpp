@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Functions for tests of UsbDevice with the emulator: they send orders to the emulator, and exchange packets with a
-// device until its state is known.
+// Functions for tests of UsbDevice with the emulator.
 #pragma once
 
 #include <sys/socket.h>
@@ -8,12 +7,10 @@
 #include <unistd.h>
 
 #include <array>
-#include <chrono>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
-#include <thread>
 
 #include "palpate/device/usb.hpp"
 
@@ -45,32 +42,12 @@ inline double state(const std::string& field) {
     return value.rfind("true", 0) == 0 ? 1.0 : value.rfind("false", 0) == 0 ? 0.0 : std::stod(value);
 }
 
-/// Returns a device with a long timeout, because the computer that runs the test may be slow.
-inline UsbDevice patient(const std::string& serial = "") {
-    UsbOptions options;
-    options.serial = serial;
-    options.wait = std::chrono::seconds{20};
-    return UsbDevice{options};
-}
-
-/// Exchanges packets until every command is sent, the last command has reached the motor, the reading is the newest
-/// one, and only two reads are queued. Then each further exchange takes exactly one frame.
+/// Exchanges commands until the last one has reached the motor, and returns the last reading. Each exchange takes one
+/// frame.
 inline Reading settled(UsbDevice& device, double force = 0.0) {
     Reading reading;
     for (int k = 0; k < 4; ++k) {
         reading = device.exchange({force});
-    }
-    const auto is_settled = [&] {
-        const bool newest =
-            static_cast<std::uint16_t>(reading.sequence) == static_cast<std::uint16_t>(state("last_read"));
-        return reading.status != Status::Lost && device.in_flight() <= 2 && newest;
-    };
-    for (int k = 0; k < 1000 && reading.status != Status::Fault && !is_settled(); ++k) {
-        // During this pause a packet that the device has sent arrives at the host; the next exchange reads this packet.
-        std::this_thread::sleep_for(std::chrono::milliseconds{2});
-        if (!is_settled()) {
-            reading = device.exchange({force});
-        }
     }
     return reading;
 }

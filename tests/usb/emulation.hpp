@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <chrono>
 #include <fstream>
 #include <memory>
 #include <stdexcept>
@@ -24,8 +23,6 @@ struct Settings {
     /// Firmware of the devices: see `make_firmware`
     std::string firmware = default_firmware();
     double rate_hz = 1000.0;
-    /// Option --lock-step: longest time that a frame waits for a transfer of the host
-    std::chrono::milliseconds lock_step_timeout{3000};
     /// Path of a CSV file with one row for each USB frame: the state of the emulated device
     std::string trace;
     std::string preload_first;  ///< library of a sanitizer, which must be loaded before umockdev
@@ -34,7 +31,9 @@ struct Settings {
 };
 
 inline constexpr const char* options_text =
-    "  --lock-step            Frames begin when the host transfers, otherwise every 1/rate.\n"
+    "  --lock-step            A frame begins when every thread of the command waits; the clock of the "
+    "command\n"
+    "                         shows the time of the device. Otherwise frames begin in real time.\n"
     "  --rate-hz RATE         Frames a second [1000].\n"
     "  --firmware cpp|c|FILE.elf  Firmware of the device: the second implementation, cpp/firmware, or\n"
     "                         cpp/firmware as machine code of a Cortex-M4F in QEMU\n"
@@ -42,7 +41,6 @@ inline constexpr const char* options_text =
     "  --model UNM_PER_COUNT  The device has a model: a spring with this stiffness.\n"
     "  --model-fingerprint HEX, --model-certificate HEX  Fingerprints of the model in GET_MODEL.\n"
     "  --loop-hz RATE         Rate of the control loop in the device, also that of its model [10000].\n"
-    "  --lock-step-ms MS      Longest wait of lock-step for the host [3000].\n"
     "  --serial SERIAL        One device with this serial number; repeatable [EMU-1].\n"
     "  --no-device            No device is connected.\n"
     "  --seed SEED            Draws the choices of the firmware; must be before options that change them.\n"
@@ -92,8 +90,6 @@ inline constexpr const char* options_text =
             settings.lock_step = true;
         } else if (word == "--rate-hz") {
             settings.rate_hz = std::stod(value());
-        } else if (word == "--lock-step-ms") {
-            settings.lock_step_timeout = std::chrono::milliseconds{std::stoi(value())};
         } else if (word == "--firmware") {
             settings.firmware = value();
         } else if (word == "--model") {
@@ -158,7 +154,7 @@ inline constexpr const char* options_text =
     return settings;
 }
 
-/// Executes an order of a test ("fault KIND COUNT" or "state") and returns the answer of the emulator.
+/// Executes an order of a test ("fault KIND COUNT", "heal" to end all faults, or "state") and returns the answer of the emulator.
 [[nodiscard]] inline std::string execute_order(Port& port, const std::string& order) {
     const std::size_t space = order.find(' ');
     const std::string verb = order.substr(0, space);
@@ -167,6 +163,10 @@ inline constexpr const char* options_text =
         const std::size_t second = rest.find(' ');
         const auto times = second == std::string::npos ? 1 : std::stoul(rest.substr(second + 1));
         port.device().inject(fault_named(rest.substr(0, second)), static_cast<std::uint32_t>(times));
+        return "ok";
+    }
+    if (verb == "heal") {
+        port.device().end_faults();
         return "ok";
     }
     if (verb == "state") {
@@ -179,6 +179,7 @@ inline constexpr const char* options_text =
                field("last_read", std::to_string(device.last_read_sequence())) + ", " +
                field("outs", std::to_string(device.outs())) + ", " +
                field("enabled", device.state().is_enabled() ? "true" : "false") + ", " +
+               field("commanded_uNm", std::to_string(device.commanded_uNm())) + ", " +
                field("torque_uNm", std::to_string(device.applied_uNm())) + ", " +
                field("position_rad", std::to_string(device.plant().position)) + ", " +
                field("waiting", std::to_string(port.waiting())) + "}";

@@ -40,14 +40,26 @@ enum class FaultKind : std::uint8_t {
     Slow,           ///< Each frame of the device lasts three times longer than normal.
     /// The device refuses OUT packets with NAK, so they arrive one frame late; IN packets are not late.
     Busy,
+    StuckEcho,   ///< IN packets report no newer OUT packet, although OUT packets act.
+    StuckClock,  ///< The clock in IN packets stands still.
+    ClockJump,   ///< The clock in IN packets jumps by 50 ms; it goes on from there.
+    Drop,        ///< An IN packet is lost.
+    Swap,        ///< An IN packet arrives after the next one.
+    Burst,       ///< IN packets are held back, and arrive together afterwards.
+    /// The watchdog does not act: the last OUT packet counts as repeated in each frame.
+    NoWatchdog,
+    ErrorIn,  ///< IN transfers end with an error of the bus.
+    Refuse,   ///< The device refuses `count` requests to disable its torque.
 };
 
-inline constexpr std::array<std::string_view, 22> fault_names{
-    "stall-in",       "stall-out", "short",    "freeze",  "unplug",
-    "skip",           "repeat",    "magic",    "version", "long",
-    "deaf",           "mute",      "old-echo", "encoder", "over-temperature",
-    "emergency-stop", "reset",     "saturate", "jump",    "frozen-encoder",
-    "slow",           "busy"};
+inline constexpr std::array<std::string_view, 31> fault_names{
+    "stall-in",       "stall-out", "short",      "freeze",      "unplug",
+    "skip",           "repeat",    "magic",      "version",     "long",
+    "deaf",           "mute",      "old-echo",   "encoder",     "over-temperature",
+    "emergency-stop", "reset",     "saturate",   "jump",        "frozen-encoder",
+    "slow",           "busy",      "stuck-echo", "stuck-clock", "clock-jump",
+    "drop",           "swap",      "burst",      "no-watchdog", "error-in",
+    "refuse"};
 
 /// A fault with its duration `count` (in packets or frames) and the number `frame` of the frame in which it begins.
 struct Fault {
@@ -85,6 +97,8 @@ class Faults {
     explicit Faults(std::vector<Fault> script) : script_{std::move(script)} {}
 
     void inject(FaultKind kind, std::uint32_t count) { remaining(kind) = std::max(count, 1U); }
+    /// Ends all active faults.
+    void end() { remaining_ = {}; }
 
     /// Begins a USB frame. If `counts` is true, the frame number increases and the faults of the script with this
     /// number begin.

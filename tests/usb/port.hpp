@@ -55,9 +55,7 @@ class Port {
         if (transfer.endpoint != 0x81 && transfer.endpoint != 0x01) {
             return -ENOENT;
         }
-        host_must_answer_ = host_must_answer_ && transfer.endpoint == 0x81;
         (transfer.endpoint == 0x81 ? in_ : out_).push_back(std::move(transfer));
-        reads_ahead_ = reads_ahead_ || in_.size() >= 2;
         return 0;
     }
 
@@ -82,8 +80,6 @@ class Port {
     void reset_host() {
         in_held_ = false;
         out_held_ = false;
-        reads_ahead_ = false;
-        host_must_answer_ = true;
     }
 
     /// Removes the transfers of a client process that has ended.
@@ -96,8 +92,6 @@ class Port {
     void clear_halt(std::uint8_t endpoint) {
         device_.clear_halt(endpoint);
         (endpoint == 0x81 ? in_held_ : out_held_) = false;
-        // The OUT packet that the host sent after the last IN packet was lost, even if the host does not know this.
-        host_must_answer_ = host_must_answer_ && endpoint == 0x81;
     }
 
     /// Executes the transfers of one USB frame.
@@ -132,17 +126,6 @@ class Port {
         }
     }
 
-    /// Returns true if the host has done everything it can do in this frame: a read is queued, and each received
-    /// packet that needs a command is answered.
-    [[nodiscard]] bool host_is_ready() const {
-        return !in_.empty() && (!out_.empty() || !host_must_answer_) && !in_held_ && !out_held_;
-    }
-    /// Returns true if the host keeps several reads queued; false if the host reads and writes alternately.
-    [[nodiscard]] bool host_reads_ahead() const { return reads_ahead_; }
-    /// Returns true if a host that keeps several reads queued has no read queued now.
-    [[nodiscard]] bool has_no_read() const { return reads_ahead_ && in_.empty(); }
-    /// Returns true if an OUT packet has arrived too late for its frame.
-    [[nodiscard]] bool is_behind() const { return out_refused_ && !out_.empty(); }
     [[nodiscard]] std::deque<Transfer>& done() { return done_; }
     [[nodiscard]] std::size_t waiting() const { return in_.size() + out_.size(); }
 
@@ -158,11 +141,12 @@ class Port {
         if (answer == Handshake::Stall) {
             transfer.status = -EPIPE;
             in_held_ = true;
+        } else if (answer == Handshake::Error) {
+            transfer.status = -EPROTO;
         } else {
             transfer.status = packet.size() > transfer.length ? -EOVERFLOW : 0;
             packet.resize(std::min(packet.size(), transfer.length));
             transfer.actual = packet.size();
-            host_must_answer_ = host_must_answer_ || EmulatedDevice::is_whole(packet);
             transfer.data = std::move(packet);
         }
         done_.push_back(std::move(transfer));
@@ -173,8 +157,7 @@ class Port {
             return;
         }
         const Handshake answer = device_.out(out_.front().data);
-        out_refused_ = answer == Handshake::Nak;
-        if (out_refused_) {
+        if (answer == Handshake::Nak) {
             return;
         }
         Transfer transfer = std::move(out_.front());
@@ -192,70 +175,33 @@ class Port {
     /// True: the IN endpoint has halted and serves no transfer until the host clears the halt
     bool in_held_ = false;
     bool out_held_ = false;
-    bool out_refused_ = false;
-    bool reads_ahead_ = false;
-    /// The host has received an IN packet and has not sent an OUT packet since
-    bool host_must_answer_ = true;
 };
 
-/// Decides when a frame begins.
-///
-/// Paced mode: a frame begins every millisecond; up to three late frames follow immediately.
-///
-/// Lock-step mode: a frame begins when the host has read and answered, so that the result does not depend on the speed
-/// of the computer. Before the first command of the host, and while the device refuses transfers, frames follow the
-/// clock while the host reads. Otherwise a frame waits for the host; after `lock_step_timeout` the host misses one
-/// frame. For a host without two queued reads the frame waits a few milliseconds.
+/// Decides in real time when a frame begins: every millisecond; up to three late frames follow immediately.
 class FrameClock {
   public:
     using Clock = std::chrono::steady_clock;
 
-    FrameClock(bool lock_step, double rate_hz, std::chrono::milliseconds lock_step_timeout)
-        : lock_step_{lock_step},
-          period_{std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_hz))},
-          lock_step_timeout_{lock_step_timeout} {}
-
-    void host_wrote() {
-        if (!std::exchange(host_is_connected_, true)) {
-            first_ = Clock::now() + settling;
-        }
+    explicit FrameClock(double rate_hz)
+        : period_{std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_hz))} {
     }
-    void host_left() { host_is_connected_ = false; }
 
-    /// Returns true if a frame begins now; otherwise sets `until` to the latest time at which this function must be
-    /// called again.
-    [[nodiscard]] bool is_due(const Port& port, Clock::time_point now, Clock::time_point& until) {
-        const EmulatedDevice& device = port.device();
-        const bool in_step =
-            lock_step_ && !device.withholds_packets() && !device.is_slow() && !port.is_behind();
-        if (in_step && host_is_connected_ && port.host_is_ready()) {
-            until = first_;
-            last_ = now;
-            return now >= until;
-        }
-        const bool waits_for_host = in_step && (host_is_connected_ || port.has_no_read());
-        const Clock::duration waits = !waits_for_host           ? (device.is_slow() ? 3 : 1) * period_
-                                      : port.host_reads_ahead() ? lock_step_timeout_
-                                                                : 5 * period_;
-        until = last_ + waits;
+    /// Returns the duration of a frame.
+    [[nodiscard]] Clock::duration frame(bool is_slow) const { return (is_slow ? 3 : 1) * period_; }
+
+    /// Returns true if a frame begins now; otherwise sets `until` to the time of the next frame.
+    [[nodiscard]] bool is_due(bool is_slow, Clock::time_point now, Clock::time_point& until) {
+        until = last_ + frame(is_slow);
         if (now < until) {
             return false;
         }
-        last_ = lock_step_ || now - until > 3 * period_ ? now : until;
+        last_ = now - until > 3 * period_ ? now : until;
         return true;
     }
 
   private:
-    /// Pause before the first frame in lock-step, in which the host receives earlier packets; without this pause the
-    /// host would always stay one packet behind the device.
-    static constexpr std::chrono::milliseconds settling{20};
-
-    bool lock_step_;
     Clock::duration period_;
-    Clock::duration lock_step_timeout_;
     Clock::time_point last_ = Clock::now();
-    Clock::time_point first_ = last_;  ///< time at which the first frame in lock-step begins
-    bool host_is_connected_ = false;
 };
 
 }  // namespace emulator

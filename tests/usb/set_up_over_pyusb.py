@@ -87,6 +87,7 @@ def main() -> dict[str, Any]:
         order("fault emergency-stop 1")
         wait_until(lambda: packet()[1] & 64)
         reported["enabled after an emergency stop"] = refusal(device.enable)
+        packet()  # the cause of the stop is over in the next frame
         device.clear()
         device.enable()
         reported["enabled after it was cleared"] = state()["enabled"]

@@ -1,27 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests UsbDevice with faults of the USB transfers and faults of the device.
+#include <dlfcn.h>
+
 #include <array>
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 
 #include "emulated_machine.hpp"
 #include "palpate/device/usb.hpp"
 
+namespace {
+
+/// Pause of the calling thread after each transfer that it submits.
+thread_local std::chrono::milliseconds pause_after_submit{0};
+
+}  // namespace
+
+/// Replaces the function of libusb, to delay the transfers of a thread.
+extern "C" int LIBUSB_CALL libusb_submit_transfer(libusb_transfer* transfer) {
+    const int code = reinterpret_cast<decltype(&::libusb_submit_transfer)>(
+        ::dlsym(RTLD_NEXT, "libusb_submit_transfer"))(transfer);
+    std::this_thread::sleep_for(pause_after_submit);
+    return code;
+}
+
 namespace palpate {
 namespace {
 
 using std::chrono::milliseconds;
 using test::open_files;
-using test::patient;
 using test::send_order;
 using test::settled;
 using test::state;
 
 TEST(UsbDevice, CountsAndIgnoresPacketsOfAnotherProtocol) {
-    UsbDevice device = patient();
+    UsbDevice device;
     ASSERT_TRUE(device.open());
     std::uint64_t malformed = 0;
     for (const char* fault : {"short", "magic", "version", "long"}) {
@@ -37,7 +54,7 @@ TEST(UsbDevice, CountsAndIgnoresPacketsOfAnotherProtocol) {
 }
 
 TEST(UsbDevice, ClearsHaltedEndpointsAndContinuesTheStream) {
-    UsbDevice device = patient();
+    UsbDevice device;
     ASSERT_TRUE(device.open());
     std::uint64_t stalls = 0;
     for (const char* fault : {"stall-in", "stall-out", "stall-in", "stall-out"}) {
@@ -68,62 +85,69 @@ TEST(UsbDevice, OpensADeviceThatTheLastProgramLeftHalted) {
                 libusb_bulk_transfer(last.handle(), endpoint, packet.data(), packet.size(), &moved, 1000);
             ASSERT_EQ(code, LIBUSB_ERROR_PIPE);
         }
-        UsbDevice device = patient();
+        UsbDevice device;
         ASSERT_EQ(device.open().reason, "");
         EXPECT_EQ(settled(device, 0.1).status, Status::Ok);
         EXPECT_EQ(device.health().stalls, 1U);
     }
 }
 
+TEST(UsbDevice, OpensAHaltedDeviceIfTheSecondReadIsSubmittedAfterTheHalt) {
+    send_order("fault stall-in 1");
+    UsbDevice device;
+    pause_after_submit = milliseconds{3};
+    const std::string reason = device.open().reason;
+    pause_after_submit = {};
+    EXPECT_EQ(reason, "");
+    EXPECT_EQ(settled(device, 0.1).status, Status::Ok);
+    EXPECT_EQ(device.health().stalls, 1U);
+}
+
+TEST(UsbDevice, ALateProgramDiscardsOldPacketsAndContinues) {
+    UsbDevice device;
+    ASSERT_TRUE(device.open());
+    const Reading before = settled(device, 0.1);
+    std::this_thread::sleep_for(milliseconds{6});
+    const Reading after = device.exchange({0.1});
+    EXPECT_EQ(after.status, Status::Ok);
+    EXPECT_EQ(after.sequence, before.sequence + 7);
+    EXPECT_EQ(device.health().discarded, 6U);
+    EXPECT_EQ(device.health().stream.lost, 0U);
+    EXPECT_EQ(settled(device, 0.1).sequence, after.sequence + 4);
+}
+
 TEST(UsbDevice, ReportsATimeoutWhileTheDeviceDoesNotAnswer) {
-    UsbOptions options;
-    options.wait = milliseconds{5};
-    UsbDevice device{options};
+    UsbDevice device;
     ASSERT_TRUE(device.open());
     settled(device);
     send_order("fault mute 30");
-    int timeouts = 0;
-    for (int k = 0; k < 3; ++k) {
-        timeouts += device.exchange({0.0}).status == Status::Timeout ? 1 : 0;
+    for (int k = 0; k < 6; ++k) {  // each waits 5 ms
+        EXPECT_EQ(device.exchange({0.0}).status, Status::Timeout) << k;
     }
-    EXPECT_GE(timeouts, 1);
-    EXPECT_GE(device.health().timeouts, 1U);
-    Status status = Status::Timeout;
-    for (int k = 0; k < 10'000 && status != Status::Ok; ++k) {
-        status = device.exchange({0.0}).status;
-    }
-    EXPECT_EQ(status, Status::Ok);
+    EXPECT_EQ(device.health().timeouts, 6U);
+    EXPECT_EQ(device.exchange({0.0}).status, Status::Ok);
 }
 
 // After a late command the next commands must arrive in time, because each late command ends a certified run.
 TEST(UsbDevice, ALateCommandDoesNotDelayTheNextOnes) {
-    constexpr int rounds = 20;
-    constexpr int commands = 40;
-    UsbOptions options;
-    options.wait = std::chrono::seconds{20};
-    options.longest_delay_s = 1.25e-3;
-    UsbDevice device{options};
+    UsbDevice device;
     ASSERT_EQ(device.open().reason, "");
-    int late = 0;
-    int in_time_again = 0;
-    // The first round of this loop sends the first command after the device was opened.
-    for (int round = 0; round < rounds; ++round) {
+    for (int round = 0; round < 20; ++round) {
+        // The first exchange after opening only waits for a packet. A late command shows while it is expected, when
+        // it is confirmed, and once more because the host skips the command after it.
+        const int late = round == 0 ? 2 : 1;
         send_order("fault busy 1");
-        int in_a_row = 0;
-        for (int k = 0; k < commands; ++k) {
-            const bool in_time = device.exchange({0.1}).status != Status::Timeout;
-            late += in_time ? 0 : 1;
-            in_a_row = in_time ? in_a_row + 1 : 0;
+        for (int k = 0; k < 10; ++k) {
+            const Reading reading = device.exchange({0.1});
+            EXPECT_EQ(reading.status, Status::Ok) << round << " " << k;
+            EXPECT_EQ(reading.delay > 1.25e-3, late <= k && k < late + 3)
+                << round << " " << k << " " << reading.delay;
         }
-        in_time_again += in_a_row >= commands / 2 ? 1 : 0;
     }
-    EXPECT_GE(late, rounds);
-    // At least half of the rounds; on a fast computer the commands arrive in time again in every round
-    EXPECT_GE(in_time_again, rounds / 2);
 }
 
 TEST(UsbDevice, CountsSkippedSamplesInTheSequence) {
-    UsbDevice device = patient();
+    UsbDevice device;
     ASSERT_TRUE(device.open());
     const Reading before = settled(device);
     const std::uint64_t lost = device.health().stream.lost;
@@ -137,7 +161,7 @@ TEST(UsbDevice, CountsSkippedSamplesInTheSequence) {
 }
 
 TEST(UsbDevice, CountsLateEchoes) {
-    UsbDevice device = patient();
+    UsbDevice device;
     ASSERT_TRUE(device.open());
     settled(device);
     send_order("fault old-echo 1");
@@ -147,12 +171,16 @@ TEST(UsbDevice, CountsLateEchoes) {
 }
 
 TEST(UsbDevice, WatchdogEndsTheTorqueUntilTheNextCommand) {
-    UsbDevice device = patient();
+    UsbDevice device;
     ASSERT_TRUE(device.open());
     settled(device, 0.2);
     EXPECT_EQ(state("torque_uNm"), -200'000.0);
     // The device answers no transfer for 15 frames, which is longer than it applies a command
     send_order("fault freeze 15");
+    for (int k = 0; k < 3; ++k) {  // each waits 5 ms
+        EXPECT_EQ(device.exchange({0.2}).status, Status::Timeout) << k;
+    }
+    EXPECT_EQ(device.health().timeouts, 3U);
     const Reading tripped = device.exchange({0.2});
     EXPECT_EQ(tripped.status, Status::Timeout);
     EXPECT_EQ(tripped.applied, 0.0);
@@ -163,7 +191,7 @@ TEST(UsbDevice, WatchdogEndsTheTorqueUntilTheNextCommand) {
 
 TEST(UsbDevice, ReportsEveryFaultOfTheDevice) {
     for (const char* fault : {"encoder", "over-temperature", "emergency-stop", "reset"}) {
-        UsbDevice device = patient();
+        UsbDevice device;
         ASSERT_EQ(device.open().reason, "") << fault;
         settled(device, 0.2);
         send_order(std::string("fault ") + fault + " 1");
@@ -184,7 +212,7 @@ TEST(UsbDevice, ReportsEveryFaultOfTheDevice) {
 }
 
 TEST(UsbDevice, ReportsASaturatedTorqueAsLimited) {
-    UsbDevice device = patient();
+    UsbDevice device;
     ASSERT_TRUE(device.open());
     settled(device, 0.2);
     send_order("fault saturate 1");
@@ -192,7 +220,7 @@ TEST(UsbDevice, ReportsASaturatedTorqueAsLimited) {
 }
 
 TEST(UsbDevice, ReportsAFaultAfterUnpluggingAndOpensAgainAfterPluggingIn) {
-    UsbDevice device = patient();
+    UsbDevice device;
     ASSERT_TRUE(device.open());
     device.close();
     const std::size_t files = open_files();
@@ -209,11 +237,8 @@ TEST(UsbDevice, ReportsAFaultAfterUnpluggingAndOpensAgainAfterPluggingIn) {
         device.close();
         EXPECT_EQ(device.in_flight(), 0);
         EXPECT_EQ(open_files(), files);
-        // The operating system may still list the device that was unplugged.
         const std::string reason = device.open().reason;
-        EXPECT_TRUE(reason.find("is connected") != std::string::npos ||
-                    reason.find("was unplugged") != std::string::npos)
-            << reason;
+        EXPECT_NE(reason.find("is connected"), std::string::npos) << reason;
         ASSERT_EQ(send_order("plug"), "ok");
     }
     ASSERT_EQ(device.open().reason, "");

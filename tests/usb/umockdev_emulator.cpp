@@ -26,6 +26,9 @@ namespace emulator {
 namespace {
 
 constexpr const char* preload = "libumockdev-preload.so.0";
+constexpr const char* host_clock = "libhost_clock.so";
+/// The device runs on for a second after the end of the command, so that its watchdog ends the torque
+constexpr int frames_after_command = 1000;
 
 class Emulation {
   public:
@@ -47,18 +50,32 @@ class Emulation {
 
     int run() {
         const Orders orders{[this](const std::string& order) { return executed(order); }};
-        Command command{settings_.command, [this] { prepare(); }};
-        std::thread frames{[this] { run_frames(); }};
-        const int code = command.wait();
-        {
-            const std::lock_guard locked{mutex_};
-            over_ = true;
+        std::string libraries = settings_.preload_first.empty() ? "" : settings_.preload_first + ":";
+        if (settings_.lock_step) {
+            libraries +=
+                (std::filesystem::read_symlink("/proc/self/exe").parent_path() / host_clock).string() + ":";
         }
-        changed_.notify_all();
-        frames.join();
-        if (trace_.is_open() && !places_.empty()) {
-            // The last row of the trace is the state of the emulated device after the command has ended.
-            trace_ << places_.back()->node->port().device().trace_row();
+        Command command{settings_.command, {orders.variable(), "LD_PRELOAD=" + libraries + preload}, [this] {
+                            give_up_rights();
+                        }};
+        std::thread frames;
+        if (!settings_.lock_step) {
+            frames = std::thread{[this] { run_frames(); }};
+        }
+        const int code = command.wait();
+        std::unique_lock locked{mutex_};
+        over_ = true;
+        if (frames.joinable()) {
+            locked.unlock();
+            changed_.notify_all();
+            frames.join();
+            locked.lock();
+        }
+        for (const std::unique_ptr<Place>& place : places_) {
+            place->node->remove_clients();
+        }
+        for (int k = 0; k < frames_after_command; ++k) {
+            execute_frame();
         }
         return code;
     }
@@ -72,14 +89,9 @@ class Emulation {
 
     void plug(const Identity& identity, const std::vector<Fault>& script) {
         auto place = std::make_unique<Place>(
-            Place{FrameClock{settings_.lock_step, settings_.rate_hz, settings_.lock_step_timeout}, nullptr});
-        place->node = std::make_unique<UsbfsNode>(testbed_, make_device(settings_, identity, script),
-                                                  next_address_++, mutex_, [this] {
-                                                      if (begin_frames() < wakes_at_) {
-                                                          changed_.notify_all();
-                                                      }
-                                                  });
-        place->node->set_clock(place->clock);
+            Place{FrameClock{settings_.rate_hz},
+                  std::make_unique<UsbfsNode>(testbed_, make_device(settings_, identity, script),
+                                              next_address_++, mutex_)});
         if (settings_.denied) {
             deny(place->node->node_file());
         }
@@ -101,59 +113,74 @@ class Emulation {
         fs::permissions(node, fs::perms::none);
     }
 
-    /// Sets the preloaded libraries and the user for the command; called in the child process that runs the command.
-    void prepare() {
-        const std::string first = settings_.preload_first;
-        ::setenv("LD_PRELOAD", (first + (first.empty() ? "" : ":") + preload).c_str(), 1);
-        if (settings_.denied && ::getuid() == 0) {
-            constexpr uid_t unprivileged = 65'534;
-            if (::setgid(unprivileged) != 0 || ::setuid(unprivileged) != 0) {
-                ::_exit(126);
-            }
+    /// Gives up the right to open every file, so that the device is denied also to root.
+    void give_up_rights() const {
+        constexpr uid_t unprivileged = 65'534;
+        if (settings_.denied && ::getuid() == 0 &&
+            (::setgid(unprivileged) != 0 || ::setuid(unprivileged) != 0)) {
+            ::_exit(126);
         }
     }
 
-    /// Executes every USB frame that is due and returns the time of the next frame. The caller must hold the mutex.
-    FrameClock::Clock::time_point begin_frames() {
+    // The caller of these functions must hold the mutex.
+
+    void execute_frame(Place& place) {
+        Port& port = place.node->port();
+        if (port.device().is_unplugged()) {
+            return;
+        }
+        place.node->frame();
+        if (trace_.is_open()) {
+            trace_ << port.device().trace_row();
+        }
+    }
+
+    /// Executes a frame of every device. Returns its duration.
+    FrameClock::Clock::duration execute_frame() {
+        FrameClock::Clock::duration frame = FrameClock{settings_.rate_hz}.frame(false);
+        for (const std::unique_ptr<Place>& place : places_) {
+            place->node->remove_closed_clients();
+            execute_frame(*place);
+            frame = place->clock.frame(place->node->port().device().is_slow());
+        }
+        return frame;
+    }
+
+    /// Executes every frame that is due, and returns the time of the next frame.
+    FrameClock::Clock::time_point execute_due_frames() {
         auto next = FrameClock::Clock::now() + std::chrono::milliseconds{50};
         for (const std::unique_ptr<Place>& place : places_) {
-            Port& port = place->node->port();
+            const EmulatedDevice& device = place->node->port().device();
+            place->node->remove_closed_clients();
             auto until = next;
-            while (!port.device().is_unplugged() &&
-                   place->clock.is_due(port, FrameClock::Clock::now(), until)) {
-                place->node->frame();
-                if (trace_.is_open()) {
-                    trace_ << port.device().trace_row();
-                }
-                if (port.device().is_unplugged()) {
-                    changed_.notify_all();
-                }
+            while (!device.is_unplugged() &&
+                   place->clock.is_due(device.is_slow(), FrameClock::Clock::now(), until)) {
+                execute_frame(*place);
             }
             next = std::min(next, until);
         }
         return next;
     }
 
+    /// Announces the removal of unplugged devices, without the mutex.
+    void announce_removals(std::unique_lock<std::mutex>& locked) {
+        for (std::size_t k = 0; k < places_.size(); ++k) {
+            Place& place = *places_[k];
+            if (place.node->port().device().is_unplugged() && !std::exchange(place.removal_announced, true)) {
+                locked.unlock();
+                place.node->announce_removal();
+                locked.lock();
+            }
+        }
+    }
+
     void run_frames() {
         ::prctl(PR_SET_TIMERSLACK, 1000);
         std::unique_lock locked{mutex_};
         while (!over_) {
-            for (const std::unique_ptr<Place>& place : places_) {
-                place->node->remove_closed_clients();
-            }
-            const FrameClock::Clock::time_point next = begin_frames();
-            for (const std::unique_ptr<Place>& place : places_) {
-                if (place->node->port().device().is_unplugged() &&
-                    !std::exchange(place->removal_announced, true)) {
-                    locked.unlock();
-                    place->node->announce_removal();
-                    locked.lock();
-                    break;
-                }
-            }
-            wakes_at_ = next;
+            const FrameClock::Clock::time_point next = execute_due_frames();
+            announce_removals(locked);
             changed_.wait_until(locked, next);
-            wakes_at_ = {};
         }
     }
 
@@ -163,7 +190,12 @@ class Emulation {
             places_.back()->node->announce_arrival();
             return "ok";
         }
-        const std::lock_guard locked{mutex_};
+        std::unique_lock locked{mutex_};
+        if (order == "frame") {
+            const std::chrono::nanoseconds frame = execute_frame();
+            announce_removals(locked);
+            return std::to_string(frame.count());
+        }
         return execute_order(places_.back()->node->port(), order);
     }
 
@@ -173,7 +205,6 @@ class Emulation {
     std::mutex mutex_;
     std::condition_variable changed_;
     std::vector<std::unique_ptr<Place>> places_;
-    FrameClock::Clock::time_point wakes_at_{};  ///< time at which the frame thread wakes up
     int next_address_ = 2;
     bool over_ = false;
 };

@@ -67,6 +67,8 @@ int main(int count, char** words) {
                                   {"UsbDeniedDevice", {"--denied"}},
                                   {"UsbPlainDevice", {"--no-transducer", "--no-velocity"}},
                                   {"UsbModelDevice", {"--model", "10"}},
+                                  {"UsbDelay", {}},
+                                  {"UsbEnding", {}},
                                   {"UsbText", {"--no-device"}}};
     for (int seed = 1; seed <= palpate::test::cases(10); ++seed) {
         machines.push_back({"UsbOtherFirmware", {"--seed", std::to_string(seed)}});

@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
-#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -24,12 +23,8 @@ namespace emulator {
 /// Device in a umockdev testbed: its files, and the usbfs ioctls of its device file.
 class UsbfsNode {
   public:
-    UsbfsNode(UMockdevTestbed* testbed, EmulatedDevice device, int address, std::mutex& mutex,
-              std::function<void()> woken)
-        : handler_{umockdev_ioctl_base_new()},
-          port_{std::move(device)},
-          mutex_{mutex},
-          woken_{std::move(woken)} {
+    UsbfsNode(UMockdevTestbed* testbed, EmulatedDevice device, int address, std::mutex& mutex)
+        : handler_{umockdev_ioctl_base_new()}, port_{std::move(device)}, mutex_{mutex} {
         g_object_connect(handler_, "signal-after::handle-ioctl", G_CALLBACK(&UsbfsNode::ioctl_called), this,
                          nullptr);
         files_ = std::make_unique<UsbfsFiles>(testbed, handler_, port_.device().identity(), address);
@@ -43,12 +38,16 @@ class UsbfsNode {
 
     // The caller of `port` to `frame` must hold the mutex.
     [[nodiscard]] Port& port() { return port_; }
-    [[nodiscard]] FrameClock& clock() { return *clock_; }
-    void set_clock(FrameClock& clock) { clock_ = &clock; }
     [[nodiscard]] const std::string& node_file() const { return files_->node_file(); }
     void frame() {
         port_.frame();
         show_readiness();
+    }
+    /// Removes the transfers of all clients.
+    void remove_clients() {
+        for (const auto& [client, is_connected] : clients_) {
+            remove_client(client);
+        }
     }
     /// Removes the transfers of clients that ended without closing the device.
     void remove_closed_clients() {
@@ -104,7 +103,6 @@ class UsbfsNode {
     void reset_host() {
         claimed_by_ = nullptr;
         port_.reset_host();
-        clock_->host_left();
     }
 
     /// Returns the argument of an ioctl, copied from the client; changes reach the client when the ioctl is completed.
@@ -230,17 +228,12 @@ class UsbfsNode {
         }
         transfer.length = bytes.size();
         transfer.data = std::move(bytes);
-        const bool writes = transfer.endpoint == 0x01 && !transfer.is_control;
         const int result = port_.submit(std::move(transfer));
         if (result < 0) {
             g_object_unref(data);
             return result;
         }
         urbs_[{client, address}] = data;
-        if (writes) {
-            clock_->host_wrote();
-        }
-        woken_();
         return 0;
     }
 
@@ -279,10 +272,8 @@ class UsbfsNode {
 
     UMockdevIoctlBase* handler_;
     Port port_;
-    FrameClock* clock_ = nullptr;
     std::unique_ptr<UsbfsFiles> files_;
     std::mutex& mutex_;
-    std::function<void()> woken_;
     std::map<UMockdevIoctlClient*, bool> clients_;  ///< the value is true while the client process runs
     const UMockdevIoctlClient* claimed_by_ = nullptr;
     std::map<std::pair<const UMockdevIoctlClient*, std::uint64_t>, UMockdevIoctlData*>

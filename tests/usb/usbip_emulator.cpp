@@ -62,8 +62,8 @@ class UsbIp {
     }
     [[nodiscard]] int file() const { return wire_; }
 
-    /// Handles a message of the kernel; sets `wrote` for an OUT packet. Returns false if the kernel closed the device.
-    [[nodiscard]] bool receive(bool& wrote) {
+    /// Handles a message of the kernel. Returns false if the kernel closed the device.
+    [[nodiscard]] bool receive() {
         std::array<std::uint8_t, 48> header{};
         if (!read_all(header.data(), header.size())) {
             return false;
@@ -102,7 +102,6 @@ class UsbIp {
             transfer.setup[1] == 1) {  // CLEAR_FEATURE, endpoint
             port_.clear_halt(transfer.setup[4]);
         }
-        wrote = !in && !transfer.is_control;
         if (const int error = port_.submit(std::move(transfer)); error != 0) {
             answer(submit_answer, number, error, 0, {});
         }
@@ -169,7 +168,7 @@ int run(Settings settings) {
     using namespace std::chrono_literals;
     const Identity identity = settings.devices.empty() ? Identity{} : settings.devices.front();
     Port port{make_device(settings, identity, settings.script)};
-    FrameClock clock{settings.lock_step, settings.rate_hz, settings.lock_step_timeout};
+    FrameClock clock{settings.rate_hz};
     std::ofstream trace;
     if (!settings.trace.empty()) {
         trace.open(settings.trace);
@@ -187,7 +186,7 @@ int run(Settings settings) {
             auto until = FrameClock::Clock::now() + 50ms;
             {
                 const std::lock_guard locked{mutex};
-                while (clock.is_due(port, FrameClock::Clock::now(), until)) {
+                while (clock.is_due(port.device().is_slow(), FrameClock::Clock::now(), until)) {
                     port.frame();
                     usb.answer_all();
                     if (trace.is_open()) {
@@ -204,20 +203,16 @@ int run(Settings settings) {
                                 std::max<long>(0, std::chrono::nanoseconds(left - whole).count())};
             pollfd ready{usb.file(), POLLIN, 0};
             if (::ppoll(&ready, 1, &wait, nullptr) > 0) {
-                bool wrote = false;
                 const std::lock_guard locked{mutex};
-                if (!usb.receive(wrote)) {
+                if (!usb.receive()) {
                     return;
-                }
-                if (wrote) {
-                    clock.host_wrote();
                 }
                 usb.answer_all();
             }
         }
     }};
     std::this_thread::sleep_for(1s);  // enumeration
-    Command command{settings.command, [] {}};
+    Command command{settings.command, {orders.variable()}, [] {}};
     const int code = command.wait();
     over = true;
     bus.join();

@@ -23,6 +23,7 @@ enum class Status : std::uint8_t {
     Ramp,
     EnergyLimited,
     LimitCycleScaled,
+    Stale,
 };
 
 /// The word of a status, such as "Ok", and its meaning as a sentence.
@@ -32,7 +33,7 @@ struct StatusText {
 };
 
 /// Word and meaning of every status, in the order of the enumeration.
-inline constexpr std::array<StatusText, 13> status_texts{{
+inline constexpr std::array<StatusText, 14> status_texts{{
     {"Ok", "the step was computed to its tolerance, without an error or limit"},
     {"MaxIterations",
      "the solver of the load line used all its evaluations; the position is its best approximation"},
@@ -51,6 +52,10 @@ inline constexpr std::array<StatusText, 13> status_texts{{
     {"EnergyLimited",
      "the rendering had given all the energy that the energy tank allows; the force was scaled down"},
     {"LimitCycleScaled", "a limit cycle was detected; all forces are scaled down until the end of the run"},
+    {"Stale",
+     "the device applied a force computed from an older sample than the certificate allows; the force sent "
+     "is "
+     "zero"},
 }};
 
 /// Returns word and meaning of a status.
@@ -67,7 +72,8 @@ inline constexpr std::array<StatusText, 13> status_texts{{
 
 /// Returns true if the run must end after this status, because the device or its readings are no longer reliable.
 [[nodiscard]] constexpr bool is_final(Status status) noexcept {
-    return status == Status::Fault || status == Status::Jump || status == Status::Frozen;
+    return status == Status::Fault || status == Status::Jump || status == Status::Frozen ||
+           status == Status::Stale;
 }
 
 }  // namespace palpate

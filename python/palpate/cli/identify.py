@@ -29,6 +29,8 @@ from ..identification.options import (
 from ..identification.search.evidence import reporting_to
 from ..model import Model
 from ..recording import Recording
+from ..recording.files import CELL_BYTES, TooLargeError, require_memory
+from ..recording.formats import is_read_in_parts
 from ..recording.units import Unit
 from ..verdict import Verdict
 from ..verification import Verification, verify
@@ -201,7 +203,9 @@ def _objects(sizes: Sequence[int], recordings: Sequence[Recording]) -> list[list
     help="Print the force curve as text.",
 )
 @expert_option(
-    "--out-of-core", is_flag=True, help="Read files larger than memory part by part, each row once."
+    "--out-of-core",
+    is_flag=True,
+    help="Read CSV or Parquet part by part, as files above 4 GiB of cells are.",
 )
 @expert_option(
     "--jobs",
@@ -243,13 +247,19 @@ def identify(
     sizes = click.get_current_context().meta[_OBJECT_SIZES]
     _require_object_of_each(sizes, len(recording_files))
     by_parts = out_of_core or jobs != 1 or scheduler is not None
+    if not by_parts:
+        columns = [name for name in settings["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
+        try:
+            recordings = _read_at_once(recording_files, reading, [name.strip() for name in columns])
+        except TooLargeError as error:
+            if not all(map(is_read_in_parts, recording_files)):
+                raise
+            by_parts = True
+            talk(str(error))
     if by_parts:
         left = {name: value for name, value in reading.options.items() if name not in _READ_BY_PARTS}
         left |= {"object": sizes, "plot": plot, "baselines": with_baselines}
         _require_unused(hold_out_every=hold_out_every, **left)
-    else:
-        columns = [name for name in settings["inputs"].split(",") if name.strip() not in RESERVED_INPUTS]
-        recordings = [reading.read(path, [name.strip() for name in columns]) for path in recording_files]
     others = _fit_baselines(recordings, hold_out_every) if with_baselines else []
     judged_on = recordings
     if hold_out_every is not None:
@@ -279,7 +289,9 @@ def identify(
         for note in model.notes["identification"]:
             talk(f"  {note}")
     seconds = time.perf_counter() - start
-    verified = [(recording, verify(model, recording)) for recording in judged_on]
+    verified = []
+    if hold_out_every is not None or plot is not None:
+        verified = [(recording, verify(model, recording)) for recording in judged_on]
     nrmse = model.fit.nrmse if hold_out_every is None else _pooled_nrmse(verified)
     compared = sum(verification.n for _, verification in verified)
     verdict = model.verdict
@@ -304,7 +316,10 @@ def identify(
         result["baselines"] = [asdict(each) for each in others]
     rows = sum(len(recording) for recording in judged_on)
     of_rows = str(rows) if compared == rows else f"{compared} of {rows}"
-    judged = "the rows of the identification" if hold_out_every is None else f"{of_rows} rows held out"
+    judged = f"{of_rows} rows held out"
+    if hold_out_every is None:
+        fitted = model.data.rows
+        judged = f"{fitted} of {rows} rows" if fitted < rows else "the rows of the identification"
     if hold_out_every is None and settings["loss"] == "huber":
         judged += ", where rows far from the model have less weight"
     # The NRMSE of the fit leaves out wrong readings, which `verify` compares.
@@ -341,6 +356,18 @@ def identify(
                 reason = f"growth of the network stopped by {model.stop_reason}"
                 print_details([reason, *model.notes["identification"]])
     end_with(verdict)
+
+
+def _read_at_once(files: Sequence[Path], reading: ReadingOptions, inputs: Sequence[str]) -> list[Recording]:
+    """Reads all rows of files, and refuses files that together need more memory than the limit."""
+    recordings: list[Recording] = []
+    cells = 0
+    for file in files:
+        recording = reading.read(file, inputs)
+        cells += len(recording) * (len(recording.source.columns) + len(recording.columns))
+        require_memory(f"{file}, with the files before it,", CELL_BYTES * cells)
+        recordings.append(recording)
+    return recordings
 
 
 def _band_text(model: Model, recordings: Sequence[Recording]) -> dict[str, str]:

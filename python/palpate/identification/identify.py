@@ -29,6 +29,7 @@ from .classes.model_selection import select
 from .data.limits import ForceScale
 from .data.outliers import without_isolated
 from .data.rows import Rows, require_in_range, require_usable, rows_of
+from .data.sections import in_sections
 from .decision import latest
 from .network.fitted import FittedNetwork
 from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fields, kind_of, options_from
@@ -137,13 +138,18 @@ def identify(
     for each in recordings:
         require_in_range("position", each.position)
         require_in_range("force", each.force)
-    rows = rows_of(recordings, settings, object_of)
+        for name, column in zip(each.input_names, each.inputs.T, strict=True):
+            require_in_range(name, column)
+    fitted, sections = in_sections(recordings)
+    rows = rows_of(fitted, settings, object_of)
     # The matrices are small: several threads make the computation slower and change the last digits of the
     # result.
     with threadpool_limits(limits=1, user_api="blas"):
-        network = fit_rows(replace(rows, findings=(*isolated, *rows.findings)), settings)
-        network = better_with_memory(network, recordings, settings, _resting(rows, settings))
-    source = Source.merged(part.source for part in recordings)
+        rows = replace(rows, findings=(*isolated, *rows.findings), notes=(*sections, *rows.notes))
+        network = fit_rows(rows, settings)
+        rest = _resting(rows, settings)
+        network = better_with_memory(network, recordings, len(rows.force), settings, rest)
+    source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
     with threadpool_limits(limits=1, user_api="blas"):

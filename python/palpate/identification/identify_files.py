@@ -20,8 +20,9 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import partial, reduce
 from importlib import import_module
+from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -35,6 +36,7 @@ from ..errors import InputError
 from ..model import Model
 from ..recording import Source
 from ..recording.conversion import mirror_notes
+from ..recording.files import unchanged
 from ..recording.motion import strokes_from_order
 from ..recording.reading import PART_ROWS, LongRecording, open_long_recording
 from ..recording.rows import LeftOut
@@ -44,7 +46,7 @@ from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
 from .data.outliers import refuse_isolated
 from .data.rows import modulo, require_in_range
-from .decision import Decision
+from .decision import Decision, in_words
 from .identify import fit_environment, model_of
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from
@@ -59,6 +61,12 @@ rows: enough for the resolution of an identification."""
 
 UNKNOWN_STROKES = "the files have no direction column, and the order of rows does not show the direction"
 """Text of the decision that hysteresis is not tested, if the directions of the rows are not known."""
+
+IN_PARTS = "the files were read part by part"
+"""Reason for everything that is not tested because it needs all rows at once."""
+
+UNTESTED = ("damping", "mass", "velocity", "memory")
+"""Model classes of recordings with time that need all rows at once."""
 
 SCATTER_CELLS = 16
 """Number of neighbouring position cells in which the force of single rows is compared with one straight
@@ -123,9 +131,11 @@ def identify_files(
     paths = [path_of("files", each) for each in (files if isinstance(files, (list, tuple)) else [files])]
     if not paths:
         raise InputError("files is empty: give a path or a list of paths")
-    recordings = [
-        open_long_recording(
-            os.fspath(path),
+    with unchanged(*paths):
+        summary, recordings, notes = _read(
+            paths,
+            partial(in_order, jobs=jobs, scheduler=scheduler),
+            progress,
             position=position,
             force=force,
             time=time,
@@ -135,8 +145,17 @@ def identify_files(
             invalid=invalid,
             part_rows=part_rows,
         )
-        for path in paths
-    ]
+    return _identified(summary, recordings, settings, notes)
+
+
+def _read(
+    paths: Sequence[Path], in_workers: Callable[..., Iterator[PartRead]], progress: Progress, **reading: Any
+) -> tuple[Summary, list[LongRecording], list[str]]:
+    """Returns the summary of all rows of files, the opened files, and notes on their format and rows.
+
+    `reading` holds the arguments of :func:`open_long_recording`.
+    """
+    recordings = [open_long_recording(path, **reading) for path in paths]
     for other in recordings[1:]:
         if other.units != recordings[0].units or (other.direction is None) != (
             recordings[0].direction is None
@@ -146,9 +165,7 @@ def identify_files(
                 "column; identify each one separately"
             )
     parts = [(recording, part) for recording in recordings for part in recording.parts]
-    read = in_order(
-        read_part, parts, jobs=jobs, scheduler=scheduler, done=lambda count: progress(count, len(parts))
-    )
+    read = in_workers(read_part, parts, done=lambda count: progress(count, len(parts)))
     of_file = [PartRead() for _ in recordings]
     numbers = [number for number, recording in enumerate(recordings) for _ in recording.parts]
     for number, part in zip(numbers, read, strict=True):
@@ -156,7 +173,7 @@ def identify_files(
         of_file[number].add(part.summary, part.rows)
     notes: list[str] = []
     for recording, found in zip(recordings, of_file, strict=True):
-        _require_all_rows(recording, found)
+        require_all_rows(recording, found)
         # The first note repeats the columns of the source, and is used only if it states the format of the
         # file.
         sentences = [note for note in recording.notes[:1] if "read as" in note]
@@ -165,7 +182,7 @@ def identify_files(
     summaries = [found.summary for found in of_file if found.summary is not None]
     if not summaries:
         raise InputError(f"{', '.join(str(path) for path in paths)}: no row is usable")
-    return _identified(reduce(merged, summaries), recordings, settings, notes)
+    return reduce(merged, summaries), recordings, notes
 
 
 @dataclass
@@ -203,7 +220,7 @@ def read_part(work: tuple[LongRecording, tuple[int, int]]) -> PartRead:
     return found
 
 
-def _require_all_rows(recording: LongRecording, read: PartRead) -> None:
+def require_all_rows(recording: LongRecording, read: PartRead) -> None:
     """Checks that the numbers of used rows and of left out rows add up to all rows of the file.
 
     Raises
@@ -215,7 +232,7 @@ def _require_all_rows(recording: LongRecording, read: PartRead) -> None:
     if not used + read.left_out.rows == read.rows == recording.rows:
         raise InputError(
             f"{recording.path} has {recording.rows} rows, but {used} were used and {read.left_out.rows} were "
-            "not. The file may have changed while it was read: read it again, or without --out-of-core"
+            "not. The workers may have another file of this name: give all of them the same file"
         )
 
 
@@ -242,7 +259,10 @@ def _identified(
     refuse_isolated(summary.position, summary.count, width)
     notes += mirror_notes(summary.correlation)
     side: Float1D | None = summary.side.astype(np.float64)
-    decisions: tuple[Decision, ...] = ()
+    notes.append(f"Defects of the recording and a lag of the force were not searched: {IN_PARTS}.")
+    decisions: list[Decision] = []
+    if settings.inputs == "auto" and all(recording.has_time for recording in recordings):
+        decisions += [Decision(in_words(name), "not tested", IN_PARTS) for name in UNTESTED]
     findings: list[Finding] = []
     if all(recording.direction is None for recording in recordings):
         if settings.inputs != "auto" and "hysteresis" not in settings.inputs:
@@ -251,7 +271,7 @@ def _identified(
             notes.append("The direction is taken from the order of rows, block by block.")
         else:
             side = None
-            decisions = (Decision("hysteresis", "not tested", UNKNOWN_STROKES),)
+            decisions.insert(0, Decision("hysteresis", "not tested", UNKNOWN_STROKES))
             findings.append(_untested(summary, recordings[0].file_unit("force")))
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_environment(

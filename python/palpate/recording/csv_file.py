@@ -21,10 +21,14 @@ import pandas as pd
 
 from ..errors import InputError
 from .dialect import HEAD_BYTES, not_csv, recognise, refuse_marks
+from .files import CELL_BYTES, require_memory
 from .table import MISSING, Cells, LongTable, parse_with, to_numbers
 
-_CHUNK_ROWS = 1_000_000
-"""Number of rows of a CSV file that are read at a time, to limit the use of memory."""
+_CHUNK_CELLS = 1 << 22
+"""Number of cells of a CSV file that are read at a time, to limit the use of memory."""
+
+_WORD_BYTES = 64
+"""Memory of a word without its characters [bytes]."""
 
 _EXACT_OPTIONS: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
@@ -179,6 +183,7 @@ class CsvFile(LongTable):
 
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
         as_text = {*self.text_names, *text}
+        require_memory(self._path, self._least_memory())
         try:
             return self._read(as_text, numbers, text)
         except ValueError as error:
@@ -187,8 +192,15 @@ class CsvFile(LongTable):
         # A column has numbers in its first rows and text in later rows. Find this column and read it as text.
         return self._read(as_text | self._columns_with_text(as_text), numbers, text)
 
+    def _least_memory(self) -> int:
+        """Returns the memory for all cells without the words in them [bytes]."""
+        with self._bytes(self._dialect.start) as stream:
+            lines = sum(block.count(b"\n") for block in iter(lambda: stream.read(_BLOCK_BYTES), b""))
+        return CELL_BYTES * lines * len(self.names)
+
     def _read(self, as_text: set[str], numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
         parts: dict[str, list[Cells]] = {name: [] for name in self.names}
+        needed = 0
         for chunk in self._chunks({name: "str" if name in as_text else "float64" for name in self.names}):
             for name in self.names:
                 cells: Cells
@@ -198,8 +210,12 @@ class CsvFile(LongTable):
                     cells = self._to_numbers(name, chunk[name].to_numpy(dtype=object))
                 else:
                     # The pandas type "category" stores each distinct word only once, which saves memory.
-                    cells = chunk[name].astype("category").to_numpy(dtype=object)
+                    words = chunk[name].astype("category")
+                    needed += sum(_WORD_BYTES + len(word) for word in words.cat.categories)
+                    cells = words.to_numpy(dtype=object)
                 parts[name].append(cells)
+                needed += CELL_BYTES * len(cells)
+            require_memory(self._path, needed)
         columns: dict[str, Cells] = {}
         for name in self.names:
             empty = np.empty(0, dtype=object if name in as_text else np.float64)
@@ -283,9 +299,9 @@ class CsvFile(LongTable):
         *,
         part: tuple[int, int] | None = None,
         columns: Collection[str] | None = None,
-        rows: int = _CHUNK_ROWS,
+        rows: int = 0,
     ) -> Iterator[Any]:
-        """Yields frames of the given number of rows, from the whole file or a part."""
+        """Yields frames of the given number of rows, by default few, from the whole file or a part."""
         raw = FileBytes(self._path, *(part or (self._dialect.start, self._size)))
         trailing = [_TRAILING_COLUMN] if self._dialect.trailing else []
         before = 0
@@ -305,7 +321,7 @@ class CsvFile(LongTable):
                     keep_default_na=False,
                     na_values={name: MISSING for name, dtype in dtypes.items() if dtype == "float64"},
                     **_EXACT_OPTIONS,
-                    chunksize=rows,
+                    chunksize=rows or max(1, _CHUNK_CELLS // len(self.names)),
                     engine="c",
                 ) as reader,
             ):

@@ -14,6 +14,7 @@ import json
 import os
 import secrets
 import stat
+import time
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -27,6 +28,19 @@ from ..errors import InputError, shortened
 from .table import Cells
 
 _BLOCK_BYTES = 1 << 20
+
+MEMORY_LIMIT = 4 << 30
+"""Largest memory for the content of a recording file [bytes]: 10^8 rows of 5 columns."""
+
+_TICK_S = 0.01
+"""Longest tick of the clock that dates changes of files [s]: Linux with 100 Hz."""
+
+CELL_BYTES = 8
+"""Memory of a cell with a number, or of the place of a word [bytes]."""
+
+
+class TooLargeError(InputError):
+    """The content of a file needs more memory than :data:`MEMORY_LIMIT`."""
 
 
 def sha256_of_file(path: Path) -> str:
@@ -54,6 +68,63 @@ def require_file(path: Path) -> None:
         raise InputError(f"{path} cannot be read: {error.strerror}") from None
     if not first:
         raise InputError(f"{path} is empty")
+
+
+def require_memory(path: Path | str, needed: float) -> None:
+    """Raises TooLargeError if the content of a file needs more memory than `MEMORY_LIMIT`.
+
+    Readers call it before they allocate memory.
+
+    Parameters
+    ----------
+    path : Path or str
+        Name of the file in the message.
+    needed : float
+        Memory for all cells of the file that are needed, or for those found so far [bytes].
+    """
+    if needed > MEMORY_LIMIT:
+        raise TooLargeError(
+            f"{path} needs at least {needed / 2**30:.3g} GiB of memory, and the limit is "
+            f"{MEMORY_LIMIT / 2**30:.3g} GiB; remove rows or columns. palpate identify reads longer CSV and "
+            "Parquet files part by part"
+        )
+
+
+@contextmanager
+def unchanged(*paths: Path) -> Iterator[None]:
+    """Ensures that all reads of files within the context, also for the fingerprint, read the same bytes.
+
+    Raises
+    ------
+    InputError
+        A file was changed, replaced or removed in the meantime.
+    """
+    before = [_state_of(path) for path in paths]
+    # Two changes within one tick get the same time, so the tick of the last change must be over.
+    ages_s = [time.time() - 1e-9 * state[-1] for state in before if state is not None]
+    if any(abs(age) < _TICK_S for age in ages_s):
+        time.sleep(_TICK_S)
+
+    def refuse_changed() -> None:
+        for path, state in zip(paths, before, strict=True):
+            if _state_of(path) != state:
+                raise InputError(f"{path} was changed while it was read; read it when nothing writes to it")
+
+    try:
+        yield
+    except Exception:
+        refuse_changed()  # a changed file is the reason for any other message about its content
+        raise
+    refuse_changed()
+
+
+def _state_of(path: Path) -> tuple[int, ...] | None:
+    """Returns identity, size and times of change of a file; None if it cannot be found."""
+    try:
+        state = path.stat()
+    except OSError:
+        return None
+    return state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from .._typing import Float1D, Int8Vector
 from ..arguments import path_of, shown
 from ..errors import InputError
 from .conversion import Conversion, Source, converted
-from .files import require_file, sha256_of_file
+from .files import require_file, sha256_of_file, unchanged
 from .formats import open_table
 from .recording import Recording
 from .rows import LeftOut
@@ -106,22 +106,23 @@ def read_recording(
     if invalid not in ("refuse", "drop"):
         raise InputError(f"invalid is {invalid!r}; it must be 'refuse' or 'drop'")
     require_file(file)
-    fields = converted(
-        open_table(file),
-        str(file),
-        file=file,
-        position=position,
-        force=force,
-        time=time,
-        direction=direction,
-        inputs=inputs,
-        units=units,
-        torque_constant=torque_constant,
-        negate=negate,
-        rows=rows,
-        zero=zero,
-        drop=invalid == "drop",
-    )
+    with unchanged(file):
+        fields = converted(
+            open_table(file),
+            str(file),
+            file=file,
+            position=position,
+            force=force,
+            time=time,
+            direction=direction,
+            inputs=inputs,
+            units=units,
+            torque_constant=torque_constant,
+            negate=negate,
+            rows=rows,
+            zero=zero,
+            drop=invalid == "drop",
+        )
     recording = Recording(**fields)
     if not force_late_s:
         return recording
@@ -237,6 +238,8 @@ class LongRecording:
     path: Path
     conversion: Conversion
     """Conversion of the columns position, force and direction to SI values"""
+    has_time: bool
+    """True if the file has a column of time, which is not read"""
     parts: tuple[tuple[int, int], ...]
     """Start and end of each part of the file: bytes of a CSV file, row groups of a Parquet file"""
     rows: int
@@ -332,11 +335,13 @@ def open_long_recording(
     if conversion.direction == "segment" and direction is None and "segment" not in table.text_names:
         conversion = replace(conversion, direction=None)  # segment numbers are not directions
     notes = conversion.note(dialect=table.notes), *conversion.choice.notes
+    has_time = conversion.choice.time is not None
     conversion = replace(conversion, choice=replace(conversion.choice, time=None, inputs=()))
     rows, parts = _require_long_table(table, file).parts(part_rows)
     return LongRecording(
         path=file,
         conversion=conversion,
+        has_time=has_time,
         parts=tuple(parts),
         rows=rows,
         source=Source(files=(str(file),), sha256=sha256_of_file(file), rows=0, columns=conversion.names),

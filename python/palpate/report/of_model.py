@@ -16,7 +16,6 @@ from .._typing import Float1D
 from ..identification.options import CHOICES
 from ..model import Model
 from ..plotting.look import scale_for
-from ..recording.files import sha256_of_file
 from .charts import CLASS_MARKS, Chart, Panel
 from .of_comparison import LINE_MARKS, curves_of
 from .page import Section
@@ -140,8 +139,8 @@ def provenance(subject: Subject) -> Section:
     if subject.file is not None:
         facts["model file"] = [
             str(subject.file),
-            f"SHA-256 {sha256_of_file(subject.file)}",
-            f"written by {model.created_by}, {date_text(subject.file.stat().st_mtime)}",
+            f"SHA-256 {subject.sha256}",
+            f"written by {model.created_by}, {date_text(subject.written_at_s)}",
         ]
     facts["identified on"] = [
         *_files(data.files, data.sha256),

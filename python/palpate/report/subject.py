@@ -20,6 +20,7 @@ from ..planning import DeviceProfile, ForceError, Plan, force_error, hand_for, j
 from ..planning.plan import NO_CERTIFICATE
 from ..planning.search import plan as make_plan
 from ..recording import Recording
+from ..recording.files import require_file, sha256_of_file, unchanged
 from ..verdict import Verdict, no
 from ..verification import Uncertainty, Verification, uncertainty, verify
 from ..verification.verification import is_fresh
@@ -51,6 +52,10 @@ class Subject:
     """Compared recording: the held-out rows if it is the recording of the identification"""
     identified_on: tuple[Recording, ...] = ()
     """Rows from which the model was identified, as far as their recordings were given"""
+    sha256: str = ""
+    """SHA-256 of the model file"""
+    written_at_s: float = 0.0
+    """Time at which the model file was written [s since 1970]"""
 
     @classmethod
     def of(cls, model: Model | str | os.PathLike[str]) -> Subject:
@@ -63,7 +68,11 @@ class Subject:
         """
         if isinstance(model, Model):
             return cls(model, plan=_plan_of(model))
-        return _of_file(path_of("model", model))
+        file = path_of("model", model)
+        require_file(file)
+        with unchanged(file):
+            subject = _of_file(file)
+            return replace(subject, sha256=sha256_of_file(file), written_at_s=file.stat().st_mtime)
 
     def planned_on(self, device: DeviceProfile) -> Subject:
         """Returns the subject with the plan of its model on a device. The plan in a model file is not used.
@@ -73,8 +82,7 @@ class Subject:
         InputError
             The model cannot be planned on this device.
         """
-        file = self.file
-        model = self.model if file is None else load_model(file, with_plan=False)
+        model = Model.from_dict({**self.model.to_dict(), "plan": None, "certificate": None})
         return replace(self, plan=make_plan(model, device), refusal="")
 
     def compared_with(self, recording: Recording | None, identified_on: Sequence[Recording] = ()) -> Subject:

@@ -14,50 +14,16 @@
 #include <libusb-1.0/libusb.h>
 #endif
 
-#include "palpate/device/packet_stream.hpp"
+#include "packet.hpp"
 #include "palpate/device/wire.hpp"
 #include "support.hpp"
 
 namespace palpate {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
-
-/// An IN packet of the USB protocol, written byte by byte as the protocol page of the documentation defines the
-/// packet.
-struct Packet {
-    std::uint16_t sequence = 0;
-    std::uint32_t clock_us = 0;
-    std::int32_t count = 0;
-    std::int32_t velocity_cps = 0;
-    std::int32_t torque_uNm = 0;
-    std::uint16_t status = wire::enabled;
-    std::uint16_t out_sequence = 0;
-    std::uint16_t out_age_us = 0;
-    std::int32_t sensor_uNm = 0;
-
-    [[nodiscard]] Bytes bytes() const {
-        Bytes all{'H', 1};
-        const auto put = [&](auto value) {
-            for (std::size_t k = 0; k < sizeof value; ++k) {
-                all.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(value) >> (8 * k)));
-            }
-        };
-        put(sequence), put(clock_us), put(count), put(velocity_cps), put(torque_uNm), put(status);
-        put(out_sequence), put(out_age_us), put(std::uint16_t{253}), put(sensor_uNm);
-        return all;
-    }
-};
-
-wire::Info knob(std::uint32_t capabilities = 3) {
-    return {0x0100, 65536, 5'000'000, 1000, 20, capabilities, 7};
-}
-
-PacketStream stream_of(const wire::Info& info = knob()) {
-    return PacketStream{info, std::numeric_limits<Nanoseconds>::max()};
-}
-
-constexpr Nanoseconds ms = 1'000'000;
+using test::Bytes;
+using test::knob;
+using test::Packet;
 
 TEST(Wire, InPacketsAreReadFieldByField) {
     const Packet sent{0xFEDC, 0x89AB'CDEF, -2, 0x0102'0304, -70'000, 0x0041, 0x1234, 999, 5};
@@ -215,154 +181,6 @@ TEST(Unwrapped, FollowsACounterThroughWrapsLossAndRepetition) {
         truth += step;
         EXPECT_EQ(counter.follow(static_cast<std::uint16_t>(truth)), step);
         EXPECT_EQ(counter.value(), truth);
-    }
-}
-
-TEST(PacketStream, MakesReadingsInSiWithTheSignsOfThisLibrary) {
-    PacketStream stream = stream_of();
-    ASSERT_TRUE(stream.take(Packet{10, 5'000'000, 16384, -32768, -300'000, 1, 0, 0, -250'000}.bytes(), 0));
-    const Reading& reading = stream.reading();
-    EXPECT_NEAR(reading.position, 0.5 * std::numbers::pi, 1e-15);
-    EXPECT_NEAR(reading.velocity, -std::numbers::pi, 1e-15);
-    EXPECT_NEAR(reading.applied, 0.3, 1e-15);
-    EXPECT_NEAR(reading.measured, 0.25, 1e-15);
-    EXPECT_NEAR(reading.device_time, 5.0, 1e-12);
-    EXPECT_EQ(reading.sequence, 10U);
-    EXPECT_EQ(reading.status, Status::Ok);
-}
-
-TEST(PacketStream, HasNoMeasuredForceWithoutATransducerAndComputesAMissingVelocity) {
-    PacketStream stream = stream_of(knob(0));
-    ASSERT_TRUE(stream.take(Packet{1, 1000, 100, 77, 0, 1, 0, 0, 9}.bytes(), 0));
-    EXPECT_TRUE(std::isnan(stream.reading().measured));
-    EXPECT_EQ(stream.reading().velocity, 0.0);
-    ASSERT_TRUE(stream.take(Packet{3, 3000, 110, 77, 0, 1, 0, 0, 9}.bytes(), 0));  // one was lost
-    EXPECT_NEAR(stream.reading().velocity, wire::position_of(10, 65536) / 2e-3, 1e-9);
-}
-
-TEST(PacketStream, ClockAndSequenceContinueWhenTheirCountersWrap) {
-    PacketStream stream = stream_of();
-    std::uint16_t sequence = 65'530;
-    std::uint32_t clock = 4'294'960'000U;
-    double last = -1.0;
-    for (int k = 0; k < 20; ++k) {
-        ASSERT_TRUE(stream.take(Packet{sequence++, clock, 0, 0, 0, 1, 0, 0, 0}.bytes(), 0));
-        clock += 1000;
-        if (k > 0) {
-            EXPECT_NEAR(stream.reading().device_time - last, 1e-3, 1e-9);
-        }
-        last = stream.reading().device_time;
-        EXPECT_EQ(stream.reading().sequence, 65'530U + static_cast<std::uint64_t>(k));
-    }
-    EXPECT_EQ(stream.health().lost, 0U);
-}
-
-TEST(PacketStream, CountsLostRepeatedAndMalformedPackets) {
-    PacketStream stream = stream_of();
-    for (const std::uint16_t sequence : {1, 2, 5, 5, 4, 6, 10}) {
-        EXPECT_TRUE(stream.take(Packet{sequence, 0, 0, 0, 0, 1, 0, 0, 0}.bytes(), 0));
-    }
-    Bytes wrong = Packet{}.bytes();
-    wrong.pop_back();
-    EXPECT_FALSE(stream.take(wrong, 0));
-    EXPECT_EQ(stream.health().packets, 7U);
-    EXPECT_EQ(stream.health().repeated, 2U);
-    EXPECT_EQ(stream.health().malformed, 1U);
-    // Two packets are lost between the numbers 2 and 5, one between the repeated packet 4 and 6, and three between 6
-    // and 10.
-    EXPECT_EQ(stream.health().lost, 2U + 1U + 3U);
-}
-
-TEST(PacketStream, MeasuresRoundTripAndDelayFromTheEcho) {
-    PacketStream stream = stream_of();
-    // The device still echoes a packet of an earlier session, whose sequence number is close to the overflow of the
-    // 16-bit counter.
-    ASSERT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, 1, 65'535, 100, 0}.bytes(), 0));
-    for (int k = 0; k < 100; ++k) {
-        const wire::OutPacket command = stream.next_command(0.1, 10, k * ms);
-        EXPECT_EQ(command.sequence, static_cast<std::uint16_t>(k));
-        stream.sent(command, k * ms);
-        // The device accepts the command 300 us before it latches the encoder of the next sample; the sample arrives
-        // 1.25 ms after the command was sent.
-        ASSERT_TRUE(
-            stream.take(Packet{static_cast<std::uint16_t>(k + 1), static_cast<std::uint32_t>(k + 1) * 1000, 0,
-                               0, 0, 1, command.sequence, 300, 0}
-                            .bytes(),
-                        k * ms + 1'250'000));
-    }
-    EXPECT_EQ(stream.health().round_trip.count(), 100U);
-    EXPECT_NEAR(stream.health().round_trip.quantile(0.5), 1.25e6, 5e3);
-    EXPECT_NEAR(stream.health().delay.quantile(1.0), 0.7e6, 3e3);
-    EXPECT_EQ(stream.health().late_echoes, 0U);
-}
-
-TEST(PacketStream, EchoOfAnEarlierSessionIsCountedAndNotMeasured) {
-    PacketStream stream = stream_of();
-    ASSERT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, 1, 7, 0, 0}.bytes(), 0));
-    for (int k = 0; k < 3; ++k) {
-        stream.sent(stream.next_command(0.0, 10, 0), 0);
-    }
-    for (const std::uint16_t echo : {10, 9, 20'000, 10}) {
-        ASSERT_TRUE(stream.take(Packet{1, 0, 0, 0, 0, 1, echo, 0, 0}.bytes(), 0));
-    }
-    EXPECT_EQ(stream.health().late_echoes, 2U);
-    EXPECT_EQ(stream.health().round_trip.count(), 1U);
-}
-
-TEST(PacketStream, CommandTooLateForItsCertificateIsATimeout) {
-    PacketStream stream{knob(), ms + ms / 4};
-    for (const std::uint32_t clock : {0U, 1000U, 2000U, 4000U}) {
-        const std::uint16_t echo =
-            clock == 0 ? 0 : static_cast<std::uint16_t>(clock == 4000 ? 3 : clock / 1000);
-        ASSERT_TRUE(stream.take(Packet{0, clock, 0, 0, 0, 1, echo, 0, 0}.bytes(), 0));
-        EXPECT_EQ(stream.reading().status, clock == 4000 ? Status::Timeout : Status::Ok) << clock;
-        stream.sent(stream.next_command(0.0, 10, 0), 0);
-    }
-    EXPECT_EQ(stream.health().late_commands, 1U);
-}
-
-TEST(PacketStream, StatusIsThatOfTheMostSeriousBit) {
-    const auto status = [](std::uint16_t bits) {
-        PacketStream stream = stream_of();
-        EXPECT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, wire::enabled, 0, 0, 0}.bytes(), 0));
-        stream.sent(stream.next_command(0.0, 10, 0), 0);
-        EXPECT_TRUE(stream.take(Packet{1, 0, 0, 0, 0, bits, 1, 0, 0}.bytes(), 0));
-        return stream.reading().status;
-    };
-    EXPECT_EQ(status(1), Status::Ok);
-    EXPECT_EQ(status(1 | 4), Status::Limited);
-    EXPECT_EQ(status(1 | 2 | 4), Status::Timeout);
-    EXPECT_EQ(status(1 | 8), Status::Lost);
-    EXPECT_EQ(status(1 | 16), Status::Fault);
-    EXPECT_EQ(status(1 | 32), Status::Fault);
-    EXPECT_EQ(status(1 | 64), Status::Fault);
-    // The previous packet had the enabled bit of the status, this packet has not
-    EXPECT_EQ(status(0), Status::Fault);
-}
-
-TEST(PacketStream, IgnoresAWatchdogTripOfAnEarlierSession) {
-    PacketStream stream = stream_of();
-    ASSERT_TRUE(stream.take(Packet{0, 0, 0, 0, 0, 3, 500, 0, 0}.bytes(), 0));
-    EXPECT_EQ(stream.reading().status, Status::Ok);
-    stream.sent(stream.next_command(0.0, 10, 0), 0);
-    ASSERT_TRUE(stream.take(Packet{1, 0, 0, 0, 0, 1, 501, 0, 0}.bytes(), 0));
-    ASSERT_TRUE(stream.take(Packet{2, 0, 0, 0, 0, 3, 501, 0, 0}.bytes(), 0));
-    EXPECT_EQ(stream.reading().status, Status::Timeout);
-    EXPECT_EQ(stream.health().watchdog_trips, 1U);
-}
-
-TEST(PacketStream, AcceptsAnyBytesAndReportsOnlyValidReadings) {
-    test::Random random{4};
-    PacketStream stream = stream_of();
-    for (int k = 0; k < test::cases(20'000); ++k) {
-        Bytes bytes = Packet{}.bytes();
-        for (std::size_t at = 2; at < bytes.size(); ++at) {
-            bytes[at] = static_cast<std::uint8_t>(random());
-        }
-        EXPECT_TRUE(stream.take(bytes, static_cast<Nanoseconds>(random() % 1'000'000'000)));
-        stream.sent(stream.next_command(0.0, 10, 0), 0);
-        EXPECT_TRUE(std::isfinite(stream.reading().position));
-        EXPECT_TRUE(std::isfinite(stream.reading().velocity));
     }
 }
 

@@ -110,11 +110,11 @@ TEST(GuardSettings, BecomeLimitsOfOneTick) {
 int frozen_after(const GuardSettings& settings, double period_s, double speed) {
     ReadingGuard guard = reading_guard(settings, period_s);
     std::uint64_t sequence = 0;
-    EXPECT_EQ(guard.check(0.0, sequence, Status::Ok), Status::Ok);
+    EXPECT_EQ(guard.check({.sequence = sequence}), Status::Ok);
     const double position = speed * period_s;
-    EXPECT_EQ(guard.check(position, ++sequence, Status::Ok), Status::Ok);
+    EXPECT_EQ(guard.check({.position = position, .sequence = ++sequence}), Status::Ok);
     for (int k = 1; k < 200; ++k) {
-        if (guard.check(position, ++sequence, Status::Ok) == Status::Frozen) {
+        if (guard.check({.position = position, .sequence = ++sequence}) == Status::Frozen) {
             return k;
         }
     }
@@ -128,8 +128,9 @@ TEST(GuardSettings, ReadingsAreCheckedAtTheirSpeeds) {
     settings.frozen_s = 4.0;
     for (const double speed : {8.0, 8.25}) {
         ReadingGuard guard = reading_guard(settings, 0.25);
-        (void)guard.check(0.0, 1, Status::Ok);
-        EXPECT_EQ(guard.check(0.25 * speed, 2, Status::Ok), speed > 8.0 ? Status::Jump : Status::Ok);
+        (void)guard.check({.sequence = 1});
+        EXPECT_EQ(guard.check({.position = 0.25 * speed, .sequence = 2}),
+                  speed > 8.0 ? Status::Jump : Status::Ok);
     }
     EXPECT_EQ(frozen_after(settings, 0.25, 2.0), 16);
     EXPECT_EQ(frozen_after(settings, 0.25, 1.875), 0) << "slower than the frozen speed";
@@ -238,8 +239,8 @@ TEST(Guards, ArePlacedInTheirRunWithTheSettings) {
         EXPECT_EQ(guards.slew.largest_step, 50.0);
         EXPECT_EQ(guards.ramp.ticks, 4U);
         ReadingGuard reading = guards.reading;
-        (void)reading.check(0.0, 1, Status::Ok);
-        EXPECT_EQ(reading.check(2.25, 2, Status::Ok), Status::Jump);
+        (void)reading.check({.sequence = 1});
+        EXPECT_EQ(reading.check({.position = 2.25, .sequence = 2}), Status::Jump);
     }
 }
 

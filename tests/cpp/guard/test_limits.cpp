@@ -108,12 +108,12 @@ struct Samples {
     /// Returns the status of a sample whose sequence number is larger by `more`.
     Status next(double position, std::uint64_t more = 1, Status reported = Status::Ok) {
         sequence += more;
-        return guard.check(position, sequence, reported);
+        return guard.check({.position = position, .sequence = sequence, .status = reported});
     }
     /// Exchanges that end without a sample.
     void miss(int exchanges) {
         for (int k = 0; k < exchanges; ++k) {
-            EXPECT_EQ(guard.check(nan, 0, Status::Timeout), Status::Timeout);
+            EXPECT_EQ(guard.check({.position = nan, .status = Status::Timeout}), Status::Timeout);
         }
     }
 };
@@ -131,10 +131,32 @@ TEST(ReadingGuard, CountsLostSamples) {
     EXPECT_EQ(samples.next(0.0, 1, Status::Limited), Status::Limited) << "the status of the device";
 }
 
+TEST(ReadingGuard, AForceThatIsLaterThanAllowedIsStale) {
+    for (const double allowed : {0.0, 2e-3}) {
+        ReadingGuard guard{{.longest_delay = allowed}};
+        std::uint64_t sequence = 0;
+        const auto check = [&](double delay, Status reported = Status::Ok) {
+            return guard.check({.sequence = ++sequence, .status = reported, .delay = delay});
+        };
+        EXPECT_EQ(guard.longest_delay(), allowed);
+        EXPECT_EQ(check(nan), Status::Ok) << "this device does not measure the delay";
+        EXPECT_TRUE(std::isnan(guard.largest_delay()));
+        EXPECT_EQ(check(allowed), Status::Ok);
+        EXPECT_EQ(check(1e-6 * std::round(1e6 * allowed)), Status::Ok) << "rounding of another unit";
+        EXPECT_EQ(check(allowed + 1e-6), Status::Stale);
+        EXPECT_EQ(check(0.5 * allowed), Status::Ok) << "the loop ends after a stale force, not the guard";
+        EXPECT_EQ(check(1.0, Status::Timeout), Status::Timeout) << "the status of the device";
+        EXPECT_EQ(check(infinity), Status::Stale);
+        EXPECT_EQ(guard.largest_delay(), infinity);
+    }
+    ReadingGuard unlimited;
+    EXPECT_EQ(unlimited.check({.sequence = 1, .delay = 1e9}), Status::Ok);
+}
+
 TEST(ReadingGuard, BeginsWithTheNumberZero) {
     ReadingGuard guard;
-    EXPECT_EQ(guard.check(0.0, 0, Status::Ok), Status::Ok);
-    EXPECT_EQ(guard.check(0.0, 0, Status::Ok), Status::Lost);
+    EXPECT_EQ(guard.check({}), Status::Ok);
+    EXPECT_EQ(guard.check({}), Status::Lost);
     EXPECT_EQ(guard.repeated(), 1U);
 }
 
@@ -143,7 +165,7 @@ TEST(ReadingGuard, CountsRepeatedAndEarlierSamples) {
     (void)samples.next(0.0);
     EXPECT_EQ(samples.next(0.0, 0), Status::Lost);
     EXPECT_EQ(samples.guard.repeated(), 1U);
-    EXPECT_EQ(samples.guard.check(0.0, samples.sequence - 1, Status::Ok), Status::Lost);
+    EXPECT_EQ(samples.guard.check({.sequence = samples.sequence - 1}), Status::Lost);
     EXPECT_EQ(samples.guard.repeated(), 2U);
     EXPECT_EQ(samples.next(0.0, 3), Status::Ok) << "the third exchange since the last new sample";
     EXPECT_EQ(samples.next(0.0, 2), Status::Lost) << "nothing is late any more";

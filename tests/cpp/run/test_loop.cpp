@@ -108,7 +108,7 @@ TEST(ExitReason, IsOrderlyAfterTheDurationOrARequest) {
 
 TEST(RecordOf, ContainsEveryValueOfATick) {
     Tick tick;
-    tick.reading = {1.0, 2.0, 3.0, 4.0, 5.0, 6, Status::Ok};
+    tick.reading = {1.0, 2.0, 3.0, 4.0, 5.0, 6, Status::Ok, 11.0};
     tick.rendered = {7.0, 8.0, 9, Status::Ok, true};
     tick.command.force = 10.0;
     tick.status = Status::Limited;
@@ -120,6 +120,7 @@ TEST(RecordOf, ContainsEveryValueOfATick) {
     EXPECT_EQ(record.applied, 3.0);
     EXPECT_EQ(record.measured, 4.0);
     EXPECT_EQ(record.device_time, 5.0);
+    EXPECT_EQ(record.delay, 11.0);
     EXPECT_EQ(record.sequence, 6U);
     EXPECT_EQ(record.environment_position, 8.0);
     EXPECT_EQ(record.evaluations, 9);
@@ -133,16 +134,17 @@ TEST(MustStop, AfterAFinalStatusOrMoreBadTicksThanTolerated) {
     for (std::size_t k = 0; k < status_texts.size(); ++k) {
         const auto status = static_cast<Status>(k);
         const std::string word = text(status).word;
-        const bool at_once = word == "Fault" || word == "Jump" || word == "Frozen";
+        const bool at_once = word == "Fault" || word == "Jump" || word == "Frozen" || word == "Stale";
         const bool of_device = word == "Fault" || word == "Timeout" || word == "Lost";
         for (const std::uint64_t tolerated : {0U, 3U}) {
             for (std::uint64_t bad = 0; bad < 6; ++bad) {
                 ExitReason reason = ExitReason::TimeUp;
                 const bool stops = detail::must_stop(status, bad, tolerated, reason);
                 EXPECT_EQ(stops, at_once || bad > tolerated) << word << ", " << bad;
-                EXPECT_EQ(reason, !stops      ? ExitReason::TimeUp
-                                  : of_device ? ExitReason::DeviceFault
-                                              : ExitReason::Guard)
+                EXPECT_EQ(reason, !stops            ? ExitReason::TimeUp
+                                  : word == "Stale" ? ExitReason::NotCertified
+                                  : of_device       ? ExitReason::DeviceFault
+                                                    : ExitReason::Guard)
                     << word;
             }
         }
@@ -170,7 +172,11 @@ struct ListedDevice {
         }
         return reading;
     }
-    void close() noexcept { ++closed; }
+    ZeroForce close() noexcept {
+        ++closed;
+        return at_close;
+    }
+    ZeroForce at_close = ZeroForce::Confirmed;
 };
 
 /// A clock that wakes up at prescribed times. The loop must end before the times do.
@@ -250,6 +256,37 @@ TEST(RunLoop, RunsTheRoundedNumberOfTicksAndAtLeastOne) {
         EXPECT_EQ(run.records.size(), ticks) << duration_s;
         EXPECT_EQ(run.report->exit_reason, ExitReason::TimeUp);
         EXPECT_EQ(run.report->status, Status::Ok);
+    }
+}
+
+// The command of a sample acts late: the force that is computed from this sample must not be sent.
+TEST(RunLoop, EndsAtTheFirstForceThatIsLaterThanAllowed) {
+    LoopRun run;
+    run.guards.reading = ReadingGuard{{.longest_delay = 2e-3}};
+    run.clock = regular(10);
+    for (const double delay : {1e-3, 2e-3, 3e-3, 1e-3}) {
+        run.device.readings.push_back({.position = 1.0, .delay = delay});
+    }
+    run.go(ExitReason::Guard);
+    EXPECT_EQ(run.report->exit_reason, ExitReason::NotCertified);
+    EXPECT_EQ(run.report->status, Status::Stale);
+    EXPECT_EQ(run.report->largest_delay, 3e-3);
+    EXPECT_EQ(run.report->longest_delay, 2e-3);
+    ASSERT_EQ(run.records.size(), 4U);
+    EXPECT_EQ(run.records[2].force, 2.0);
+    EXPECT_EQ(run.records[3].force, 0.0);
+    EXPECT_EQ(run.records[3].delay, 3e-3);
+}
+
+TEST(RunLoop, ReportsWhatTheDeviceConfirmedAtTheEnd) {
+    for (const ZeroForce zero_force :
+         {ZeroForce::Commanded, ZeroForce::NotSent, ZeroForce::Sent, ZeroForce::Confirmed}) {
+        LoopRun run;
+        run.settings.duration_s = 0.001;
+        run.clock = regular(1);
+        run.device.at_close = zero_force;
+        run.go(ExitReason::Guard);
+        EXPECT_EQ(run.report->zero_force, zero_force);
     }
 }
 

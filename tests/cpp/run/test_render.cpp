@@ -387,6 +387,7 @@ TEST(ApplyCertificate, SetsTheLimitsOfTheProofs) {
         EXPECT_EQ(guards.force_limit, 5.0);
         EXPECT_EQ(guards.device_damping, 0.06);
         EXPECT_EQ(guards.device_friction, 0.01);
+        EXPECT_EQ(guards.longest_delay_s, certificate.device.delay_s);
         EXPECT_EQ(loop.tolerated, 0U);
         EXPECT_EQ(loop.lowest_rate_share, share == 1.0 ? 1.0 : 0.99);
         EXPECT_EQ(loop.longest_period_s, certificate.longest_period_s);

@@ -486,7 +486,7 @@ TEST(ControllerOf, PassesAllCallsToItsController) {
     EXPECT_TRUE(any.paced_by_device());
     EXPECT_EQ(&any.reading_guard(), &controller.reading_guard());
     EXPECT_EQ(&any.guards(), &controller.guards());
-    any.stop();
+    EXPECT_EQ(any.stop(), ZeroForce::Commanded);
     EXPECT_TRUE(device.is_closed);
 }
 

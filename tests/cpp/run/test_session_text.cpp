@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -51,6 +52,28 @@ TEST(TimingText, StatesRatePeriodsAndDelays) {
                   "; late by p50 0 us, p99 0 us, p99.9 0 us, max 2 us; missed deadlines 3; longest gap 5 us");
 }
 
+TEST(ClosingText, StatesWhatIsKnownAboutTheForce) {
+    EXPECT_EQ(closing_text(ZeroForce::Commanded), "zero force commanded, device closed");
+    EXPECT_EQ(closing_text(ZeroForce::NotSent),
+              "zero force could not be sent: switch the motor off if it still pushes");
+    EXPECT_EQ(closing_text(ZeroForce::Sent),
+              "zero force sent, but not confirmed by the device: switch the motor off if it still pushes");
+    EXPECT_EQ(closing_text(ZeroForce::Confirmed), "zero force sent and confirmed, device closed");
+}
+
+TEST(DelayText, StatesTheLargestAndTheAllowedDelay) {
+    LoopReport report;
+    EXPECT_EQ(delay_text(report), "not measured by this device");
+    report.longest_delay = 2e-3;
+    EXPECT_EQ(delay_text(report), "not measured by this device; the certificate holds for 2 ms");
+    report.largest_delay = 1.5e-3;
+    EXPECT_EQ(
+        delay_text(report),
+        "at most 1.5 ms from a sample until the device applied its force; the certificate holds for 2 ms");
+    report.longest_delay = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(delay_text(report), "at most 1.5 ms from a sample until the device applied its force");
+}
+
 TEST(ExitText, StatesEveryReason) {
     const auto report = thousand_periods();
     LoopSettings settings;
@@ -72,6 +95,12 @@ TEST(ExitText, StatesEveryReason) {
               "stopped by a fault of the device: Timeout, the device did not answer in time");
     EXPECT_EQ(exit(ExitReason::RateTooLow),
               "stopped because the rate was too low: less than 1500 Hz of 2000 Hz for half a second");
+    report->loop.largest_delay = 3e-3;
+    report->loop.longest_delay = 2e-3;
+    EXPECT_EQ(
+        exit(ExitReason::NotCertified, Status::Stale),
+        "stopped because the device applied a force 3 ms after its sample, or not at all: the certificate "
+        "holds for at most 2 ms; plan with a larger delay_s of the device");
     EXPECT_EQ(exit(ExitReason::NotCertified),
               "stopped because a tick started 0.005 ms after the previous tick: the certificate holds for at "
               "most 2.5 ms");
@@ -148,7 +177,8 @@ TEST_F(RecordTest, EndsWithReasonTimingAndItsName) {
     EXPECT_TRUE(finish_record(recording, *report, settings, name).empty());
     EXPECT_EQ(name, file("a.csv"));
     const std::string written = text("a.csv");
-    EXPECT_TRUE(has(written, "# ended: the duration ended; zero force sent, device closed  ")) << written;
+    EXPECT_TRUE(has(written, "# ended: the duration ended; zero force commanded, device closed  "))
+        << written;
     EXPECT_TRUE(has(written, "# timing: " + timing_text(report->loop, 1000.0) + "; lost records 4"));
     EXPECT_FALSE(has(written, "incomplete"));
 }

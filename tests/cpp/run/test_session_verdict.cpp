@@ -60,6 +60,17 @@ TEST(SessionVerdict, IsGoodWithoutFindings) {
     EXPECT_EQ(Judged{}.text(), "good");
 }
 
+TEST(SessionVerdict, RefusesASessionWhoseDeviceDidNotConfirmZeroForce) {
+    Judged judged;
+    judged.report->loop.zero_force = ZeroForce::Confirmed;
+    EXPECT_EQ(judged.text(), "good");
+    judged.report->loop.zero_force = ZeroForce::Sent;
+    expect(judged, "no: the duration ended; zero force sent, but not confirmed by the device",
+           "switch the motor off");
+    judged.report->loop.zero_force = ZeroForce::NotSent;
+    expect(judged, "no: the duration ended; zero force could not be sent", "switch the motor off");
+}
+
 TEST(SessionVerdict, ReportsMissedDeadlinesAboveOneInAThousand) {
     Judged one;
     one.tick(1'001'000'000, 1);

@@ -31,6 +31,8 @@ Summary summary() {
     loop.exit_reason = ExitReason::StopRequested;
     loop.lost_samples = 11;
     loop.repeated_samples = 12;
+    loop.largest_delay = 0.0015;
+    loop.longest_delay = 0.002;
     loop.limit_cycles = 13;
     loop.given_in_ramp = 0.25;
     loop.given = 0.5;
@@ -68,7 +70,13 @@ T get(const NamedValues& values, const std::string& name) {
 TEST(Summary, IsOrderlyAfterARequestAndStatesItsEnd) {
     Summary one = summary();
     EXPECT_TRUE(one.orderly());
-    EXPECT_EQ(one.ended(), "stopped on request");
+    EXPECT_EQ(one.ended(), "stopped on request; zero force commanded, device closed");
+    for (const ZeroForce zero_force :
+         {ZeroForce::Commanded, ZeroForce::NotSent, ZeroForce::Sent, ZeroForce::Confirmed}) {
+        one.report.loop.zero_force = zero_force;
+        EXPECT_EQ(one.orderly(), zero_force == ZeroForce::Commanded || zero_force == ZeroForce::Confirmed);
+        EXPECT_EQ(one.ended(), "stopped on request; " + closing_text(zero_force));
+    }
     one.report.loop.exit_reason = ExitReason::DeviceFault;
     EXPECT_FALSE(one.orderly());
 }
@@ -116,7 +124,9 @@ TEST(Summary, NamesEveryValueForPrograms) {
     EXPECT_EQ(get<std::string>(findings[1], "level"), "usable");
     EXPECT_EQ(get<std::string>(findings[1], "sentence"), "second");
     EXPECT_TRUE(get<bool>(values, "orderly"));
-    EXPECT_EQ(get<std::string>(values, "ended"), "stopped on request");
+    EXPECT_EQ(get<std::string>(values, "ended"), one.ended());
+    EXPECT_EQ(get<double>(values, "largest_delay_s"), 0.0015);
+    EXPECT_EQ(get<double>(values, "longest_delay_s"), 0.002);
     EXPECT_EQ(get<std::string>(values, "status"), "Timeout");
     EXPECT_EQ(get<std::string>(values, "device"), "knob");
     EXPECT_EQ(get<double>(values, "rate_hz"), 1000.0);
@@ -169,12 +179,13 @@ TEST(Summary, IsATableForTheTerminal) {
     Summary one = summary();
     one.device_report.lines = {{"wire", "5 packets"}};
     EXPECT_EQ(lines(one),
-              (Lines{{"ended", "stopped on request"},
+              (Lines{{"ended", one.ended()},
                      {"rate", "1000 Hz of 1000 Hz, 2 deadlines of the loop missed"},
                      {"period", "p50 1000 us, p99 1000 us, p99.9 1000 us, max 1000 us (the longest gap)"},
                      {"late by", percentiles(one.report.loop.timing.lateness)},
                      {"ticks", "90 Ok, 3 Timeout, 8 Ramp"},
                      {"samples", "11 lost, 12 repeated"},
+                     {"delay", delay_text(one.report.loop)},
                      {"energy", energy_text(one.report.loop)},
                      {"wire", "5 packets"},
                      {"recorded", "a.csv: 14 rows, 15 lost"},
@@ -192,8 +203,8 @@ TEST(Summary, HasNoLinesAboutUnusedFunctions) {
     Summary one = summary();
     one.record.clear();
     one.telemetry_sent = one.telemetry_dropped = 0;
-    EXPECT_EQ(titles(one),
-              (std::vector<std::string>{"ended", "rate", "period", "late by", "ticks", "samples", "energy"}));
+    EXPECT_EQ(titles(one), (std::vector<std::string>{"ended", "rate", "period", "late by", "ticks", "samples",
+                                                     "delay", "energy"}));
     one.telemetry_dropped = 1;
     EXPECT_EQ(lines(one).back().second, "0 lines sent, 1 dropped");
     one.telemetry_dropped = 0;

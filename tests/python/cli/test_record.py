@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import pytest
 
 import palpate
 from conftest import ROOT
-from control_program import ANY_RATE, PROGRAM, every_row, needs_program
+from control_program import PROGRAM, every_row, needs_program
 from palpate import InputError, Model, identify, load_model, read_recording
 from palpate.cli.live import LiveLine
 from palpate.cli.main import main
@@ -23,14 +24,13 @@ from usb_emulation import emulated, frames, needs_emulation
 
 OBJECT = ROOT / "tests" / "models" / "good" / "position.json"
 STIFFNESS = 3.0
-SPRING = ["--lock-step", "--spring", str(STIFFNESS)]
+SPRING = ["--spring", str(STIFFNESS)]
 COUNTS_PER_TURN = 65536
-MOST_PACKETS_IN_FLIGHT = 5  # largest number of sent USB packets that are not yet received
 
 
-def run_record(out: Path, *arguments: Any, device: list[str]) -> subprocess.CompletedProcess[str]:
+def run_record(out: Path, *arguments: Any, device: Sequence[Any] = ()) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "palpate", "record", out, "--device", "usb", "--duration-s", 3]
-    return emulated(*command, "--wait-ms", 2000, *arguments, device=device)
+    return emulated(*command, *arguments, device=device)
 
 
 def test_a_simulated_device_without_object_names_the_option(
@@ -53,7 +53,7 @@ def stiffness(model: Model) -> float:
 @needs_emulation
 def test_the_rendering_of_a_device_is_recorded(tmp_path: Path) -> None:
     out = tmp_path / "rendered.csv"
-    device = ["--lock-step", "--model", "10", "--no-transducer"]
+    device = ["--model", "10", "--no-transducer"]
     completed = run_record(out, "--device-renders", "--json", device=device)
     assert completed.returncode == 0, completed.stderr
     assert json.loads(completed.stdout)["device_model"] == "0123456789abcdef"
@@ -69,7 +69,7 @@ def test_the_rendering_of_a_device_is_recorded(tmp_path: Path) -> None:
 
 @needs_emulation
 def test_a_device_without_a_model_is_not_recorded_as_renderer(tmp_path: Path) -> None:
-    completed = run_record(tmp_path / "out.csv", "--device-renders", device=["--lock-step"])
+    completed = run_record(tmp_path / "out.csv", "--device-renders")
     assert completed.returncode == 2
     assert "does not report a model to render" in completed.stderr
     assert not (tmp_path / "out.csv").exists()
@@ -78,7 +78,7 @@ def test_a_device_without_a_model_is_not_recorded_as_renderer(tmp_path: Path) ->
     completed = run_record(
         tmp_path / "out.csv",
         *("--device-renders", "--probe", "--upper", 0.4),
-        device=["--lock-step", "--model", "10"],
+        device=["--model", "10"],
     )
     assert completed.returncode == 2
     assert "leave out probe and push" in completed.stderr
@@ -103,21 +103,9 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
     assert stiffness(model) == pytest.approx(STIFFNESS, rel=0.002)
     model.save(model_file)
 
-    device = [
-        PROGRAM,
-        model_file,
-        "--device",
-        "usb",
-        "--structure",
-        "direct",
-        "--uncertified",
-        *ANY_RATE,
-        "--wait-ms",
-        2000,
-    ]
-    completed = emulated(
-        *device, "--duration-s", 3, "--record", rendered_file, device=["--lock-step", "--trace", str(trace)]
-    )
+    command = [PROGRAM, model_file, "--device", "usb", "--structure", "direct", "--uncertified"]
+    command = [*command, "--duration-s", 3, "--record", rendered_file]
+    completed = emulated(*command, device=["--trace", str(trace)])
     assert completed.returncode == 0, completed.stderr
     # After the start ramp the device receives a torque towards smaller positions, proportional to position.
     sent_frames = frames(trace)
@@ -131,7 +119,7 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
 @needs_emulation
 def test_a_probe_measures_the_stiffness_of_a_spring_without_a_hand(tmp_path: Path) -> None:
     out, trace = tmp_path / "a.csv", tmp_path / "t.csv"
-    probe = ["--probe", "--upper", 0.3, "--force-limit", 1.2, "--speed", 0.3, "--lowest-rate-share", 0]
+    probe = ["--probe", "--upper", 0.3, "--force-limit", 1.2, "--speed", 0.3]
     device_without_hand = [*SPRING, "--no-hand", "--no-transducer", "--trace", str(trace)]
     completed = run_record(out, *probe, device=device_without_hand)
     assert completed.returncode == 0, completed.stderr
@@ -152,8 +140,8 @@ def test_a_probe_measures_the_stiffness_of_a_spring_without_a_hand(tmp_path: Pat
 def test_a_probe_may_use_the_whole_force_of_a_weak_device(arguments: list[Any], tmp_path: Path) -> None:
     """A torque limit of 50000 uNm allows the probe 0.05 N*m, although 1e-6 * 50000 is slightly less."""
     trace, out = tmp_path / "trace.csv", tmp_path / "a.csv"
-    probe = ["--probe", "--upper", 0.1, "--stiffness", 1, "--lowest-rate-share", 0, *arguments]
-    weak_device = ["--lock-step", "--no-hand", "--spring", 0.3, "--max-torque-uNm", 50000, "--trace", trace]
+    probe = ["--probe", "--upper", 0.1, "--stiffness", 1, *arguments]
+    weak_device = ["--no-hand", "--spring", 0.3, "--max-torque-uNm", 50000, "--trace", trace]
     completed = run_record(out, *probe, device=weak_device)
     assert completed.returncode == 0, completed.stderr
     assert 0.02 < max(abs(frame.torque) for frame in frames(trace)) <= 0.05
@@ -175,9 +163,7 @@ def test_an_impossible_recording_is_refused_before_the_device_moves(
     arguments: list[Any], device: list[str], reason: str, tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace.csv"
-    completed = run_record(
-        tmp_path / "a.csv", *arguments, device=["--lock-step", *device, "--trace", str(trace)]
-    )
+    completed = run_record(tmp_path / "a.csv", *arguments, device=[*device, "--trace", str(trace)])
     assert completed.returncode == 2, completed.stderr
     assert reason in completed.stderr
     assert not list(tmp_path.glob("a.csv*"))
@@ -188,24 +174,20 @@ def test_an_impossible_recording_is_refused_before_the_device_moves(
 def test_rows_recorded_before_an_unplug_are_kept(tmp_path: Path) -> None:
     out, trace = tmp_path / "a.csv", tmp_path / "t.csv"
     unplugged_device = [*SPRING, "--fault", "unplug@4000", "--trace", str(trace)]
-    for _ in range(3):
-        completed = run_record(out, "--force", "--json", "--duration-s", "inf", device=unplugged_device)
-        if "uevent_sender" not in completed.stderr:
-            break  # umockdev aborts if the program closes its socket while the removal is announced
+    completed = run_record(out, "--json", "--duration-s", "inf", device=unplugged_device)
     assert completed.returncode == 1
     assert "a fault of the device" in completed.stderr
     summary = json.loads(completed.stdout)
     rows = every_row(out)
     assert len(rows) == summary["recorded"] == summary["ticks"]
     assert summary["lost_records"] == 0
-    # The number of samples that are lost or come before row 1 depends on the machine; the test counts them.
+    assert summary["lost_samples"] == 0
     samples = rows["sequence"].drop_duplicates().to_numpy()
-    lost = np.diff(samples) - 1
-    assert (lost >= 0).all()
-    assert lost.sum() == summary["lost_samples"]
+    assert (np.diff(samples) == 1).all()
     last = frames(trace)[-1]
     assert last.unplugged
-    assert (last.sequence - samples[-1]) % 0x10000 <= MOST_PACKETS_IN_FLIGHT
+    # The device did not send the sample of its last frame.
+    assert (last.sequence - samples[-1]) % 0x10000 == 1
     assert list(rows["status"])[-1] == "Fault"
     assert len(read_recording(out)) > 100
 
@@ -247,7 +229,7 @@ def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path
 
 @needs_emulation
 def test_a_handle_without_motion_gives_the_verdict_no(tmp_path: Path) -> None:
-    completed = run_record(tmp_path / "a.csv", "--json", device=["--lock-step", "--no-hand"])
+    completed = run_record(tmp_path / "a.csv", "--json", device=["--no-hand"])
     assert completed.returncode == 1
     verdict = json.loads(completed.stdout)["verdict"]
     assert verdict.startswith("no: ")

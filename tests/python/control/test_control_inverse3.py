@@ -18,11 +18,12 @@ pytest.importorskip("websockets")
 from conftest import ROOT
 from control_program import ANY_RATE, control, needs_program
 from inverse3_service import Service, serving
-from palpate import read_recording
+from palpate import DeviceProfile, load_model, plan, read_recording
 
 pytestmark = needs_program
 
 STIFFNESS = 100.0
+UNCONFIRMED = "zero force sent, but not confirmed by the device"
 MODEL = ROOT / "tests" / "models" / "good" / "spring.json"
 
 
@@ -62,7 +63,7 @@ def test_a_spring_is_rendered_along_one_axis_against_the_displacement(spring: Pa
     with render_on_service(spring, *arguments) as (completed, service):
         assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
-    assert summary["inverse3"] == {"force_gate": 0.3, "damping": 0.5}
+    assert summary["inverse3"] == {"force_gate": 0.3, "damping": 0.5, "skipped_states": 0}
     assert "(the service's force gate 0.3, damping 0.5), uncertified, at 1000 Hz" in completed.stderr
     recording = read_recording(out)
     assert recording.units == {"position": "m", "force": "N"}
@@ -88,8 +89,8 @@ def test_only_the_first_message_names_the_program_and_it_sends_zero_force(spring
     assert service.forces[0] == {"x": 0.0, "y": 0.0, "z": 0.0}
     assert all(set(message) == {"inverse3"} for message in later_messages)
     assert (
-        ticks <= len(later_messages) <= ticks + 2
-    )  # the program sends one message each tick, and at the end up to two more with zero force
+        ticks <= len(later_messages) <= ticks + 3
+    )  # the program sends one message each tick, one before them, and at the end two more with zero force
 
 
 def test_a_negative_axis_reverses_the_force(spring: Path) -> None:
@@ -102,26 +103,88 @@ def test_a_negative_axis_reverses_the_force(spring: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("service", "reason"),
+    ("service", "reason", "zero_force"),
     [
-        (Service(unplug_after=300), "fault of the device"),
-        (Service(close_after=300), "fault of the device"),
-        (Service(garbage_after=300), "fault of the device"),
-        (Service(silent_after=300), "Timeout"),
-        (Service(force_key="values"), "fault of the device"),
+        (Service(unplug_after=300), "fault of the device", UNCONFIRMED),
+        (Service(close_after=300), "fault of the device", "zero force could not be sent"),
+        (Service(garbage_after=300), "fault of the device", "zero force sent and confirmed"),
+        (Service(garbage_after=300, garbage_messages=10**9), "fault of the device", UNCONFIRMED),
+        (Service(renamed_after=300), "fault of the device", UNCONFIRMED),
+        (Service(silent_after=300), "Timeout", UNCONFIRMED),
+        (Service(force_key="values"), "fault of the device", "zero force sent and confirmed"),
     ],
-    ids=["unplugged", "closed", "garbage", "silent", "force unheeded"],
+    ids=[
+        "unplugged",
+        "closed",
+        "garbage once",
+        "garbage",
+        "another device",
+        "silent",
+        "force unheeded",
+    ],
 )
-def test_a_fault_ends_the_run_with_a_record(
-    spring: Path, tmp_path: Path, service: Service, reason: str
+def test_a_fault_ends_the_run_with_a_record_and_the_truth_about_zero_force(
+    spring: Path, tmp_path: Path, service: Service, reason: str, zero_force: str
 ) -> None:
     out = tmp_path / "rendered.csv"
     with render_on_service(spring, "--duration-s", 2, "--record", out, service=service) as (completed, _):
         assert completed.returncode == 1, completed.stderr
     assert reason in completed.stderr
-    assert "zero force sent, device closed" in completed.stderr
-    assert out.exists()
+    assert f"; {zero_force}" in completed.stderr
+    assert zero_force in out.read_text(encoding="utf-8")
     assert service.closed
+    if service.close_after is None:
+        assert service.forces[-1].get("z", 0.0) == 0.0
+        assert min(force.get("z", 0.0) for force in service.forces) < -0.2 or service.force_key != "vector"
+        assert service.close_code == 1000
+
+
+@pytest.mark.parametrize("extra", [1, 5, 20])
+def test_states_without_a_command_are_skipped_and_do_not_delay_later_forces(
+    spring: Path, tmp_path: Path, extra: int
+) -> None:
+    out = tmp_path / "rendered.csv"
+    service = Service(extra_after=300, extra_states=extra)
+    arguments = ["--structure", "direct", "--duration-s", 1, "--ramp-s", 0, "--record", out, "--json"]
+    with render_on_service(spring, *arguments, service=service) as (completed, _):
+        assert completed.returncode == 0, completed.stderr
+    summary = json.loads(completed.stdout)
+    assert summary["inverse3"]["skipped_states"] == extra
+    assert summary["lost_samples"] == 0
+    # The object of each command is the newest state that the service had sent before the command.
+    positions = np.array(service.positions) - service.start
+    forces = -np.array([force["z"] for force in service.forces])
+    commands = np.arange(320, len(forces) - 3)  # without the last commands, of zero force
+    commands = commands[(abs(np.diff(positions))[commands - 1] > 1e-6) & (forces[commands] > 0.0)]
+    states = np.array([np.argmin(abs(STIFFNESS * positions[:k] - forces[k])) for k in commands])
+    assert len(commands) > 100
+    assert (commands - 1 - states).max() <= 1
+
+
+def certified(folder: Path, spring: Path, delay_s: float) -> Path:
+    """Plans the spring for the simulated service's device."""
+    device = DeviceProfile(
+        id="inverse3-049D",
+        position_unit="m",
+        encoder_step=1e-6,
+        force_limit=2.0,
+        inertia=0.2,
+        viscous_damping=10.0,
+        coulomb_friction=0.5,
+        delay_s=delay_s,
+    )
+    return plan(load_model(spring), device).stored().save(folder / "certified.json")
+
+
+def test_a_force_later_than_certified_ends_the_run_with_its_cause(spring: Path, tmp_path: Path) -> None:
+    # The service answers within the period, but the loop sends the force of a state one period after it.
+    model = certified(tmp_path, spring, delay_s=0.5e-3)
+    with serving(Service()) as service:
+        completed = control(model, "--device", f"inverse3:z@{service.port}", "--priority", 0)
+    assert completed.returncode == 1
+    assert "stopped because the device applied a force" in completed.stderr
+    assert "the certificate holds for at most 0.5 ms; plan with a larger delay_s" in completed.stderr
+    assert service.forces[-1]["z"] == 0.0
 
 
 @pytest.mark.parametrize(

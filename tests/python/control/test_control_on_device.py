@@ -50,13 +50,13 @@ def device_of(path: Path, **changes: str) -> list[str]:
     assert certificate is not None
     fingerprints = {"fingerprint": certificate["model"], "certificate": certificate["fingerprint"], **changes}
     options = [word for name, digits in fingerprints.items() for word in (f"--model-{name}", digits)]
-    return ["--lock-step", "--firmware", "c", "--model", str(UNM_PER_COUNT), *options]
+    return ["--firmware", "c", "--model", str(UNM_PER_COUNT), *options]
 
 
 def rendered(
     path: Path, *arguments: Any, device: list[str], program: str = "palpate-control"
 ) -> subprocess.CompletedProcess[str]:
-    options = ["--device", "usb", "--wait-ms", 10000, "--lowest-rate-share", 0, "--duration-s", 0.6]
+    options = ["--device", "usb", "--duration-s", 0.6]
     return emulated(*PROGRAMS[program], path, *options, *arguments, device=device)
 
 
@@ -153,13 +153,12 @@ def test_a_silent_host_ends_the_rendering_of_the_device(tmp_path: Path) -> None:
     for signal, enabled in (("KILL", True), ("TERM", False)):
         trace, out = tmp_path / f"{signal}-trace.csv", tmp_path / f"{signal}.csv"
         path = planned(tmp_path)
-        command = [PROGRAM, path, "--device", "usb", "--wait-ms", 10000, "--lowest-rate-share", 0]
-        command = [*command, "--duration-s", "inf", "--record", out]
+        command = [PROGRAM, path, "--device", "usb", "--duration-s", "inf", "--record", out]
         script = f"""
             {shlex.join(map(str, command))} > /dev/null 2> /dev/null &
             until [ "$(wc -l < '{out}.part' 2> /dev/null)" -gt 300 ] 2> /dev/null; do sleep 0.05; done
             kill -{signal} $!
-            sleep 1
+            wait $! || true
         """
         device = [*device_of(path), "--trace", str(trace)]
         completed = emulated("sh", "-c", script, device=device)
@@ -184,7 +183,7 @@ def test_an_exported_model_is_rendered_by_the_machine_code_of_a_cortex_m4(tmp_pa
     build = [f"OUT={tmp_path}", "MODEL=knob", f"HEADER={header}", "NAME=knob", "CPUS=m4"]
     build += [f"RATE_HZ={RATE_HZ}", f"PROFILE={numbers['profile']:#010x}"]
     subprocess.run(["make", "--silent", "-C", str(PORT), *build], check=True)
-    device = ["--lock-step", "--firmware", str(tmp_path / "knob-m4.elf")]
+    device = ["--firmware", str(tmp_path / "knob-m4.elf")]
     completed = rendered(path, "--record", out, device=device)
     assert completed.returncode == 0, completed.stderr
     recording = read_recording(out)

@@ -332,7 +332,7 @@ def test_a_model_without_a_certificate_is_refused() -> None:
 
 def run_check(*words: Any, device: list[str], seconds: float = 3.0) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "palpate", "check-device", "--device", "usb", "--duration-s", seconds]
-    return emulated(*command, "--wait-ms", 2000, "--json", *words, device=["--lock-step", *device])
+    return emulated(*command, "--json", *words, device=device)
 
 
 def findings_of_answer(answer: subprocess.CompletedProcess[str]) -> tuple[dict[str, Any], dict[str, Any]]:

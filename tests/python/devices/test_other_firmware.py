@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from conftest import ROOT
-from control_program import ANY_RATE, PROGRAM, needs_program
+from control_program import PROGRAM, needs_program
 from palpate import read_recording
 from usb_emulation import emulated, frames, needs_emulation
 
@@ -25,7 +25,7 @@ pytestmark = [needs_emulation, pytest.mark.parametrize("seed", range(1, 1 + 3 * 
 
 
 def firmware_of(seed: int, *words: Any) -> list[str]:
-    return ["--lock-step", "--seed", str(seed), *map(str, words)]
+    return ["--seed", str(seed), *map(str, words)]
 
 
 @needs_program
@@ -35,12 +35,12 @@ def test_the_device_is_zeroed_found_by_serial_number_and_rendered_on(seed: int, 
     model["continuation"] = {**model["continuation"], "below": "linear"}  # for any handle position
     both_ways = tmp_path / "spring.json"
     both_ways.write_text(json.dumps(model), encoding="utf-8")
-    control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified", *ANY_RATE, "--wait-ms", 10_000]))
+    control = shlex.join(map(str, [PROGRAM, both_ways, "--uncertified"]))
     name = [sys.executable, "-c", 'import json, sys; print(json.load(sys.stdin)["devices"][0]["serial"])']
     script = f"""
         {shlex.join(PALPATE)} devices --zero --json > '{listed}' &&
         serial=$({shlex.join(name)} < '{listed}') &&
-        {control} --device "usb:$serial" --priority 0 --json --duration-s 0.5 --record '{record}'
+        {control} --device "usb:$serial" --json --duration-s 0.5 --record '{record}'
     """
     answer = emulated("sh", "-c", script, device=firmware_of(seed, "--trace", trace))
     assert answer.returncode == 0, answer.stderr
@@ -58,9 +58,9 @@ def test_the_device_is_zeroed_found_by_serial_number_and_rendered_on(seed: int, 
 
 
 def test_the_sign_and_mechanics_of_the_device_are_measured(seed: int) -> None:
-    words = [*PALPATE, "check-device", "--device", "usb", "--duration-s", 2, "--wait-ms", 2000, "--json"]
+    words = [*PALPATE, "check-device", "--device", "usb", "--duration-s", 2, "--json"]
     answer = emulated(*words, "--push", "--yes", device=firmware_of(seed, "--no-hand"))
-    assert answer.returncode in (0, 1), answer.stderr  # exit code 1: the control loop was late
+    assert answer.returncode == 0, answer.stderr
     result = json.loads(answer.stdout)
     findings = {one["name"]: one for one in result["findings"]}
     # A coarse encoder cannot detect the small displacement that the push of check-device causes.

@@ -9,6 +9,7 @@ import os
 import stat
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ def reported() -> dict[str, Any]:
     return result
 
 
-def devices(*words: str, device: list[str]) -> subprocess.CompletedProcess[str]:
+def devices(*words: str, device: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
     return emulated(sys.executable, "-m", "palpate", "devices", *words, device=device)
 
 
@@ -119,7 +120,7 @@ def test_devices_prints_the_model_on_the_device() -> None:
         "rate_hz": 10000,
         "is_rendered": False,
     }
-    assert "model on the device" not in devices(device=[]).stdout
+    assert "model on the device" not in devices().stdout
 
 
 @pytest.mark.parametrize(
@@ -175,7 +176,7 @@ def test_an_error_of_libusb_becomes_device_reason_and_cure(code: int | None, sen
 
 
 def test_devices_sets_up_one_device() -> None:
-    answer = devices("--clear", "--zero", "--disable", "--watchdog-ms", "50", "--json", device=[])
+    answer = devices("--clear", "--zero", "--disable", "--watchdog-ms", "50", "--json")
     assert answer.returncode == 0, answer.stderr
     assert "emulated knob EMU-1" in answer.stderr
     assert "disabled, faults cleared, zeroed, watchdog set" in answer.stderr

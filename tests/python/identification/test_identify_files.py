@@ -21,7 +21,15 @@ import pytest
 import palpate
 from palpate.cli.main import main
 from palpate.errors import InputError
-from palpate.identification.identify_files import MOST_CELLS, Summary, merged, summarise
+from palpate.identification.identify_files import (
+    MOST_CELLS,
+    PartRead,
+    Summary,
+    merged,
+    read_part,
+    require_all_rows,
+    summarise,
+)
 from palpate.recording.reading import LongRecording, open_long_recording
 
 SCALE = float(os.environ.get("PALPATE_TEST_SCALE", "1"))
@@ -284,6 +292,50 @@ def test_command_shows_its_progress(
     assert "--hold-out-every needs all rows at once" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_files_above_the_limit_of_memory_are_read_in_parts_without_an_option(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, suffix: str
+) -> None:
+    file, frame = tmp_path / f"press.{suffix}", rows(5_000).drop(columns=["note"])
+    frame["time_s"] = np.arange(5_000) / 1000.0
+    frame.to_csv(file, index=False) if suffix == "csv" else frame.to_parquet(file, row_group_size=1_000)
+    monkeypatch.setattr("palpate.recording.files.MEMORY_LIMIT", 5_000 * 2 * 8)
+    command = ["identify", str(file), "-o", str(tmp_path / "m.json")]
+    assert main(command) == 0
+    printed = capsys.readouterr()
+    assert f"press.{suffix} needs at least " in printed.err
+    assert "palpate identify reads longer CSV and Parquet files part by part" in printed.err
+    assert "lag of the force were not searched: the files were read part by part" in printed.err
+    for name in ("damping", "mass", "curve over position and velocity", "memory"):
+        line = next(line for line in printed.out.splitlines() if line.startswith(name))
+        assert "not tested (the files were read part by part)" in line
+    assert palpate.load_model(tmp_path / "m.json").data.rows == 5_000
+    assert main([*command, "--hold-out-every", "5"]) == 2
+    assert "--hold-out-every needs all rows at once" in capsys.readouterr().err
+
+
+def test_files_that_exceed_the_limit_of_memory_together_are_read_in_parts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = [str(tmp_path / f"{name}.csv") for name in "ab"]
+    for file in files:
+        rows(2_000).drop(columns=["note"]).to_csv(file, index=False)
+    monkeypatch.setattr("palpate.recording.files.MEMORY_LIMIT", 3_000 * 3 * 8)
+    assert main(["identify", *files, "-o", str(tmp_path / "m.json")]) == 0
+    assert "b.csv, with the files before it, needs at least " in capsys.readouterr().err
+    assert palpate.load_model(tmp_path / "m.json").data.rows == 4_000
+
+
+def test_other_formats_above_the_limit_of_memory_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x = np.linspace(0.0, 1.0, 2_000)
+    np.savez(tmp_path / "press.npz", position_m=x, force_N=x)
+    monkeypatch.setattr("palpate.recording.files.MEMORY_LIMIT", 10_000)
+    assert main(["identify", str(tmp_path / "press.npz"), "-o", str(tmp_path / "m.json")]) == 2
+    assert "press.npz needs at least" in capsys.readouterr().err
+
+
 def test_an_interrupted_run_leaves_no_output(tmp_path: Path) -> None:
     rows(200_000).to_csv(tmp_path / "press.csv", index=False)
     command = [sys.executable, "-m", "palpate", "identify", "press.csv", "-o", "m.json", "--out-of-core"]
@@ -443,17 +495,16 @@ def test_a_row_with_too_many_cells_is_refused(tmp_path: Path, row: int) -> None:
         palpate.identify_files(file, part_rows=350)
 
 
-def test_a_file_that_loses_a_row_while_it_is_read_is_refused(tmp_path: Path) -> None:
+def test_a_worker_that_reads_another_file_of_the_same_name_is_noticed(tmp_path: Path) -> None:
     file = written(stroke_rows(1000), tmp_path / "press.csv")
-
-    def blank_the_last_row(done: int, total: int) -> None:
-        if done == 1:
-            text = file.read_text(encoding="utf-8").rstrip("\n")
-            kept, _, last = text.rpartition("\n")
-            file.write_text(f"{kept}\n{' ' * len(last)}\n", encoding="utf-8")
-
-    with pytest.raises(InputError, match=r"has 1000 rows, but 999 were used and 0 were not"):
-        palpate.identify_files(file, part_rows=300, progress=blank_the_last_row)
+    recording, found = open_long_recording(file, part_rows=300), PartRead()
+    kept, _, last = file.read_text(encoding="utf-8").rstrip("\n").rpartition("\n")
+    file.write_text(f"{kept}\n{' ' * len(last)}\n", encoding="utf-8")
+    for part in recording.parts:
+        read = read_part((recording, part))
+        found.add(read.summary, read.rows)
+    with pytest.raises(InputError, match=r"has 1000 rows, but 999 were used and 0 were not. The workers may"):
+        require_all_rows(recording, found)
 
 
 def test_rows_with_a_force_not_from_the_model_are_dropped_and_counted(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from conftest import ROOT
 from models_by_hand import model_by_hand
-from palpate import InputError, Model, load_model
+from palpate import InputError, Model, load_model, read_recording
 from palpate.recording.files import replacing
 
 MODEL = ROOT / "tests" / "models" / "good" / "position.json"
@@ -201,3 +201,26 @@ def test_a_link_of_another_user_in_a_shared_folder_is_not_followed(tmp_path: Pat
     os.lchown(link, 0, 0)
     write(link, "new")
     assert victim.read_text(encoding="utf-8") == "new"
+
+
+def test_a_csv_file_above_the_limit_of_memory_is_refused_before_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "long.csv"
+    file.write_text("position_m,force_N\n" + "1,2\n" * 1_000 + "3,not a number\n")
+    monkeypatch.setattr("palpate.recording.files.MEMORY_LIMIT", 16_000)
+    with pytest.raises(InputError, match=r"long.csv needs at least .* GiB of memory, and the limit is"):
+        read_recording(file)
+
+
+def test_words_count_as_memory_if_they_differ_in_each_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    same, different = tmp_path / "same.csv", tmp_path / "different.csv"
+    for file, words in ((same, ["wet"] * 1_000), (different, [f"word {k}" for k in range(1_000)])):
+        lines = [f"{k / 1000},{k / 500},{word}" for k, word in enumerate(words)]
+        file.write_text("\n".join(["position_m,force_N,note", *lines]) + "\n")
+    monkeypatch.setattr("palpate.recording.files.MEMORY_LIMIT", 32_000)
+    assert len(read_recording(same)) == 1_000
+    with pytest.raises(InputError, match=r"different.csv needs at least"):
+        read_recording(different)

@@ -212,7 +212,7 @@ def test_a_damaged_matlab_file_is_refused_with_the_byte(
         ),
         (
             "mcap",
-            "mcap.reader",
+            "mcap.records",
             "a.mcap is MCAP, which needs mcap: install it with pip install 'palpate[mcap]'",
         ),
     ],

@@ -28,6 +28,10 @@ struct Reading {
     double device_time = 0.0;
     std::uint64_t sequence = 0;  ///< number of this sample, counted by the device
     Status status = Status::Ok;
+    /// Largest time, since the sample before, by which the applied force was late: the time from a sample until the
+    /// device applied the force computed from it or from a newer sample. Without such a force it counts up to this
+    /// sample, so that a command that never acts becomes late. NaN if the device does not measure it [s]
+    double delay = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Result of opening a device: `reason` is empty if the device is open, otherwise one sentence with the likely
@@ -37,14 +41,33 @@ struct Opened {
     [[nodiscard]] explicit operator bool() const noexcept { return reason.empty(); }
 };
 
+/// Known state of the force after a device was closed.
+enum class ZeroForce : std::uint8_t {
+    Commanded,  ///< zero force was commanded; this device does not report whether the command arrived
+    NotSent,    ///< zero force could not be sent
+    Sent,       ///< zero force was sent; the device did not confirm it
+    Confirmed,  ///< the device confirmed zero force
+};
+
 /// A haptic device of one degree of freedom. `exchange` sends a force command and returns the next sample. It waits for
-/// the next sample if the device's clock sets the rate of the loop.
+/// the next sample if the device's clock sets the rate of the loop. `close` may return a `ZeroForce`.
 template <class D>
 concept Device = requires(D& device, const Command& command) {
     { device.open() } -> std::same_as<Opened>;
     { device.exchange(command) } noexcept -> std::same_as<Reading>;
     { device.close() } noexcept;
 };
+
+/// Closes a device and returns what is known about its force.
+template <Device D>
+[[nodiscard]] ZeroForce closed(D& device) noexcept {
+    if constexpr (std::same_as<decltype(device.close()), ZeroForce>) {
+        return device.close();
+    } else {
+        device.close();
+        return ZeroForce::Commanded;
+    }
+}
 
 /// True if the device's clock sets the rate of the control loop: `exchange` waits for the device's next sample. Such a
 /// device class has a member `paces_host`. With other devices the host's clock sets the rate.

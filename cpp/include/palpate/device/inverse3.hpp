@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -55,7 +56,14 @@ struct Inverse3Settings {
 /// force for more than 200 consecutive commands of a force, the exchange therefore returns the status Fault.
 ///
 /// Position 0 is the position of the handle on opening. The service does not send its time, so device_time is the
-/// host's time at the end of the exchange. An exchange parses JSON and therefore allocates memory.
+/// host's time at the end of the exchange. A state is at most as old as the command that it answers, and a command acts
+/// before its answer arrives: Reading::delay is the time from sending a command until the answer to the next one, which
+/// is computed from the first one's state. States that the service sends without a command are skipped, so that the
+/// reading is the newest state; a command may then have acted only when they were found, which the delay contains. An
+/// exchange parses JSON and therefore allocates memory.
+///
+/// After a message that differs from the documentation, each exchange returns Fault and sends zero force as long as the
+/// connection lives.
 class Inverse3Device {
   public:
     explicit Inverse3Device(Inverse3Settings settings = {}) : settings_{std::move(settings)} {}
@@ -82,26 +90,28 @@ class Inverse3Device {
     /// Sends the force command and waits for the device's state that answers the command. If an answer is late, the
     /// next exchange reads it together with the answer to its command.
     [[nodiscard]] Reading exchange(const Command& command) noexcept {
-        if (!link_ || link_->disconnected) {
-            last_.status = Status::Fault;
-            last_.applied = 0.0;
-            return last_;
+        last_.status = Status::Fault;
+        if (link_ && !link_->disconnected) {
+            try {
+                last_.status = exchanged(std::isfinite(command.force) ? command.force : 0.0);
+            } catch (const std::exception&) {
+                link_->is_wrong = true;
+            }
         }
-        try {
-            last_.status = exchanged(std::isfinite(command.force) ? command.force : 0.0);
-        } catch (const std::exception&) {
-            link_->disconnected = true;
-            last_.status = Status::Fault;
+        if (!link_ || link_->disconnected) {
+            last_.applied = 0.0;
         }
         return last_;
     }
 
-    /// Closes the connection to the service.
-    void close() noexcept {
+    /// Sends zero force until the service reports it, then closes the connection.
+    ZeroForce close() noexcept {
         if (!link_) {
-            return;
+            return ZeroForce::Confirmed;
         }
+        ZeroForce zero_force = ZeroForce::NotSent;
         try {
+            zero_force = end_force();
             if (!link_->disconnected) {
                 bool closed = false;
                 link_->stream.async_close(boost::beast::websocket::close_code::normal,
@@ -109,16 +119,20 @@ class Inverse3Device {
                 link_->run(std::chrono::milliseconds{200}, [&closed] { return closed; });
             }
         } catch (const std::exception&) {
-            // Zero force need not be sent: the service ends the force of a device that gets no commands
             link_->disconnected = true;
         }
         link_.reset();
+        return zero_force;
     }
 
+    /// Returns the number of states that the service sent without a command, and that were skipped.
+    [[nodiscard]] std::uint64_t skipped_states() const noexcept { return skipped_states_; }
     [[nodiscard]] const Inverse3Info& info() const noexcept { return info_; }
 
   private:
     using Error = boost::system::error_code;
+    using Clock = std::chrono::steady_clock;
+    using Time = Clock::time_point;
 
     /// A connection to the service and its unfinished operations. The address of a Link must not change, because
     /// handlers store the address.
@@ -133,23 +147,49 @@ class Inverse3Device {
         bool sending = false;
         bool reading = false;
         bool disconnected = false;
-        int unanswered = 0;   ///< sent messages that the service has not answered
-        Inverse3State state;  ///< state that the service sent last
+        bool is_wrong = false;       ///< true after a message that differs from the documentation
+        int unanswered = 0;          ///< sent messages that the service has not answered
+        std::uint64_t unasked = 0;   ///< messages of the service without a message that they answer
+        std::string newest_message;  ///< message that the service sent last
+        Time sent = Clock::now();    ///< time at which the last command was sent
+        /// Earliest time of the first state that the force of the device does not take into account, now and before the
+        /// last answer
+        Time late_from{}, late_from_before{};
+        Inverse3State state;  ///< state that was read last
         double origin = 0.0;  ///< handle position when the device was opened [m]
-        std::uint64_t sequence = 0;
         /// Number of consecutive exchanges in which the service reports zero force although a force was commanded
         int states_without_effect = 0;
-        std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+        Time start = Clock::now();
 
         /// Runs the handlers of network operations, until `done` returns true or the time `within` has passed. Returns
         /// the last result of `done`.
         template <class Done>
         bool run(std::chrono::milliseconds within, Done done) {
-            const auto until = std::chrono::steady_clock::now() + within;
+            const auto until = Clock::now() + within;
             context.restart();
             while (!done() && context.run_one_until(until) > 0) {
             }
             return done();
+        }
+
+        /// Receives messages whenever `run` is called, and keeps the newest.
+        void receive() {
+            if (reading || disconnected) {
+                return;
+            }
+            reading = true;
+            stream.async_read(buffer, [this](const Error& error, std::size_t /*size*/) {
+                reading = false;
+                disconnected = disconnected || error;
+                if (disconnected) {
+                    return;
+                }
+                newest_message = boost::beast::buffers_to_string(buffer.data());
+                buffer.clear();
+                unasked += unanswered > 0 ? 0 : 1;
+                unanswered = std::max(unanswered - 1, 0);
+                receive();
+            });
         }
     };
 
@@ -213,11 +253,15 @@ class Inverse3Device {
     void begin_session(const std::string& service) {
         write_message(0.0, R"({"session":{"configure":{"profile":{"name":"palpate"}}},)");
         Error error;
+        link_->sent = Clock::now();
         link_->stream.write(boost::asio::buffer(link_->message), error);
-        take_state(received(service, "does not answer a command"));
+        link_->newest_message = received(service, "does not answer a command");
+        link_->late_from = link_->late_from_before = link_->sent;
+        read_state();
         link_->origin = link_->state.position;
         last_ = {};
-        last_.sequence = link_->sequence;
+        skipped_states_ = 0;
+        link_->receive();
     }
 
     /// Writes a command with this force as the next message to the service.
@@ -226,32 +270,63 @@ class Inverse3Device {
                                -settings_.direction * force);
     }
 
-    /// Sends a force command and waits for the service's next message with the position. Returns the tick's status.
-    [[nodiscard]] Status exchanged(double force) {
+    /// Sends a force command, unless another one is being sent, and waits for the answer of the service. Returns false
+    /// without an answer.
+    bool is_answered(double force) {
         Link& link = *link_;
-        if (!link.sending) {  // no new command while another one is being sent
+        if (!link.sending) {
             write_message(force, "{");
             link.sending = true;
             ++link.unanswered;
+            link.sent = Clock::now();
             link.stream.async_write(boost::asio::buffer(link.message),
                                     [&link](const Error& error, std::size_t /*size*/) {
                                         link.sending = false;
                                         link.disconnected = link.disconnected || error;
                                     });
         }
-        read_next();
-        const bool answered = link.run(settings_.answer_timeout, [&link] {
+        const bool ended = link.run(settings_.answer_timeout, [&link] {
             return link.disconnected || (!link.sending && link.unanswered == 0);
         });
-        if (link.disconnected) {
+        return ended && !link.disconnected;
+    }
+
+    /// Reads the messages that arrived since the last exchange. Returns true if one of them answers no command.
+    bool skip_waiting_states() {
+        Link& link = *link_;
+        const std::uint64_t before = link.unasked;
+        link.context.restart();
+        for (const Time until = Clock::now() + settings_.answer_timeout;
+             link.context.poll_one() > 0 && Clock::now() < until;) {
+        }
+        skipped_states_ += link.unasked - before;
+        return link.unasked != before;
+    }
+
+    /// Sends a force command and waits for the service's next message with the position. Returns the tick's status.
+    [[nodiscard]] Status exchanged(double force) {
+        Link& link = *link_;
+        const bool has_skipped = skip_waiting_states();
+        const Time found = Clock::now();
+        const bool answered = is_answered(link.is_wrong ? 0.0 : force);
+        if (link.disconnected || link.is_wrong) {
             return Status::Fault;
+        }
+        read_state();
+        const auto seconds = [](Clock::duration time) { return std::chrono::duration<double>(time).count(); };
+        const Time now = Clock::now();
+        last_.delay = seconds(now - link.late_from);
+        if (has_skipped) {
+            last_.delay = std::max(last_.delay, seconds(found - link.late_from_before));
+        }
+        if (answered) {
+            link.late_from_before = std::exchange(link.late_from, link.sent);
         }
         last_.position = settings_.direction * (link.state.position - link.origin);
         last_.velocity = settings_.direction * link.state.velocity;
         last_.applied = -settings_.direction * link.state.force;
-        last_.device_time =
-            std::chrono::duration<double>(std::chrono::steady_clock::now() - link.start).count();
-        last_.sequence = link.sequence;
+        last_.device_time = seconds(now - link.start);
+        last_.sequence += answered ? 1 : 0;
         link.states_without_effect = std::abs(force) > least_visible_force && link.state.force == 0.0
                                          ? link.states_without_effect + 1
                                          : 0;
@@ -261,37 +336,40 @@ class Inverse3Device {
         return answered ? Status::Ok : Status::Timeout;
     }
 
-    /// Reads messages of the service until every sent message has been answered.
-    void read_next() {
+    /// Sends zero force until the service reports it, at most for the longest wait of an answer.
+    [[nodiscard]] ZeroForce end_force() {
         Link& link = *link_;
-        if (link.reading || link.disconnected || link.unanswered == 0) {
-            return;
-        }
-        link.reading = true;
-        link.stream.async_read(link.buffer, [this, &link](const Error& error, std::size_t /*size*/) {
-            link.reading = false;
-            link.disconnected = link.disconnected || error;
-            if (link.disconnected) {
-                return;
+        link.run(settings_.answer_timeout, [&link] { return link.disconnected || !link.sending; });
+        const Time until = Clock::now() + settings_.answer_timeout;
+        for (bool answered = !link.sending; answered && Clock::now() < until;) {
+            (void)skip_waiting_states();
+            answered = !link.disconnected && is_answered(0.0);
+            if (answered && reports_zero_force()) {
+                return ZeroForce::Confirmed;
             }
-            take_state(boost::beast::buffers_to_string(link.buffer.data()));
-            link.buffer.clear();
-            --link.unanswered;
-            read_next();
-        });
+        }
+        return link.disconnected || link.sending ? ZeroForce::NotSent : ZeroForce::Sent;
     }
 
-    /// Reads position, velocity and force from a message of the service. Throws if the message differs from the
-    /// service's documentation, or does not contain this device.
-    void take_state(const std::string& text) {
-        link_->state = read_inverse3_state(text, info_.id, settings_.axis);
-        ++link_->sequence;
+    /// Returns true if the newest message of the service is a state of this device without a force.
+    [[nodiscard]] bool reports_zero_force() {
+        try {
+            read_state();
+        } catch (const std::exception&) {
+            return false;
+        }
+        return std::abs(link_->state.force) < least_visible_force;
     }
+
+    /// Reads position, velocity and force from the newest message of the service. Throws if the message differs from
+    /// the service's documentation, or does not contain this device.
+    void read_state() { link_->state = read_inverse3_state(link_->newest_message, info_.id, settings_.axis); }
 
     Inverse3Settings settings_;
     Inverse3Info info_;
     std::unique_ptr<Link> link_;
     Reading last_;
+    std::uint64_t skipped_states_ = 0;
 };
 
 static_assert(Device<Inverse3Device>);

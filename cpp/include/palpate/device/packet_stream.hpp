@@ -25,7 +25,6 @@ struct StreamHealth {
     std::uint64_t watchdog_trips = 0;  ///< number of times the watchdog ended a torque
 
     std::uint64_t refused_commands = 0;  ///< packets in which the device reports an invalid command
-    std::uint64_t late_commands = 0;     ///< commands with a delay longer than allowed
     /// Times from sending a command to the packet that confirms it, by the host's clock [ns]
     DurationHistogram round_trip;
     /// Times from a sample until the device applies the force computed from it, by the device's clock [ns]
@@ -34,15 +33,18 @@ struct StreamHealth {
 
 /// Converts the packets of one device to readings. Counters no longer restart at 0, encoder counts become SI units, and
 /// status bits become a Status. Each packet contains the number of the last accepted command (its echo), which gives
-/// the delay of commands.
+/// the delay of the force.
 ///
-/// The delay is computed from the device's clock only. A command is computed from the sample of time t_k. A packet of
-/// time t_m states that the command was accepted `out_age` before t_m. The delay is then t_m - out_age - t_k.
+/// The delay is computed from the device's clock and sample numbers only. A command is computed from the last sample k
+/// that was read. Its force is late from the time t_{k+1} of the next sample on. A packet of time t_m states that the
+/// device accepted a newer command `out_age` before t_m; the old force was then late by t_m - out_age - t_{k+1}.
+/// Otherwise the force is late by t_m - t_{k+1} so far. `Reading::delay` is the largest of these times since the last
+/// packet. It thus contains commands that the device ignores, commands that the host skips, and lost samples. A clock of
+/// the device that stands still is found by the numbers of the samples: the delay is at least m - k - 1 periods.
 class PacketStream {
   public:
     PacketStream() = default;
-    explicit PacketStream(const wire::Info& info, Nanoseconds longest_delay) noexcept
-        : info_{info}, longest_delay_{longest_delay} {}
+    explicit PacketStream(const wire::Info& info) noexcept : info_{info} {}
 
     /// Reads a packet that arrived at the time `now` of the host's clock. Returns false if it is not a packet of this
     /// protocol.
@@ -53,26 +55,27 @@ class PacketStream {
             return false;
         }
         const bool first = !sequence_.started();
+        const SampleTime before = newest();
         const std::int64_t step = sequence_.follow(packet.sequence);
         clock_us_.follow(packet.clock_us);
         count_.follow(packet.count);
         ++health_.packets;
         health_.lost += follows_ ? static_cast<std::uint64_t>(std::max<std::int64_t>(step - 1, 0)) : 0;
         health_.repeated += !first && step <= 0 ? 1 : 0;
-        is_late_ = false;
-        if (!has_sent_) {
-            sent_ = echoed_ = packet.out_sequence;
-        } else {
-            follow_echo(packet, now);
-        }
         read(packet, first, step);
+        if (has_sent_) {
+            end_sample_of_last_command(before, step);
+            reading_.delay = follow_echo(packet, before, now);
+        } else {
+            sent_ = echoed_ = packet.out_sequence;
+        }
+        reading_.status = status_of(packet.status);
         status_bits_ = packet.status;
         follows_ = true;
         return true;
     }
 
-    /// Marks that packets were discarded. The step to the next packet then does not count lost samples, and the delay
-    /// of commands sent before the next packet is not measured.
+    /// Marks that packets were discarded. The step to the next packet then does not count lost samples.
     void pause() noexcept { follows_ = false; }
     /// Returns true if a packet was read after the last pause().
     [[nodiscard]] bool follows() const noexcept { return follows_; }
@@ -85,10 +88,14 @@ class PacketStream {
     }
     /// Stores a command that was sent, to compute its delay later.
     void sent(const wire::OutPacket& command, Nanoseconds now) noexcept {
-        has_sent_ = true;
+        const SampleTime sample = newest();
+        if (!std::exchange(has_sent_, true)) {
+            late_from_ = sample;  // the device made zero force until this sample
+        }
         sent_ = command.sequence;
         sent_commands_[sent_ % sent_commands_.size()] = {
-            sent_, now, follows_ ? clock_us_.value() : SentCommand{}.sample_us};
+            sent_, now, {sample.number + 1, sample.us + period_us()}};
+        awaits_next_sample_ = true;
     }
 
     [[nodiscard]] const Reading& reading() const noexcept { return reading_; }
@@ -97,40 +104,60 @@ class PacketStream {
     [[nodiscard]] std::uint16_t status_bits() const noexcept { return status_bits_; }
 
   private:
-    /// A command that was sent, with the time of the sample from which it was computed.
+    /// Number of a sample, and its time by the device's clock [us].
+    struct SampleTime {
+        std::int64_t number = 0;
+        std::int64_t us = 0;
+    };
+    /// A command that was sent, with the first sample that its force does not take into account.
     struct SentCommand {
         std::uint16_t sequence = 0;
         Nanoseconds sent = 0;
-        /// Time of the sample by the device's clock [us]; the smallest integer for a command without a sample.
-        std::int64_t sample_us = std::numeric_limits<std::int64_t>::min();
+        SampleTime late_from{};
     };
 
-    /// Finds the command that a packet confirms, and measures its delay. The numbers of commands start after the last
-    /// number confirmed before the first command, so that a confirmation of an earlier session's command is recognised.
-    void follow_echo(const wire::InPacket& packet, Nanoseconds now) noexcept {
+    [[nodiscard]] SampleTime newest() const noexcept { return {sequence_.value(), clock_us_.value()}; }
+    [[nodiscard]] std::int64_t period_us() const noexcept {
+        return std::int64_t{1'000'000} / std::max<std::int64_t>(info_.rate_hz, 1);
+    }
+
+    /// Stores the time of the sample after that of the last command, when the first packet after it is read. The
+    /// packet comes `step` samples after the one `before`; if samples between them were lost, the time is interpolated.
+    void end_sample_of_last_command(const SampleTime& before, std::int64_t step) noexcept {
+        if (step > 0 && std::exchange(awaits_next_sample_, false)) {
+            sent_commands_[sent_ % sent_commands_.size()].late_from.us =
+                before.us + (clock_us_.value() - before.us) / step;
+        }
+    }
+
+    /// Finds the command that a packet confirms, and returns the delay of the force since the packet `before` [s]. The
+    /// numbers of commands start after the last number confirmed before the first command, so that a confirmation of an
+    /// earlier session's command is recognised.
+    [[nodiscard]] double follow_echo(const wire::InPacket& packet, const SampleTime& before,
+                                     Nanoseconds now) noexcept {
+        const auto seconds = [](std::int64_t us) { return 1e-6 * static_cast<double>(us); };
+        const SampleTime sample = newest();
         const auto ahead = static_cast<std::int16_t>(packet.out_sequence - echoed_);
         const auto unsent = static_cast<std::int16_t>(packet.out_sequence - sent_);
-        if (ahead == 0) {
-            return;
-        }
-        if (ahead < 0 || unsent > 0) {
+        double delay = 0.0;
+        if (ahead > 0 && unsent <= 0) {
+            // The packet before did not confirm this command, so it was accepted later
+            const std::int64_t accepted_us =
+                std::min(std::max(sample.us - packet.out_age_us, before.us), sample.us);
+            delay = seconds(accepted_us - late_from_.us);
+            health_.delay.add(static_cast<Nanoseconds>(1e9 * delay));
+            echoed_ = packet.out_sequence;
+            is_acknowledged_ = true;
+            if (const SentCommand& command = sent_commands_[echoed_ % sent_commands_.size()];
+                command.sequence == echoed_) {
+                health_.round_trip.add(now - command.sent);
+                late_from_ = command.late_from;
+            }
+        } else if (ahead != 0) {
             ++health_.late_echoes;
-            return;
         }
-        echoed_ = packet.out_sequence;
-        is_acknowledged_ = true;
-        const SentCommand& command = sent_commands_[echoed_ % sent_commands_.size()];
-        if (command.sequence != echoed_) {
-            return;
-        }
-        health_.round_trip.add(now - command.sent);
-        if (command.sample_us != SentCommand{}.sample_us &&
-            packet.out_age_us < std::numeric_limits<std::uint16_t>::max()) {
-            const Nanoseconds delay = 1000 * (clock_us_.value() - packet.out_age_us - command.sample_us);
-            health_.delay.add(delay);
-            is_late_ = delay > longest_delay_;
-            health_.late_commands += is_late_ ? 1 : 0;
-        }
+        return std::max({delay, seconds(sample.us - late_from_.us),
+                         seconds((sample.number - late_from_.number) * period_us())});
     }
 
     /// Stores the position, velocity, force and time of a packet as the last reading, in SI units.
@@ -144,7 +171,6 @@ class PacketStream {
             now.measured = wire::force_of(packet.sensor_uNm);
         }
         now.sequence = static_cast<std::uint64_t>(sequence_.value());
-        now.status = status_of(packet.status);
         reading_ = now;
     }
 
@@ -173,7 +199,7 @@ class PacketStream {
         if ((bits & wire::fault_bits) != 0 || disabled) {
             return Status::Fault;
         }
-        if (tripped || is_late_) {
+        if (tripped) {
             return Status::Timeout;
         }
         if (refused) {
@@ -183,7 +209,6 @@ class PacketStream {
     }
 
     wire::Info info_;
-    Nanoseconds longest_delay_ = std::numeric_limits<Nanoseconds>::max();
     wire::Unwrapped<std::uint16_t> sequence_;
     wire::Unwrapped<std::uint32_t> clock_us_;
     wire::Unwrapped<std::int32_t> count_;
@@ -191,8 +216,8 @@ class PacketStream {
     std::uint16_t sent_ = 0;
     std::uint16_t echoed_ = 0;
     bool is_acknowledged_ = false;
-    /// True if the delay of the command confirmed by the last packet was longer than allowed
-    bool is_late_ = false;
+    SampleTime late_from_;             ///< first sample that the applied force does not take into account
+    bool awaits_next_sample_ = false;  ///< true if no packet was read after the last command was sent
     bool was_enabled_ = false;
     bool follows_ = false;  ///< true if a packet was read after the last pause()
     std::uint16_t status_bits_ = 0;

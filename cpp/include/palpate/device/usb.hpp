@@ -24,8 +24,7 @@ struct UsbOptions {
     std::string serial;                     ///< serial number of the device; empty: the only one connected
     std::chrono::microseconds wait{5'000};  ///< longest time that a tick waits for a packet
     std::uint16_t time_to_live_ms = 10;  ///< the device ends its torque if no command arrives for this time
-    double longest_delay_s = std::numeric_limits<double>::infinity();  ///< allowed delay [s]
-    bool makes_force = true;  ///< false: the motor is never enabled; the device only sends samples
+    bool makes_force = true;             ///< false: the motor is never enabled; the device only sends samples
     /// True: the device renders its own model. The commands only keep it active; their force has no effect.
     bool device_renders = false;
     /// With `device_renders`: fingerprints and rate of the model that the device must contain; unset: any model
@@ -55,13 +54,13 @@ struct UsbHealth {
 /// uses its own locks; the wait uses a futex.
 ///
 /// Reading::status:
-/// - Timeout: no packet arrived, the device's watchdog ended the torque, or a command took longer than
-///   `UsbOptions::longest_delay_s`.
+/// - Timeout: no packet arrived, or the device's watchdog ended the torque.
 /// - Fault: the device reported a fault, was disabled or was unplugged. The control loop ends after this status.
 /// - Lost: a command could not be sent, did not arrive, or was not understood by the device.
 /// - Limited: the device limited the torque of a command.
 ///
-/// Reading::sequence, the number of the sample, shows lost and repeated samples.
+/// Reading::sequence, the number of the sample, shows lost and repeated samples; Reading::delay late and ignored
+/// commands.
 class UsbDevice {
   public:
     static constexpr bool paces_host = true;
@@ -69,12 +68,12 @@ class UsbDevice {
     explicit UsbDevice(UsbOptions options = {}) : options_{std::move(options)} {}
     UsbDevice(UsbDevice&&) noexcept = default;
     UsbDevice& operator=(UsbDevice&&) = delete;
-    ~UsbDevice() { close(); }
+    ~UsbDevice() { (void)close(); }
 
     /// Finds the device and starts its packets. Enables the device's torque if `UsbOptions::makes_force` is set. The
     /// torque is zero until the first exchange.
     Opened open() {
-        close();
+        (void)close();
         open_ = std::make_unique<OpenDevice>();
         std::string reason = open_->connection.open(options_.serial).reason;
         if (reason.empty()) {
@@ -85,7 +84,7 @@ class UsbDevice {
         }
         if (!reason.empty()) {
             const UsbName tried = name();
-            close();
+            (void)close();
             last_name_ = tried;
         }
         return {reason};
@@ -117,14 +116,14 @@ class UsbDevice {
     }
 
     /// Sends zero torque, disables the device, ends all USB transfers and releases the device, in this order. Steps to
-    /// which the device does not respond are skipped.
-    void close() noexcept {
+    /// which the device does not respond are skipped. The device confirms zero force by accepting the request that
+    /// disables it.
+    ZeroForce close() noexcept {
         if (open_ == nullptr) {
-            return;
+            return ZeroForce::Confirmed;
         }
-        if (open_->transfers != nullptr && !open_->transfers->has_failed()) {
-            send_zero_and_disable();
-        }
+        const ZeroForce zero_force =
+            open_->transfers == nullptr ? ZeroForce::NotSent : send_zero_and_disable();
         last_name_ = name();
         last_info_ = info();
         last_health_ = health();
@@ -132,6 +131,7 @@ class UsbDevice {
             open_->transfers->stop();
         }
         open_.reset();
+        return zero_force;
     }
 
     // name(), info() and health() describe the open USB device, or after closing the USB device that was open last.
@@ -210,7 +210,7 @@ class UsbDevice {
     /// with the reason and the cure.
     [[nodiscard]] std::string start() {
         detail::UsbConnection& connection = open_->connection;
-        open_->stream = PacketStream{connection.info(), longest_delay()};
+        open_->stream = PacketStream{connection.info()};
         open_->frame = nanoseconds_a_second / connection.info().rate_hz;
         if (const int code = connection.request(wire::Request::Enable, 0); code != 0) {
             return "cannot be disabled: " + detail::usb_reason(code);
@@ -270,12 +270,6 @@ class UsbDevice {
                    ? "refuses to render its model: the rate or the encoder differs from the certified one"
                : code != 0 ? "cannot render its model: " + detail::usb_reason(code)
                            : "";
-    }
-
-    [[nodiscard]] Nanoseconds longest_delay() const noexcept {
-        return std::isfinite(options_.longest_delay_s)
-                   ? static_cast<Nanoseconds>(1e9 * options_.longest_delay_s)
-                   : std::numeric_limits<Nanoseconds>::max();
     }
 
     /// Returns the fault that the status bits report as text, for example "an emergency stop".
@@ -369,13 +363,17 @@ class UsbDevice {
         open_->skipped_commands += code == LIBUSB_ERROR_BUSY ? 1 : 0;
     }
 
-    /// Sends zero force and disables the device.
-    void send_zero_and_disable() noexcept {
-        (void)open_->transfers->wait_for_write(monotonic_now() + write_timeout);
+    /// Sends zero force and disables the device. If both fail, the device's watchdog ends the torque.
+    [[nodiscard]] ZeroForce send_zero_and_disable() noexcept {
+        detail::UsbTransfers& transfers = *open_->transfers;
+        (void)transfers.wait_for_write(monotonic_now() + write_timeout);
+        const std::uint64_t lost = transfers.lost_writes();
         send(0.0);
-        (void)open_->transfers->wait_for_write(monotonic_now() + write_timeout);
-        (void)open_->transfers->request(wire::Request::Enable,
-                                        0);  // if this request fails, the device's watchdog ends the torque
+        (void)transfers.wait_for_write(monotonic_now() + write_timeout);
+        const bool was_sent = open_->sent_last && transfers.lost_writes() == lost;
+        return transfers.request(wire::Request::Enable, 0) == 0 ? ZeroForce::Confirmed
+               : was_sent                                       ? ZeroForce::Sent
+                                                                : ZeroForce::NotSent;
     }
 
     /// Sets the status of a reading to Lost if the last command was not sent or did not arrive, because the device then

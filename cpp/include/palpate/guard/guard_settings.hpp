@@ -36,6 +36,8 @@ struct GuardSettings {
     /// all damping and friction of the device, and includes the energy that the virtual object stores outside the
     /// domain.
     bool certified = false;
+    /// Largest delay of the applied force, `Reading::delay`; a longer delay ends the run [s]
+    double longest_delay_s = std::numeric_limits<double>::infinity();
 };
 
 /// Returns the default guard settings for a device. Speeds and the force of a limit cycle are scaled by the length and
@@ -83,6 +85,7 @@ inline void validate(const GuardSettings& settings) {
     require_rule("device_damping", settings.device_damping, Rule::NotNegative);
     require_rule("device_friction", settings.device_friction, Rule::NotNegative);
     require_rule("encoder_step", settings.encoder_step, Rule::NotNegative);
+    require_field(settings.longest_delay_s >= 0.0, "longest_delay_s", settings.longest_delay_s, ">= 0");
 }
 
 /// Smallest number of consecutive ticks with equal position after which an encoder can count as frozen.
@@ -109,7 +112,8 @@ inline constexpr std::uint64_t fewest_frozen_samples = 5;
 [[nodiscard]] inline ReadingGuard reading_guard(const GuardSettings& settings, double period_s) noexcept {
     const auto samples = static_cast<std::uint64_t>(std::llround(settings.frozen_s / period_s));
     return ReadingGuard{{settings.largest_speed * period_s, settings.frozen_speed * period_s,
-                         settings.frozen_s > 0.0 ? std::max(samples, fewest_frozen_samples) : 0}};
+                         settings.frozen_s > 0.0 ? std::max(samples, fewest_frozen_samples) : 0,
+                         settings.longest_delay_s}};
 }
 
 }  // namespace palpate

@@ -25,8 +25,10 @@ struct TickRecord {
     double velocity = 0.0;              ///< velocity of the handle [m/s or rad/s]
     double device_time = 0.0;           ///< time of the sample by the device's clock [s]
     double lateness = 0.0;              ///< actual minus planned time of the control loop's wake-up [s]
-    std::uint64_t sequence = 0;         ///< number of the sample, counted by the device
-    std::int32_t evaluations = 0;       ///< number of evaluations of the model's force in this tick
+    /// Time from a sample until the device applied its force [s], `Reading::delay`; NaN if it is not measured.
+    double delay = std::numeric_limits<double>::quiet_NaN();
+    std::uint64_t sequence = 0;    ///< number of the sample, counted by the device
+    std::int32_t evaluations = 0;  ///< number of evaluations of the model's force in this tick
     Status status = Status::Ok;
     bool extrapolated = false;  ///< true if the model was evaluated outside its domain
 };
@@ -80,7 +82,7 @@ inline void append_nanoseconds(std::string& text, double seconds) {
     const std::string force = suffix_of(units.force);
     return "time_s,position" + position + ",force" + force + ",applied" + force + ",environment_position" +
            position + ",velocity" + position + (position.empty() ? "" : "ps") +
-           ",sequence,device_clock_s,lateness_s,evaluations,extrapolated,status";
+           ",sequence,device_clock_s,lateness_s,delay_s,evaluations,extrapolated,status";
 }
 
 /// Appends the record of a tick as one row of a CSV file.
@@ -95,6 +97,10 @@ inline void append_row(std::string& text, const TickRecord& tick) {
     detail::append_number(text, tick.device_time);
     text += ',';
     detail::append_nanoseconds(text, tick.lateness);
+    text += ',';
+    if (!std::isnan(tick.delay)) {
+        detail::append_nanoseconds(text, tick.delay);
+    }
     text += ',' + std::to_string(tick.evaluations) + (tick.extrapolated ? ",1," : ",0,");
     text += palpate::text(tick.status).word;
     text += '\n';

@@ -41,8 +41,7 @@ class Controller {
     /// Computes the force for the last reading, sends the force and takes the next reading. The first valid reading sets
     /// the virtual object at rest at the position of the handle.
     [[nodiscard]] Tick tick() noexcept PALPATE_NONBLOCKING {
-        const Status reading_status =
-            guards_.reading.check(reading_.position, reading_.sequence, reading_.status);
+        const Status reading_status = guards_.reading.check(reading_);
         Tick tick{reading_, {}, {}, reading_status};
         if (sends_force(reading_status)) {
             if (!std::exchange(is_placed_, true)) {
@@ -59,10 +58,10 @@ class Controller {
         return tick;
     }
 
-    /// Sends zero force and closes the device.
-    void stop() noexcept {
+    /// Sends zero force and closes the device. Returns what is known about its force.
+    ZeroForce stop() noexcept {
         (void)device_.exchange({});
-        device_.close();
+        return closed(device_);
     }
 
     /// Returns true if the device's clock sets the rate of the control loop.

@@ -30,7 +30,7 @@ class LiveDevice {
 
     [[nodiscard]] virtual Opened open() = 0;
     [[nodiscard]] virtual Reading exchange(const Command& command) noexcept = 0;
-    virtual void close() noexcept = 0;
+    virtual ZeroForce close() noexcept = 0;
     /// Returns true if the device's clock sets the rate of the control loop: `exchange` waits for the next sample.
     [[nodiscard]] virtual bool sets_pace() const noexcept = 0;
     /// Returns the counters of the device since it was opened, for the summary.
@@ -55,13 +55,13 @@ class LiveDeviceOf final : public LiveDevice {
         : device_{std::move(device)}, report_{std::move(report)} {}
     LiveDeviceOf(const LiveDeviceOf&) = delete;
     LiveDeviceOf& operator=(const LiveDeviceOf&) = delete;
-    ~LiveDeviceOf() override { device_.close(); }
+    ~LiveDeviceOf() override { (void)closed(device_); }
 
     [[nodiscard]] Opened open() override { return device_.open(); }
     [[nodiscard]] Reading exchange(const Command& command) noexcept override {
         return device_.exchange(command);
     }
-    void close() noexcept override { device_.close(); }
+    ZeroForce close() noexcept override { return closed(device_); }
     [[nodiscard]] bool sets_pace() const noexcept override { return paces_host<D>; }
     [[nodiscard]] DeviceReport report() const override { return report_ ? report_(device_) : DeviceReport{}; }
 

@@ -55,7 +55,7 @@ enum class ExitReason : std::uint8_t {
     Guard,        ///< a guard found a wrong position or force
     DeviceFault,  ///< the device reported a fault, did not respond or lost samples
     RateTooLow,
-    NotCertified,  ///< a tick came later than the certificate allows
+    NotCertified,  ///< a tick came later, or a force acted later, than the certificate allows
 };
 
 /// Returns true if the loop ended because its duration ended or a stop was requested.
@@ -83,6 +83,10 @@ struct LoopReport {
     std::array<std::uint64_t, status_texts.size()> ticks_by_status{};
     std::uint64_t lost_samples = 0;
     std::uint64_t repeated_samples = 0;
+    double largest_delay =
+        std::numeric_limits<double>::quiet_NaN();  ///< largest `Reading::delay`; NaN: unknown [s]
+    double longest_delay = std::numeric_limits<double>::infinity();  ///< allowed delay [s]
+    ZeroForce zero_force = ZeroForce::Commanded;                     ///< force after the device was closed
     /// Largest value of the energy that the motor gave minus the energy that it received, during the start ramp [J]
     double given_in_ramp = 0.0;
     /// Largest value of the energy that the motor gave minus the energy that it received, after the start ramp [J]
@@ -91,6 +95,12 @@ struct LoopReport {
     /// Number of detected limit cycles; each multiplied all later forces by 0.7
     std::uint64_t limit_cycles = 0;
 
+    /// Returns true if the run ended because its duration ended or a stop was requested, and no device that confirms
+    /// zero force left the confirmation out.
+    [[nodiscard]] bool orderly() const noexcept {
+        return is_orderly(exit_reason) &&
+               (zero_force == ZeroForce::Confirmed || zero_force == ZeroForce::Commanded);
+    }
     /// Returns the number of ticks, which is the number of records.
     [[nodiscard]] std::uint64_t ticks() const noexcept {
         return std::accumulate(ticks_by_status.begin(), ticks_by_status.end(), std::uint64_t{0});
@@ -108,6 +118,7 @@ struct LoopReport {
     record.environment_position = tick.rendered.environment_position;
     record.velocity = tick.reading.velocity;
     record.device_time = tick.reading.device_time;
+    record.delay = tick.reading.delay;
     record.lateness = static_cast<double>(wake.now - wake.deadline) * 1e-9;
     record.sequence = tick.reading.sequence;
     record.evaluations = tick.rendered.evaluations;
@@ -125,6 +136,10 @@ namespace detail {
     if (!is_final(status) && bad_in_a_row <= tolerated) {
         return false;
     }
+    if (status == Status::Stale) {
+        reason = ExitReason::NotCertified;
+        return true;
+    }
     const bool device = status == Status::Fault || status == Status::Timeout || status == Status::Lost;
     reason = device ? ExitReason::DeviceFault : ExitReason::Guard;
     return true;
@@ -134,7 +149,8 @@ namespace detail {
 
 /// Runs the control loop: wake up, run a tick, pass the tick's record to `sink`. The loop runs until the duration ends,
 /// a stop is requested, a guard or the device ends the loop, the rate is too low, or a tick is later than the
-/// certificate allows. On every exit it sends zero force and closes the device. `clock` has start() and wait(); `sink`
+/// certificate allows. On every exit it sends zero force, closes the device and reports what the device confirmed.
+/// `clock` has start() and wait(); `sink`
 /// has push(record). Apart from the clock and the device's `exchange`, the loop does not allocate, lock, throw, log or
 /// make a system call.
 template <class Control, class Clock, class Sink>
@@ -186,9 +202,11 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
             running = false;
         }
     }
-    controller.stop();
+    report.zero_force = controller.stop();
     report.lost_samples = controller.reading_guard().lost();
     report.repeated_samples = controller.reading_guard().repeated();
+    report.largest_delay = controller.reading_guard().largest_delay();
+    report.longest_delay = controller.reading_guard().longest_delay();
     report.given_in_ramp = 0.0 - controller.guards().ramp_observer.least();  // subtraction from 0.0 avoids -0
     report.given = 0.0 - controller.guards().observer.least();
     report.most_stored = controller.guards().tank.stored().most();

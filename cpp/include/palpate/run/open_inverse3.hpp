@@ -34,9 +34,13 @@ namespace palpate {
         Inverse3Device{std::move(settings)}, [](const Inverse3Device& device) -> DeviceReport {
             const Inverse3Info& info = device.info();
             return {"inverse3",
-                    {{"force_gate", info.force_gate}, {"damping", info.damping}},
+                    {{"force_gate", info.force_gate},
+                     {"damping", info.damping},
+                     {"skipped_states", device.skipped_states()}},
                     {{"service",
-                      "force gate " + readable(info.force_gate) + ", damping " + readable(info.damping)}}};
+                      "force gate " + readable(info.force_gate) + ", damping " + readable(info.damping)},
+                     {"skipped", std::to_string(device.skipped_states()) +
+                                     " states that the service sent without a command"}}};
         });
     if (const Opened opened = live->open(); !opened) {
         refuse("device " + options.device + ": " + opened.reason);

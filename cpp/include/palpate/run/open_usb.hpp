@@ -49,17 +49,13 @@ namespace detail {
          {"lost_commands", health.lost_commands},
          {"refused_commands", stream.refused_commands},
          {"late_echoes", stream.late_echoes},
-         {"late_commands", stream.late_commands},
          {"timeouts", health.timeouts},
          {"stalls", health.stalls},
          {"bus_errors", health.bus_errors},
          {"watchdog_trips", stream.watchdog_trips}},
         {{"round trip", percentiles(stream.round_trip)},
          {"delay", "p50 " + readable(samples(0.5)) + ", p99 " + readable(samples(0.99)) + ", max " +
-                       readable(samples(1.0)) + " samples, from a sample to the force computed from it" +
-                       (stream.late_commands == 0
-                            ? ""
-                            : "; " + number(stream.late_commands) + " commands later than certified")},
+                       readable(samples(1.0)) + " samples, from a sample to the force computed from it"},
          {"wire", number(stream.packets) + " packets, " + number(stream.lost) + " lost, " +
                       number(stream.repeated) + " repeated, " + number(stream.malformed) + " malformed, " +
                       number(health.discarded) + " discarded; " + number(health.skipped_commands) +
@@ -110,12 +106,7 @@ namespace detail {
 [[nodiscard]] inline std::unique_ptr<LiveDevice> open_usb(const RenderOptions& options,
                                                           const PlannedModel& model) {
     UsbOptions usb = detail::usb_options(options);
-    if (!options.uncertified && model.certificate) {
-        // The allowed delay is the certified delay, because the certificate does not hold for a longer delay
-        usb.longest_delay_s = model.certificate->device.delay_s;
-    }
     if (rendered_by_device(options, model)) {
-        usb.longest_delay_s = UsbOptions{}.longest_delay_s;  // the commands carry no force
         usb.device_renders = true;
         usb.model = detail::device_model_of(*model.certificate);
     }

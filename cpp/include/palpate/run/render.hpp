@@ -222,7 +222,7 @@ namespace detail {
 inline constexpr double certified_rate_share = 0.99;
 
 /// Sets guards and control loop to the values of the certificate: force limit, least rate, longest time between two
-/// ticks, and the device's damping and friction for the energy tank. Disables the slew limit, and lets the loop end
+/// ticks, longest delay of a force, and the device's damping and friction for the energy tank. Disables the slew limit, and lets the loop end
 /// after the first tick without a force, because the proofs of the certificate include neither.
 inline void apply_certificate(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
     guards.certified = true;
@@ -233,6 +233,7 @@ inline void apply_certificate(const Certificate& certificate, GuardSettings& gua
     loop.tolerated = 0;
     loop.lowest_rate_share = std::max(loop.lowest_rate_share, certified_rate_share);
     loop.longest_period_s = certificate.longest_period_s;
+    guards.longest_delay_s = certificate.device.delay_s;
 }
 
 /// Opens telemetry and recording. Returns a note if it renamed an earlier interrupted recording, otherwise "".

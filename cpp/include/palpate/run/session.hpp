@@ -59,7 +59,7 @@ class AnyController {
     virtual ~AnyController() = default;
     [[nodiscard]] virtual Status start() noexcept = 0;
     [[nodiscard]] virtual Tick tick() noexcept = 0;
-    virtual void stop() noexcept = 0;
+    [[nodiscard]] virtual ZeroForce stop() noexcept = 0;
     [[nodiscard]] virtual bool paced_by_device() const noexcept = 0;
     [[nodiscard]] virtual const ReadingGuard& reading_guard() const noexcept = 0;
     [[nodiscard]] virtual const Guards& guards() const noexcept = 0;
@@ -72,7 +72,7 @@ class ControllerOf final : public AnyController {
     explicit ControllerOf(Control& controller) noexcept : controller_{controller} {}
     [[nodiscard]] Status start() noexcept override { return controller_.start(); }
     [[nodiscard]] Tick tick() noexcept override { return controller_.tick(); }
-    void stop() noexcept override { controller_.stop(); }
+    [[nodiscard]] ZeroForce stop() noexcept override { return controller_.stop(); }
     [[nodiscard]] bool paced_by_device() const noexcept override { return controller_.paced_by_device(); }
     [[nodiscard]] const ReadingGuard& reading_guard() const noexcept override {
         return controller_.reading_guard();
@@ -146,8 +146,8 @@ namespace detail {
 
 }  // namespace detail
 
-/// Runs the control loop on an open device until the loop ends. When it returns, the device is closed at zero force,
-/// and `sinks` has received the records of all ticks, except lost ones.
+/// Runs the control loop on an open device until the loop ends. When it returns, the device is closed,
+/// `LoopReport::zero_force` states its force, and `sinks` has received the records of all ticks, except lost ones.
 template <class Control>
 [[nodiscard]] SessionReport run_session(Control& controller, const SessionSettings& settings,
                                         RecordSinks& sinks, const std::atomic<bool>& stop_requested,

@@ -37,6 +37,22 @@ namespace palpate {
            "; longest gap " + readable(1e-3 * static_cast<double>(timing.period.largest())) + " us";
 }
 
+/// Returns what is known about the force of a device after it was closed.
+[[nodiscard]] inline std::string closing_text(ZeroForce zero_force) {
+    switch (zero_force) {
+        case ZeroForce::Commanded:
+            return "zero force commanded, device closed";
+        case ZeroForce::NotSent:
+            return "zero force could not be sent: switch the motor off if it still pushes";
+        case ZeroForce::Sent:
+            return "zero force sent, but not confirmed by the device: switch the motor off if it still "
+                   "pushes";
+        case ZeroForce::Confirmed:
+            break;
+    }
+    return "zero force sent and confirmed, device closed";
+}
+
 /// Returns the exit reason of a control loop as a sentence.
 [[nodiscard]] inline std::string exit_text(const LoopReport& report, const LoopSettings& settings) {
     const StatusText& status = text(report.status);
@@ -50,6 +66,11 @@ namespace palpate {
         case ExitReason::DeviceFault:
             return std::string("stopped by a fault of the device: ") + status.word + ", " + status.meaning;
         case ExitReason::NotCertified:
+            if (report.status == Status::Stale) {
+                return "stopped because the device applied a force " + readable(1e3 * report.largest_delay) +
+                       " ms after its sample, or not at all: the certificate holds for at most " +
+                       readable(1e3 * report.longest_delay) + " ms; plan with a larger delay_s of the device";
+            }
             return "stopped because a tick started " +
                    readable(1e-6 * static_cast<double>(report.timing.period.largest())) +
                    " ms after the previous tick: the certificate holds for at most " +
@@ -60,6 +81,17 @@ namespace palpate {
     return "stopped because the rate was too low: less than " +
            readable(settings.lowest_rate_share * settings.rate_hz) + " Hz of " + readable(settings.rate_hz) +
            " Hz for half a second";
+}
+
+/// Returns the largest time from a sample until the device applied its force, and the allowed time, as one line of text.
+[[nodiscard]] inline std::string delay_text(const LoopReport& report) {
+    const std::string largest = std::isnan(report.largest_delay)
+                                    ? "not measured by this device"
+                                    : "at most " + readable(1e3 * report.largest_delay) +
+                                          " ms from a sample until the device applied its force";
+    return largest + (std::isfinite(report.longest_delay)
+                          ? "; the certificate holds for " + readable(1e3 * report.longest_delay) + " ms"
+                          : "");
 }
 
 /// Returns the largest net energy that a rendering gave, as one line of text. The energy during the start ramp is
@@ -116,7 +148,7 @@ namespace palpate {
                                                             const LoopSettings& settings, std::string& name) {
     std::vector<std::string> warnings;
     const int disk = file.error();
-    std::string ended = exit_text(report.loop, settings) + "; zero force sent, device closed";
+    std::string ended = exit_text(report.loop, settings) + "; " + closing_text(report.loop.zero_force);
     if (disk != 0) {
         ended += std::string("; incomplete, because of the disk: ") + std::generic_category().message(disk);
         warnings.push_back(name + " is incomplete: " + std::generic_category().message(disk) + "; " +

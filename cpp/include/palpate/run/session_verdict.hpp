@@ -152,8 +152,9 @@ inline void judge_motion(const RecordSinks& sinks, const SessionExpectation& exp
                                                                const RecordSinks& sinks,
                                                                const SessionExpectation& expected) {
     std::vector<SessionFinding> findings;
-    if (!is_orderly(report.loop.exit_reason)) {
-        findings.push_back({"no", exit_text(report.loop, settings)});
+    if (!report.loop.orderly()) {
+        findings.push_back(
+            {"no", exit_text(report.loop, settings) + "; " + closing_text(report.loop.zero_force)});
     }
     const auto usable_rows = report.loop.ticks_by_status[static_cast<std::size_t>(Status::Ok)];
     if (expected.recorded && sinks.file.written() == 0) {

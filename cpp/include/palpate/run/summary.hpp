@@ -44,10 +44,12 @@ struct Summary {
     std::string device;
     DeviceReport device_report;
 
-    /// Returns true if the run ended because its duration ended or a stop was requested.
-    [[nodiscard]] bool orderly() const noexcept { return is_orderly(report.loop.exit_reason); }
-    /// Returns the exit reason of the run as a sentence.
-    [[nodiscard]] std::string ended() const { return exit_text(report.loop, loop); }
+    /// Returns true if the run ended as intended (`LoopReport::orderly`).
+    [[nodiscard]] bool orderly() const noexcept { return report.loop.orderly(); }
+    /// Returns why the run ended, and what is known about the force of the device, as a sentence.
+    [[nodiscard]] std::string ended() const {
+        return exit_text(report.loop, loop) + "; " + closing_text(report.loop.zero_force);
+    }
     /// Returns all messages of the run: refused real-time requests, notes and warnings.
     [[nodiscard]] std::vector<std::string> all_notes() const {
         std::vector<std::string> all = report.refused;
@@ -106,6 +108,8 @@ struct Summary {
         {"limit_cycles", loop.limit_cycles},
         {"lost_samples", loop.lost_samples},
         {"repeated_samples", loop.repeated_samples},
+        {"largest_delay_s", loop.largest_delay},
+        {"longest_delay_s", loop.longest_delay},
         {"record", summary.record.empty() ? Value{} : Value{summary.record}},
         {"recorded", summary.recorded},
         {"lost_records", summary.lost_records},
@@ -145,6 +149,7 @@ struct Summary {
         {"ticks", counts},
         {"samples",
          std::to_string(loop.lost_samples) + " lost, " + std::to_string(loop.repeated_samples) + " repeated"},
+        {"delay", delay_text(loop)},
         {"energy", energy_text(loop)},
     };
     all.insert(all.end(), summary.device_report.lines.begin(), summary.device_report.lines.end());

@@ -77,7 +77,10 @@ class Faulty {
         return faulty(*fault, command);
     }
 
-    void close() noexcept { device_.close(); }
+    ZeroForce close() noexcept {
+        const ZeroForce zero_force = closed(device_);
+        return disconnected_ ? ZeroForce::NotSent : zero_force;
+    }
     [[nodiscard]] const D& device() const noexcept { return device_; }
 
   private:

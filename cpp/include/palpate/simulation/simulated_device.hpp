@@ -70,10 +70,14 @@ class SimulatedHandle {
         const double measured = encoded(handle_.position);
         const double velocity = (measured - last_reading_) / profile_.period_s;
         last_reading_ = measured;
-        return {measured, velocity, applied_, plant_.measured(handle_), time(), tick_, Status::Ok};
+        return {measured, velocity, applied_,   plant_.measured(handle_),
+                time(),   tick_,    Status::Ok, profile_.delay_s};
     }
 
-    void close() noexcept { applied_ = 0.0; }
+    ZeroForce close() noexcept {
+        applied_ = 0.0;
+        return ZeroForce::Confirmed;
+    }
 
     [[nodiscard]] const DeviceProfile& profile() const noexcept { return profile_; }
     /// Returns the true position and velocity of the handle, which the encoder reports only in steps.

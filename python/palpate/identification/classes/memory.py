@@ -259,7 +259,9 @@ class Recorded:
         )
 
 
-def untested(found: FittedNetwork, recordings: Sequence[Recording], options: IdentifyOptions) -> str | None:
+def untested(
+    found: FittedNetwork, recordings: Sequence[Recording], fitted_rows: int, options: IdentifyOptions
+) -> str | None:
     """Returns the reason why a memory is not tested; an empty text if no decision is reported; None if it is
     tested."""
     automatic = options.inputs == "auto" and options.period is None and options.search.filters == "matched"
@@ -271,7 +273,7 @@ def untested(found: FittedNetwork, recordings: Sequence[Recording], options: Ide
         return _unsupported(options)
     if found.nrmse < LEAST_NRMSE:
         return f"the model without memory has an NRMSE of {found.nrmse:.2g}, below {LEAST_NRMSE:g}"
-    every_second = 2 * found.residuals >= sum(len(part) for part in recordings)
+    every_second = 2 * found.residuals >= fitted_rows
     upper = found.residual_correlation + 2.0 / np.sqrt(max(found.residuals, 1))
     if every_second and upper < LEAST_CORRELATION:
         return (
@@ -293,14 +295,15 @@ def _unsupported(options: IdentifyOptions) -> str | None:
 def better_with_memory(
     found: FittedNetwork,
     recordings: Sequence[Recording],
+    fitted_rows: int,
     options: IdentifyOptions,
     identify_rest: IdentifyRest,
 ) -> FittedNetwork:
     """Returns the model with memory if the recordings support it, else the model found without memory.
 
-    `identify_rest` identifies the force at rest.
+    `found` was fitted to a number of rows of the recordings. `identify_rest` identifies the force at rest.
     """
-    reason = untested(found, recordings, options)
+    reason = untested(found, recordings, fitted_rows, options)
     if reason is not None:
         decision = Decision("memory", "not tested", reason)
         return replace(found, decisions=(*found.decisions, decision)) if reason else found

@@ -60,11 +60,12 @@ class UsbTransfers {
                         [](const Read& read) { return read.transfer == nullptr; })) {
             return LIBUSB_ERROR_NO_MEM;
         }
-        runs_.store(true, std::memory_order_release);
-        events_ = std::thread{[this] { handle_events(); }};
+        // Before the event thread starts, because it submits all reads again if the first one finds a halted endpoint
         for (Read& read : reads_) {
             submit(read);
         }
+        runs_.store(true, std::memory_order_release);
+        events_ = std::thread{[this] { handle_events(); }};
         return error_.load(std::memory_order_acquire);
     }
 
@@ -91,7 +92,7 @@ class UsbTransfers {
     /// Sends a command, unless the previous command is still in flight. Returns 0, LIBUSB_ERROR_BUSY or another error
     /// code of libusb.
     [[nodiscard]] int write(const wire::OutPacket& command) noexcept {
-        if (has_failed()) {
+        if (is_unplugged()) {
             return LIBUSB_ERROR_NO_DEVICE;
         }
         if (writes()) {
@@ -159,6 +160,9 @@ class UsbTransfers {
 
     /// Returns true after an error that ends the connection, such as an unplugged device or repeated errors.
     [[nodiscard]] bool has_failed() const noexcept { return error_.load(std::memory_order_acquire) != 0; }
+    /// Returns true if the device is gone. After any other error that ended the connection, commands and requests may
+    /// still arrive, so that zero force can be sent.
+    [[nodiscard]] bool is_unplugged() const noexcept { return unplugged_.load(std::memory_order_acquire); }
     /// Returns the first libusb error code that ended the connection; 0 without such an error.
     [[nodiscard]] int error() const noexcept { return error_.load(std::memory_order_acquire); }
     [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_.load(std::memory_order_relaxed); }
@@ -218,10 +222,10 @@ class UsbTransfers {
     /// Restarts a halted USB endpoint. For packets: cancels all reads, clears the halt, and submits the reads again.
     /// For commands: clears the halt and allows the next command.
     void recover() noexcept {
-        if (stopping_.load(std::memory_order_acquire) || has_failed()) {
+        if (stopping_.load(std::memory_order_acquire) || is_unplugged()) {
             return;
         }
-        if (reads_halted_) {
+        if (reads_halted_ && !has_failed()) {
             if (reads_in_flight_.load(std::memory_order_acquire) > 0) {
                 cancel_reads();
                 return;
@@ -389,6 +393,9 @@ class UsbTransfers {
         if (code == 0) {
             return;
         }
+        if (code == LIBUSB_ERROR_NO_DEVICE) {
+            unplugged_.store(true, std::memory_order_release);
+        }
         int none = 0;
         (void)error_.compare_exchange_strong(none, code, std::memory_order_acq_rel);
         changes_.notify();
@@ -424,6 +431,7 @@ class UsbTransfers {
     std::atomic<bool> stopping_{false};
     std::atomic<bool> runs_{false};
     std::atomic<int> error_{0};
+    std::atomic<bool> unplugged_{false};
     std::atomic<std::uint64_t> stalls_{0};
     std::atomic<std::uint64_t> bus_errors_{0};
     std::atomic<std::uint64_t> lost_writes_{0};
