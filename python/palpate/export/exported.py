@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,7 @@ from .._core.model import fingerprint
 from .._core.portable import ExportCheck, ExportedModel, profile_checksum
 from .._core.rendering import Scheme
 from .._core.stability import Certificate, Inequality, with_force_error
-from ..errors import InputError
+from ..errors import InputError, command_word
 from ..model import Model
 from ..planning import Plan, describe, mechanical_units
 from ..planning.plan import require_force
@@ -288,10 +287,10 @@ def _require_certificate(certificate: Certificate | None, request: Request) -> N
     if request.uncertified or (certificate is not None and certificate.certified):
         return
     found = "the model has no certificate" if certificate is None else f"the plan is {certificate.verdict}"
-    file = shlex.quote(str(request.model_file))
+    file = request.model_file or "MODEL.json"
+    command = f"palpate plan {command_word(file)} --device PROFILE -o {command_word(file)}"
     raise InputError(
-        f"{found}: certify it with palpate plan {file} --device PROFILE -o {file}, or export it without a "
-        "certificate with --uncertified"
+        f"{found}: certify it with {command}, or export it without a certificate with --uncertified"
     )
 
 
