@@ -94,7 +94,7 @@ def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 def test_exit_code_and_number_of_findings_are_reported(tmp_path: Path) -> None:
     file = tmp_path / "a.py"
-    file.write_text("told = 1\n# The user is told.\n# What.\nlimit = told\n", encoding="utf-8")
+    file.write_text("told = 1\n# The user is told.\n# Nobody.\nlimit = told\n", encoding="utf-8")
     completed = run(file)
     assert completed.returncode == 1
     assert completed.stdout.splitlines()[-1] == "3 findings"
