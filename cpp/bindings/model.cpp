@@ -145,7 +145,9 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
                       const Array& lower, const Array& upper, const std::string& below,
                       const std::string& above, std::optional<double> period,
                       std::optional<double> play_radius, bool of_velocity,
-                      const std::optional<MemoryParameters>& memory) {
+                      const std::optional<MemoryParameters>& memory, const std::string& position_unit,
+                      const std::string& force_unit) {
+    const ModelUnits units{position_unit, force_unit};
     NetworkParameters network{static_cast<std::size_t>(lower.size()),
                               copied(alpha),
                               copied(beta),
@@ -164,17 +166,19 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
         if (memory) {
             detail::require(!of_velocity && network.dimension == 1,
                             "memory is given, but the model has several inputs: leave it out");
-            return ForceModel{std::move(network), std::move(domain)}.with_memory(*memory);
+            return ForceModel{std::move(network), std::move(domain)}.with_memory(*memory).with_units(units);
         }
-        return of_velocity ? ForceModel::of_velocity(std::move(network), std::move(domain))
-                           : ForceModel{std::move(network), std::move(domain)};
+        return (of_velocity ? ForceModel::of_velocity(std::move(network), std::move(domain))
+                            : ForceModel{std::move(network), std::move(domain)})
+            .with_units(units);
     }
     detail::require(!memory, "memory is given, but the model has hysteresis: leave one of them out");
     detail::require_size(copied(*linear_hysteresis), 1, "linear_hysteresis");
-    return {network,
-            {copied(*weight_hysteresis), linear_hysteresis->data()[0], *bias_hysteresis},
-            domain,
-            play_radius};
+    return ForceModel{network,
+                      {copied(*weight_hysteresis), linear_hysteresis->data()[0], *bias_hysteresis},
+                      domain,
+                      play_radius}
+        .with_units(units);
 }
 
 /// Makes the memory of a model from the arguments of its Python constructor.
@@ -408,10 +412,11 @@ void bind_model(py::module_& module) {
         "weight_hysteresis"_a = py::none(), "linear_hysteresis"_a = py::none(),
         "bias_hysteresis"_a = py::none(), "lower"_a, "upper"_a, "below"_a = "linear", "above"_a = "linear",
         "period"_a = py::none(), "play_radius"_a = py::none(), "of_velocity"_a = false,
-        "memory"_a = py::none(),
+        "memory"_a = py::none(), "position_unit"_a = "", "force_unit"_a = "",
         "Makes the model of N wavelets and d inputs: alpha, beta (N, d); weight (N,); linear, lower,\n"
         "upper (d,). of_velocity is true if the second of two inputs is the velocity. With a memory, the\n"
-        "network is the force at rest. Raises ValueError with the wrong field.");
+        "network is the force at rest. The units do not change the numbers; empty: not stated. Raises\n"
+        "ValueError with the wrong field.");
 
     bind_quantity<&EnvironmentSample::force>(
         type, "force",
@@ -497,6 +502,12 @@ void bind_model(py::module_& module) {
                                [](const ForceModel& m) { return std::string(name_of(m.domain().above)); });
     type.def_property_readonly("period", [](const ForceModel& m) { return m.domain().period; });
     type.def_property_readonly("play_radius", &ForceModel::play_radius);
+    type.def_property_readonly(
+        "position_unit", [](const ForceModel& m) { return m.units().position; },
+        "Unit of the position, rad, m or count; empty: not stated.");
+    type.def_property_readonly(
+        "force_unit", [](const ForceModel& m) { return m.units().force; },
+        "Unit of the force, N*m, N or A; empty: not stated.");
 
     module.def(
         "play", &play_states, "position"_a, "radius"_a, "start"_a = py::none(),
@@ -518,9 +529,10 @@ void bind_model(py::module_& module) {
                "linear"_a, "bias"_a, "lower"_a, "upper"_a, "order"_a,
                "Returns proved upper bounds (k,) of the absolute derivative of a network of one input,\n"
                "for orders up to 9, in k intervals of positions from lower (k,) to upper (k,).");
+    module.attr("most_wavelets") = most_wavelets;
     module.def("fingerprint", &fingerprint, "model"_a,
-               "Returns a fingerprint of a model: 16 hexadecimal digits, computed from all numbers that "
-               "determine the force.");
+               "Returns a fingerprint of a model: 16 hexadecimal digits, computed from its units and all "
+               "numbers that determine the force.");
 }
 
 }  // namespace palpate::bindings

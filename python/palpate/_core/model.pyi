@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['ForceModel', 'Memory', 'derivative_bounds', 'fingerprint', 'play', 'slope_bounds', 'stretches', 'wavelet_columns', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_slope_columns', 'wavelet_steps']
+__all__: list[str] = ['ForceModel', 'Memory', 'derivative_bounds', 'fingerprint', 'most_wavelets', 'play', 'slope_bounds', 'stretches', 'wavelet_columns', 'wavelet_curvature_columns', 'wavelet_jacobian', 'wavelet_slope_columns', 'wavelet_steps']
 class Memory:
     """
     Memory of a relaxing object: J springs of stiffness k_j in series with dashpots (branches).
@@ -52,11 +52,12 @@ class ForceModel:
     is f(x, s) = g(x) + s h(x), with the mean force g of press and release, the direction state s
     from -1 to 1, and the hysteresis h, which has separate weights for the same wavelets.
     """
-    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.SupportsFloat | typing.SupportsIndex, weight_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, linear_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, bias_hysteresis: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], below: str = 'linear', above: str = 'linear', period: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, of_velocity: bool = False, memory: Memory | None = None) -> None:
+    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.SupportsFloat | typing.SupportsIndex, weight_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, linear_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, bias_hysteresis: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], below: str = 'linear', above: str = 'linear', period: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, of_velocity: bool = False, memory: Memory | None = None, position_unit: str = '', force_unit: str = '') -> None:
         """
         Makes the model of N wavelets and d inputs: alpha, beta (N, d); weight (N,); linear, lower,
         upper (d,). of_velocity is true if the second of two inputs is the velocity. With a memory, the
-        network is the force at rest. Raises ValueError with the wrong field.
+        network is the force at rest. The units do not change the numbers; empty: not stated. Raises
+        ValueError with the wrong field.
         """
     @typing.overload
     def energy(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
@@ -145,6 +146,11 @@ class ForceModel:
     def dimension(self) -> int:
         ...
     @property
+    def force_unit(self) -> str:
+        """
+        Unit of the force, N*m, N or A; empty: not stated.
+        """
+    @property
     def hysteretic(self) -> bool:
         ...
     @property
@@ -176,6 +182,11 @@ class ForceModel:
     def play_radius(self) -> float | None:
         ...
     @property
+    def position_unit(self) -> str:
+        """
+        Unit of the position, rad, m or count; empty: not stated.
+        """
+    @property
     def upper(self) -> numpy.typing.NDArray[numpy.float64]:
         ...
     @property
@@ -191,7 +202,7 @@ def derivative_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.f
     """
 def fingerprint(model: ForceModel) -> str:
     """
-    Returns a fingerprint of a model: 16 hexadecimal digits, computed from all numbers that determine the force.
+    Returns a fingerprint of a model: 16 hexadecimal digits, computed from its units and all numbers that determine the force.
     """
 def play(position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], radius: typing.SupportsFloat | typing.SupportsIndex, start: typing.SupportsFloat | typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float64]:
     """
@@ -236,3 +247,4 @@ def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], al
     dilations and alpha d(beta) of the translations. They are those of the M inputs of wavelets which
     `used` (N, d) marks with True: (n, 2 M), columns ordered by quantity, input, wavelet.
     """
+most_wavelets: int = 1000

@@ -153,7 +153,16 @@ class Model(ForceModel):
         instance_of("data", data, Source, "the source of the recordings")
         instance_of("band", band, (Band, NoneType), "the band of several recordings")
         of_velocity = kind == "position_velocity" and len(inputs) == 2
-        super().__init__(**network, below=below, above=above, of_velocity=of_velocity, memory=memory)
+        position_unit, force_unit = (str(units.get(role, "")) for role in ("position", "force"))
+        super().__init__(
+            **network,
+            below=below,
+            above=above,
+            of_velocity=of_velocity,
+            memory=memory,
+            position_unit=position_unit,
+            force_unit=force_unit,
+        )
         self.kind = kind
         self.inputs = tuple(inputs)
         self.units = dict(units)

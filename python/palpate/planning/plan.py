@@ -59,7 +59,10 @@ NETWORK = (
 )
 """Arguments of a force model that define its network"""
 
-_DOMAIN = ("lower", "upper", "below", "above", "period", "play_radius", "of_velocity", "memory")
+_DOMAIN = (
+    *("lower", "upper", "below", "above", "period", "play_radius", "of_velocity", "memory"),
+    *("position_unit", "force_unit"),
+)
 """Arguments of a force model that do not define its network"""
 
 

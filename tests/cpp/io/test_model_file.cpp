@@ -95,6 +95,37 @@ TEST(ModelFile, GivesThePlanItsOwnNetworkAndKeepsTheIdentifiedOne) {
     EXPECT_EQ(&plain.planned(), &plain.model);
 }
 
+/// Returns the content of a good model file with n equal wavelets.
+Json with_wavelets(const std::string& file, std::size_t n) {
+    Json content = listed("good/" + file + ".json");
+    for (const char* name : {"alpha", "beta", "weight", "weight_hysteresis"}) {
+        if (Json& values = content["network"][name]; values.is_array()) {
+            values = Json::array_t(n, Json(values[0]));
+        }
+    }
+    content["fit"]["n_wavelets"] = n;
+    content["slope_bounds"] = nullptr;
+    return content;
+}
+
+TEST(ModelFile, RefusesMoreWaveletsThanATickCanEvaluate) {
+    for (const char* file : {"position", "hysteresis"}) {
+        EXPECT_EQ(parse_model(with_wavelets(file, most_wavelets)).model.parameters().weight.size(), 1000U);
+        try {
+            (void)parse_model(with_wavelets(file, most_wavelets + 1));
+            ADD_FAILURE() << file << " was not refused";
+        } catch (const std::invalid_argument& error) {
+            EXPECT_STREQ(error.what(),
+                         "network.alpha has 1001 values: must have at most 1000, which a tick of 1 "
+                         "ms can evaluate");
+        }
+    }
+}
+
+TEST(ModelFile, AcceptsManyWaveletsOfAForceThatIsNotRendered) {
+    EXPECT_NO_THROW((void)parse_model(with_wavelets("two_inputs", 3000)));
+}
+
 TEST(ModelFile, ReportsAMissingFile) {
     EXPECT_THROW((void)load_model_file(corpus + "nothing.json"), std::invalid_argument);
 }

@@ -146,6 +146,25 @@ TEST(Fingerprint, DistinguishesEveryNumberOfAModel) {
     EXPECT_EQ(seen.size(), models);
 }
 
+TEST(Fingerprint, DistinguishesTheUnits) {
+    const NetworkParameters network{1, {5.0}, {0.25}, {0.5}, {2.0}, 0.125};
+    const ForceModel single{network, test::unit_domain()};
+    const ForceModel both{network, {{0.25}, 0.5, 1.0}, test::unit_domain(), 0.125};
+    for (const ForceModel& model :
+         {single, single.with_memory({{1, {}, {}, {}, {0.0}, 1.0}, {2.0}, {0.5}}), both}) {
+        std::set<std::string> seen;
+        for (const char* position : {"", "rad", "m", "count"}) {
+            for (const char* force : {"", "N*m", "N", "A"}) {
+                seen.insert(fingerprint(model.with_units({position, force})));
+            }
+        }
+        EXPECT_EQ(seen.size(), 16U);
+        EXPECT_TRUE(seen.contains(fingerprint(model)));
+    }
+    const ForceModel in_units = both.with_units({"rad", "N*m"});
+    EXPECT_EQ(fingerprint(in_units.with_play_radius(0.125)), fingerprint(in_units));
+}
+
 TEST(Fingerprint, DistinguishesAPeriodicForce) {
     const NetworkParameters constant{1, {}, {}, {}, {0.0}, 0.5};
     Domain domain = test::unit_domain();
@@ -168,6 +187,7 @@ TEST(Fingerprint, StaysTheSameForStoredPlans) {
     const Domain box{{0.0, -1.0}, {1.0, 1.0}, {}, {}, std::nullopt};
     const ForceModel one{network, test::unit_domain()};
     EXPECT_EQ(fingerprint(one), "5f5b49fa096de810");
+    EXPECT_EQ(fingerprint(one.with_units({"rad", "N*m"})), "cf5b04612975810e");
     EXPECT_EQ(fingerprint(one.with_memory({{1, {}, {}, {}, {0.0}, 1.0}, {2.0}, {0.5}})), "95b2bde19fbd6981");
     EXPECT_EQ(fingerprint(ForceModel{network, {{0.25}, 0.5, 1.0}, test::unit_domain(), 0.125}),
               "f5c203b8f58c9f50");

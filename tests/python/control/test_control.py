@@ -23,7 +23,7 @@ from control_program import (
     start_control,
     wait_for_rows,
 )
-from palpate import load_model, read_recording
+from palpate import InputError, load_model, read_recording
 from palpate._core.rendering import structure_names
 
 pytestmark = needs_program
@@ -128,6 +128,24 @@ def test_a_bad_model_is_refused_with_one_sentence(tmp_path: Path, old: str, new:
     assert completed.returncode == 2
     assert completed.stderr.startswith(f"error: {path}: {sentence}")
     assert completed.stderr.count("\n") == 1
+
+
+def test_a_model_with_more_wavelets_than_a_tick_can_evaluate_is_refused_as_in_python(tmp_path: Path) -> None:
+    content = json.loads(MODEL.read_text(encoding="utf-8"))
+    count = 100_000
+    network = {name: count * content["network"][name][:1] for name in ("alpha", "beta", "weight")}
+    path = changed_model(
+        tmp_path,
+        network={**content["network"], **network},
+        fit={**content["fit"], "n_wavelets": count},
+        slope_bounds=None,
+    )
+    completed = control(path)
+    assert completed.returncode == 2
+    with pytest.raises(InputError) as refused:
+        load_model(path)
+    assert completed.stderr == f"error: {refused.value}\n"
+    assert "network.alpha has 100000 values: must have at most 1000" in completed.stderr
 
 
 def test_a_missing_usb_device_or_library_is_named() -> None:

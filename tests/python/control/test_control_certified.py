@@ -86,7 +86,7 @@ def test_a_certificate_of_another_network_is_refused(limited: Path) -> None:
     completed = control(limited, "--duration-s", 0.2)
     assert completed.returncode == 2
     assert "certificate.model is " in completed.stderr
-    assert "the model or its certificate was changed" in completed.stderr
+    assert "the model, its units or its certificate was changed" in completed.stderr
 
 
 def test_the_default_coupling_is_reported_without_plan_and_structure(tmp_path: Path) -> None:

@@ -12,12 +12,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import palpate.model
 from conftest import ROOT
-from palpate import InputError, load_model
+from palpate import InputError, Model, identify, load_model
 from palpate._core.io import check_model, checked_certificate, largest_json_bytes, scheme_of
+from palpate._core.model import most_wavelets
 
 CORPUS = ROOT / "tests" / "models"
 GOOD: list[dict[str, str]] = json.loads((CORPUS / "good.json").read_text(encoding="utf-8"))
@@ -338,3 +340,37 @@ def test_mutations_are_read_or_refused_with_one_sentence(tmp_path: Path) -> None
         path.write_bytes(mutated)
         error = refused(path)
         assert error is None or (error.isprintable() and error.startswith(str(path)))
+
+
+@pytest.mark.parametrize("role", ["position", "force"])
+def test_a_certificate_does_not_survive_a_change_of_the_units(tmp_path: Path, role: str) -> None:
+    """The units change in the file, in the content of a model, and in a model that is saved."""
+    model = load_model(CORPUS / "good" / "plan_and_certificate.json")
+    sentence = "certificate.model is .* in its units; the model, its units or its certificate was changed"
+    content = model.to_dict()
+    content["units"] = {**content["units"], role: ""}
+    with pytest.raises(InputError, match=sentence):
+        Model.from_dict(content)
+    assert Model.from_dict({**content, "certificate": None}).units[role] == ""
+    (tmp_path / "edited.json").write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(InputError, match=f"edited.json: {sentence}"):
+        load_model(tmp_path / "edited.json")
+    model.units[role] = ""
+    with pytest.raises(InputError, match=sentence):
+        model.save(tmp_path / "saved.json")
+    assert not (tmp_path / "saved.json").exists()
+
+
+def test_a_rendered_model_has_at_most_the_wavelets_of_a_tick() -> None:
+    content = load_model(CORPUS / "good" / "position.json").to_dict()
+    for name in ("alpha", "beta", "weight"):
+        content["network"][name] = (most_wavelets + 1) * content["network"][name][:1]
+    content["fit"]["n_wavelets"] = most_wavelets + 1
+    with pytest.raises(InputError, match=r"^network.alpha has 1001 values: must have at most 1000, which"):
+        Model.from_dict(content)
+
+
+def test_more_wavelets_than_a_tick_can_evaluate_are_refused_before_the_identification() -> None:
+    x = np.linspace(0.0, 1.0, 50)
+    with pytest.raises(InputError, match=r"^max_wavelets is 1001: must be at most 1000 for a force of"):
+        identify(x, x, max_wavelets=most_wavelets + 1)

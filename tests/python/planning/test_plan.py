@@ -297,7 +297,7 @@ def test_an_edited_model_is_refused_when_it_is_read(tmp_path: Path) -> None:
     content = json.loads(path.read_text(encoding="utf-8"))
     content["network"]["weight"][0] *= 1.0 + 1e-15
     path.write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(InputError, match=r"certificate\.model is .*the model or its certificate was changed"):
+    with pytest.raises(InputError, match=r"certificate\.model is .*its units or its certificate was changed"):
         load_model(path)
     assert load_model(path, with_plan=False).plan is None
 

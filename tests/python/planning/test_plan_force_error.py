@@ -120,7 +120,7 @@ def test_a_changed_network_of_the_plan_is_refused_when_the_file_is_read(tmp_path
     content = json.loads(path.read_text(encoding="utf-8"))
     content["plan"]["network"]["bias"] += 1e-12
     path.write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(InputError, match=r"certificate\.model is .*the model or its certificate was changed"):
+    with pytest.raises(InputError, match=r"certificate\.model is .*its units or its certificate was changed"):
         load_model(path)
 
 

@@ -228,7 +228,7 @@ def test_a_changed_model_is_reported_with_the_refused_plan(planned: Model, tmp_p
     file = tmp_path / "changed.json"
     file.write_text(json.dumps(content), encoding="utf-8")
     page = parsed(file, recording(model_by_hand(), seed=1))
-    assert "the model or its certificate was changed" in page.text["verdict"]
+    assert "the model, its units or its certificate was changed" in page.text["verdict"]
     assert page.text["verdict"].startswith("Verdict no")
     assert "Left out: the plan is refused" in page.text["rendered"]
     assert "computed again for the model in the file" in page.text["certificate"]

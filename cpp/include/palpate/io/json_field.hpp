@@ -48,6 +48,15 @@ class JsonField {
         }
     }
 
+    /// Throws std::invalid_argument if this JSON list has more than `longest` elements.
+    void require_at_most(std::size_t longest, const char* meaning) const {
+        if (value_.size() > longest) {
+            throw std::invalid_argument(path_ + " has " + std::to_string(value_.size()) +
+                                        " values: must have at most " + std::to_string(longest) + ", " +
+                                        meaning);
+        }
+    }
+
     [[nodiscard]] bool is_null() const { return value_.is_null(); }
 
     /// Returns the value of a key of this object. Throws if the key is missing.

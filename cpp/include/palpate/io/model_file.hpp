@@ -157,6 +157,14 @@ inline MemoryParameters read_memory(const JsonField& memory) {
     return read;
 }
 
+/// Reads the key `units` of a model file.
+inline ModelUnits read_units(const JsonField& file) {
+    const JsonField units = file["units"];
+    units.require_keys({"position", "force"});
+    return {units["position"].one_of({"rad", "m", "count", ""}),
+            units["force"].one_of({"N*m", "N", "A", ""})};
+}
+
 /// Returns the model with the wavelet network at `network`, which is the identified network or the network of the plan.
 /// Domain and kind of the model are those in `file`.
 inline ForceModel read_network(const JsonField& network, const JsonField& file) {
@@ -186,6 +194,9 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
                          "another kind: weight_hysteresis is null");
     file["kind"].require((kind != "position" && kind != "memory") || hysteresis.is_null(),
                          "hysteresis: weight_hysteresis is given");
+    if (d == 1 || kind == "position_velocity") {
+        network["alpha"].require_at_most(most_wavelets, "which a tick of 1 ms can evaluate");
+    }
     const bool remembers = file.value().contains("memory");
     file["kind"].require((kind == "memory") == remembers,
                          remembers ? "memory: memory is given" : "another kind: memory is not given");
@@ -196,20 +207,23 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
     radius.require(radius.is_null() || !hysteresis.is_null(), "null in a model without hysteresis");
     network["dimension"].require(hysteresis.is_null() || d == 1, "1 in a model with hysteresis");
     const Domain domain = read_domain(file, d);
+    const ModelUnits units = read_units(file);
     if (remembers) {
         file["continuation"]["period"].require(!domain.period, "null in a model with memory");
-        return ForceModel{read, domain}.with_memory(read_memory(file["memory"]));
+        return ForceModel{read, domain}.with_memory(read_memory(file["memory"])).with_units(units);
     }
     if (hysteresis.is_null()) {
-        return kind == "position_velocity" && d == 2 ? ForceModel::of_velocity(read, domain)
-                                                     : ForceModel{read, domain};
+        return (kind == "position_velocity" && d == 2 ? ForceModel::of_velocity(read, domain)
+                                                      : ForceModel{read, domain})
+            .with_units(units);
     }
     const std::vector<double> linear = network["linear_hysteresis"].numbers();
     hysteresis.require(hysteresis.value().is_array(), "a list");
     hysteresis.require_length(n, "one for each wavelet of alpha");
     network["linear_hysteresis"].require_length(d, "one for each dimension");
-    return {
-        read, {hysteresis.numbers(), linear[0], network["bias_hysteresis"].number()}, domain, play_radius};
+    return ForceModel{
+        read, {hysteresis.numbers(), linear[0], network["bias_hysteresis"].number()}, domain, play_radius}
+        .with_units(units);
 }
 
 /// Returns the model that a plan renders instead of the identified model; nothing without a plan, or if the plan
@@ -249,15 +263,8 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
         "; put keys of your own under notes");
     (void)file["format"].one_of({"palpate-model"});
     (void)file["created_by"].string();
-    const detail::JsonField units = file["units"];
-    units.require_keys({"position", "force"});
-    ModelFile read{detail::read_network(file["network"], file),
-                   units["position"].one_of({"rad", "m", "count", ""}),
-                   units["force"].one_of({"N*m", "N", "A", ""}),
-                   {},
-                   {},
-                   {},
-                   {}};
+    const ModelUnits units = detail::read_units(file);
+    ModelFile read{detail::read_network(file["network"], file), units.position, units.force, {}, {}, {}, {}};
     for (const detail::JsonField& input : file["inputs"].items()) {
         read.inputs.push_back(input.string());
     }

@@ -53,8 +53,9 @@ class NumberHash {
 
 }  // namespace detail
 
-/// Returns 16 hexadecimal digits that change with every number of a model's force: network, domain, continuation, play
-/// radius, memory. The digits distinguish an edited model from the certified model; they are not a signature.
+/// Returns 16 hexadecimal digits that change with every number of a model's force (network, domain, continuation, play
+/// radius, memory) and with its units. The digits distinguish an edited model from the certified model; they are not a
+/// signature.
 [[nodiscard]] inline std::string fingerprint(const ForceModel& model) {
     detail::NumberHash hash;
     const NetworkParameters& network = model.parameters();
@@ -90,6 +91,10 @@ class NumberHash {
         hash.add(parameters.ratio.bias);
         hash.add(parameters.stiffness);
         hash.add(parameters.time_constant_s);
+    }
+    if (model.units() != ModelUnits{}) {
+        hash.add(model.units().position);
+        hash.add(model.units().force);
     }
     return hash.text();
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
@@ -16,6 +17,17 @@
 #include "palpate/model/velocity_network.hpp"
 
 namespace palpate {
+
+/// Largest number of wavelets of a model that can be rendered. A solver evaluates the force at most 64 times
+/// (`LoadLineSolver`). Without a table each wavelet takes up to 10 ns, so 1000 of them leave a third of a tick of 1 ms.
+inline constexpr std::size_t most_wavelets = 1000;
+
+/// SI units in which the numbers of a model are given; an empty unit is not stated. They do not change the force.
+struct ModelUnits {
+    std::string position;  ///< rad, m or count
+    std::string force;     ///< N*m, N or A
+    bool operator==(const ModelUnits&) const = default;
+};
 
 /// An identified force law of any kind that a model file can hold.
 ///
@@ -59,6 +71,8 @@ class ForceModel {
     /// Returns the memory of a force of position, or null if the model has no memory. `network` is then the force at
     /// rest.
     [[nodiscard]] const MemoryNetwork* memory() const noexcept { return memory_ ? &*memory_ : nullptr; }
+    /// Returns the units of the model's numbers.
+    [[nodiscard]] const ModelUnits& units() const noexcept { return units_; }
     /// Returns the play radius [m], or nothing if the model was identified without a play radius.
     [[nodiscard]] std::optional<double> play_radius() const noexcept { return play_radius_; }
 
@@ -135,7 +149,15 @@ class ForceModel {
             return *this;
         }
         const NetworkParameters& h = both->hysteresis_force().parameters();
-        return {both->parameters(), {h.weight, h.linear[0], h.bias}, both->domain(), radius};
+        return ForceModel{both->parameters(), {h.weight, h.linear[0], h.bias}, both->domain(), radius}
+            .with_units(units_);
+    }
+
+    /// Returns a copy of the model whose numbers are given in these units. The numbers do not change.
+    [[nodiscard]] ForceModel with_units(ModelUnits units) const {
+        ForceModel model = *this;
+        model.units_ = std::move(units);
+        return model;
     }
 
   private:
@@ -161,6 +183,7 @@ class ForceModel {
     Kind kind_;
     std::optional<double> play_radius_;
     std::optional<MemoryNetwork> memory_;
+    ModelUnits units_;
 };
 
 /// Throws std::invalid_argument unless the model is a force of position, with or without hysteresis or velocity. Models

@@ -119,8 +119,8 @@ namespace detail {
     if (const std::string now = fingerprint(model); stored.model != now) {
         require(
             "certificate.model is \"" + stored.model + "\": must be \"" + now +
-            "\", the fingerprint of this network; the model or its certificate was changed, plan the model "
-            "again");
+            "\", the fingerprint of this network in its units; the model, its units or its certificate was "
+            "changed, plan the model again");
     }
     ForceBounds bounds;
     try {

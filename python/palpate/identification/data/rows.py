@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._core.dynamics import environment_filters, paper_sample_time_s
+from ..._core.model import most_wavelets
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...recording import Recording
@@ -223,6 +224,11 @@ def require_usable(rows: Rows, options: IdentifyOptions) -> None:
                 f"{name} has only {len(np.unique(column))} distinct values; "
                 f"at least {MIN_POSITIONS} are needed"
             )
+    if names[1:] in ((), ("velocity",)) and options.max_wavelets > most_wavelets:
+        raise InputError(
+            f"max_wavelets is {options.max_wavelets}: must be at most {most_wavelets} for a force of "
+            "position, which is what a tick of 1 ms can evaluate"
+        )
     if len(names) > 1 and (options.slope_limits is not None or options.fixed_force is not None):
         raise InputError(
             f"the inputs are {', '.join(names)}: slope_bounds, monotone, coupling_stiffness and fixed_force "
