@@ -189,6 +189,9 @@ void bind_exported_model(py::module_& module) {
         .def_property_readonly("step_error_lasts", &ExportedModel::step_error_lasts,
                                "True if the error of a step does not grow with the number of steps.")
         .def_property_readonly("outside_share", &ExportedModel::outside_share)
+        .def_property_readonly("rendering_error", &ExportedModel::rendering_error,
+                               "Friction that the certificate of an exported model needs in addition [N or "
+                               "N*m]; infinity if no bound of the errors is known.")
         .def_property_readonly("largest_force", &ExportedModel::largest_force)
         .def_property_readonly("largest_slope", &ExportedModel::largest_slope);
     type.def("samples", &samples, "counts"_a,

@@ -109,6 +109,10 @@ void bind_stability(py::module_& module) {
         "Returns the certificate of every force within the bounds, rendered by "
         "a scheme on a device.");
     module.def(
+        "with_force_error", &with_force_error, "certificate"_a, "force_error"_a,
+        "Returns the certificate of the same rendering by another program, such as an exported model, whose\n"
+        "force differs by at most `force_error`.");
+    module.def(
         "stiffest_coupling", &stiffest_coupling, py::kw_only(), "coupling_damping"_a, "falling"_a, "device"_a,
         "share"_a = usual_coupling_share,
         "Returns the largest coupling stiffness K_c that is certified with only the given share of the\n"

@@ -134,7 +134,7 @@ void print_summary(const Summary& summary, bool as_json) {
         std::cerr << "warning: " << warning << "\n";
     }
     if (!summary.orderly()) {
-        std::cerr << "error: " << summary.ended() << "\n";
+        std::cerr << "error: " << summary.ended() << "; " << summary.zero_force() << "\n";
         print_last_ticks(summary);
         if (!summary.last_ticks.empty()) {
             std::cerr << summary.last_ticks << "\n";

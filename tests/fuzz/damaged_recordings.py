@@ -280,6 +280,7 @@ def content_of(path: Path) -> dict[str, str]:
         "names": repr((dict(found.source.columns), found.input_names, list(found.columns))),
         "units": repr((dict(found.units), dict(found.file_units))),
         "metadata": repr(dict(found.metadata)),
+        "note": found.notes[0],
     }
 
 
@@ -339,9 +340,11 @@ def outcome_of(found: dict[str, str], whole: dict[str, str], covered: bool) -> t
             return failure.upper(), found[failure]
     if "refused" in found:
         return "refused", found["refused"]
-    changed = [name for name in whole if found[name] != whole[name]]
+    changed = [name for name in whole if name != "note" and found[name] != whole[name]]
     if not changed:
         return "equal", ""
+    if changed == ["metadata"] and "metadata may be lost" in found["note"]:
+        return "noted", found["note"]
     return ("CHANGED" if covered else "changed"), ", ".join(changed)
 
 

@@ -22,8 +22,8 @@
 
 namespace emulator {
 
-/// Answer of the emulated device to one packet on the USB bus: accepted, not ready (Nak), or refused.
-enum class Handshake : std::uint8_t { Ack, Nak, Stall };
+/// Answer of the emulated device to one packet on the USB bus: accepted, not ready (Nak), refused, or damaged.
+enum class Handshake : std::uint8_t { Ack, Nak, Stall, Error };
 
 /// Emulates the device of protocol version 1: a firmware with its mechanics, its USB endpoints and their faults, one
 /// frame for each millisecond. It is independent of the transport and shares no code with the tested library.
@@ -125,6 +125,9 @@ class EmulatedDevice {
             halts_.in = true;
             return Handshake::Stall;
         }
+        if (faults_.used(FaultKind::ErrorIn)) {
+            return Handshake::Error;
+        }
         packet = faults_.used(FaultKind::Repeat) ? last_sent_ : packets_.front();
         packets_.pop_front();
         last_sent_ = packet;
@@ -152,6 +155,7 @@ class EmulatedDevice {
             halts_.out = true;
             return Handshake::Stall;
         }
+        last_bus_out_ = packet;
         if (faults_.used(FaultKind::Deaf)) {
             return Handshake::Ack;
         }
@@ -171,6 +175,8 @@ class EmulatedDevice {
     /// Ends all active faults, and drops the packets that they held back.
     void end_faults() {
         faults_.end();
+        present_faults_ = 0;
+        firmware_->fault(0);
         held_back_.clear();
         packets_.clear();
     }
@@ -189,6 +195,10 @@ class EmulatedDevice {
     [[nodiscard]] FirmwareState state() const { return firmware_->state(); }
     /// Number of OUT packets that the firmware has received.
     [[nodiscard]] std::uint64_t outs() const { return outs_; }
+    /// Torque of the last OUT packet that the device has acknowledged [uN*m].
+    [[nodiscard]] std::int32_t commanded_uNm() const {
+        return last_bus_out_.size() == 16 ? get<std::int32_t>(last_bus_out_, 4) : 0;
+    }
     /// Torque that acts on the handle [uN*m].
     [[nodiscard]] std::int32_t applied_uNm() const {
         const std::int32_t step = identity_.torque_step_uNm;
@@ -347,7 +357,8 @@ class EmulatedDevice {
     std::deque<Bytes> packets_;    ///< IN packets that the host has not yet read
     std::deque<Bytes> held_back_;  ///< IN packets of a fault that sends them later
     Bytes last_sent_;
-    Bytes last_out_;  ///< last OUT packet that the firmware has received
+    Bytes last_bus_out_;  ///< last OUT packet that the device has acknowledged
+    Bytes last_out_;      ///< last OUT packet that the firmware has received
     std::uint16_t last_echo_ = 0;
     std::uint32_t last_clock_us_ = 0;
     std::uint32_t clock_error_us_ = 0;

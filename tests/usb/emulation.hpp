@@ -179,6 +179,7 @@ inline constexpr const char* options_text =
                field("last_read", std::to_string(device.last_read_sequence())) + ", " +
                field("outs", std::to_string(device.outs())) + ", " +
                field("enabled", device.state().is_enabled() ? "true" : "false") + ", " +
+               field("commanded_uNm", std::to_string(device.commanded_uNm())) + ", " +
                field("torque_uNm", std::to_string(device.applied_uNm())) + ", " +
                field("position_rad", std::to_string(device.plant().position)) + ", " +
                field("waiting", std::to_string(port.waiting())) + "}";

@@ -48,16 +48,18 @@ enum class FaultKind : std::uint8_t {
     Burst,       ///< IN packets are held back, and arrive together afterwards.
     /// The watchdog does not act: the last OUT packet counts as repeated in each frame.
     NoWatchdog,
-    Refuse,  ///< The device refuses `count` requests to disable its torque.
+    ErrorIn,  ///< IN transfers end with an error of the bus.
+    Refuse,   ///< The device refuses `count` requests to disable its torque.
 };
 
-inline constexpr std::array<std::string_view, 30> fault_names{
+inline constexpr std::array<std::string_view, 31> fault_names{
     "stall-in",       "stall-out", "short",      "freeze",      "unplug",
     "skip",           "repeat",    "magic",      "version",     "long",
     "deaf",           "mute",      "old-echo",   "encoder",     "over-temperature",
     "emergency-stop", "reset",     "saturate",   "jump",        "frozen-encoder",
     "slow",           "busy",      "stuck-echo", "stuck-clock", "clock-jump",
-    "drop",           "swap",      "burst",      "no-watchdog", "refuse"};
+    "drop",           "swap",      "burst",      "no-watchdog", "error-in",
+    "refuse"};
 
 /// A fault with its duration `count` (in packets or frames) and the number `frame` of the frame in which it begins.
 struct Fault {

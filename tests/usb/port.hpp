@@ -141,6 +141,8 @@ class Port {
         if (answer == Handshake::Stall) {
             transfer.status = -EPIPE;
             in_held_ = true;
+        } else if (answer == Handshake::Error) {
+            transfer.status = -EPROTO;
         } else {
             transfer.status = packet.size() > transfer.length ? -EOVERFLOW : 0;
             packet.resize(std::min(packet.size(), transfer.length));

@@ -68,6 +68,7 @@ int main(int count, char** words) {
                                   {"UsbPlainDevice", {"--no-transducer", "--no-velocity"}},
                                   {"UsbModelDevice", {"--model", "10"}},
                                   {"UsbDelay", {}},
+                                  {"UsbEnding", {}},
                                   {"UsbText", {"--no-device"}}};
     for (int seed = 1; seed <= palpate::test::cases(10); ++seed) {
         machines.push_back({"UsbOtherFirmware", {"--seed", std::to_string(seed)}});

@@ -283,6 +283,11 @@ class ExportedModel:
     def play_radius(self) -> float:
         ...
     @property
+    def rendering_error(self) -> float:
+        """
+        Friction that the certificate of an exported model needs in addition [N or N*m]; infinity if no bound of the errors is known.
+        """
+    @property
     def response(self) -> CellTable | None:
         """
         Table of the force on the load line; None without a load line.

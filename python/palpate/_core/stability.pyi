@@ -8,7 +8,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'certify', 'certify_bounds', 'device_difference', 'explicit_scheme', 'force_bounds', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share']
+__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'certify', 'certify_bounds', 'device_difference', 'explicit_scheme', 'force_bounds', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share', 'with_force_error']
 class ForceBounds:
     """
     Proved bounds of a model's force and slope at all positions, inside and outside the domain.
@@ -21,7 +21,7 @@ class ForceBounds:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, slope_min: typing.SupportsFloat | typing.SupportsIndex, slope_max: typing.SupportsFloat | typing.SupportsIndex, steepest: typing.SupportsFloat | typing.SupportsIndex, sliding: typing.SupportsFloat | typing.SupportsIndex, loss_min: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_max: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_per_play: typing.SupportsFloat | typing.SupportsIndex = 0.0, mean_force: typing.SupportsFloat | typing.SupportsIndex = 0.0, drag: typing.SupportsFloat | typing.SupportsIndex = 0.0, hysteresis: bool = False) -> None:
+    def __init__(self, *, slope_min: typing.SupportsFloat | typing.SupportsIndex, slope_max: typing.SupportsFloat | typing.SupportsIndex, steepest: typing.SupportsFloat | typing.SupportsIndex, sliding: typing.SupportsFloat | typing.SupportsIndex, loss_min: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_max: typing.SupportsFloat | typing.SupportsIndex = 0.0, loss_per_play: typing.SupportsFloat | typing.SupportsIndex = 0.0, mean_force: typing.SupportsFloat | typing.SupportsIndex = 0.0, drag: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_error: typing.SupportsFloat | typing.SupportsIndex = 0.0, hysteresis: bool = False) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -35,6 +35,12 @@ class ForceBounds:
     def drag(self) -> float:
         """
         B_v = max |f(x, v) - f(x, 0)| / |v|; 0 for a force of position alone.
+        """
+    @property
+    def force_error(self) -> float:
+        """
+        epsilon, largest difference of the rendered force from the force with these bounds [N]; 0 unless
+        another program renders the model.
         """
     @property
     def hysteresis(self) -> bool:
@@ -282,5 +288,10 @@ def stiffest_coupling(*, coupling_damping: typing.SupportsFloat | typing.Support
     Returns the largest coupling stiffness K_c that is certified with only the given share of the
     device's damping; 0 if no stiffness is certified. `coupling_damping` is B_c; `falling` is the
     steepest falling slope of the object's force.
+    """
+def with_force_error(certificate: Certificate, force_error: typing.SupportsFloat | typing.SupportsIndex) -> Certificate:
+    """
+    Returns the certificate of the same rendering by another program, such as an exported model, whose
+    force differs by at most `force_error`.
     """
 usual_coupling_share: float = 0.95

@@ -75,6 +75,14 @@ format_options: Callable[[Any], Any] = options(
     show_default="of the certified device",
     help="Position for each count of the encoder, without certificate.",
 )
+@click.option(
+    "--force-limit",
+    type=float,
+    default=None,
+    metavar="NUMBER",
+    show_default="of the certified device",
+    help="Largest force of the device, without certificate.",
+)
 @json_option
 @reading_options
 def export(
@@ -85,6 +93,7 @@ def export(
     name: str | None,
     uncertified: bool,
     encoder_step: float | None,
+    force_limit: float | None,
     as_json: bool,
     reading: ReadingOptions,
 ) -> None:
@@ -100,7 +109,7 @@ def export(
     talk(f"writing {output} ...")
     module = import_module(f"palpate.export.{FORMATS[kind][0]}")
     recording = reading.read(source) if kind == "mcap" and source is not None else None
-    request = Request(output, source, precision, name, uncertified, encoder_step, recording)
+    request = Request(output, source, precision, name, uncertified, encoder_step, force_limit, recording)
     with finishing():
         written: Written = module.write(request)
         if as_json:

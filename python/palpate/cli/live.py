@@ -93,5 +93,5 @@ class LiveLine:
 def session_verdict(summary: Mapping[str, Any]) -> Verdict:
     """Returns the verdict in the summary of a run; prints on standard error why the run ended early."""
     if not summary["orderly"]:
-        print_line(f"error: {summary['ended']}", err=True)
+        print_line(f"error: {summary['ended']}; {summary['zero_force']}", err=True)
     return Verdict.from_record(summary["findings"])

@@ -137,6 +137,8 @@ class _Numbers:
         yield _define("FORCE_ERROR", self.bound(model.force_error), f"largest error of the force [{force}]")
         yield _define("SLOPE_ERROR", self.bound(model.slope_error), f"largest error of the slope [{slope}]")
         yield _define("STEP_ERROR", self.bound(model.step_error), f"largest error of a step [{force}]")
+        needed = self.bound(exported.needed_friction)
+        yield _define("NEEDED_FRICTION", needed, f"of the device, by the certificate [{force}]; 0: none")
         if not np.isinf(model.force_limit):
             yield _define("FORCE_LIMIT", self.real(model.force_limit), f"of the device [{force}]")
         yield ""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +12,7 @@ from .._core.device import DeviceProfile
 from .._core.model import fingerprint
 from .._core.portable import ExportCheck, ExportedModel, profile_checksum
 from .._core.rendering import Scheme
-from .._core.stability import Certificate
+from .._core.stability import Certificate, Inequality, with_force_error
 from ..errors import InputError
 from ..model import Model
 from ..planning import Plan, describe, mechanical_units
@@ -37,6 +38,7 @@ class Exported:
     fingerprint: str
     """Fingerprint of the rendered model, 16 hexadecimal digits"""
     certificate: Certificate | None
+    """Certificate of the plan, with the errors of the program as errors of the force"""
     units: tuple[str, str]
     """Units of position and force"""
 
@@ -59,13 +61,21 @@ class Exported:
         device = None if certificate is None else certificate.device
         rendered = model if plan is None else plan.rendered
         scheme = Scheme(structure="direct") if plan is None else plan.scheme
-        tables = ExportedModel(
-            rendered,
-            scheme,
-            encoder_step=_encoder_step(device, request),
-            precision=request.precision,
-            **({} if device is None else {"period_s": device.period_s, "force_limit": device.force_limit}),
-        )
+        numbers = {
+            "encoder_step": _encoder_step(device, request),
+            "force_limit": _force_limit(device, request),
+            "period_s": 0.0 if device is None else device.period_s,
+        }
+
+        def tables_in(precision: str) -> ExportedModel:
+            return ExportedModel(rendered, scheme, precision=precision, **numbers)
+
+        tables = tables_in(request.precision)
+        if certificate is not None and certificate.certified:
+            planned, certificate = certificate, with_force_error(certificate, tables.rendering_error)
+            if not (certificate.certified or request.uncertified):
+                exact = with_force_error(planned, tables_in("double").rendering_error)
+                raise InputError(_too_inexact(certificate, tables, double=exact.certified))
         return cls(
             name,
             "" if request.model_file is None else request.model_file.name,
@@ -157,6 +167,28 @@ class Exported:
             f"Certificate {self.certificate.fingerprint}, model {self.certificate.model}."
         )
 
+    @property
+    def needed_friction(self) -> float:
+        """Friction of the device that the certificate needs with the errors of the program; 0 without
+        certificate."""
+        return _friction_line(self.certificate).right if self.certificate and self.has_certificate else 0.0
+
+    @property
+    def friction_text(self) -> str:
+        """Friction of the device against the friction that the certificate needs."""
+        assert self.certificate is not None
+        line, error = _friction_line(self.certificate), self.certificate.bounds.force_error
+        return (
+            f"{line.left:.4g} >= needed {line.right:.4g} {self.force_unit}, of which {error:.2g} for the "
+            "errors of the program"
+        )
+
+    @property
+    def limit_text(self) -> str:
+        """Largest force of a step."""
+        limit = self.model.force_limit
+        return "none: a step can return any force" if limit == math.inf else f"{limit:.4g} {self.force_unit}"
+
     def summary(self) -> dict[str, str]:
         """Returns the proved bounds of the errors for display, by name."""
         model = self.model
@@ -164,6 +196,8 @@ class Exported:
             "force error": self.error_text(model.force_error, model.largest_force, self.force_unit),
             "slope error": self.error_text(model.slope_error, model.largest_slope, self.slope_unit),
             "step error": self.step_error_text(),
+            **({"device friction": self.friction_text} if self.has_certificate else {}),
+            "force limit": self.limit_text,
         }
 
     def definitions(self) -> dict[str, str]:
@@ -189,6 +223,9 @@ class Exported:
             "slope_error_share": _share(model.slope_error, model.largest_slope),
             "energy_error": model.energy_error,
             "step_error": model.step_error,
+            "rendering_error": model.rendering_error,
+            "needed_friction": self.needed_friction,
+            "force_limit": model.force_limit,
             "checked_places": self.check.places,
             "largest_share_of_bounds": max(
                 self.check.force, self.check.slope, self.check.energy, self.check.step
@@ -219,7 +256,8 @@ class Exported:
             f"{self.force_unit}. The force is that of the object against the tool; the device applies its "
             "negative.\n"
             f"Structure: {self.structure}.\n"
-            f"Position for each count: {model.encoder_step:.9g} {self.position_unit}.",
+            f"Position for each count: {model.encoder_step:.9g} {self.position_unit}.\n"
+            f"Force limit: {self.limit_text}.",
             self.certificate_text,
             "Proved bounds of the difference to the model inside its domain. They hold with and without "
             "contraction of products and sums (-ffp-contract).\n"
@@ -237,7 +275,11 @@ class Exported:
         ]
         if self.has_certificate and device is not None:
             numbers = ", ".join(f"{key} {value}" for key, value in device.to_dict().items())
-            paragraphs.insert(3, f"Device profile (PALPATE_PROFILE {self.profile:#010x}): {numbers}.")
+            paragraphs.insert(
+                3,
+                f"Device profile (PALPATE_PROFILE {self.profile:#010x}): {numbers}.\n"
+                f"Device friction: {self.friction_text}.",
+            )
         return paragraphs
 
 
@@ -249,6 +291,52 @@ def _require_certificate(certificate: Certificate | None, request: Request) -> N
         f"{found}: certify it with palpate plan {request.model_file} --device PROFILE -o "
         f"{request.model_file}, or export it without a certificate with --uncertified"
     )
+
+
+def _friction_line(certificate: Certificate) -> Inequality:
+    """Returns the inequality that contains the errors of the program."""
+    return next(line for line in certificate.inequalities if line.id == "friction-steps")
+
+
+def _too_inexact(certificate: Certificate, tables: ExportedModel, *, double: bool) -> str:
+    """Returns the reason why the errors of a program are too large for its certificate, and the cure."""
+    if double and tables.single:
+        cure = "export it with --precision double"
+    elif tables.hysteretic:
+        cure = f"plan the model with a --play-radius above {tables.play_radius:.4g}"
+    else:
+        needed = _rounded_up(_friction_line(certificate).right)
+        cure = f"plan the model for a device with a coulomb_friction of at least {needed:.6g}"
+    return (
+        f"the certificate does not hold for the program in {'single' if tables.single else 'double'} "
+        f"precision, whose errors of the force are up to epsilon = {certificate.bounds.force_error:.3g}: "
+        f"{certificate.reason}; {cure}"
+    )
+
+
+def _rounded_up(value: float) -> float:
+    """Returns a number of six digits that is not below the value."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 5)
+    return math.ceil(value / unit) * unit
+
+
+def _force_limit(device: DeviceProfile | None, request: Request) -> float:
+    given = request.force_limit
+    if device is not None:
+        if given is not None:
+            raise InputError(
+                f"--force-limit is given, but the force limit of {device.id} is {device.force_limit:g}: "
+                "leave it out"
+            )
+        return device.force_limit
+    if given is None:
+        raise InputError(
+            "the force limit is not known, because the model has no device: state the largest force of the "
+            "device with --force-limit, which the program never exceeds"
+        )
+    if not 0.0 < given < math.inf:
+        raise InputError(f"--force-limit is {given:g}: must be a finite number > 0")
+    return given
 
 
 def _encoder_step(device: DeviceProfile | None, request: Request) -> float:

@@ -43,6 +43,8 @@ class Request:
     """True if a model without certificate is exported too"""
     encoder_step: float | None = None
     """Position for each count, for a model without the profile of a device"""
+    force_limit: float | None = None
+    """Largest force of the device, for a model without the profile of a device"""
     recording: Recording | None = None
     """Recording to export in place of a model"""
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from .._core.device import DeviceProfile
 from .._core.model import ForceModel
+from .._core.portable import ExportedModel
 from .._core.rendering import Scheme, compensated_share, default_play_radius
 from .._core.stability import (
     Certificate,
@@ -20,6 +21,7 @@ from .._core.stability import (
     steepest_stick,
     stiffest_coupling,
     usual_coupling_share,
+    with_force_error,
 )
 from .device_profile import mechanical_units
 from .limited_network import (
@@ -115,7 +117,11 @@ class Task:
         """Returns the structure and settings for the model, or for a network in its place, with the
         certificate."""
         rendered = rendered or self.model
-        return Candidate(rendered, certify(rendered, scheme, self.device))
+        certificate = certify(rendered, scheme, self.device)
+        if certificate.certified and self.device.renderer == "device":
+            of_program = _certified_program(certificate, rendered)
+            certificate = certificate if of_program.certified else of_program
+        return Candidate(rendered, certificate)
 
     def direct_scheme(self, rendered: ForceModel) -> Scheme:
         """Returns the direct structure. If the plan chooses the play radius, it is the narrowest that is
@@ -151,6 +157,23 @@ class Task:
             f"predict is {self.predict}: a required prediction is possible only in direct rendering of the "
             "identified model"
         )
+
+
+def _certified_program(certificate: Certificate, rendered: ForceModel) -> Certificate:
+    """Returns the certificate of the exported program in single precision, which a motor controller runs; if
+    the structure or the model cannot be exported, returns `certificate`."""
+    device = certificate.device
+    try:
+        program = ExportedModel(
+            rendered,
+            certificate.scheme,
+            encoder_step=device.encoder_step,
+            period_s=device.period_s,
+            force_limit=device.force_limit,
+        )
+    except ValueError:
+        return certificate
+    return with_force_error(certificate, program.rendering_error)
 
 
 _NOT_LIMITED = Refusal("the identified model must be rendered without changes")
@@ -391,7 +414,7 @@ def _hysteresis_limited(model: ForceModel, task: Task) -> ForceModel:
     needed."""
 
     def holds(candidate: ForceModel) -> bool:
-        return not certify(candidate, task.direct_scheme(candidate), task.device).refused
+        return not task.certified(task.direct_scheme(candidate), candidate).certificate.refused
 
     def scaled(candidate: ForceModel, share: float) -> ForceModel:
         return _balanced(scale_hysteresis(candidate, share), task.device)

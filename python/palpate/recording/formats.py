@@ -7,6 +7,7 @@ import base64
 import io
 import math
 import struct
+import sys
 import zipfile
 import zlib
 from collections import Counter
@@ -21,7 +22,7 @@ import numpy as np
 from ..errors import InputError, escaped, listed, shortened
 from .csv_file import CsvFile
 from .dialect import decimal_mark, find_header, first_row_as_header, with_checked_names
-from .files import MEMORY_LIMIT, readable, require_memory
+from .files import CELL_BYTES, MEMORY_LIMIT, readable, require_memory
 from .mcap_file import read_mcap
 from .memory_table import MemoryTable, cells_of, import_library
 from .table import Cells, LongTable, Table, to_numbers
@@ -55,6 +56,8 @@ _INTEGER_TYPES, _TEXT_TYPES = (5, 6), (1, 16)
 
 _NUMBER_TYPES = frozenset({*range(1, 8), 9, 12, 13, 16, 17, 18})
 """Type numbers of MATLAB elements with numbers or characters."""
+
+_TYPES = _NUMBER_TYPES | {_MATRIX_TYPE, _COMPRESSED_TYPE}
 
 _CELL_CLASS, _SPARSE_CLASS, _OPAQUE_CLASS = 1, 5, 17
 _NESTED_CLASSES, _VALUE_CLASSES = range(1, 4), range(4, 16)
@@ -104,6 +107,8 @@ class ParquetFile(LongTable):
         with readable(path, "Parquet"):
             footer = parquet.ParquetFile(path)
             _require_whole_footer(path, footer)
+            if not footer.metadata.created_by:  # damage that hides the metadata hides this field, too
+                self.notes = ["the footer names no program, so that metadata may be lost"]
             schema = footer.schema_arrow
             self._stored = tuple(str(name) for name in schema.names)
             self.names = tuple(map(escaped, self._stored))
@@ -150,7 +155,8 @@ class ParquetFile(LongTable):
                 needed += memory[name]
             names.append(name)
         if left_out:
-            self.notes = [f"left out {listed(left_out)}, for which the limit of memory is too low"]
+            note = f"left out {listed(left_out)}, for which the limit of memory is too low"
+            self.notes = [*self.notes, note]
         with readable(self._path, "Parquet"):
             return _arrow_cells(self._file.read(self._stored_names(names)), names, numbers, text)
 
@@ -162,7 +168,7 @@ class ParquetFile(LongTable):
         """Returns the memory for the pages and the cells of columns [bytes]."""
         stored = {*self._stored_names(names)}
         return sum(
-            chunk.total_uncompressed_size + 8 * chunk.num_values
+            chunk.total_uncompressed_size + CELL_BYTES * chunk.num_values
             for chunk in chunks
             if chunk.path_in_schema in stored or chunk.path_in_schema.split(".")[0] in stored
         )
@@ -319,7 +325,8 @@ def _excel(path: Path) -> Table:
     """Returns the first sheet of a workbook that is not empty."""
     openpyxl = import_library("openpyxl", path, "an Excel file", "excel")
     with readable(path, "Excel (.xlsx)"):
-        _require_whole_archive(path)
+        for _ in _members(path):  # openpyxl does not check the end of a sheet
+            pass
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         sheets = [(sheet.title, [*sheet.iter_rows(values_only=True)]) for sheet in book.worksheets]
         book.close()
@@ -353,33 +360,34 @@ def _excel(path: Path) -> Table:
     return MemoryTable(path, columns, metadata, [*notes, *header_notes], ("row", first), decimal)
 
 
-def _require_whole_archive(path: Path) -> None:
-    """Checks checksums, names and number of the members of a zip archive, and its size in memory.
+def _members(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Yields names and contents of the members of a zip archive, after checking their checksums.
 
     Raises
     ------
     ValueError
-        The archive is damaged.
+        The archive is damaged, or a member is missing.
     """
     with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
         members = archive.infolist()
         require_memory(path, sum(each.file_size for each in members))
-        if (damaged := archive.testzip()) is not None:
-            raise ValueError(f"its member {damaged} is damaged")
         stream.seek(max(0, path.stat().st_size - _ZIP_END_BYTES))
         end = stream.read()
-    (count,) = struct.unpack_from("<H", end, end.rfind(b"PK\5\6") + 10)
-    if count != min(len(members), 0xFFFF):
-        raise ValueError("its directory is damaged")
+        (count,) = struct.unpack_from("<H", end, end.rfind(b"PK\5\6") + 10)
+        if count != min(len(members), 0xFFFF):
+            raise ValueError(f"its directory names {len(members)} of {count} members")
+        for each in members:
+            yield each.filename, archive.read(each)
 
 
 def _numpy(path: Path) -> Table:
     """Returns the arrays of an .npz file by name."""
-    with readable(path, "NumPy (.npz)"), path.open("rb") as stream:
-        _require_whole_archive(path)
-        arrays = np.load(stream, allow_pickle=False)
-        found = {name: arrays[name] for name in arrays.files}
-    return _table_of_arrays(path, found)
+    with readable(path, "NumPy (.npz)"):
+        arrays = {
+            name.removesuffix(".npy"): np.load(io.BytesIO(content), allow_pickle=False)
+            for name, content in _members(path)
+        }
+    return _table_of_arrays(path, arrays)
 
 
 def _matlab(path: Path) -> Table:
@@ -417,7 +425,7 @@ def _inflated(path: Path) -> bytes:
         An element is damaged, for example longer than the file; the message names its first byte.
     """
     needed = path.stat().st_size
-    require_memory(path, needed)
+    require_memory(path, 2 * needed)  # the content and its arrays
     content = path.read_bytes()
     order = "<" if content[126:128] == b"IM" else ">"
     if 0 in content[:4] or content[125 if order == "<" else 124 :][:1] != b"\1":
@@ -435,7 +443,7 @@ def _inflated(path: Path) -> bytes:
         except (zlib.error, struct.error):
             raise _damaged(element.offset) from None
         needed += size
-        require_memory(path, needed)
+        require_memory(path, 2 * needed)
         try:
             part = tag + stream.decompress(stream.unconsumed_tail, size + 8)
             (array,) = _elements(part, 0, len(part), order)
@@ -473,7 +481,7 @@ def _elements(content: bytes, offset: int, end: int, order: str) -> list[_Elemen
         else:
             start, available = offset + 8, end - offset - 8
             following = start + (size if kind == _COMPRESSED_TYPE else -(-size // 8) * 8)
-        if kind not in (*_NUMBER_TYPES, _MATRIX_TYPE, _COMPRESSED_TYPE) or size > available:
+        if kind not in _TYPES or size > available:
             raise _damaged(offset)
         found.append(_Element(kind, offset, start, start + size))
         offset = following
@@ -533,8 +541,10 @@ def _table_of_arrays(path: Path, found: Mapping[str, Any]) -> Table:
     if not lengths:
         raise InputError(f"{path} holds no vectors, only {listed(arrays) or 'nothing'}")
     length = max(lengths, key=lambda each: (lengths[each], each))
-    require_memory(path, length * lengths[length] * np.dtype(np.float64).itemsize)
-    columns = {name: _vector(array) for name, array in vectors.items() if len(array) == length}
+    chosen = {name: array for name, array in vectors.items() if len(array) == length}
+    text_bytes = sum(sys.getsizeof("") + each.itemsize for each in chosen.values() if each.dtype.kind in "UO")
+    require_memory(path, length * (CELL_BYTES * len(chosen) + text_bytes))
+    columns = {name: _vector(array) for name, array in chosen.items()}
     # A structure or a sparse array has no short text; that of a damaged sparse array crashes SciPy.
     metadata = {
         name: escaped(str(each))

@@ -8,6 +8,7 @@
 
 #include "../support.hpp"
 #include "coupled_lines.hpp"
+#include "exported_lines.hpp"
 #include "guard_lines.hpp"
 #include "held_lines.hpp"
 #include "line.hpp"
@@ -90,6 +91,10 @@ namespace palpate::energy_search {
         friction("encoder, memory", false,
                  [](R& random, double delay) { return draw_memory(random, delay, true); });
         friction("force step", false, draw_force_step);
+        friction("exported model", false,
+                 [](R& random, double delay) { return draw_exported(random, delay, false); });
+        friction("exported model, hysteresis", false,
+                 [](R& random, double delay) { return draw_exported(random, delay, true); });
     }
     return lines;
 }

@@ -46,6 +46,23 @@ TEST(EnergySearch, FindsFailuresAt95PercentOfTightBounds) {
     }
 }
 
+TEST(EnergySearch, AnExportedModelNeedsFrictionForItsRounding) {
+    const auto found = [](bool with_rounding) {
+        std::size_t number = 0;
+        for (std::size_t index = 0; index < scenes_of_each_line(40); ++index) {
+            test::Random random{index};
+            std::optional<Trial> trial;
+            while (!trial) {
+                trial = draw_exported(random, 0.0, index % 4 == 0, with_rounding);
+            }
+            number += trial->finds_energy(1.0 + 1e-9, 1.0 + 1e-9) ? 1 : 0;
+        }
+        return number;
+    };
+    EXPECT_GE(5 * found(false), scenes_of_each_line(40));
+    EXPECT_EQ(found(true), 0U);
+}
+
 /// Returns the damping that a spring of stiffness 1 needs, found by value iteration on grid positions of distance 1.
 double spring_need(int nodes, int reach, int delay, double late) {
     HeldScene scene;

@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/stability/force_bounds.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -146,18 +147,39 @@ TEST(Scheme, RefusesACompensationThatIsNotPossible) {
         "92");
     EXPECT_EQ(refused(scheme, lossy(5.0, 0.1, 0.01)),
               "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
+    EXPECT_EQ(refused(scheme, spring(-89.9)), "");
+    EXPECT_NE(refused(scheme, spring(-92.0)), "") << "outside the domain its force rises by as much";
     scheme.coupling.stiffness = 0.5;
-    EXPECT_EQ(refused(scheme, spring(-50.0)), "") << "a falling force needs no stiffness";
     EXPECT_EQ(refused(scheme, spring(0.4)), "");
     scheme.structure = StructureKind::Direct;
     EXPECT_EQ(refused(scheme, spring(0.1)),
               "compensated is set for the direct structure, which has no coupling");
 }
 
+// A plan limits the slopes of a model to the proved bound of the certificate. A wider bound here would refuse this plan.
+TEST(Scheme, CompensationIsRefusedExactlyBeyondTheCertifiedSlope) {
+    test::Random random{5};
+    for (int k = 0; k < test::cases(50); ++k) {
+        NetworkParameters network = test::random_network(random, 1 + random() % 6);
+        network.bias += k % 2 == 0 ? 0.0 : 20.0;  // the continuation is then the steepest part
+        const ForceModel model{network, test::unit_domain()};
+        const double steepest = force_bounds(model).slope.upper;
+        Scheme scheme;
+        scheme.compensated = true;
+        scheme.coupling.stiffness = steepest / compensated_share;
+        while (compensated_share * scheme.coupling.stiffness >= steepest) {
+            scheme.coupling.stiffness = std::nextafter(scheme.coupling.stiffness, 0.0);
+        }
+        EXPECT_NE(refused(scheme, model), "") << k;
+        scheme.coupling.stiffness = std::nextafter(scheme.coupling.stiffness, 1e9);
+        EXPECT_EQ(refused(scheme, model), "") << k;
+    }
+}
+
 TEST(Scheme, SteepestSlopeIsThatOfTheRenderedForce) {
     Scheme scheme;
     EXPECT_NEAR(steepest_slope(scheme, spring(45.0)), 45.0, 1e-9);
-    EXPECT_EQ(steepest_slope(scheme, spring(-45.0)), 0.0);
+    EXPECT_NEAR(steepest_slope(scheme, spring(-45.0)), 45.0, 1e-9) << "of its continuation";
     EXPECT_NEAR(steepest_slope(scheme, lossy(5.0, 0.1, 0.02)), 5.0 + 5.0, 1e-6);
     scheme.play_radius = 0.05;
     EXPECT_NEAR(steepest_slope(scheme, lossy(5.0, 0.1, 0.02)), 5.0 + 2.0, 1e-6) << "of the scheme";

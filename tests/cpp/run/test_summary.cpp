@@ -70,12 +70,12 @@ T get(const NamedValues& values, const std::string& name) {
 TEST(Summary, IsOrderlyAfterARequestAndStatesItsEnd) {
     Summary one = summary();
     EXPECT_TRUE(one.orderly());
-    EXPECT_EQ(one.ended(), "stopped on request; zero force commanded, device closed");
+    EXPECT_EQ(one.ended(), "stopped on request");
     for (const ZeroForce zero_force :
          {ZeroForce::Commanded, ZeroForce::NotSent, ZeroForce::Sent, ZeroForce::Confirmed}) {
         one.report.loop.zero_force = zero_force;
         EXPECT_EQ(one.orderly(), zero_force == ZeroForce::Commanded || zero_force == ZeroForce::Confirmed);
-        EXPECT_EQ(one.ended(), "stopped on request; " + closing_text(zero_force));
+        EXPECT_EQ(one.zero_force(), closing_text(zero_force));
     }
     one.report.loop.exit_reason = ExitReason::DeviceFault;
     EXPECT_FALSE(one.orderly());
@@ -124,7 +124,8 @@ TEST(Summary, NamesEveryValueForPrograms) {
     EXPECT_EQ(get<std::string>(findings[1], "level"), "usable");
     EXPECT_EQ(get<std::string>(findings[1], "sentence"), "second");
     EXPECT_TRUE(get<bool>(values, "orderly"));
-    EXPECT_EQ(get<std::string>(values, "ended"), one.ended());
+    EXPECT_EQ(get<std::string>(values, "ended"), "stopped on request");
+    EXPECT_EQ(get<std::string>(values, "zero_force"), "zero force commanded, device closed");
     EXPECT_EQ(get<double>(values, "largest_delay_s"), 0.0015);
     EXPECT_EQ(get<double>(values, "longest_delay_s"), 0.002);
     EXPECT_EQ(get<std::string>(values, "status"), "Timeout");
@@ -179,7 +180,7 @@ TEST(Summary, IsATableForTheTerminal) {
     Summary one = summary();
     one.device_report.lines = {{"wire", "5 packets"}};
     EXPECT_EQ(lines(one),
-              (Lines{{"ended", one.ended()},
+              (Lines{{"ended", "stopped on request; zero force commanded, device closed"},
                      {"rate", "1000 Hz of 1000 Hz, 2 deadlines of the loop missed"},
                      {"period", "p50 1000 us, p99 1000 us, p99.9 1000 us, max 1000 us (the longest gap)"},
                      {"late by", percentiles(one.report.loop.timing.lateness)},

@@ -926,6 +926,34 @@ TEST(Certificate, HoldsTheNumbersForWhichItWasComputed) {
     EXPECT_EQ(certify_rendered(infinite, scheme, device).verdict, Verdict::Refused);
 }
 
+TEST(Certificate, OfAnotherProgramNeedsFrictionForItsForceErrors) {
+    DeviceProfile device = smooth(1.0);
+    device.encoder_step = 0x1p-10;
+    device.coulomb_friction = 20.0 * 0x1p-11 + 0x1p-20;
+    for (const Scheme& scheme :
+         {scheme_of(StructureKind::Direct), scheme_of(StructureKind::Massless, {1e6, 0.0}),
+          scheme_of(StructureKind::Massless, {100.0, 0.02})}) {
+        Certificate certificate = certify_rendered(slopes(0.0, 20.0), scheme, device);
+        ASSERT_TRUE(certificate.certified()) << certificate.reason;
+        certificate.model = "a model";
+        certificate.fingerprint = "stored";
+        const double needed = certificate.inequalities.back().right;
+        const double reserve = certificate.inequalities.back().margin();
+        const Certificate at_the_bound = with_force_error(certificate, reserve);
+        EXPECT_TRUE(at_the_bound.certified()) << at_the_bound.reason;
+        EXPECT_DOUBLE_EQ(at_the_bound.inequalities.back().right, needed + reserve);
+        EXPECT_EQ(at_the_bound.model, "a model");
+        EXPECT_EQ(at_the_bound.fingerprint, "stored");
+        const Certificate beyond = with_force_error(certificate, reserve * (1.0 + 1e-9) + 1e-17);
+        EXPECT_EQ(beyond.verdict, Verdict::Refused);
+        EXPECT_NE(beyond.reason.find(" + epsilon"), std::string::npos) << beyond.reason;
+        EXPECT_EQ(with_force_error(certificate, std::numeric_limits<double>::infinity()).verdict,
+                  Verdict::Refused);
+        EXPECT_EQ(with_force_error(certificate, 0.0).inequalities.back().formula,
+                  certificate.inequalities.back().formula);
+    }
+}
+
 TEST(Certificate, OfAModelChecksItsNumbersAndNamesTheModel) {
     const ForceModel model{NetworkParameters{1, {}, {}, {}, {20.0}, 0.0}, test::unit_domain()};
     const Certificate certificate = certify(model, scheme_of(StructureKind::Direct), smooth(1.0));

@@ -285,6 +285,7 @@ ForceBounds different_bounds() {
     bounds.steepest = 65.0;
     bounds.sliding = 20.0;
     bounds.mean_force = 0.003;
+    bounds.force_error = 0.0005;
     bounds.hysteresis_force = {0.0, 1.0};
     bounds.hysteresis_per_play = 40.0;
     return bounds;
@@ -304,7 +305,8 @@ DeviceProfile weak_device(double delay) {
 
 constexpr double weak_longest_period = 0.625e-3;
 constexpr double half_encoder_step = 0.5e-4;
-constexpr double other_friction = 0.001 + 0.003;  // half a force step, and the mean force
+// Half a force step, the mean force, and the force error of the program
+constexpr double other_friction = 0.001 + 0.003 + 0.0005;
 
 /// Checks id and both sides of a line about damping and of a line about friction.
 void expect_sides(const std::vector<Inequality>& lines, std::size_t first, double damping, double friction) {
@@ -380,7 +382,7 @@ TEST(DirectLines, OfVelocityAddTheDragOfTheLongerPeriod) {
         const DeviceProfile profile = weak_device(delay);
         expect_sides(velocity_inequalities(bounds, profile), 0,
                      weak_longest_period * device_need(profile, {60.0, 10.0}) + 1.25 * 0.04,
-                     20.0 * half_encoder_step + 0.04 * 1e-4 / 0.5e-3 + 0.001);
+                     20.0 * half_encoder_step + 0.04 * 1e-4 / 0.5e-3 + other_friction);
     }
 }
 
@@ -435,6 +437,9 @@ TEST(DirectLines, WithoutEncoderStepsNeedNoFrictionAgainstThem) {
 
 TEST(DirectLines, NameTheTermsThatTheyContain) {
     ForceBounds bounds = different_bounds();
+    EXPECT_EQ(direct_inequalities(bounds, weak_device(0.0))[1].formula,
+              "f_c >= L Delta / 2 + Delta_F / 2 + |mean c(f)| + epsilon");
+    bounds.force_error = 0.0;
     const auto formula = [&](const std::vector<Inequality>& lines, std::size_t k) {
         return lines[k].formula;
     };

@@ -25,7 +25,7 @@ VERBS = {
     "check-device": "check-device --object m.json --duration-s 2 --rate-hz 100",
     "show": "show m.json",
     "report": "report m.json a.csv -o report.html",
-    "export": "export m.json --c --uncertified --encoder-step 1e-4 -o knob.h",
+    "export": "export m.json --c --uncertified --encoder-step 1e-4 --force-limit 2 -o knob.h",
     "demo": "demo -o demo",
 }
 """Command lines for the tests, one for each verb; each command ends quickly."""

@@ -2,8 +2,10 @@
 """Tests palpate export: formats, refusals, exit codes and outputs."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,6 +13,8 @@ import pytest
 
 import palpate
 from models_by_hand import keyswitch_by_hand, model_by_hand
+from palpate import DeviceProfile, Model, Scheme
+from palpate._core.stability import certify
 from palpate.cli.main import main
 from palpate.export import exported
 from palpate.model import model_file
@@ -29,6 +33,13 @@ def exported_json(capsys: pytest.CaptureFixture[str], *arguments: object) -> dic
     code = main([*map(str, arguments), "--json"])
     result = json.loads(capsys.readouterr().out)
     return result | {"code": code}
+
+
+def macro(header: str, name: str) -> float:
+    """Returns the number of a macro."""
+    found = re.search(rf"#define {name} (\S+)f ", header)
+    assert found is not None
+    return float(found[1])
 
 
 def test_c_header_states_rate_profile_and_errors_of_a_certified_model(
@@ -71,23 +82,101 @@ def test_uncertified_header_says_so_and_compares_nothing(
 ) -> None:
     model = model_by_hand().save(tmp_path / "m.json")
     header = tmp_path / "m.h"
-    result = exported_json(
-        capsys, "export", model, "--c", "--uncertified", "--encoder-step", "1e-4", "-o", header
-    )
+    options = ["--uncertified", "--encoder-step", 1e-4, "--force-limit", 1.5]
+    result = exported_json(capsys, "export", model, "--c", *options, "-o", header)
     assert result["code"] == 0
     assert str(result["verdict"]).startswith("usable: the model has no certificate")
+    assert (result["force_limit"], result["needed_friction"]) == (1.5, 0.0)
     text = header.read_text(encoding="utf-8")
     assert "No certificate" in text
+    assert "Force limit: 1.5 N*m." in text
+    assert (macro(text, "m_FORCE_LIMIT"), macro(text, "m_NEEDED_FRICTION")) == (1.5, 0.0)
     assert "PALPATE_RATE_HZ" not in text
+    assert main(["export", str(model), "--c", *map(str, options), "-o", str(header)]) == 0
+    assert "force limit  1.5 N*m" in capsys.readouterr().out
+
+
+def test_every_header_limits_its_force(
+    planned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    header = tmp_path / "knob.h"
+    model = model_by_hand().save(tmp_path / "m.json")
+    for options, sentence in (
+        ([str(model), "--uncertified", "--encoder-step", "1e-4"], "state the largest force of the device"),
+        ([str(model), "--uncertified", "--encoder-step", "1e-4", "--force-limit", "0"], "must be a finite"),
+        ([str(model), "--uncertified", "--encoder-step", "1e-4", "--force-limit", "inf"], "must be a finite"),
+        ([str(planned), "--force-limit", "9"], "the force limit of bench-knob is 5: leave it out"),
+    ):
+        assert main(["export", *options, "--c", "-o", str(header)]) == 2
+        assert sentence in capsys.readouterr().err
+        assert not header.exists()
+    assert main(["export", str(planned), "--c", "-o", str(header)]) == 0
+    assert macro(header.read_text(encoding="utf-8"), "knob_FORCE_LIMIT") == 5.0
+
+
+def friction_at_its_bound(model: Model, reserve: float, **changes: Any) -> DeviceProfile:
+    """Returns a device with the friction that the certificate of a model needs, plus a reserve [N*m]."""
+    knob = {"id": "knob", "encoder_step": 2.0 * np.pi / 2**20, "viscous_damping": 0.5, "force_limit": 2.0}
+    strong = DeviceProfile(**(knob | {"coulomb_friction": 1.0} | changes))
+    certificate = certify(model, Scheme(structure="direct"), strong)
+    needed = next(line.right for line in certificate.inequalities if line.id == "friction-steps")
+    return DeviceProfile(**strong.to_dict() | {"coulomb_friction": needed + reserve})
+
+
+def test_program_whose_rounding_breaks_the_certificate_is_refused_with_the_cure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, header = model_by_hand(), tmp_path / "knob.h"
+    path = tmp_path / "knob.json"
+
+    def export(device: DeviceProfile, *options: str) -> int:
+        chosen = palpate.plan(model, device, predict="off")
+        assert (chosen.structure, chosen.limited, chosen.certificate.certified) == ("direct", None, True)
+        chosen.stored().save(path)
+        header.unlink(missing_ok=True)
+        return main(["export", str(path), "--c", "-o", str(header), *options])
+
+    exact = friction_at_its_bound(model, 1e-8)
+    assert export(exact) == 2
+    sentence = capsys.readouterr().err.splitlines()[-1]
+    assert "the certificate does not hold for the program in single precision" in sentence
+    assert "errors of the force are up to epsilon = 5.13e-06: " in sentence
+    assert "f_c >= L Delta / 2 + Delta_F / 2 + epsilon needs " in sentence
+    assert sentence.endswith("; export it with --precision double")
+    assert not header.exists()
+    assert export(exact, "--precision", "double") == 0
+    assert "for the errors of the program" in " ".join(capsys.readouterr().out.split())
+
+    assert export(exact, "--uncertified") == 0
+    assert capsys.readouterr().out.startswith("verdict: usable\n  the model has no certificate")
+    text = header.read_text(encoding="utf-8")
+    assert "No certificate" in text
+    assert "#define knob_CERTIFICATE_FINGERPRINT UINT64_C(0x0)" in text
+
+    assert export(friction_at_its_bound(model, 1e-16)) == 2
+    sentence = capsys.readouterr().err.splitlines()[-1]
+    assert "plan the model for a device with a coulomb_friction of at least " in sentence
+    enough = DeviceProfile(**exact.to_dict() | {"coulomb_friction": float(sentence.rsplit(" ", 1)[1])})
+    assert export(enough) == 0
+    capsys.readouterr()
+    numbers = exported_json(capsys, "export", path, "--c", "-o", header)
+    assert numbers["needed_friction"] <= enough.coulomb_friction  # type: ignore[operator]
+    text = header.read_text(encoding="utf-8")
+    assert (
+        f"Device friction: {enough.coulomb_friction:.4g} >= needed {numbers['needed_friction']:.4g}" in text
+    )
+    defined = macro(text, "knob_NEEDED_FRICTION")
+    assert numbers["needed_friction"] <= defined <= 1.00001 * enough.coulomb_friction  # type: ignore[operator]
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ("--uncertified", "--encoder-step"),
-        ("--uncertified --encoder-step 0.2", "an eighth of the model's domain"),
-        ("--uncertified --encoder-step 1e-4 --name 2fast", "identifier of C"),
-        ("--uncertified --encoder-step 1e-4 --name for", "identifier of C"),
+        ("--uncertified", "--force-limit"),
+        ("--uncertified --force-limit 1", "--encoder-step"),
+        ("--uncertified --encoder-step 0.2 --force-limit 1", "an eighth of the model's domain"),
+        ("--uncertified --encoder-step 1e-4 --force-limit 1 --name 2fast", "identifier of C"),
+        ("--uncertified --encoder-step 1e-4 --force-limit 1 --name for", "identifier of C"),
     ],
 )
 def test_impossible_export_is_refused_in_one_sentence(

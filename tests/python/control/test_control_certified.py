@@ -138,7 +138,7 @@ def test_one_lost_sample_ends_a_certified_run(planned: Path) -> None:
     arguments = ["--duration-s", 0.4, "--fault", "lost@0.1", "--json"]
     completed = control(planned, *arguments)
     assert completed.returncode == 1
-    assert "zero force sent, device closed" in completed.stderr
+    assert "zero force sent and confirmed, device closed" in completed.stderr
     assert control(planned, "--uncertified", "--lowest-rate-share", 0, *arguments).returncode == 0
 
 

@@ -70,7 +70,7 @@ def test_a_run_writes_a_complete_recording(tmp_path: Path, structure: str, rate:
     assert recording.source.columns["force"] == "force_Nm"
     assert recording.units == {"position": "rad", "force": "N*m"}
     assert "missed deadlines" in recording.metadata["timing"]
-    assert recording.metadata["ended"].startswith("the duration ended; zero force sent, device closed")
+    assert recording.metadata["ended"].startswith("the duration ended; zero force sent and confirmed")
     assert recording.metadata["simulated"].startswith("yes")
 
 

@@ -66,7 +66,7 @@ def test_a_suspended_rendering_sends_no_further_force(
     assert rows["time_s"].diff().max() < SUSPENDED_S / 2, "a tick was rendered after the pause"
     head = out.read_text(encoding="utf-8")[:4096]
     assert reason in head
-    assert "zero force sent, device closed" in head
+    assert "zero force sent and confirmed, device closed" in head
 
 
 def test_a_suspended_recording_by_hand_goes_on_and_counts_the_gap(tmp_path: Path) -> None:

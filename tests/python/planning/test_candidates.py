@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Certificates of direct rendering: wheels above the force limit, and slopes with delay."""
+"""Certificates of candidate structures: wheels above the force limit, slopes with delay, couplings."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from models_by_hand import model_by_hand
-from palpate import DeviceProfile, Model, Scheme, plan
-from palpate._core.stability import certify, passive_shift
+from palpate import DeviceProfile, InputError, Model, Scheme, plan
+from palpate._core.rendering import compensated_share
+from palpate._core.stability import certify, force_bounds, passive_shift
 from palpate.planning import profile_file
 from palpate.planning.limited_network import limit_slopes, renderable_slopes
 from palpate.planning.plan import static_force_error
@@ -89,3 +91,43 @@ def test_without_delay_a_fall_is_limited_by_friction_alone() -> None:
     assert low == pytest.approx(-200.0, rel=1e-4)
     assert high == pytest.approx(20.0, rel=1e-4)
     assert renderable_slopes(DeviceProfile(id="smooth", encoder_step=0.0))[0] == -math.inf
+
+
+def softest_coupling(slope: float) -> float:
+    """Returns the smallest coupling stiffness that compensates a model of this steepest slope."""
+    stiffness = slope / compensated_share
+    while compensated_share * stiffness >= slope:
+        stiffness = math.nextafter(stiffness, 0.0)
+    return math.nextafter(stiffness, math.inf)
+
+
+def random_slopes(seed: int, **changes: Any) -> Model:
+    """Returns a random model of one to eight wavelets, whose slope changes over the domain."""
+    random = np.random.default_rng(seed)
+    count = int(random.integers(1, 9))
+    return model_by_hand(
+        **{
+            "alpha": np.exp(random.uniform(1.0, 3.9, count))[:, None].tolist(),
+            "beta": random.uniform(0.0, 0.5, count)[:, None].tolist(),
+            "weight": random.uniform(-0.5, 0.5, count).tolist(),
+            "linear": [random.uniform(0.0, 40.0)],
+            **changes,
+        }
+    )
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_a_required_coupling_is_planned_at_its_bound_and_one_ulp_below(seed: int) -> None:
+    strong = DeviceProfile(id="strong", viscous_damping=2.0, coulomb_friction=0.5)
+    # The force of every second model pushes out of the domain, so that its continuation is the steepest part
+    model = random_slopes(seed, **({"bias": 40.0} if seed % 2 else {}))
+    stiffness = softest_coupling(force_bounds(model).slope_max)
+    softer = math.nextafter(stiffness, 0.0)
+    exact = plan(model, strong, coupling_stiffness=stiffness)
+    assert (exact.structure, exact.limited) == ("massless", None)
+    Scheme(structure="massless", coupling_stiffness=stiffness, compensated=True).validate(model)
+    with pytest.raises(InputError, match="to compensate a model"):
+        Scheme(structure="massless", coupling_stiffness=softer, compensated=True).validate(model)
+    for below in (softer, 0.999 * stiffness, 0.99 * stiffness, 0.9 * stiffness):
+        limited = plan(model, strong, coupling_stiffness=below)
+        assert limited.limited is not None or limited.structure != "massless"

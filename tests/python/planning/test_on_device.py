@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from models_by_hand import model_by_hand
@@ -61,6 +62,22 @@ def test_the_controller_renders_a_wall_that_the_host_cannot() -> None:
     on_controller = plan(wall, KNOB, on_device=40e3)
     assert (on_controller.structure, on_controller.limited) == ("direct", None)
     assert str(on_controller.verdict) == "good"
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_plan_for_the_controller_holds_for_the_exported_program(seed: int, tmp_path: Path) -> None:
+    # The friction limits the play radius, so the narrowest certified play radius has no reserve for rounding
+    random = np.random.default_rng(seed)
+    switch = model_by_hand(
+        alpha=[[20.0]], weight=[float(random.uniform(-0.3, 0.3))], linear=[float(random.uniform(1.0, 10.0))],
+        weight_hysteresis=[0.0], linear_hysteresis=[0.0], bias_hysteresis=float(random.uniform(0.05, 0.2)),
+    )  # fmt: skip
+    device = DeviceProfile(**KNOB.to_dict() | {"encoder_step": 4e-4, "coulomb_friction": 0.004})
+    chosen = plan(switch, device, on_device=20e3)
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    model = chosen.stored().save(tmp_path / "m.json")
+    assert main(["export", str(model), "--c", "-o", str(tmp_path / "m.h")]) == 0
 
 
 def test_a_stored_plan_is_checked_and_read_again(tmp_path: Path) -> None:

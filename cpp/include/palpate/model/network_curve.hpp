@@ -14,6 +14,22 @@
 
 namespace palpate {
 
+namespace detail {
+
+/// Requested accuracy of the proved bounds of a slope: their difference from its true minimum and maximum, as a share
+/// of the steepest slope. A wider bound reduces the stiffness that can be rendered.
+inline constexpr double slope_slack = 1e-4;
+
+/// Returns the smallest and the largest slope of a force outside one edge of the domain: the slope of its straight
+/// line, and 0 where the line has ended.
+[[nodiscard]] inline Interval line_slopes(const EdgeLine& line) noexcept {
+    const double slope = line.at_edge.slope;
+    return std::isfinite(line.reach) ? Interval{std::min(slope, 0.0), std::max(slope, 0.0)}
+                                     : Interval{slope, slope};
+}
+
+}  // namespace detail
+
 /// The force of a wavelet network of one input over all positions: the sum of eq. 4 inside the domain, and outside the
 /// domain either a straight line on each side or, for a periodic force, the force inside the domain repeated.
 class NetworkCurve {
@@ -102,6 +118,13 @@ class NetworkCurve {
     /// by at most 1 % of the largest absolute value.
     [[nodiscard]] Interval value_bounds() const { return palpate::value_bounds(network_, lower_, upper_); }
     [[nodiscard]] Interval slope_bounds() const { return palpate::slope_bounds(network_, lower_, upper_); }
+    /// Returns proved bounds of the slope at every position, continuation included. A certificate uses these bounds, so
+    /// every other limit of the slope must use them too.
+    [[nodiscard]] Interval slopes_everywhere() const {
+        const Interval inside = palpate::slope_bounds(network_, lower_, upper_, detail::slope_slack);
+        return periodic_ ? inside
+                         : inside.with(detail::line_slopes(below_)).with(detail::line_slopes(above_));
+    }
 
     /// Returns the properties of the force inside the domain from which its straight lines outside the domain are
     /// computed.

@@ -146,7 +146,9 @@ class ExportComparison {
             outside *= 16.0 * unit_roundoff(model_.target().precision);
         }
         add(check_.force, found.force - right.force, model_.force_error() + outside);
-        add(check_.step, exported_.step(exported, count) - right.force, model_.step_error() + outside);
+        const double step = exported_.step(exported, count);
+        add(check_.step, step - right.force, model_.step_error() + outside);
+        add(check_.step, step - right.force, model_.rendering_error());
         if (right.extrapolated || right.slope == 0.0 || found.slope == Real{0}) {
             return;  // at a limit rounding decides by which factor the stretches are reduced
         }
@@ -253,6 +255,7 @@ class ExportComparison {
                                                          (std::abs(right) + 2.0 * at_ends_)
                                                    : 0.0;
                 add(check_.step, found - right, model_.step_error() + of_core + outside);
+                add(check_.step, found - right, model_.rendering_error() + of_core);
             }
         });
     }

@@ -119,6 +119,9 @@ class ExportedModel {
     [[nodiscard]] bool step_error_lasts() const noexcept { return step_error_lasts_; }
     /// Returns the factor of the additional error outside the domain: times |f - force at the end of the domain|.
     [[nodiscard]] double outside_share() const noexcept { return 6.0 * unit_roundoff(target_.precision); }
+    /// Returns the friction that the certificate of the exported program needs in addition [N]. It is a proved bound of
+    /// the error of the sent torque, at every position and for a motion of any length. Infinity: no bound is known.
+    [[nodiscard]] double rendering_error() const noexcept { return rendering_error_; }
     /// Returns lower bounds of max|f| [N] and max|f'| [N/m] over the domain. With hysteresis the slope includes that of
     /// the play, h / r.
     [[nodiscard]] double largest_force() const { return CellTable::largest_force(law_.curves())[0]; }
@@ -285,9 +288,12 @@ class ExportedModel {
         force_error_ = std::max(force_error_, at_ends);
         step_error_ = force_error_;
         step_error_lasts_ = !memory_;
+        rendering_error_ += force_error_ + outside_error();
         if (response_) {
             bound_lag(u);
         }
+        // Rounding of the force limit and of the torque in micronewtonmetres
+        rendering_error_ += 3.0 * u * target_.force_limit;
     }
 
     /// Returns the largest absolute value of the integrals in column `column` of the table.
@@ -319,6 +325,9 @@ class ExportedModel {
         slope_error_ += p.slope * sum + p.steepest * stiffness * of_stretch +
                         (2.0 * p.largest + p.value) * p.value * memory.sudden +
                         8.0 * u * (g.steepest + p.steepest + p.largest * p.largest * memory.sudden);
+        // The coordinate grows with the distance from the domain
+        rendering_error_ =
+            128.0 * 0x1p-53 * p.largest * p.largest * stiffness * 0x1p31 * target_.encoder_step;
         const double energy = 0.5 * sum * memory.largest_stretch;
         energy_error_ += stiffness * (memory.largest_stretch + 0.5 * of_stretch) * of_stretch;
         return energy;
@@ -343,14 +352,27 @@ class ExportedModel {
         for (const ExportedLine& line : response_lines_) {
             one_step = std::max(one_step, 4.0 * u * (std::abs(line.value) + std::abs(line.gain)));
         }
-        const double largest = std::min(target_.force_limit, response_->errors()[0].largest);
-        const double farthest = largest / scheme_.coupling.stiffness;
-        // In single precision the constants are rounded too
-        const double of_lag = one_step / p + 8.0 * u * farthest;
         step_error_lasts_ = rho < 1.0;
-        step_error_ = one_step +
-                      response.largest() * lag_.memory * (step_error_lasts_ ? of_lag / (1.0 - rho) : 0.0) +
-                      response.largest() * 4.0 * u * farthest;
+        const auto lasting = [&](double error, double largest) {
+            const double farthest = largest / scheme_.coupling.stiffness;
+            // In single precision the constants are rounded too
+            const double of_lag = error / p + 8.0 * u * farthest;
+            return error +
+                   response.largest() *
+                       (lag_.memory * (step_error_lasts_ ? of_lag / (1.0 - rho) : 0.0) + 4.0 * u * farthest);
+        };
+        step_error_ = lasting(one_step, std::min(target_.force_limit, response_->errors()[0].largest));
+        rendering_error_ = step_error_lasts_ ? lasting(one_step + outside_error(), target_.force_limit)
+                                             : std::numeric_limits<double>::infinity();
+    }
+
+    /// Returns a bound of the additional error of a force outside the domain, where at most the force limit is sent.
+    [[nodiscard]] double outside_error() const noexcept {
+        double largest = target_.force_limit;
+        for (const std::array<ExportedLine, 2>& pair : lines_) {
+            largest += 2.0 * std::max(std::abs(pair[0].value), std::abs(pair[1].value));
+        }
+        return periodic() ? 0.0 : 10.0 * unit_roundoff(target_.precision) * largest;
     }
 
     ForceModel model_;
@@ -367,6 +389,7 @@ class ExportedModel {
     double energy_error_ = 0.0;
     double step_error_ = 0.0;
     bool step_error_lasts_ = true;
+    double rendering_error_ = 0.0;
 };
 
 }  // namespace palpate

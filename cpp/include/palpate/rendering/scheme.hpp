@@ -103,7 +103,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
         detail::require(
             !model.hysteresis(),
             "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
-        const double steepest = std::max(model.slope_bounds().upper, 0.0);
+        const double steepest = std::max(model.network()->curve().slopes_everywhere().upper, 0.0);
         detail::require(steepest <= compensated_share * scheme.coupling.stiffness,
                         "coupling_stiffness is " + readable(scheme.coupling.stiffness) +
                             ", must be at least " + readable(steepest / compensated_share) +
@@ -117,7 +117,9 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
 [[nodiscard]] inline double steepest_slope(const Scheme& scheme, const ForceModel& model) {
     const std::optional<double> radius =
         scheme.play_radius > 0.0 ? std::optional{scheme.play_radius} : model.play_radius();
-    const double steepest = std::max(model.slope_bounds(radius).upper, 0.0);
+    const WaveletNetwork* network = model.network();
+    const Interval slopes = network ? network->curve().slopes_everywhere() : model.slope_bounds(radius);
+    const double steepest = std::max(slopes.upper, 0.0);
     const double stiffness = scheme.coupling.stiffness;
     return scheme.compensated ? stiffness * steepest / (stiffness - steepest) : steepest;
 }

@@ -59,7 +59,7 @@ class Controller {
     }
 
     /// Sends zero force and closes the device. Returns what is known about its force.
-    [[nodiscard]] ZeroForce stop() noexcept {
+    ZeroForce stop() noexcept {
         (void)device_.exchange({});
         return closed(device_);
     }

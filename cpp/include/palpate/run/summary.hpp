@@ -46,10 +46,10 @@ struct Summary {
 
     /// Returns true if the run ended as intended (`LoopReport::orderly`).
     [[nodiscard]] bool orderly() const noexcept { return report.loop.orderly(); }
-    /// Returns why the run ended, and what is known about the force of the device, as a sentence.
-    [[nodiscard]] std::string ended() const {
-        return exit_text(report.loop, loop) + "; " + closing_text(report.loop.zero_force);
-    }
+    /// Returns the exit reason of the run as a sentence.
+    [[nodiscard]] std::string ended() const { return exit_text(report.loop, loop); }
+    /// Returns what is known about the force of the device after the run.
+    [[nodiscard]] std::string zero_force() const { return closing_text(report.loop.zero_force); }
     /// Returns all messages of the run: refused real-time requests, notes and warnings.
     [[nodiscard]] std::vector<std::string> all_notes() const {
         std::vector<std::string> all = report.refused;
@@ -95,6 +95,7 @@ struct Summary {
         {"findings", findings},
         {"orderly", summary.orderly()},
         {"ended", summary.ended()},
+        {"zero_force", summary.zero_force()},
         {"status", std::string(text(loop.status).word)},
         {"device", summary.device},
         {"ticks", loop.ticks()},
@@ -140,7 +141,7 @@ struct Summary {
                   status.name;
     }
     Lines all{
-        {"ended", summary.ended()},
+        {"ended", summary.ended() + "; " + summary.zero_force()},
         {"rate", readable(loop.timing.rate_hz()) + " Hz of " + readable(summary.loop.rate_hz) + " Hz" +
                      (slow ? ", lower than required, " : ", ") + std::to_string(loop.timing.missed) +
                      " deadlines of the loop missed"},

@@ -275,4 +275,16 @@ namespace detail {
     return certificate;
 }
 
+/// Returns the certificate of the same rendering by another program, such as an exported model, whose force differs by
+/// at most `force_error` [N or N*m] from the force with the certified bounds. Friction must exceed the sum of all force
+/// errors. Model and fingerprint remain those of `certificate`, which a model file stores.
+[[nodiscard]] inline Certificate with_force_error(const Certificate& certificate, double force_error) {
+    ForceBounds bounds = certificate.bounds;
+    bounds.force_error += force_error;
+    Certificate now = certify_rendered(bounds, certificate.scheme, certificate.device);
+    now.model = certificate.model;
+    now.fingerprint = certificate.fingerprint;
+    return now;
+}
+
 }  // namespace palpate

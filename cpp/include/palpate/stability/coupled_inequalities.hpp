@@ -54,12 +54,12 @@ inline void add_hysteresis(std::vector<Inequality>& lines, const ForceBounds& bo
 }
 
 /// Adds two inequalities for an object for which the effect of encoder steps has no proved bound. The encoder step must
-/// be 0. Coulomb friction must be at least half a force step plus the mean force of a periodic model.
+/// be 0. Coulomb friction must be at least half a force step plus the other force errors of `friction_inequality`.
 inline void add_no_quantisation(std::vector<Inequality>& lines, const ForceBounds& bounds,
                                 const DeviceProfile& device, const char* name, const char* cure) {
     lines.push_back(unknown("encoder-step-coupling", name, "proved only for an encoder step Delta = 0", 0.0,
                             device.encoder_step, cure));
-    Inequality friction = friction_inequality(device, 0.0, bounds.mean_force, "0");
+    Inequality friction = friction_inequality(device, 0.0, bounds, "0");
     friction.id = "friction-force-step";
     friction.name = "Coulomb friction against force steps";
     lines.push_back(friction);
@@ -161,7 +161,7 @@ inline constexpr double usual_coupling_share = 0.95;
             "use direct rendering");
     } else {
         lines.push_back(detail::friction_inequality(device, massless_gain(bounds, coupling, device.period_s),
-                                                    bounds.mean_force, "gamma Delta / 2"));
+                                                    bounds, "gamma Delta / 2"));
     }
     return lines;
 }
@@ -194,7 +194,7 @@ inline constexpr double usual_coupling_share = 0.95;
     lines.push_back(detail::uniqueness(coupled + uncoupled, bounds.falling(), "p > s_"));
     if (!bounds.hysteresis && bounds.slope.lower == bounds.slope.upper) {
         lines.push_back(detail::friction_inequality(
-            device, implicit_gain(bounds.slope.lower, scheme.inertia, coupling, T), bounds.mean_force,
+            device, implicit_gain(bounds.slope.lower, scheme.inertia, coupling, T), bounds,
             "||g||_1 Delta / 2"));
     } else {
         detail::add_no_quantisation_of_a_mass(lines, bounds, device);

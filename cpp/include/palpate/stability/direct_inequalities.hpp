@@ -16,17 +16,19 @@ namespace palpate {
 
 namespace detail {
 
-/// Returns the inequality for Coulomb friction, which must be at least the sum of three force errors: `gain` times half
-/// an encoder step, half a force step, and the mean force of a periodic model.
+/// Returns the inequality for Coulomb friction, which must be at least the sum of four force errors: `gain` times half an
+/// encoder step, half a force step, and of `bounds` the mean force of a periodic model and the error of the program that
+/// renders the force.
 [[nodiscard]] inline Inequality friction_inequality(const DeviceProfile& device, double gain,
-                                                    double mean_force, const std::string& formula) {
+                                                    const ForceBounds& bounds, const std::string& formula) {
     // A device without encoder steps needs no friction against encoder steps, even if `gain` is infinite.
     const double encoder = device.encoder_step > 0.0 ? 0.5 * gain * device.encoder_step : 0.0;
     return {"friction-steps",
             "Coulomb friction against encoder and force steps",
-            "f_c >= " + formula + " + Delta_F / 2" + (mean_force > 0.0 ? " + |mean c(f)|" : ""),
+            "f_c >= " + formula + " + Delta_F / 2" + (bounds.mean_force > 0.0 ? " + |mean c(f)|" : "") +
+                (bounds.force_error > 0.0 ? " + epsilon" : ""),
             device.coulomb_friction,
-            encoder + 0.5 * device.force_step + mean_force,
+            encoder + 0.5 * device.force_step + bounds.mean_force + bounds.force_error,
             Basis::Proved,
             "Abbott and Okamura 2005; Diolaiti et al. 2006; docs/certificate.md"};
 }
@@ -82,12 +84,12 @@ namespace detail {
         return {detail::prediction_inequality(
                     device, predicted_need(device, predict, {bounds.rising(), bounds.falling()}),
                     device.late_samples() > 0 ? "b >= T B(M, s_, m, t_d)" : "b >= T B(M, s_, m)"),
-                detail::friction_inequality(device, predicted_encoder_gain(predict) * bounds.steepest,
-                                            bounds.mean_force, "(m + 3) / (m + 1) L Delta / 2")};
+                detail::friction_inequality(device, predicted_encoder_gain(predict) * bounds.steepest, bounds,
+                                            "(m + 3) / (m + 1) L Delta / 2")};
     }
     return {detail::hold_inequality(device, {bounds.rising(), bounds.falling()}, 0.0,
                                     device.late_samples() > 0 ? "b >= T B(M, s_, t_d)" : "b >= T M / 2"),
-            detail::friction_inequality(device, bounds.steepest, bounds.mean_force, "L Delta / 2")};
+            detail::friction_inequality(device, bounds.steepest, bounds, "L Delta / 2")};
 }
 
 /// Returns the inequalities of direct rendering of a force with hysteresis, f = g + s h with the play radius r. While
@@ -101,29 +103,28 @@ namespace detail {
     const bool late = device.late_samples() > 0;
     if (predict > 0) {
         const double gain = predicted_encoder_gain(predict);
-        return {
-            nonnegative,
-            detail::prediction_inequality(
-                device, predicted_path_need(device, {bounds.rising(), bounds.falling()}),
-                late ? "b >= T (B(M_h, s_h, t_d) + L_h / 2)" : "b >= T (M_h + L_h) / 2"),
-            detail::friction_inequality(
-                device, gain * bounds.sliding + (gain + 1.0) * bounds.hysteresis_per_play, bounds.mean_force,
-                "((m + 3) max(|g'| + |h'|) + (2 m + 4) max h / r) / (m + 1) Delta / 2")};
+        return {nonnegative,
+                detail::prediction_inequality(
+                    device, predicted_path_need(device, {bounds.rising(), bounds.falling()}),
+                    late ? "b >= T (B(M_h, s_h, t_d) + L_h / 2)" : "b >= T (M_h + L_h) / 2"),
+                detail::friction_inequality(
+                    device, gain * bounds.sliding + (gain + 1.0) * bounds.hysteresis_per_play, bounds,
+                    "((m + 3) max(|g'| + |h'|) + (2 m + 4) max h / r) / (m + 1) Delta / 2")};
     }
     const auto hold = [&](double more, const std::string& added) {
         return detail::hold_inequality(device, {bounds.rising() + more, bounds.falling() + more}, 0.0,
                                        late ? "b >= T B(M_h, s_h, t_d)" : "b >= T (M_h" + added + ") / 2");
     };
     const Inequality both =
-        detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.hysteresis_per_play,
-                                    bounds.mean_force, "(max(|g'| + |h'|) + 2 max h / r) Delta / 2");
+        detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.hysteresis_per_play, bounds,
+                                    "(max(|g'| + |h'|) + 2 max h / r) Delta / 2");
     if (both.holds() || late || !(2.0 * bounds.play_radius() >= device.encoder_step)) {
         return {nonnegative, hold(0.0, ""), both};
     }
     const double more = 0.5 * bounds.sliding * device.encoder_step / bounds.play_radius();
     return {nonnegative, hold(more, " + e"),
-            detail::friction_inequality(device, bounds.sliding + more + bounds.hysteresis_per_play,
-                                        bounds.mean_force, "(max(|g'| + |h'|) + e + max h / r) Delta / 2")};
+            detail::friction_inequality(device, bounds.sliding + more + bounds.hysteresis_per_play, bounds,
+                                        "(max(|g'| + |h'|) + e + max h / r) Delta / 2")};
 }
 
 /// Returns the inequalities of direct rendering of a force f(x, v) of position x and velocity v. The velocity is a
@@ -135,7 +136,7 @@ namespace detail {
                 device, {bounds.rising(), bounds.falling()}, bounds.drag,
                 std::string(device.late_samples() > 0 ? "b >= T B(M, s_, t_d)" : "b >= T M / 2") +
                     " + B_v T / period"),
-            detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.drag / device.period_s, 0.0,
+            detail::friction_inequality(device, bounds.sliding + 2.0 * bounds.drag / device.period_s, bounds,
                                         "L_x Delta / 2 + B_v Delta / T")};
 }
 
@@ -167,7 +168,7 @@ namespace detail {
          n > 0.0 ? "b >= T (M / 2 + n L + (1 + n^2 / 2) R)" : "b >= T (M_g + K (P^2 + U P')) / 2",
          device.viscous_damping, device.longest_period_s() * (0.5 * rising + late), Basis::Proved,
          "docs/certificate.md"},
-        detail::friction_inequality(device, encoder, bounds.mean_force,
+        detail::friction_inequality(device, encoder, bounds,
                                     n > 0.0 ? "(L_g + K (2 P^2 + U P') + 2 n (L + R)) Delta / 2"
                                             : "(L_g + K (2 P^2 + U P')) Delta / 2")};
 }

@@ -39,6 +39,7 @@ struct ForceBounds {
     double hysteresis_per_play = 0.0;
     double mean_force = 0.0;
     double drag = 0.0;
+    double force_error = 0.0;
     bool hysteresis = false;
     std::optional<MemoryBounds> memory = std::nullopt;
 
@@ -74,6 +75,11 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
                                     "Mean of a limited periodic force above its hysteresis [N]; 0: passive."},
     Field<&ForceBounds::drag>{"drag", "B_v = max |f(x, v) - f(x, 0)| / |v|; 0 for a force of position alone.",
                               Rule::NotNegative},
+    Field<&ForceBounds::force_error>{
+        "force_error",
+        "epsilon, largest difference of the rendered force from the force with these bounds [N]; 0 unless\n"
+        "another program renders the model.",
+        Rule::NotNegative, false},
     Field<&ForceBounds::hysteresis>{"hysteresis", "True if the model has hysteresis.", Rule::Any, false}};
 
 /// Returns true if every bound of the force is finite. A model with an infinite bound cannot be certified.
@@ -105,11 +111,8 @@ inline constexpr auto fields_of<ForceBounds> = std::tuple{
 
 namespace detail {
 
-/// Requested accuracy of the proved bounds of a slope: their difference from its true minimum and maximum, as a share
-/// of the steepest slope. A wider bound reduces the stiffness that can be rendered.
-inline constexpr double slope_slack = 1e-4;
-/// The same accuracy for a force of position and velocity. It is coarser than `slope_slack`, because two inputs need
-/// many more cells.
+/// Accuracy of the bounds of a slope for a force of position and velocity. It is coarser than `slope_slack`, because two
+/// inputs need many more cells.
 inline constexpr double velocity_slack = 1e-3;
 
 /// Coefficients a, b, c of the slope a g' + b h' + c h of a force with hysteresis (mean force g, hysteresis h).
@@ -138,14 +141,6 @@ struct SlopeReading {
     return enclose(std::array{Term{slope_of, 1}, Term{value_of, 0}}, from, to, relative);
 }
 
-/// Returns the smallest and the largest slope of a force outside one edge of the domain: the slope of its straight
-/// line, and 0 where the line has ended.
-[[nodiscard]] inline Interval line_slopes(const EdgeLine& line) noexcept {
-    const double slope = line.at_edge.slope;
-    return std::isfinite(line.reach) ? Interval{std::min(slope, 0.0), std::max(slope, 0.0)}
-                                     : Interval{slope, slope};
-}
-
 /// Returns proved bounds of the hysteresis h. They are computed again with 1e-6 instead of 1e-4 relative error if the
 /// first lower bound is negative. An identified h >= 0 has a minimum near 0, small compared with its largest value.
 [[nodiscard]] inline Interval hysteresis_force_bounds(const NetworkParameters& hysteresis, double from,
@@ -163,14 +158,7 @@ struct SlopeReading {
 /// Returns proved bounds of a force of position without hysteresis, continuations included.
 [[nodiscard]] inline ForceBounds static_bounds(const NetworkCurve& curve, double force_limit) {
     ForceBounds bounds;
-    bounds.slope = slope_bounds(curve.parameters(), curve.lower(), curve.upper(), slope_slack);
-    if (!curve.periodic()) {
-        for (const EdgeLine& line : {curve.below(), curve.above()}) {
-            const Interval slopes = line_slopes(line);
-            bounds.slope = {std::min(bounds.slope.lower, slopes.lower),
-                            std::max(bounds.slope.upper, slopes.upper)};
-        }
-    }
+    bounds.slope = curve.slopes_everywhere();
     bounds.steepest = bounds.sliding = bounds.slope.largest();
     bounds.mean_force = active_mean(PeriodicStrokes{curve, nullptr, bounds.sliding}, force_limit);
     return bounds;
@@ -279,8 +267,7 @@ struct SlopeReading {
 [[nodiscard]] inline double passive_shift(const ForceModel& model, double force_limit) {
     if (const WaveletNetwork* network = model.network()) {
         const NetworkCurve& f = network->curve();
-        const Interval slope = slope_bounds(f.parameters(), f.lower(), f.upper(), detail::slope_slack);
-        return detail::passive_shift({f, nullptr, slope.largest()}, force_limit);
+        return detail::passive_shift({f, nullptr, f.slopes_everywhere().largest()}, force_limit);
     }
     if (const HysteresisNetwork* pair = model.hysteresis()) {
         const double wide = pair->force().upper() - pair->force().lower();
