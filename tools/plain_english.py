@@ -53,7 +53,6 @@ INSTEAD = {
     r"stands?|stood|standing": "is, represents, is stored",
     r"learn(?:s|t)? of": "receives",
     # indirect subjects and negated nouns
-    r"what": "the noun itself",
     r"somebody(?: else)?|nobody|who(?:m)?ever|whatever|wherever": "the user, a hand, no, any",
     r"(?<!there )(?:is|are|was|were|be) no (?!longer)\w+": "is not a",
     r"(?:that|which) (?:is|are|was) none": "no X",

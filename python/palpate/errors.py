@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import difflib
+import os
+import shlex
 import unicodedata
 from collections.abc import Iterable
 
@@ -37,6 +39,16 @@ def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
     """Returns the escaped text; the end of a long text is cut."""
     shown = escaped(text)
     return shown if len(shown) <= longest else f"{shown[:longest]}..."
+
+
+def command_word(value: str | os.PathLike[str]) -> str:
+    """Returns one word of a command that a message suggests: no shell expands it.
+
+    A path that begins with a minus sign is not an option.
+    """
+    text = os.fspath(value)
+    is_path = isinstance(value, os.PathLike)
+    return shlex.quote(f"./{text}" if is_path and text.startswith("-") else text)
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str | None:

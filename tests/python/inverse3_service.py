@@ -72,7 +72,8 @@ class Service:
                     return
                 if self.silent_after is not None and number >= self.silent_after:
                     continue
-                if self.garbage_after is not None and 0 <= number - self.garbage_after < self.garbage_messages:
+                first = number + 1 if self.garbage_after is None else self.garbage_after
+                if first <= number < first + self.garbage_messages:
                     connection.send("{")
                     continue
                 if self.renamed_after == number:

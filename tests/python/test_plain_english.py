@@ -32,8 +32,8 @@ LONG = "The program " + "sends zero force and " * 10 + "closes the device"
         ("a.py", "# The user is told.", "# The user receives a message.", 'comment: "told"'),
         ("a.py", "# Whether it ends.", "# True if it ends.", 'comment: opening "Whether"'),
         ("a.cpp", "/// Nobody holds it.", "/// No hand holds it.", 'comment: "nobody"'),
-        ("a.hpp", "int a;  ///< what it is", "int a;  ///< mass [kg]", 'comment: "what"'),
-        ("Makefile", "# What it prints.", "# Prints the targets.", 'comment: "what"'),
+        ("a.hpp", "int a;  ///< told mass", "int a;  ///< mass [kg]", 'comment: "told"'),
+        ("Makefile", "# Tells the targets.", "# Prints the targets.", 'comment: "tells"'),
         ("a.toml", "\t# Set anew each time.", "\t# Set again each time.", 'comment: "anew"'),
         ("a.py", '"""Tells the error."""', '"""Returns the error."""', 'docstring: "tells"'),
         ("a.py", '"""Where the force is."""', '"""Position of the force."""', 'docstring: opening "Where"'),
@@ -42,7 +42,7 @@ LONG = "The program " + "sends zero force and " * 10 + "closes the device"
         ("a.cpp", 'puts("the force"\n" of its own");', 'puts("a separate"\n" force here");',
          'message: "of its own"'),
         ("a.md", "The rooms are small.\n\nA room is left.", "Each module is small.", 'page: "room is"'),
-        ("a.py", "def test_what_is_wrong(): ...", "def test_errors_are_named(): ...", 'test name: "what"'),
+        ("a.py", "def test_told_errors(): ...", "def test_errors_are_named(): ...", 'test name: "told"'),
         ("a.cpp", "TEST(Force, IsTold) {}", "TEST(Force, IsReported) {}", 'test name: "told"'),
         ("a.cpp", "TEST_F(F, NothingButZero) {}", "TEST_F(F, OnlyZero) {}", 'test name: "nothing but"'),
         ("a.py", "told = 1", "output = 1", 'name: "told"'),
@@ -94,7 +94,7 @@ def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 def test_exit_code_and_number_of_findings_are_reported(tmp_path: Path) -> None:
     file = tmp_path / "a.py"
-    file.write_text("told = 1\n# The user is told.\n# What.\nlimit = told\n", encoding="utf-8")
+    file.write_text("told = 1\n# The user is told.\n# Nobody.\nlimit = told\n", encoding="utf-8")
     completed = run(file)
     assert completed.returncode == 1
     assert completed.stdout.splitlines()[-1] == "3 findings"

@@ -41,7 +41,7 @@ enum class FaultKind : std::uint8_t {
     /// The device refuses OUT packets with NAK, so they arrive one frame late; IN packets are not late.
     Busy,
     StuckEcho,   ///< IN packets report no newer OUT packet, although OUT packets act.
-    StuckClock,  ///< The clock in IN packets stands still.
+    StuckClock,  ///< The clock in IN packets does not advance.
     ClockJump,   ///< The clock in IN packets jumps by 50 ms; it goes on from there.
     Drop,        ///< An IN packet is lost.
     Swap,        ///< An IN packet arrives after the next one.

@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
-from ..errors import did_you_mean
+from ..errors import command_word, did_you_mean
 from .completion import SHELLS, completes, script_of
 from .exit_status import INTERRUPTED, exit_status_of
 from .printing import TERMS, Verbs, drop_what_cannot_be_written, echo, prepare_streams, print_line
@@ -52,9 +52,9 @@ def _hint(name: str) -> str:
         if name.lower() in words:
             return f"; use palpate {verb}"
     if Path(name).suffix == ".json":
-        return f"; to print a model, use palpate show {name}"
+        return f"; to print a model, use palpate show {command_word(Path(name))}"
     if Path(name).is_file():
-        return f"; to identify a model, use palpate identify {name} -o MODEL.json"
+        return f"; to identify a model, use palpate identify {command_word(Path(name))} -o MODEL.json"
     return did_you_mean(name, _VERBS) or f"; the verbs are {', '.join(_VERBS)}"
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ..errors import InputError
+from ..errors import InputError, command_word
 from ..report import Subject, report_of
 from ..verification import columns_of
 from .exit_status import end_with, finishing
@@ -65,7 +65,8 @@ def report(
     the verdict is no; the page is then written too.
     """
     if recording_file is not None and recording_file.suffix == ".json" != model_file.suffix:
-        raise InputError(f"the model comes first: palpate report {recording_file} {model_file}")
+        swapped = f"palpate report {command_word(recording_file)} {command_word(model_file)}"
+        raise InputError(f"the model comes first: {swapped}")
     require_writable(output, inputs=(model_file, recording_file, *identified_on))
     if output.suffix.lower() not in PAGES:
         raise InputError(f"{output} is not a page: its name must end in {' or '.join(PAGES)}")

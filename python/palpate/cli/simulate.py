@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from .._core.simulation import TestRig
+from ..errors import command_word
 from ..model import Model, load_model
 from ..planning import Plan, force_error, force_range, hand_for, judge, rig_for
 from ..planning import simulate as render
@@ -33,7 +34,7 @@ def _refuse_device(ctx: click.Context, param: click.Parameter, device: str | Non
     if device is not None:
         raise click.UsageError(
             "the device comes from the plan in the model file: run palpate plan MODEL.json --device "
-            f"{device} -o MODEL.json first",
+            f"{command_word(device)} -o MODEL.json first",
             ctx,
         )
 

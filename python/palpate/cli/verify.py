@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ..errors import InputError
+from ..errors import InputError, command_word
 from ..model import load_model
 from ..recording import Recording
 from ..verdict import FORCE_JND
@@ -85,7 +85,8 @@ def verify(
     verdict is no.
     """
     if recording_file.suffix == ".json" != model_file.suffix:
-        raise InputError(f"the model comes first: palpate verify {recording_file} {model_file}")
+        swapped = f"palpate verify {command_word(recording_file)} {command_word(model_file)}"
+        raise InputError(f"the model comes first: {swapped}")
     require_writable(plot, plot_closed_loop, inputs=(model_file, recording_file))
     model = load_model(model_file)
     recording = reading.read(recording_file, columns_of(model))

@@ -19,7 +19,7 @@ from typing import Any
 
 from .._core import device as core
 from .._core.device import UsbRequest
-from ..errors import InputError, escaped
+from ..errors import InputError, command_word, escaped
 from ..recording.files import replacing
 
 
@@ -294,7 +294,7 @@ def install_rule(report: Callable[[str], None], *, folder: Path = FOLDER) -> Non
             "not installed"
         )
     if not os.access(folder, os.W_OK):
-        command_text = f"sudo {sys.executable} -m palpate devices --install-udev-rule"
+        command_text = f"sudo {command_word(sys.executable)} -m palpate devices --install-udev-rule"
         raise DeviceError(f"writing {target} needs root; run: {command_text}")
     text = files(__package__).joinpath(RULE).read_text(encoding="utf-8")
     with replacing(target) as temporary:

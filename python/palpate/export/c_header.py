@@ -8,6 +8,7 @@ the same order.
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.resources import files
@@ -82,24 +83,25 @@ def header_text(exported: Exported) -> str:
     tables = ["law", "response"] if model.massless else ["law"]
     numbers = _Numbers(exported)
     texts = {"constants": "\n".join(numbers.constants()), "tables": "\n".join(numbers.tables())}
-    text = filled(template, parts, {"tables": tables}, texts)
-    device = "" if exported.device is None else _plain(exported.device.id)
     words = {
+        "NAME": exported.name,
         " STRUCTURE ": f" {exported.structure} ",
         " RATE_HZ": f" {exported.rate_hz}",
         " PROFILE": f" {exported.profile:#010x}",
-        " DEVICE": f" {device}",
+        " DEVICE": "" if exported.device is None else f" {_plain(exported.device.id)}",
     }
-    for word, replacement in words.items():
-        text = text.replace(word, replacement)
+    text = filled(template, parts, {"tables": tables}, {name: f"//@ {name}" for name in texts})
+    # One pass before the texts are inserted, so that no word in the name of a model or device is replaced
+    text = re.sub("|".join(words), lambda found: words[found[0]], text)
+    text = filled(text, {}, {}, texts)
     guard = f"{exported.name}_H"
     licence, _, text = text.partition("\n")
     opening = f"{licence}\n{_comment(exported.description())}#ifndef {guard}\n#define {guard}\n\n"
-    return (opening + text + f"\n#endif /* {guard} */\n").replace("NAME", exported.name)
+    return f"{opening}{text}\n#endif /* {guard} */\n"
 
 
 class _Numbers:
-    """Constants and tables of a header, in which NAME represents the name of the model."""
+    """Constants and tables of a header. In the methods NAME represents the name of the model."""
 
     def __init__(self, exported: Exported) -> None:
         self.exported = exported
@@ -108,12 +110,19 @@ class _Numbers:
 
     def constants(self) -> Iterator[str]:
         """Yields the constants that do not belong to a table."""
-        yield from self.general()
+        yield from self.named(self.general())
         yield from self.certificate()
-        yield from self.structure()
+        yield from self.named(self.structure())
 
     def tables(self) -> Iterator[str]:
         """Yields the tables with their constants."""
+        yield from self.named(self.all_tables())
+
+    def named(self, lines: Iterable[str]) -> Iterator[str]:
+        """Yields lines with the name of the model."""
+        return (line.replace("NAME", self.exported.name) for line in lines)
+
+    def all_tables(self) -> Iterator[str]:
         curves = self.model.lines
         yield from self.table("law", self.model.law, [line for pair in curves for line in pair])
         yield from self.of_energy()
@@ -152,7 +161,7 @@ class _Numbers:
     def certificate(self) -> Iterator[str]:
         lines = textwrap.wrap(_plain(self.exported.certificate_text), 100)
         yield "/* The certificate as a text. */"
-        yield "#define NAME_CERTIFICATE \\"
+        yield f"#define {self.exported.name}_CERTIFICATE \\"
         yield " \\\n".join(f'    "{line}{" " if line is not lines[-1] else ""}"' for line in lines)
         yield ""
 
@@ -303,9 +312,11 @@ def _filled(numbers: Iterable[str]) -> str:
 
 
 def _plain(text: str) -> str:
-    """Returns a text that is safe in a string and in a comment of C."""
+    """Returns a text that is safe in a string and in a comment of C: ASCII without the ends and starts of
+    strings, comments and trigraphs."""
     shown = text.encode("ascii", "replace").decode()
-    return "".join(c if c.isprintable() and c not in '\\"' else "?" for c in shown).replace("*/", "* /")
+    shown = "".join(c if c.isprintable() and c not in '\\"' else "?" for c in shown)
+    return re.sub(r"(?<=\*)(?=/)|(?<=/)(?=[*/])|(?<=\?)(?=\?)", " ", shown)
 
 
 def _comment(paragraphs: Sequence[str]) -> str:

@@ -13,7 +13,7 @@ from .._core.model import fingerprint
 from .._core.portable import ExportCheck, ExportedModel, profile_checksum
 from .._core.rendering import Scheme
 from .._core.stability import Certificate, Inequality, with_force_error
-from ..errors import InputError
+from ..errors import InputError, command_word
 from ..model import Model
 from ..planning import Plan, describe, mechanical_units
 from ..planning.plan import require_force
@@ -268,10 +268,10 @@ class Exported:
             f"Outside the domain, {model.outside_share:.2g} of the change of force since its end is added.\n"
             f"Checked at {self.check.places} counts: at most {used:.2g} of a bound was used.",
             "Functions:\n"
-            "NAME_start(&state, count)         object at rest at this position\n"
-            "NAME_step(&state, count)          force of one tick; changes the state\n"
-            "NAME_force, NAME_force_slope, NAME_energy, NAME_advance   the force law alone\n"
-            "NAME_torque_uNm, NAME_start_of    the members of palpate_model in palpate_device.h",
+            f"{self.name}_start(&state, count)   object at rest at this position\n"
+            f"{self.name}_step(&state, count)    force of one tick; changes the state\n"
+            f"{self.name}_force, _force_slope, _energy, _advance   the force law alone\n"
+            f"{self.name}_torque_uNm, _start_of   the members of palpate_model in palpate_device.h",
         ]
         if self.has_certificate and device is not None:
             numbers = ", ".join(f"{key} {value}" for key, value in device.to_dict().items())
@@ -287,9 +287,10 @@ def _require_certificate(certificate: Certificate | None, request: Request) -> N
     if request.uncertified or (certificate is not None and certificate.certified):
         return
     found = "the model has no certificate" if certificate is None else f"the plan is {certificate.verdict}"
+    file = request.model_file or "MODEL.json"
+    command = f"palpate plan {command_word(file)} --device PROFILE -o {command_word(file)}"
     raise InputError(
-        f"{found}: certify it with palpate plan {request.model_file} --device PROFILE -o "
-        f"{request.model_file}, or export it without a certificate with --uncertified"
+        f"{found}: certify it with {command}, or export it without a certificate with --uncertified"
     )
 
 

@@ -198,12 +198,14 @@ class Fmu:
 
     def model_description(self) -> str:
         """Returns modelDescription.xml."""
+        # XML has no form for control characters
+        shown = "".join(c if c.isprintable() else "?" for c in self.exported.source)
         root = Element(
             "fmiModelDescription",
             fmiVersion="3.0",
             modelName=self.name,
             instantiationToken=self.token,
-            description=f"Force law of {self.exported.source}; the force pushes towards lower positions",
+            description=f"Force law of {shown}; the force pushes towards lower positions",
             generationTool=f"palpate {_core.__version__}",
         )
         SubElement(

@@ -22,11 +22,11 @@ _RESERVED = frozenset(
         "auto break case char const continue default do double else enum extern float for goto if inline",
         "int long register restrict return short signed sizeof static struct switch typedef union unsigned",
         "void volatile while and bool class delete false new not operator or private protected public",
-        "template this true using virtual",
+        "template this true using virtual PALPATE",
     )
     for word in line.split()
 )
-"""Words of C and C++ that cannot be the name of a model."""
+"""Words that cannot be the name of a model: those of C and C++, and the prefix of the macros of a program."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,10 @@ class Request:
         """
         if self.name is not None:
             if _IDENTIFIER.fullmatch(self.name) is None or self.name in _RESERVED:
-                raise InputError(f"the name is {self.name!r}: must be an identifier of C, such as knob")
+                raise InputError(
+                    f"the name is {self.name!r}: must be an identifier of C and no reserved word, such as "
+                    "knob"
+                )
             return self.name
         name = re.sub(r"\W+", "_", self.output.name.split(".")[0], flags=re.ASCII).strip("_")
         if _IDENTIFIER.fullmatch(name) is None or name in _RESERVED:

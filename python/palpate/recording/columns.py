@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import difflib
-import shlex
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from ..errors import InputError, did_you_mean, listed, nearest_name, shortened
+from ..errors import InputError, command_word, did_you_mean, listed, nearest_name, shortened
 from .units import (
     FORCE_UNITS,
     POSITION_UNITS,
@@ -326,12 +325,12 @@ def _cure(
     for key in list(units):
         if f"units {key}" in problems and (key in names or key in roles):
             units[key] = difflib.get_close_matches(units[key], UNITS, 1, 0.0)[0]
-            added.append(f"--units {shlex.quote(f'{key}={units[key]}')}")
+            added.append(f"--units {command_word(f'{key}={units[key]}')}")
         elif f"units {key}" in problems:
             del units[key]
     if "direction" in problems:
         direction = next(iter(difflib.get_close_matches(str(direction), names, 1, 0.0)), None)
-        added.append(f"--direction {shlex.quote(str(direction))}")
+        added.append(f"--direction {command_word(str(direction))}")
     columns = _with_units(names, replace(request, units=units), {})
     for role in (role for role in ROLES if role.name in problems):
         others = {name for other, name in roles.items() if other != role.name}
@@ -351,13 +350,13 @@ def _cure(
         if suggestion is None:
             return no_cure
         if suggestion.name != named_column:
-            added.append(f"--{role.name} {shlex.quote(suggestion.name)}")
+            added.append(f"--{role.name} {command_word(suggestion.name)}")
         roles[role.name] = suggestion.name
         if role.name not in units and (suggestion.unit is None or suggestion.unit.si not in role.si_units):
             stem = stem_key(suggestion.stem)
             unit = next((unit for word, unit in _LIKELY_UNITS.items() if word in stem), role.example)
             units[suggestion.name] = unit if UNITS[unit].si in role.si_units else role.example
-            added.append(f"--units {shlex.quote(f'{suggestion.name}={units[suggestion.name]}')}")
+            added.append(f"--units {command_word(f'{suggestion.name}={units[suggestion.name]}')}")
             assumed.append(f"{shortened(suggestion.name)} is in {units[suggestion.name]}")
     choice, _ = _attempt(names, _Request(roles, direction, inputs, units), unstated)
     if (
@@ -382,7 +381,7 @@ def _time_without_unit(names: Sequence[str], request: _Request, text: Collection
 
 
 def _time_options(name: str) -> list[str]:
-    return [f"--time {shlex.quote(name)}", f"--units {shlex.quote(f'{name}=s')}"]
+    return [f"--time {command_word(name)}", f"--units {command_word(f'{name}=s')}"]
 
 
 def _suggested(role: Role, columns: Sequence[Column], steady: Collection[str]) -> Column | None:

@@ -148,11 +148,24 @@ class CsvFile(LongTable):
                 raise not_csv(str(self._path), error) from None
 
     def _rows(self, lines: io.TextIOWrapper) -> Iterator[tuple[int, list[str]]]:
-        """Yields line number and cells of each row. Slow: for the first rows and error messages only."""
-        reader = csv.reader(lines, delimiter=self._dialect.separator)
-        for cells in reader:
-            if len(cells) > 1 or (cells and cells[0].strip()):
-                yield self._dialect.lines_before + reader.line_num, cells
+        """Yields first line and cells of each row that pandas reads: it skips lines of spaces and tabs.
+
+        Slow: for the first rows and error messages only.
+        """
+        blank = " \t\r\n".replace(self._dialect.separator, "")
+        row: list[str] = []
+
+        def noted() -> Iterator[str]:
+            for each in lines:
+                row.append(each)
+                yield each
+
+        line = self._dialect.lines_before + 1
+        for cells in csv.reader(noted(), delimiter=self._dialect.separator):
+            if len(row) > 1 or row[0].strip(blank):
+                yield line, cells
+            line += len(row)
+            row.clear()
 
     def _examine_first_rows(self) -> tuple[set[str], set[str]]:
         """Returns the columns that hold text, and those with only one or two values, in the first rows."""
@@ -175,6 +188,15 @@ class CsvFile(LongTable):
     def _numeric(self, cell: str) -> bool:
         text = cell.strip()
         return text in MISSING or parse_with(text, self._dialect.decimal) is not None
+
+    def _first_too_wide(self) -> InputError:
+        columns = len(self.names) + self._dialect.trailing
+        with self._lines() as lines:
+            return next(
+                self._too_many_cells(line, len(cells))
+                for line, cells in self._rows(lines)
+                if len(cells) > columns
+            )
 
     def _too_many_cells(self, line: int, found: int) -> InputError:
         return InputError(
@@ -339,8 +361,13 @@ class CsvFile(LongTable):
                 # pandas hides the exception that interrupted the read (disk error or Ctrl-C): raise that
                 # exception.
                 raise (raw.failure or KeyboardInterrupt()) from None
-            if cells := re.search(r"in line (\d+), saw (\d+)", str(error)):
-                raise self._too_many_cells(self._line(int(cells[1]), part), int(cells[2])) from None
+            if re.search(r"in line \d+, saw \d+", str(error)):
+                raise self._first_too_wide() from None
+            if columns is not None and "Too many columns specified" in str(error):
+                # With `usecols`, pandas refuses a part that begins with incomplete rows: read all columns.
+                all_types = {name: dtypes.get(name, "category") for name in self.names}
+                yield from self._chunks(all_types, part=part, rows=rows)
+                return
             raise InputError(f"{self._path} is not CSV: {str(error).strip()}") from None
 
     def _refuse_extra_cells(self, cells: Any, before: int, part: tuple[int, int] | None) -> None:
@@ -350,13 +377,6 @@ class CsvFile(LongTable):
             row = before + int(np.flatnonzero(extra)[0])
             line, found = self._find(row + (self.rows_before(part) if part else 0))
             raise self._too_many_cells(line, len(found))
-
-    def _line(self, line: int, part: tuple[int, int] | None) -> int:
-        """Returns the line number in the file for a line number counted from the first row or from a part."""
-        if part is not None:
-            with self._bytes(self._dialect.start, part[0]) as stream:
-                line += sum(1 for _ in stream)
-        return self._dialect.lines_before + line
 
     def place(self, row: int) -> str:
         return f"line {self._find(row)[0]}"

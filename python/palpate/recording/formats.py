@@ -21,10 +21,10 @@ import numpy as np
 
 from ..errors import InputError, escaped, listed, shortened
 from .csv_file import CsvFile
-from .dialect import decimal_mark, find_header, first_row_as_header, with_checked_names
+from .excel_file import read_excel
 from .files import CELL_BYTES, MEMORY_LIMIT, readable, require_memory
 from .mcap_file import read_mcap
-from .memory_table import MemoryTable, cells_of, import_library
+from .memory_table import MemoryTable, import_library
 from .table import Cells, LongTable, Table, to_numbers
 
 _BUFFER_BYTES = 1 << 20
@@ -38,9 +38,6 @@ _ARROW_SCHEMA_BYTES = b"/////"
 
 _ARROW_TEXT = ("string", "large_string", "binary", "large_binary")
 """Names of the types of text in Arrow; a file without the logical type of its columns stores bytes."""
-
-MOST_HEADER_ROWS = 200
-"""Number of first rows of an Excel sheet among which the header is searched."""
 
 _ZIP_END_BYTES = 22 + 0xFFFF
 """Largest number of bytes of the record that ends a zip archive and states the number of members."""
@@ -322,42 +319,9 @@ def _as_objects(values: Cells) -> Cells:
 
 
 def _excel(path: Path) -> Table:
-    """Returns the first sheet of a workbook that is not empty."""
+    """Returns a sheet of a workbook."""
     openpyxl = import_library("openpyxl", path, "an Excel file", "excel")
-    with readable(path, "Excel (.xlsx)"):
-        for _ in _members(path):  # openpyxl does not check the end of a sheet
-            pass
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        sheets = [(sheet.title, [*sheet.iter_rows(values_only=True)]) for sheet in book.worksheets]
-        book.close()
-    filled = [(title, values) for title, values in sheets if values]
-    if not filled:
-        raise InputError(f"{path} has no sheet with cells")
-    title, values = filled[0]
-    kept = [k for k, row in enumerate(values) if any(cell is not None for cell in row)]
-    width = max(k + 1 for row in (values[k] for k in kept) for k, cell in enumerate(row) if cell is not None)
-    values = [values[k][:width] for k in kept]
-    rows = [["" if cell is None else str(cell) for cell in row] for row in values[:MOST_HEADER_ROWS]]
-    header, header_notes = with_checked_names(
-        f"{path}, row {kept[0] + 1}", find_header(rows) or first_row_as_header(rows)
-    )
-    where = f"{path}, row {kept[min(header.first, len(kept) - 1)] + 1}"
-    decimal = decimal_mark(where, rows[header.first :], ";") if header.numbers else "."
-    notes = [f"sheet {shortened(title)}"] if len(filled) > 1 else []
-    if header.row:
-        notes.append(f"{header.row} row{'s' * (header.row > 1)} before the header")
-    if header.units_row is not None:
-        notes.append("units in a second header row")
-    data = values[header.first :]
-    columns = {name: cells_of([row[k] for row in data], decimal) for k, name in enumerate(header.names)}
-    metadata = {}
-    for row in rows[: header.row]:
-        key, _, value = row[0].partition(":")
-        metadata[escaped(key.strip())] = escaped(" ".join(" ".join([value, *row[1:]]).split()))
-    if len(kept) > header.first and kept[-1] - kept[header.first] + 1 != len(data):
-        notes.append("empty rows are left out")
-    first = kept[header.first] + 1 if len(kept) > header.first else 0
-    return MemoryTable(path, columns, metadata, [*notes, *header_notes], ("row", first), decimal)
+    return read_excel(path, _members(path), openpyxl)
 
 
 def _members(path: Path) -> Iterator[tuple[str, bytes]]:

@@ -204,12 +204,11 @@ def _content_of(path: Path, records: Any) -> tuple[dict[str, _Topic], set[str], 
 def _inflated(chunk: Any) -> Any:
     """Returns a chunk without its compression, after checking that it is not longer than it states."""
     size = chunk.uncompressed_size
-    if chunk.compression == "zstd":
-        from zstandard import ZstdDecompressor
-
-        data = ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
+    if chunk.compression == "zstd":  # mcap installs both libraries
+        zstandard = import_module("zstandard")
+        data = zstandard.ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
     elif chunk.compression == "lz4":
-        lz4 = import_module("lz4.frame")  # without type hints
+        lz4 = import_module("lz4.frame")
         data = lz4.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
     else:
         data = chunk.data

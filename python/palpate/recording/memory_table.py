@@ -29,8 +29,8 @@ class MemoryTable(Table):
     metadata : mapping, optional
     notes : sequence of str, optional
         Statements on how the file was read, as parts of one sentence.
-    first : (str, int), optional
-        Word for a row and number of the first one, for the sentences.
+    first : (str, int or sequence of int), optional
+        Word for a row, and number of the first row or of each row, for the sentences.
     decimal : str
         Decimal mark of numbers that are stored as text.
     """
@@ -41,7 +41,7 @@ class MemoryTable(Table):
         columns: Mapping[str, Cells],
         metadata: Mapping[str, str] | None = None,
         notes: Sequence[str] = (),
-        first: tuple[str, int] = ("row", 0),
+        first: tuple[str, int | Sequence[int]] = ("row", 0),
         decimal: str = ".",
     ) -> None:
         self._path, self._columns, self._first, self._decimal = path, dict(columns), first, decimal
@@ -72,7 +72,7 @@ class MemoryTable(Table):
 
     def place(self, row: int) -> str:
         word, number = self._first
-        return f"{word} {number + row}"
+        return f"{word} {number + row if isinstance(number, int) else number[row]}"
 
     def cell(self, row: int, name: str) -> str:
         return _as_text(self._columns[name][row])

@@ -141,7 +141,7 @@ TEST(PacketStream, ACommandThatTheDeviceIgnoresIsLateFromTheNextSampleOn) {
     EXPECT_NEAR(delays.at(10, 10'000, 10, 200), 0.8e-3, 1e-12) << "in time again";
 }
 
-TEST(PacketStream, AnEchoThatStandsStillIsLate) {
+TEST(PacketStream, AnEchoThatDoesNotAdvanceIsLate) {
     Delays delays;
     (void)delays.at(0, 0, 0);
     for (int k = 1; k <= 20; ++k) {
@@ -169,7 +169,7 @@ TEST(PacketStream, LostSamplesAreLate) {
     EXPECT_NEAR(delays.at(4, 4000, 1, 3900), 3e-3, 1e-12) << "the samples of 1, 2 and 3 ms did not arrive";
 }
 
-TEST(PacketStream, AClockThatStandsStillDoesNotHideALateCommand) {
+TEST(PacketStream, AStoppedClockDoesNotHideALateCommand) {
     Delays delays;
     (void)delays.at(0, 5000, 0);
     delays.send();

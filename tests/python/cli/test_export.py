@@ -3,6 +3,7 @@
 
 import json
 import re
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -75,6 +76,26 @@ def test_model_without_certificate_is_refused_with_the_cure(
     assert "palpate plan" in sentence
     assert "--uncertified" in sentence
     assert not (tmp_path / "m.h").exists()
+
+
+def test_suggested_command_quotes_the_file_name_like_a_shell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name = "Anna's $(knob); 2.json"
+    model_by_hand().save(name)
+    assert main(["export", name, "--c", "-o", "m.h"]) == 2
+    command = capsys.readouterr().err.split("certify it with ")[1].split(", or export")[0]
+    assert shlex.split(command) == ["palpate", "plan", name, "--device", "PROFILE", "-o", name]
+
+
+def test_the_prefix_of_the_macros_is_refused_as_the_name_of_a_model(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = model_by_hand().save(tmp_path / "m.json")
+    options = ["--uncertified", "--encoder-step", "1e-4", "--force-limit", "1", "--name", "PALPATE"]
+    assert main(["export", str(model), "--c", *options, "-o", str(tmp_path / "m.h")]) == 2
+    assert "the name is 'PALPATE': must be an identifier of C and no reserved word" in capsys.readouterr().err
 
 
 def test_uncertified_header_says_so_and_compares_nothing(

@@ -111,7 +111,9 @@ def test_devices_lists_every_connected_device() -> None:
 
 def test_a_serial_number_that_controls_a_terminal_is_escaped_and_finds_the_device(tmp_path: Path) -> None:
     device = ["--serial", "A\udc9b2J"]  # byte 0x9b: a control sequence introducer
-    assert "--device usb:A\\x9b2J" in devices(device=device).stdout
+    assert "A\\x9b2J" in devices(device=device).stdout
+    zeroed = devices("--zero", "--device", "usb:A\\x9b2J", device=device)
+    assert zeroed.returncode == 0, zeroed.stderr
     words = ["record", tmp_path / "a.csv", "--device", "usb:A\\x9b2J", "--duration-s", 0.1]
     answer = emulated(sys.executable, "-m", "palpate", *words, device=device)
     assert answer.returncode == 1, answer.stderr  # the handle moved too little

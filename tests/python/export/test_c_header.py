@@ -2,6 +2,7 @@
 """Tests the C header of an exported model: compilers, bits, refusals of the preprocessor."""
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 from bench.portable.programs import BOARDS, compile_arm, missing, run_arm, run_here
 
 import palpate
-from exports import EXPORTED, KINDS, flags_of, header_of, tables_of
+from exports import EXPORTED, KINDS, flags_of, header_of, random_model, tables_of
 from palpate._core.portable import ExportedModel
 from palpate._typing import Float2D
 from palpate.export import Request, c_header
@@ -216,3 +217,52 @@ def test_certified_header_compiles_for_its_rate_and_device_only(
     else:
         with pytest.raises(RuntimeError, match="the certificate holds for"):
             run_here(EXPORTED, tmp_path, [*flags_of(header), *flags])
+
+
+HOSTILE = (
+    "*/", "/*", "/*/", "//", "??/", "??", "\\", "\\\n", '"', "'", "%s%n", "//@ end", "#include <x>", "}{;",
+    "\x01\x1b[31m", "\u2028", "é", "é/", " ", "x",
+    "NAME", " DEVICE", " PROFILE", " RATE_HZ", " STRUCTURE ", "TABLE",
+)  # fmt: skip
+"""Parts of names that end a string, a comment or a line of C, or that the template of a header contains."""
+
+
+@pytest.mark.parametrize("seed", range(6 * SCALE))
+def test_names_of_model_file_and_device_cannot_change_the_program(seed: int, tmp_path: Path) -> None:
+    random = np.random.default_rng(seed)
+    name = "".join(HOSTILE) if seed == 0 else "".join(random.choice(HOSTILE, 12))
+    hashes = set()
+    for shown in ("plain", name):
+        device = palpate.DeviceProfile(id=shown, coulomb_friction=0.02)
+        plan = palpate.plan(random_model(1), device, accept_force_error=1.0)
+        folder = tmp_path / f"of {len(shown)}"
+        folder.mkdir()
+        path = plan.stored().save(folder / f"{shown.replace('/', '_')}.json")
+        written = c_header.write(Request(folder / "knob.h", path))
+        defined = ["-DPALPATE_RATE_HZ=1000", f"-DPALPATE_PROFILE={written.record['profile']:#x}"]
+        flags = [*flags_of(folder / "knob.h"), *defined]
+        hashes |= {
+            run_here(EXPORTED, folder, flags, compiler=compiler, standard=COMPILERS[compiler])
+            for compiler in ("gcc", "g++")
+        }
+    assert len(hashes) == 1
+
+
+def test_words_of_the_template_are_kept_in_names(tmp_path: Path) -> None:
+    name = "NAME of DEVICE RATE_HZ PROFILE STRUCTURE TABLE"
+    plan = palpate.plan(random_model(1), palpate.DeviceProfile(id=name, coulomb_friction=0.02))
+    path = plan.stored().save(tmp_path / f"{name}.json")
+    c_header.write(Request(tmp_path / "knob.h", path))
+    text = (tmp_path / "knob.h").read_text(encoding="utf-8")
+    assert f"Force of the model {name}.json, exported" in text
+    assert f'if its profile is {name}"' in text
+    certificate = "".join(re.findall(r'^    "(.*)"', text, re.MULTILINE))
+    assert f" on {name} at 1000 Hz" in certificate
+
+
+@pytest.mark.parametrize("name", ["TABLE", "NAME", "PROFILE", "DEVICE", "STRUCTURE"])
+def test_a_word_of_the_template_can_be_the_name_of_a_model(name: str, tmp_path: Path) -> None:
+    model, tables = tables_of("predicted_hysteresis")
+    header = header_of(model, tables, tmp_path, name)
+    plain = header_of(model, tables, tmp_path, "knob")
+    assert run_here(EXPORTED, tmp_path, flags_of(header)) == run_here(EXPORTED, tmp_path, flags_of(plain))

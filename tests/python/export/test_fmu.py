@@ -9,6 +9,7 @@ import sys
 import zipfile
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -233,6 +234,17 @@ def test_equal_models_give_equal_files(tmp_path: Path) -> None:
         names = archive.namelist()
     assert exported(model_by_hand(), tmp_path).read_bytes() == first
     assert {"modelDescription.xml", "sources/fmu.c", "sources/buildDescription.xml"} <= set(names)
+
+
+@pytest.mark.parametrize("name", ["<a&'b\">.json", "\x01\x1b.json", "é.json"])
+def test_every_name_of_a_model_file_gives_a_description_in_xml(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    model_by_hand().save(tmp_path / "m.json").rename(path)
+    fmu.write(Request(tmp_path / "m.fmu", path))
+    with zipfile.ZipFile(tmp_path / "m.fmu") as archive:
+        root = ElementTree.fromstring(archive.read("modelDescription.xml"))
+    shown = "".join(c if c.isprintable() else "?" for c in path.name)
+    assert root.attrib["description"].startswith(f"Force law of {shown};")
 
 
 def test_a_missing_compiler_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

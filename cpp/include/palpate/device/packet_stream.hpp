@@ -39,8 +39,8 @@ struct StreamHealth {
 /// that was read. Its force is late from the time t_{k+1} of the next sample on. A packet of time t_m states that the
 /// device accepted a newer command `out_age` before t_m; the old force was then late by t_m - out_age - t_{k+1}.
 /// Otherwise the force is late by t_m - t_{k+1} so far. `Reading::delay` is the largest of these times since the last
-/// packet. It thus contains commands that the device ignores, commands that the host skips, and lost samples. A clock of
-/// the device that stands still is found by the numbers of the samples: the delay is at least m - k - 1 periods.
+/// packet. It includes commands that the device ignores, commands that the host skips, and lost samples. The numbers
+/// of the samples show a delay of m - k - 1 periods also if the clock of the device has stopped.
 class PacketStream {
   public:
     PacketStream() = default;
