@@ -132,7 +132,8 @@ inline Scene random_certified_scene(Random& random, double factor) {
         }
         scheme.inertia = {std::exp(uniform(random, -10.0, -5.0)), uniform(random, 0.0, 0.1)};
         scheme.compensated = scheme.structure == StructureKind::Massless && model.hysteresis() == nullptr &&
-                             model.slope_bounds().upper <= 0.9 * scheme.coupling.stiffness &&
+                             model.network()->curve().slopes_everywhere().upper <=
+                                 compensated_share * scheme.coupling.stiffness &&
                              random() % 2 == 0;
         if (scheme.structure == StructureKind::Direct && random() % 2 == 0) {
             scheme.predict = 1 << random() % 4;

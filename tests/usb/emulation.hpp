@@ -41,7 +41,7 @@ inline constexpr const char* options_text =
     "  --model UNM_PER_COUNT  The device has a model: a spring with this stiffness.\n"
     "  --model-fingerprint HEX, --model-certificate HEX  Fingerprints of the model in GET_MODEL.\n"
     "  --loop-hz RATE         Rate of the control loop in the device, also that of its model [10000].\n"
-    "  --serial SERIAL        One device with this serial number; repeatable [EMU-1].\n"
+    "  --serial SERIAL        One device with this serial number in Latin-1; repeatable [EMU-1].\n"
     "  --no-device            No device is connected.\n"
     "  --seed SEED            Draws the choices of the firmware; must be before options that change them.\n"
     "  --reported-rate-hz RATE  Rate in GET_INFO [1000].\n"
@@ -148,7 +148,11 @@ inline constexpr const char* options_text =
         settings.devices.clear();
         for (const std::string& serial : serials) {
             settings.devices.push_back(common);
-            settings.devices.back().serial = std::u16string{serial.begin(), serial.end()};
+            std::u16string& units = settings.devices.back().serial;
+            units.clear();
+            for (const char letter : serial) {
+                units.push_back(static_cast<unsigned char>(letter));
+            }
         }
     }
     return settings;

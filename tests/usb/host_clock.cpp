@@ -30,6 +30,7 @@
 #include <cstring>
 #include <limits>
 #include <mutex>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -44,6 +45,14 @@ constexpr Time never = std::numeric_limits<Time>::max();
 /// Returns the function that this library replaces.
 #define REAL(name) reinterpret_cast<decltype(&::name)>(::dlsym(RTLD_NEXT, #name))
 
+/// Virtual time; `never` before it begins. The library must not allocate memory earlier, because a sanitizer calls it
+/// while it starts.
+constinit std::atomic<Time> now{never};
+
+[[nodiscard]] bool is_virtual() {
+    return now != never;
+}
+
 [[nodiscard]] Time of(const timespec& time) {
     return time.tv_sec * second + time.tv_nsec;
 }
@@ -52,19 +61,21 @@ enum class State : std::uint8_t { Runs, Waits, Due };
 
 /// A thread of the program, and its wait.
 struct Thread {
+    void* (*routine)(void*) = nullptr;
+    void* argument = nullptr;
     pthread_t id{};
     State state = State::Runs;  ///< Due: the wait is over, and the thread continues when no other thread runs
     Time deadline = never;
     const void* word = nullptr;      ///< waits until another thread wakes the waiters of this address
     const Thread* joined = nullptr;  ///< waits for the end of this thread
-    std::vector<pollfd> files;       ///< waits for these files
+    std::array<pollfd, 64> files{};  ///< waits for these files
+    nfds_t count = 0;                ///< number of these files
     int alarm = -1;                  ///< file that ends a wait for files
 };
 
 /// Returns true if a thread runs, or if the file for which it waits is ready: the kernel then lets it continue.
-[[nodiscard]] bool runs(const Thread* thread) {
-    std::vector<pollfd> files = thread->files;
-    return thread->state == State::Runs || (!files.empty() && REAL(poll)(files.data(), files.size(), 0) > 0);
+[[nodiscard]] bool runs(Thread* thread) {
+    return thread->state == State::Runs || REAL(poll)(thread->files.data(), thread->count, 0) > 0;
 }
 
 /// Virtual time of this program, and its threads.
@@ -76,15 +87,14 @@ class HostClock {
         return clock;
     }
 
-    [[nodiscard]] bool is_virtual() const { return now() != never; }
-    [[nodiscard]] Time now() const { return now_.load(); }
-
     /// Starts virtual time at the present time; the calling thread is its first thread.
     void start() {
         const std::lock_guard locked{mutex_};
         if (is_virtual()) {
             return;
         }
+        std::thread{[] {
+        }}.join();  // with the first thread, a sanitizer starts a thread that must not take part
         timespec present{};
         REAL(clock_gettime)(CLOCK_MONOTONIC, &present);
         next_frame_ = of(present);
@@ -96,18 +106,18 @@ class HostClock {
         std::strncpy(address.sun_path, std::getenv("PALPATE_EMULATOR"), sizeof address.sun_path - 1);
         ::connect(emulator_, reinterpret_cast<const sockaddr*>(&address), sizeof address);
         (void)own();
-        now_ = of(present);
+        now = of(present);
     }
 
     int create(pthread_t* id, const pthread_attr_t* attributes, void* (*routine)(void*), void* argument) {
         const std::lock_guard locked{mutex_};
         Thread* thread = add();
-        auto* start = new Start{routine, argument, thread};
-        const int code = REAL(pthread_create)(id, attributes, &Start::run, start);
+        thread->routine = routine;
+        thread->argument = argument;
+        const int code = REAL(pthread_create)(id, attributes, &HostClock::run, thread);
         if (code == 0) {
             thread->id = *id;
         } else {
-            delete start;
             remove(thread);
         }
         return code;
@@ -162,54 +172,38 @@ class HostClock {
         if (self->alarm < 0) {
             self->alarm = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
         }
-        self->files.assign(files, files + count);
-        self->files.push_back({self->alarm, POLLIN, 0});
+        std::copy_n(files, count, self->files.begin());
+        self->files.at(count) = {self->alarm, POLLIN, 0};
+        self->count = count + 1;
         self->deadline = deadline;
         stop(self, State::Waits);
-        std::vector<pollfd> polled = self->files;
+        std::array polled = self->files;
         locked.unlock();
-        const int code = REAL(poll)(polled.data(), polled.size(), -1);
+        const int code = REAL(poll)(polled.data(), count + 1, -1);
         const int error = errno;
         locked.lock();
-        self->files.clear();
+        self->count = 0;
         self->state = State::Runs;
         eventfd_t rings = 0;
-        const bool rang = ::eventfd_read(self->alarm, &rings) == 0 && polled.back().revents != 0;
+        const bool rang = ::eventfd_read(self->alarm, &rings) == 0 && polled.at(count).revents != 0;
         std::copy_n(polled.begin(), count, files);
         errno = error;
         return code < 0 ? code : code - (rang ? 1 : 0);
     }
 
   private:
-    /// Removes a thread when it ends.
-    struct Membership {
-        Thread* thread = nullptr;
-        ~Membership() {
-            if (thread != nullptr) {
-                HostClock& clock = get();
-                const std::lock_guard locked{clock.mutex_};
-                clock.remove(thread);
-            }
-        }
-    };
-    static Membership& membership() {
-        thread_local Membership membership;
-        return membership;
+    HostClock() {
+        ::pthread_key_create(&own_, [](void* thread) {
+            const std::lock_guard locked{get().mutex_};
+            get().remove(static_cast<Thread*>(thread));
+        });
     }
 
-    /// A new thread of the program.
-    struct Start {
-        void* (*routine)(void*);
-        void* argument;
-        Thread* thread;
-
-        static void* run(void* start) {
-            const Start self = *static_cast<Start*>(start);
-            delete static_cast<Start*>(start);
-            membership().thread = self.thread;
-            return self.routine(self.argument);
-        }
-    };
+    /// Runs a new thread of the program. It allocates no memory, because a sanitizer does not know the thread yet.
+    static void* run(void* thread) {
+        ::pthread_setspecific(get().own_, thread);
+        return static_cast<Thread*>(thread)->routine(static_cast<Thread*>(thread)->argument);
+    }
 
     // The caller of these functions holds the mutex.
 
@@ -220,10 +214,11 @@ class HostClock {
 
     /// Returns the calling thread, which takes part from its first wait on.
     Thread* own() {
-        Thread*& self = membership().thread;
+        auto* self = static_cast<Thread*>(::pthread_getspecific(own_));
         if (self == nullptr) {
             self = add();
             self->id = ::pthread_self();
+            ::pthread_setspecific(own_, self);
         }
         return self;
     }
@@ -247,7 +242,7 @@ class HostClock {
     /// does not depend on the scheduler.
     void wait(Thread* self, Time deadline, std::unique_lock<std::mutex>& locked) {
         self->deadline = deadline;
-        stop(self, deadline > now() ? State::Waits : State::Due);
+        stop(self, deadline > now ? State::Waits : State::Due);
         changed_.wait(locked, [&] {
             const auto next = std::find_if(threads_.begin(), threads_.end(),
                                            [](const Thread* each) { return each->state == State::Due; });
@@ -266,7 +261,7 @@ class HostClock {
 
     /// Ends the wait of a thread.
     static void resume(Thread& thread) {
-        if (thread.files.empty()) {
+        if (thread.count == 0) {
             thread.state = State::Due;
         } else {
             ::eventfd_write(thread.alarm, 1);
@@ -275,20 +270,18 @@ class HostClock {
 
     /// Passes time until a thread has a reason to continue.
     void pass_time() {
-        const auto waits = [](const Thread* thread) {
-            return thread->state == State::Waits && !::runs(thread);
-        };
+        const auto waits = [](Thread* thread) { return thread->state == State::Waits && !::runs(thread); };
         while (!threads_.empty() && std::all_of(threads_.begin(), threads_.end(), waits)) {
             Time next = next_frame_;
             for (const Thread* thread : threads_) {
                 next = std::min(next, thread->deadline);
             }
-            now_ = next;
+            now = next;
             if (next == next_frame_) {
                 next_frame_ += frame();
             }
             for (Thread* thread : threads_) {
-                if (thread->deadline <= now()) {
+                if (thread->deadline <= now) {
                     resume(*thread);
                 }
             }
@@ -309,7 +302,7 @@ class HostClock {
     std::mutex mutex_;
     std::condition_variable changed_;
     std::vector<Thread*> threads_;
-    std::atomic<Time> now_{never};
+    pthread_key_t own_{};  ///< the calling thread
     Time next_frame_ = 0;
     int emulator_ = -1;
 };
@@ -329,51 +322,46 @@ int timerfd_create(int /*clock*/, int /*flags*/) {
     return -1;
 }
 
-int clock_gettime(clockid_t clock, timespec* now) {
-    HostClock& host = HostClock::get();
-    if (!host.is_virtual() || !is_monotonic(clock)) {
-        return REAL(clock_gettime)(clock, now);
+int clock_gettime(clockid_t clock, timespec* time) {
+    if (!is_virtual() || !is_monotonic(clock)) {
+        return REAL(clock_gettime)(clock, time);
     }
-    *now = {host.now() / second, host.now() % second};
+    const Time present = now;
+    *time = {present / second, present % second};
     return 0;
 }
 
 int clock_nanosleep(clockid_t clock, int flags, const timespec* time, timespec* left) {
-    HostClock& host = HostClock::get();
-    if (!host.is_virtual() || !is_monotonic(clock)) {
+    if (!is_virtual() || !is_monotonic(clock)) {
         return REAL(clock_nanosleep)(clock, flags, time, left);
     }
-    host.sleep(of(*time) + (flags == TIMER_ABSTIME ? 0 : host.now()));
+    HostClock::get().sleep(of(*time) + (flags == TIMER_ABSTIME ? 0 : now.load()));
     return 0;
 }
 
 int nanosleep(const timespec* time, timespec* left) {
-    HostClock& host = HostClock::get();
-    if (!host.is_virtual()) {
+    if (!is_virtual()) {
         return REAL(nanosleep)(time, left);
     }
-    host.sleep(of(*time) + host.now());
+    HostClock::get().sleep(of(*time) + now);
     return 0;
 }
 
 int poll(pollfd* files, nfds_t count, int timeout_ms) {
-    HostClock& host = HostClock::get();
-    if (!host.is_virtual() || timeout_ms == 0) {
+    if (!is_virtual() || timeout_ms == 0) {
         return REAL(poll)(files, count, timeout_ms);
     }
-    return host.poll(files, count, timeout_ms < 0 ? never : host.now() + timeout_ms * (second / 1000));
+    return HostClock::get().poll(files, count, timeout_ms < 0 ? never : now + timeout_ms * (second / 1000));
 }
 
 int pthread_create(pthread_t* id, const pthread_attr_t* attributes, void* (*routine)(void*), void* argument) {
-    HostClock& host = HostClock::get();
-    return host.is_virtual() ? host.create(id, attributes, routine, argument)
-                             : REAL(pthread_create)(id, attributes, routine, argument);
+    return is_virtual() ? HostClock::get().create(id, attributes, routine, argument)
+                        : REAL(pthread_create)(id, attributes, routine, argument);
 }
 
 int pthread_join(pthread_t id, void** result) {
-    HostClock& host = HostClock::get();
-    if (host.is_virtual()) {
-        host.join(id);
+    if (is_virtual()) {
+        HostClock::get().join(id);
     }
     return REAL(pthread_join)(id, result);
 }
@@ -387,20 +375,19 @@ long syscall(long number, ...) {
         word = va_arg(arguments, long);
     }
     va_end(arguments);
-    HostClock& host = HostClock::get();
     const long operation = words[1] & FUTEX_CMD_MASK;
-    if (number == SYS_futex && host.is_virtual()) {
+    if (number == SYS_futex && is_virtual()) {
         const auto* word = reinterpret_cast<const std::uint32_t*>(words[0]);
         const auto* time = reinterpret_cast<const timespec*>(words[3]);
         if (operation == FUTEX_WAIT || operation == FUTEX_WAIT_BITSET) {
-            const Time start = operation == FUTEX_WAIT ? host.now() : 0;
-            const int error = host.wait_on(word, static_cast<std::uint32_t>(words[2]),
-                                           time == nullptr ? never : start + of(*time));
+            const Time start = operation == FUTEX_WAIT ? now.load() : 0;
+            const int error = HostClock::get().wait_on(word, static_cast<std::uint32_t>(words[2]),
+                                                       time == nullptr ? never : start + of(*time));
             errno = error;
             return error == 0 ? 0 : -1;
         }
         if (operation == FUTEX_WAKE) {
-            return host.wake(word, static_cast<int>(words[2]));
+            return HostClock::get().wake(word, static_cast<int>(words[2]));
         }
     }
     return REAL(syscall)(number, words[0], words[1], words[2], words[3], words[4], words[5]);

@@ -201,6 +201,7 @@ TEST(UsbText, AcceptsAllOfUnicodeAndRefusesInvalidText) {
     EXPECT_EQ(text(u" two\nlines\t"), "two lines");
     EXPECT_EQ(text(std::u16string{u"PADDED"} + std::u16string(3, u'\0')), "PADDED");
     EXPECT_EQ(text(u"   "), "");
+    EXPECT_EQ(text(u"A\u009b31m\u202e"), "A\\x9b31m\\u202e");
     EXPECT_EQ(text({u'a', char16_t{0xD834}}), "");  // half a pair
     EXPECT_EQ(text({char16_t{0xDD1E}, u'a'}), "");
 }

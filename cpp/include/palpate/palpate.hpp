@@ -5,6 +5,7 @@
 
 #include "palpate/device/packet_stream.hpp"
 #include "palpate/dynamics/filters.hpp"
+#include "palpate/fields/escaped.hpp"
 #include "palpate/portable/export_check.hpp"
 #include "palpate/realtime/wake_up.hpp"
 #include "palpate/run/measure.hpp"

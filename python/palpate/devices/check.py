@@ -16,7 +16,7 @@ from ..model import Model
 from ..planning import DeviceProfile, mechanical_units
 from ..verdict import Verdict
 from .measuring import Progress, measure
-from .observations import Observation, compare, observe_at_rest
+from .observations import Observation, compare, interruption, observe_at_rest
 from .pushes import Mechanics, Push, push_response
 
 NO_FORCE_SHARE = 0.7
@@ -34,6 +34,8 @@ _NO_FRICTION_ADVICE = (
 )
 _SHORTEST_DURATION_S = 2.0
 """Least duration of a check [s]; in this time the handle must be moved and must be at rest"""
+_REOPENING_S = 0.01
+"""Duration for which the device is opened again after a fault, without force [s]"""
 _DELAY_MARGIN_PERIODS = 0.05
 """Time added to the measured delay of the device, because the clocks of host and device drift [periods]"""
 _LEAST_SIGN_STEPS = 5.0
@@ -192,7 +194,7 @@ def check_device(
         "lowest_rate_share": 0.0,  # a low rate of the control loop is reported, it does not end the check
         "friction_share": _SIMULATED_FRICTION_SHARE,
     }
-    summary = measure(device, duration_s=duration_s * (NO_FORCE_SHARE if push else 1.0), **common)
+    summary = _measured(device, duration_s=duration_s * (NO_FORCE_SHARE if push else 1.0), **common)
     check = judge(summary)
     if not push:
         check = _with(
@@ -203,11 +205,27 @@ def check_device(
         check = _with(check, Observation(_FORCE_SIGN, text))
     else:
         force = PUSH_FORCE_SHARE * check.base.force_limit
-        push_summary = measure(device, duration_s=duration_s * (1.0 - NO_FORCE_SHARE), push=force, **common)
-        push_result = push_response(push_summary["kept"], check.base.encoder_step, coulomb_friction)
-        check = with_pushes(replace(check, coulomb_friction=coulomb_friction), push_result)
+        check = replace(check, coulomb_friction=coulomb_friction)
+        pushes = _measured(device, duration_s=duration_s * (1.0 - NO_FORCE_SHARE), push=force, **common)
+        if pushes["orderly"]:
+            response = push_response(pushes["kept"], check.base.encoder_step, coulomb_friction)
+            check = with_pushes(check, response)
+        else:
+            text = "not measured: the pushes were interrupted"
+            check = _with(check, interruption(pushes), Observation(_FORCE_SIGN, text))
     compared = tuple(compare(other, check.numbers, name=name) for name, other in expected.items())
     return _with(check, *compared)
+
+
+def _measured(device: str, **settings: Any) -> dict[str, Any]:
+    """Measures the device. After a fault, ``fault`` in the summary says why it cannot be opened again."""
+    summary = measure(device, **settings)
+    if not summary["orderly"]:
+        try:
+            measure(device, **{**settings, "push": None, "duration_s": _REOPENING_S})
+        except InputError as error:
+            summary["fault"] = str(error)
+    return summary
 
 
 def _with(check: Check, *added: Observation) -> Check:

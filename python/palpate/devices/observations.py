@@ -81,7 +81,7 @@ def observe_at_rest(summary: Mapping[str, Any]) -> list[Observation]:
         _velocity(ticks, step),
     ]
     if not summary["orderly"]:
-        observations.insert(0, Observation("connection", summary["ended"], False, _CABLE_ADVICE, True))
+        observations.insert(0, interruption(summary))
     if "round_trip" in summary:
         observations.append(Observation("round trip", _percentiles(summary["round_trip"]), detail=True))
     if "malformed" in summary:
@@ -104,6 +104,13 @@ def observe_at_rest(summary: Mapping[str, Any]) -> list[Observation]:
     if summary["transducer"]:
         observations.append(_transducer(ticks["position"], ticks["measured"], step))
     return observations
+
+
+def interruption(summary: Mapping[str, Any]) -> Observation:
+    """Returns the observation of a measurement that a fault has ended: the fault, or advice without one."""
+    fault = summary.get("fault", "")
+    text = f"{fault} ({summary['ended']})" if fault else summary["ended"]
+    return Observation("interruption", text, False, "" if fault else _CABLE_ADVICE, True)
 
 
 def _percentiles(durations: Mapping[str, float]) -> str:

@@ -19,7 +19,7 @@ from typing import Any
 
 from .._core import device as core
 from .._core.device import UsbRequest
-from ..errors import InputError, command_word
+from ..errors import InputError, command_word, escaped
 from ..recording.files import replacing
 
 
@@ -153,14 +153,16 @@ class UsbSetup:
         return bytes(answer) if size else b""
 
     def _string(self, index: int) -> str:
-        """Returns a string descriptor without control characters; empty if the device has none."""
+        """Returns a string descriptor without control characters, escaped; empty if the device has none."""
         import usb.util
 
         try:
             text = usb.util.get_string(self._handle, index) or "" if index else ""
         except (_pyusb().USBError, ValueError):
             return ""
-        return "".join(" " if letter < " " or letter == "\x7f" else letter for letter in text).strip(" ")
+        return escaped(
+            "".join(" " if letter < " " or letter == "\x7f" else letter for letter in text).strip(" ")
+        )
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def test_a_faultless_device_has_the_verdict_good_and_all_numbers() -> None:
         ({"lost_samples": 30}, "samples", False),
         ({"repeated_samples": 30}, "samples", False),
         ({"stalls": 1}, "USB errors", False),
-        ({"orderly": False, "ended": "stopped by a fault"}, "connection", True),
+        ({"orderly": False, "ended": "stopped by a fault"}, "interruption", True),
         ({"measured": -3.0 * summary_without_force()["kept"]["position"]}, "sign of the transducer", True),
         ({"velocity": -summary_without_force()["kept"]["velocity"]}, "velocity", True),
         (
@@ -250,7 +250,7 @@ def test_the_motion_of_the_handle_gives_the_sign_of_the_force(
 @pytest.fixture
 def faultless(monkeypatch: pytest.MonkeyPatch) -> None:
     """Replaces each measurement of check-device by the result of a device without faults."""
-    push = {"kept": push_ticks(friction=0.01)}
+    push = {"kept": push_ticks(friction=0.01), "orderly": True}
     monkeypatch.setattr(
         check, "measure", lambda device, **settings: push if "push" in settings else summary_without_force()
     )
@@ -390,6 +390,45 @@ def test_a_reversed_motor_is_detected_by_a_push_of_half_a_percent_of_its_force(
     assert "do not enable force" in result["verdict"]
     assert not profile.exists()  # without a profile, nothing is certified for the device
     assert max(abs(frame.torque) for frame in frames(trace)) <= 1.001 * SHARE_OF_FORCE * 5.0
+
+
+@needs_emulation
+@pytest.mark.parametrize("frame", [1000, 2300], ids=["before the pushes", "during the pushes"])
+@pytest.mark.parametrize(
+    ("fault", "named"),
+    [
+        ("emergency-stop", "reports an emergency stop; remove the cause of the fault"),
+        ("over-temperature", "reports over-temperature; remove the cause of the fault"),
+        ("unplug", "no USB device 1209:0001 with this protocol is connected"),
+    ],
+)
+def test_a_fault_that_ends_the_measurement_is_named(
+    fault: str, named: str, frame: int, tmp_path: Path
+) -> None:
+    trace, profile = tmp_path / "trace.csv", tmp_path / "knob.toml"
+    device = ["--no-hand", "--fault", f"{fault}@{frame}", "--trace", str(trace)]
+    answer = run_check("--push", "--yes", "--write-profile", profile, device=device)
+    result, findings = findings_of_answer(answer)
+    assert answer.returncode == 1
+    assert findings["interruption"]["right"] is False
+    assert named in findings["interruption"]["text"]
+    assert result["verdict"].startswith("no: interruption: ")
+    assert named in result["verdict"]
+    assert "take the hand off" not in answer.stdout
+    assert findings["sign of the force"]["right"] is None
+    assert "friction" not in findings
+    assert not profile.exists()
+    ended = [each for each in frames(trace) if each.started > frame]
+    assert all(each.torque == 0.0 for each in ended)
+
+
+@needs_emulation
+def test_a_device_that_does_not_answer_during_the_pushes_has_advice_on_the_connection() -> None:
+    answer = run_check("--push", "--yes", device=["--no-hand", "--fault", "mute@2300x60"])
+    result, findings = findings_of_answer(answer)
+    assert answer.returncode == 1
+    assert "stopped by a fault of the device: Timeout" in findings["interruption"]["text"]
+    assert "try another cable" in result["verdict"]
 
 
 @needs_emulation

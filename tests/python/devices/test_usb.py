@@ -109,6 +109,18 @@ def test_devices_lists_every_connected_device() -> None:
     assert "force transducer: no; velocity: measured; firmware 1.0, uid 00005041" in answer.stdout
 
 
+def test_a_serial_number_that_controls_a_terminal_is_escaped_and_finds_the_device(tmp_path: Path) -> None:
+    device = ["--serial", "A\udc9b2J"]  # byte 0x9b: a control sequence introducer
+    assert "A\\x9b2J" in devices(device=device).stdout
+    zeroed = devices("--zero", "--device", "usb:A\\x9b2J", device=device)
+    assert zeroed.returncode == 0, zeroed.stderr
+    words = ["record", tmp_path / "a.csv", "--device", "usb:A\\x9b2J", "--duration-s", 0.1]
+    answer = emulated(sys.executable, "-m", "palpate", *words, device=device)
+    assert answer.returncode == 1, answer.stderr  # the handle moved too little
+    assert "\x9b" not in answer.stdout + answer.stderr
+    assert "# device: A\\x9b2J\n" in (tmp_path / "a.csv").read_text(encoding="utf-8")
+
+
 def test_devices_prints_the_model_on_the_device() -> None:
     answer = devices(device=["--model", "10"])
     model = "fingerprint 0123456789abcdef, certificate fedcba9876543210, certified for 10000 Hz"

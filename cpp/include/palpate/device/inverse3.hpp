@@ -79,7 +79,8 @@ class Inverse3Device {
             begin_session(service);
         } catch (const nlohmann::json::exception& error) {
             link_.reset();
-            return {"the program at " + service + " is not a Haply Inverse Service: " + error.what()};
+            return {"the program at " + service +
+                    " is not a Haply Inverse Service: " + escaped(error.what())};
         } catch (const std::exception& error) {
             link_.reset();
             return {error.what()};

@@ -10,16 +10,21 @@
 
 #include <nlohmann/json.hpp>
 
+#include "palpate/fields/escaped.hpp"
+
 // Messages between a program and the Inverse Service of a Haply Inverse3; inverse3.hpp names their documentation.
 namespace palpate {
 
 /// Properties of the Inverse3 that its service sent when the device was opened.
 struct Inverse3Info {
-    std::string id;    ///< identifier of the device, such as 049D
-    std::string type;  ///< device type: inverse3, inverse3x or minverse
+    std::string id;    ///< identifier of the device, such as 049D; unchanged, for commands
+    std::string type;  ///< device type: inverse3, inverse3x or minverse; unchanged
     /// Setting of the service: gain of its reduction of forces when the handle oscillates [-]
     double force_gate = 0.0;
     double damping = 0.0;  ///< setting of the service: damping that it adds to commanded forces, no unit
+
+    /// Returns type and identifier for messages and files, escaped.
+    [[nodiscard]] std::string name() const { return escaped(type) + "-" + escaped(id); }
 };
 
 /// State of the handle along one axis in a message of the service.
@@ -51,7 +56,7 @@ struct Inverse3State {
     info.force_gate = filters.value(Message::json_pointer{"/force_gate/gain"}, 0.0);
     info.damping = filters.value(Message::json_pointer{"/damping/scalar"}, 0.0);
     if (!device.value(Message::json_pointer{"/status/calibrated"}, true)) {
-        throw std::runtime_error("Inverse3 " + info.id +
+        throw std::runtime_error("Inverse3 " + escaped(info.id) +
                                  " is not calibrated: follow the instructions of its light or of Haply Hub");
     }
     return info;
@@ -73,7 +78,7 @@ struct Inverse3State {
                     state.at("current_cursor_force").at(key).get<double>()};
         }
     }
-    throw std::runtime_error("Inverse3 " + id + " is missing in the service's message");
+    throw std::runtime_error("Inverse3 " + escaped(id) + " is missing in the service's message");
 }
 
 /// Returns the start of each command's text to a device, up to the force.

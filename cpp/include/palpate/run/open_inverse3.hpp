@@ -57,7 +57,7 @@ namespace palpate {
         live->profile = unmeasured(scaled_knob(live->scale, false, period_s));
         live->profile.force_limit = options.force_limit.value_or(usual_force_limit);
     }
-    live->profile.id = info.type + "-" + info.id;
+    live->profile.id = info.name();
     live->profile.period_s = period_s;
     live->profile.position_unit = "m";
     live->title =

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "palpate/device/wire.hpp"
+#include "palpate/fields/escaped.hpp"
 
 namespace palpate::detail {
 
@@ -50,8 +51,8 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
     }
 }
 
-/// Converts the UTF-16 text (little endian) of a USB string descriptor to UTF-8, on one line and without blanks at both
-/// ends. Returns an empty text if the bytes are not valid UTF-16.
+/// Converts the UTF-16 text (little endian) of a USB string descriptor to UTF-8, on one line, without blanks at both
+/// ends, and escaped. Returns an empty text if the bytes are not valid UTF-16.
 [[nodiscard]] inline std::string text_of_utf16(std::span<const std::uint8_t> bytes) {
     std::string text;
     std::uint32_t high = 0;  // first half of a character that UTF-16 stores in two units; 0: none
@@ -74,7 +75,7 @@ inline void append_utf8(std::string& text, std::uint32_t character) {
     const std::size_t first = text.find_first_not_of(' ');
     return high != 0 || first == std::string::npos
                ? ""
-               : text.substr(first, text.find_last_not_of(' ') + 1 - first);
+               : escaped(std::string_view{text}.substr(first, text.find_last_not_of(' ') + 1 - first));
 }
 
 /// Reads the string descriptor `index` of a USB device, in the device's first language. Returns an empty text if the
