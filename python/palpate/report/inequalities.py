@@ -120,6 +120,7 @@ SYMBOLS = {
     "K": "slope of the force of the object; with memory the stiffness of all branches together",
     "p": "slope of the line whose crossing with the force is the next position",
     "gamma": "largest change of the rendered force per error of the position",
+    "epsilon": "largest error of the force by the program that renders it",
     "e": "increase of the slope of the hysteresis by a step of the encoder",
     "f": "force of the model; f' is its slope",
     "g": "mean force of press and release; g' is its slope",
