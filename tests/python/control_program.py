@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import subprocess
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,30 +14,37 @@ import pandas as pd
 import pytest
 
 from conftest import ROOT
+from host_clock import host_clock
 
 PROGRAM = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
 MODEL = ROOT / "tests" / "models" / "good" / "position.json"
 
 needs_program = pytest.mark.skipif(not PROGRAM.exists(), reason="needs palpate-control, run make control")
 
-# palpate-control accepts any loop rate with these options, because the test machine may be busy.
-ANY_RATE = ["--lowest-rate-share", "0"]
+
+def in_virtual_time(environment: Mapping[str, str] = os.environ) -> dict[str, str]:
+    """Returns the environment of a program whose clock shows virtual time while its control loop runs."""
+    libraries = [str(host_clock()), environment.get("LD_PRELOAD", "")]
+    return {**environment, "LD_PRELOAD": ":".join(filter(None, libraries))}
 
 
-def control(*arguments: Any, timeout: float = 60.0, **options: Any) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [PROGRAM, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=timeout,
-        **options,
-    )
+def run(*command: Any, timeout: float = 60.0, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Runs a program in virtual time, and captures its output."""
+    environment = in_virtual_time(options.pop("env", os.environ))
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+    words = list(map(str, command))
+    return subprocess.run(words, env=environment, text=True, check=False, timeout=timeout, **streams)
 
 
-def start_control(*arguments: Any, **options: Any) -> subprocess.Popen[str]:
-    command = [str(PROGRAM), *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+def control(*arguments: Any, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Runs palpate-control in virtual time."""
+    return run(PROGRAM, *arguments, **options)
+
+
+def start(*command: Any, **options: Any) -> subprocess.Popen[str]:
+    """Starts a program in virtual time."""
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+    return subprocess.Popen(list(map(str, command)), env=in_virtual_time(), text=True, **streams)
 
 
 def every_row(recording: Path) -> pd.DataFrame:
@@ -44,10 +52,13 @@ def every_row(recording: Path) -> pd.DataFrame:
     return pd.read_csv(recording, comment="#")
 
 
-def wait_for_rows(part: Path, process: subprocess.Popen[str]) -> float:
-    """Waits until a recording that a program is writing has rows; returns the time of the first rows."""
+def wait_for_rows(part: Path, process: subprocess.Popen[str], count: int = 1) -> None:
+    """Waits until a recording that a program is writing has this number of rows."""
     while process.poll() is None:
-        if part.exists() and sum(not line.startswith(b"#") for line in part.read_bytes().splitlines()) > 15:
-            return time.monotonic()
+        if (
+            part.exists()
+            and sum(not line.startswith(b"#") for line in part.read_bytes().splitlines()) > count
+        ):
+            return
         time.sleep(0.005)
     raise AssertionError(process.communicate()[1])

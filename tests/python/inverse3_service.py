@@ -1,22 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small server of the documented messages of the Haply Inverse Service, with a hand on the handle.
 
-It sends one state for each received message. A message is one millisecond of the plant, so that the speed of
-the machine has no effect. Unknown keys are silently ignored, as in the service.
+It sends one state for each received message. A message is one millisecond of the plant. Unknown keys are
+silently ignored, as in the service. The clock of the program under test orders each millisecond of the
+server, which then answers all messages that have arrived: no result depends on the speed of the machine.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import os
+import socket
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
+from select import select
 from threading import Thread
 from typing import Any
 
-import websockets
-from websockets.sync.server import ServerConnection, serve
+from websockets.frames import Frame
+from websockets.http11 import Request
+from websockets.protocol import State
+from websockets.server import ServerProtocol
 
 STEP_S = 1e-3
 
@@ -47,64 +55,59 @@ class Service:
     positions: list[float] = field(default_factory=list)
     closed: bool = False
     close_code: int | None = None
+    environment: dict[str, str] = field(default_factory=dict)
+    """Variables of a program whose clock moves this server"""
     port: int = 0
 
-    def answer(self, connection: ServerConnection) -> None:
-        position, velocity = self.start, 0.0
-        connection.send(
-            json.dumps({"session_id": 7, **self.state_message(position, velocity, {}, with_config=True)})
-        )
-        try:
-            for number, text in enumerate(connection):
-                message = json.loads(text)
-                self.messages.append(message)
-                command = message["inverse3"][0]["commands"]["set_cursor_force"]
-                force = command.get(self.force_key, {"x": 0.0, "y": 0.0, "z": 0.0})
-                self.forces.append(force)
-                lead = 0.5 * self.sweep * (1.0 - math.cos(2.0 * math.pi * number * STEP_S))
-                hand = self.hand_stiffness * (self.start + lead - position)
-                for _ in range(10):
-                    push = hand + force["z"] - self.damping * velocity
-                    velocity += 0.1 * STEP_S * push / self.mass
-                    position += 0.1 * STEP_S * velocity
-                self.positions.append(position)
-                if self.close_after == number:
-                    return
-                if self.silent_after is not None and number >= self.silent_after:
-                    continue
-                first = number + 1 if self.garbage_after is None else self.garbage_after
-                if first <= number < first + self.garbage_messages:
-                    connection.send("{")
-                    continue
-                if self.renamed_after == number:
-                    self.device_id = "0000"
-                for _ in range(self.extra_states if self.extra_after == number else 0):
-                    connection.send(json.dumps(self.state_message(position, velocity, force)))
-                unplugged = self.unplug_after is not None and number >= self.unplug_after
-                connection.send(
-                    json.dumps(self.state_message(position, velocity, force, unplugged=unplugged))
-                )
-        except websockets.ConnectionClosed:
-            pass
-        finally:
-            self.closed = True
-            self.close_code = connection.close_code
+    def opened(self) -> None:
+        """Puts the handle in its first position."""
+        self._position, self._velocity = self.start, 0.0
+        self._number = -1
+
+    def greeting(self) -> str:
+        state = self.state_message({}, with_config=True)
+        return json.dumps({"session_id": 7, **state})
+
+    def answers(self, text: str) -> Iterator[str | None]:
+        """Moves the handle for 1 ms, and returns the answers to a message; None ends the connection."""
+        self._number += 1
+        number = self._number
+        message = json.loads(text)
+        self.messages.append(message)
+        command = message["inverse3"][0]["commands"]["set_cursor_force"]
+        force = command.get(self.force_key, {"x": 0.0, "y": 0.0, "z": 0.0})
+        self.forces.append(force)
+        lead = 0.5 * self.sweep * (1.0 - math.cos(2.0 * math.pi * number * STEP_S))
+        hand = self.hand_stiffness * (self.start + lead - self._position)
+        for _ in range(10):
+            push = hand + force["z"] - self.damping * self._velocity
+            self._velocity += 0.1 * STEP_S * push / self.mass
+            self._position += 0.1 * STEP_S * self._velocity
+        self.positions.append(self._position)
+        if self.close_after == number:
+            yield None
+        if self.silent_after is not None and number >= self.silent_after:
+            return
+        first = number + 1 if self.garbage_after is None else self.garbage_after
+        if first <= number < first + self.garbage_messages:
+            yield "{"
+            return
+        if self.renamed_after == number:
+            self.device_id = "0000"
+        for _ in range(self.extra_states if self.extra_after == number else 0):
+            yield json.dumps(self.state_message(force))
+        unplugged = self.unplug_after is not None and number >= self.unplug_after
+        yield json.dumps(self.state_message(force, unplugged=unplugged))
 
     def state_message(
-        self,
-        position: float,
-        velocity: float,
-        force: dict[str, float],
-        *,
-        with_config: bool = False,
-        unplugged: bool = False,
+        self, force: dict[str, float], *, with_config: bool = False, unplugged: bool = False
     ) -> dict[str, Any]:
         zero_force = {"x": 0.0, "y": 0.0, "z": 0.0}
         device: dict[str, Any] = {
             "device_id": self.device_id,
             "state": {
-                "cursor_position": {"x": 0.01, "y": -0.12, "z": position},
-                "cursor_velocity": {"x": 0.0, "y": 0.0, "z": velocity},
+                "cursor_position": {"x": 0.01, "y": -0.12, "z": self._position},
+                "cursor_velocity": {"x": 0.0, "y": 0.0, "z": self._velocity},
                 "current_cursor_force": {**zero_force, **force},
                 "control_domain": "cartesian",
                 "control_mode": "force" if force else "idle",
@@ -120,15 +123,92 @@ class Service:
         return {"inverse3": [] if unplugged else [device] * self.devices}
 
 
+class _Connection:
+    """A connection to the server, whose messages wait until the next millisecond."""
+
+    def __init__(self, accepted: socket.socket, service: Service) -> None:
+        self.socket, self.service = accepted, service
+        accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.protocol = ServerProtocol()
+        service.opened()
+
+    def step(self) -> bool:
+        """Answers all messages that have arrived; returns False at the end of the connection."""
+        over = False
+        while not over and select([self.socket], [], [], 0.0)[0]:
+            try:
+                received = self.socket.recv(65536)
+            except ConnectionError:
+                received = b""
+            if received:
+                self.protocol.receive_data(received)
+            else:
+                self.protocol.receive_eof()
+            over = not received
+            for event in self.protocol.events_received():
+                self._answer(event)
+            over = self._send() or over
+        if over:
+            self.service.closed = True
+            received_close = self.protocol.close_rcvd
+            self.service.close_code = received_close.code if received_close else None
+            self.socket.close()
+        return not over
+
+    def _answer(self, event: Any) -> None:
+        if isinstance(event, Request):
+            self.protocol.send_response(self.protocol.accept(event))
+            self.protocol.send_text(self.service.greeting().encode())
+        elif isinstance(event, Frame) and event.opcode.name == "TEXT":
+            for text in self.service.answers(event.data.decode()):
+                if text is None:
+                    self.protocol.send_close(1000)
+                elif self.protocol.state is State.OPEN:
+                    self.protocol.send_text(text.encode())
+
+    def _send(self) -> bool:
+        """Sends the answers; returns True if they end the connection."""
+        for data in self.protocol.data_to_send():
+            if data == b"":
+                return True
+            try:
+                self.socket.sendall(data)
+            except ConnectionError:
+                return True
+        return False
+
+
+def _serve(listener: socket.socket, clock: socket.socket, service: Service) -> None:
+    connections: list[_Connection] = []
+    while True:
+        order, sender = clock.recvfrom(64)
+        while select([listener], [], [], 0.0)[0]:
+            connections.append(_Connection(listener.accept()[0], service))
+        connections = [connection for connection in connections if connection.step()]
+        if order == b"end":
+            break
+        clock.sendto(b"%d" % round(STEP_S * 1e9), sender)
+    for connection in connections:
+        connection.socket.close()
+
+
 @contextmanager
 def serving(service: Service) -> Iterator[Service]:
     """Runs the simulated server at a free network port of this machine."""
-    with serve(service.answer, "127.0.0.1", 0, compression=None) as server:
-        service.port = server.socket.getsockname()[1]
-        thread = Thread(target=server.serve_forever, daemon=True)
-        thread.start()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        socket.create_server(("127.0.0.1", 0)) as listener,
+        socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as clock,
+    ):
+        path = str(Path(folder) / "clock")
+        clock.bind(path)
+        service.port = listener.getsockname()[1]
+        service.environment = {**os.environ, "PALPATE_EMULATOR": path}
+        server = Thread(target=_serve, args=(listener, clock, service))
+        server.start()
         try:
             yield service
         finally:
-            server.shutdown()
-            thread.join()
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
+                end.sendto(b"end", path)
+            server.join()

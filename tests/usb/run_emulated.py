@@ -19,6 +19,10 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests" / "clock"))
+
+from host_clock import host_clock  # noqa: E402
+
 MISSING_PACKAGE_EXIT = 77
 BUILDS = ("dev", "release", "asan", "tsan", "control")
 SOURCES = ROOT / "tests" / "usb"
@@ -48,11 +52,8 @@ def emulator() -> Path | str:
     program = programs[-1]
     program.parent.mkdir(exist_ok=True)
     temporary = program.with_suffix(f".{os.getpid()}")
-    compiler = [os.environ.get("CXX", "g++"), "-std=c++20", "-O1"]
-    clock = [str(SOURCES / "host_clock.cpp"), "-shared", "-fPIC", "-o", str(temporary)]
-    subprocess.run([*compiler, *clock], check=True)
-    temporary.rename(program.with_name("libhost_clock.so"))
-    build_emulator("umockdev_emulator.cpp", temporary, *compiler_flags.stdout.split())
+    clock = f'-DPALPATE_HOST_CLOCK="{host_clock()}"'
+    build_emulator("umockdev_emulator.cpp", temporary, clock, *compiler_flags.stdout.split())
     temporary.rename(program)
     return program
 

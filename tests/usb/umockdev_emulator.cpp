@@ -26,7 +26,6 @@ namespace emulator {
 namespace {
 
 constexpr const char* preload = "libumockdev-preload.so.0";
-constexpr const char* host_clock = "libhost_clock.so";
 /// The device runs on for a second after the end of the command, so that its watchdog ends the torque
 constexpr int frames_after_command = 1000;
 
@@ -52,8 +51,7 @@ class Emulation {
         const Orders orders{[this](const std::string& order) { return executed(order); }};
         std::string libraries = settings_.preload_first.empty() ? "" : settings_.preload_first + ":";
         if (settings_.lock_step) {
-            libraries +=
-                (std::filesystem::read_symlink("/proc/self/exe").parent_path() / host_clock).string() + ":";
+            libraries += PALPATE_HOST_CLOCK ":";
         }
         Command command{settings_.command, {orders.variable(), "LD_PRELOAD=" + libraries + preload}, [this] {
                             give_up_rights();

@@ -42,7 +42,7 @@ def test_the_stored_plan_is_rendered(tmp_path: Path) -> None:
     path = Plan(model_by_hand(), scheme).stored().save(tmp_path / "planned.json")
     # A force limit that the user sets does not replace the plan.
     for options in ([], ["--uncertified"], ["--slew-s", 0.1]):
-        completed = control(path, "--duration-s", 0.2, "--lowest-rate-share", 0, *options)
+        completed = control(path, "--duration-s", 0.2, *options)
         assert completed.returncode == 0, completed.stderr
         assert "massless, K_c = 70, B_c = 0" in completed.stderr
         assert "no plan" not in completed.stderr
@@ -68,7 +68,7 @@ def test_the_planned_network_is_rendered_and_with_a_chosen_structure_the_identif
     limited: Path, tmp_path: Path
 ) -> None:
     stored = load_model(limited)
-    arguments = ["--duration-s", 3, "--lowest-rate-share", 0, "--slew-s", 0, "--no-energy-tank"]
+    arguments = ["--duration-s", 3, "--slew-s", 0, "--no-energy-tank"]
     for options, rendered in (([], stored.planned), (["--structure", "direct", "--rate-hz", 100], stored)):
         record = tmp_path / f"rendered{len(options)}.csv"
         completed = control(limited, *arguments, *options, "--record", record)
@@ -91,7 +91,7 @@ def test_a_certificate_of_another_network_is_refused(limited: Path) -> None:
 
 def test_the_default_coupling_is_reported_without_plan_and_structure(tmp_path: Path) -> None:
     path = model_by_hand().save(tmp_path / "unplanned.json")
-    arguments = [path, "--duration-s", 0.1, "--lowest-rate-share", 0]
+    arguments = [path, "--duration-s", 0.1]
     assert "the model has no plan: rendered behind the default coupling" in control(*arguments).stderr
     assert "no plan" not in control(*arguments, "--structure", "massless").stderr
 
@@ -124,8 +124,6 @@ def test_options_outside_the_certificate_make_the_run_uncertified(
         0.6,
         "--record",
         record,
-        "--lowest-rate-share",
-        0,
         "--rate-hz",
         500,
     )
@@ -139,7 +137,7 @@ def test_one_lost_sample_ends_a_certified_run(planned: Path) -> None:
     completed = control(planned, *arguments)
     assert completed.returncode == 1
     assert "zero force sent and confirmed, device closed" in completed.stderr
-    assert control(planned, "--uncertified", "--lowest-rate-share", 0, *arguments).returncode == 0
+    assert control(planned, "--uncertified", *arguments).returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -167,5 +165,5 @@ def test_a_plan_for_the_motor_controller_is_not_rendered_from_the_host(tmp_path:
             "USB device that contains the exported model, or make a plan for the host with 'palpate plan' "
             "without on_device\n"
         )
-    completed = control(path, "--uncertified", "--duration-s", 0.1, "--lowest-rate-share", 0)
+    completed = control(path, "--uncertified", "--duration-s", 0.1)
     assert completed.returncode == 0, completed.stderr

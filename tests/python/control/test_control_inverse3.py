@@ -16,7 +16,7 @@ import pytest
 pytest.importorskip("websockets")
 
 from conftest import ROOT
-from control_program import ANY_RATE, control, needs_program
+from control_program import control, needs_program
 from inverse3_service import Service, serving
 from palpate import DeviceProfile, load_model, plan, read_recording
 
@@ -45,16 +45,8 @@ def render_on_service(
     model: Path, *arguments: Any, axis: str = ":z", service: Service | None = None
 ) -> Iterator[tuple[subprocess.CompletedProcess[str], Service]]:
     with serving(service or Service()) as running_service:
-        device = [
-            "--device",
-            f"inverse3{axis}@{running_service.port}",
-            "--uncertified",
-            *ANY_RATE,
-            "--priority",
-            0,
-        ]
-        device += ["--wait-ms", 200]  # the server runs on the same, busy machine as palpate-control
-        yield control(model, *device, *arguments), running_service
+        device = ["--device", f"inverse3{axis}@{running_service.port}", "--uncertified"]
+        yield control(model, *device, *arguments, env=running_service.environment), running_service
 
 
 def test_a_spring_is_rendered_along_one_axis_against_the_displacement(spring: Path, tmp_path: Path) -> None:
@@ -180,7 +172,7 @@ def test_a_force_later_than_certified_ends_the_run_with_its_cause(spring: Path, 
     # The service answers within the period, but the loop sends the force of a state one period after it.
     model = certified(tmp_path, spring, delay_s=0.5e-3)
     with serving(Service()) as service:
-        completed = control(model, "--device", f"inverse3:z@{service.port}", "--priority", 0)
+        completed = control(model, "--device", f"inverse3:z@{service.port}", env=service.environment)
     assert completed.returncode == 1
     assert "stopped because the device applied a force" in completed.stderr
     assert "the certificate holds for at most 0.5 ms; plan with a larger delay_s" in completed.stderr
@@ -221,13 +213,14 @@ def test_a_wrong_axis_or_port_is_refused(spring: Path, device: str, reason: str)
 
 def test_a_certificate_or_the_full_option_uncertified_is_required(spring: Path) -> None:
     with serving(Service()) as service:
-        completed = control(spring, "--device", f"inverse3@{service.port}")
+        completed = control(spring, "--device", f"inverse3@{service.port}", env=service.environment)
         assert completed.returncode == 2
         assert "or inverse3[:AXIS[@PORT]]" in completed.stderr
-        completed = control(spring, "--device", f"inverse3:z@{service.port}")
+        completed = control(spring, "--device", f"inverse3:z@{service.port}", env=service.environment)
         assert completed.returncode == 2
         assert "has no certificate" in completed.stderr
-        completed = control(MODEL, "--device", f"inverse3:z@{service.port}", "--uncertified")
+        arguments = ["--device", f"inverse3:z@{service.port}", "--uncertified"]
+        completed = control(MODEL, *arguments, env=service.environment)
         assert completed.returncode == 2
         assert "an Inverse3 moves along a line and needs a model in m and N" in completed.stderr
     assert all(force == {"x": 0.0, "y": 0.0, "z": 0.0} for force in service.forces)

@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import random
 import resource
 import shutil
 import signal
@@ -21,21 +20,20 @@ import numpy as np
 import pytest
 
 from control_program import (
-    ANY_RATE,
     MODEL,
     PROGRAM,
     control,
     every_row,
     needs_program,
-    start_control,
+    run,
+    start,
     wait_for_rows,
 )
 from palpate import InputError, load_model, read_recording
 from palpate.recording.sample import sample_recording
 
 SCALE = max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
-KILLS = 2 * SCALE
-LONG_RUN_S = 6.0 * SCALE
+LONG_RUN_S = 60 * SCALE
 
 pytestmark = needs_program
 
@@ -57,14 +55,14 @@ def test_a_run_writes_a_complete_recording(tmp_path: Path, structure: str, rate:
         "--json",
         "--structure",
         structure,
-        *ANY_RATE,
     )
     assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
     recording = read_recording(out)
     assert not (tmp_path / "rendered.csv.part").exists()
     assert len(every_row(out)) == summary["ticks"] == summary["recorded"]
-    assert summary["ticks"] + summary["missed_deadlines"] >= 0.5 * rate
+    assert summary["ticks"] == 0.5 * rate
+    assert summary["missed_deadlines"] == 0
     assert summary["lost_records"] == 0
     assert recording.source.columns["position"] == "position_rad"
     assert recording.source.columns["force"] == "force_Nm"
@@ -76,7 +74,7 @@ def test_a_run_writes_a_complete_recording(tmp_path: Path, structure: str, rate:
 
 def test_the_same_columns_are_chosen_without_the_metadata(tmp_path: Path) -> None:
     out = tmp_path / "rendered.csv"
-    assert control(MODEL, "--duration-s", 0.3, "--record", out, *ANY_RATE).returncode == 0
+    assert control(MODEL, "--duration-s", 0.3, "--record", out).returncode == 0
     without_comments = tmp_path / "bare.csv"
     lines = [line for line in out.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     without_comments.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -84,20 +82,20 @@ def test_the_same_columns_are_chosen_without_the_metadata(tmp_path: Path) -> Non
 
 
 def test_after_kill_the_part_file_is_complete_except_for_100_ms(tmp_path: Path) -> None:
-    generator = random.Random(5)
-    out = tmp_path / "rendered.csv"
     part = tmp_path / "rendered.csv.part"
     as_modelled = ["--ramp-s", 0, "--slew-s", 0]  # without start ramp and slew limit every row can be used
-    for _ in range(KILLS):
-        process = start_control(MODEL, "--duration-s", "inf", "--record", out, *as_modelled, *ANY_RATE)
-        first_rows_at_s = wait_for_rows(part, process)
-        time.sleep(generator.uniform(0.0, 1.5))
-        duration_s = time.monotonic() - first_rows_at_s
-        process.kill()
-        process.communicate()
+    for reports in range(1, 1 + 2 * SCALE):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+            listener.bind(("127.0.0.1", 0))
+            port = ["--telemetry-port", listener.getsockname()[1]]
+            record = ["--duration-s", "inf", "--record", tmp_path / "rendered.csv"]
+            process = start(PROGRAM, MODEL, *record, *as_modelled, *port)
+            times = [json.loads(listener.recv(4096))["time_s"] for _ in range(8 * reports)]
+            process.kill()
+            process.communicate()
         recording = read_recording(part)
         assert recording.time is not None
-        assert recording.time[-1] >= duration_s - 0.1
+        assert recording.time[-1] >= times[-1] - 0.1
         sequence = recording.columns["sequence"]
         assert np.array_equal(sequence, np.arange(1, len(recording) + 1))
         part.unlink()
@@ -105,7 +103,7 @@ def test_after_kill_the_part_file_is_complete_except_for_100_ms(tmp_path: Path) 
 
 def test_an_incomplete_last_line_is_dropped_and_counted(tmp_path: Path) -> None:
     out = tmp_path / "rendered.csv"
-    assert control(MODEL, "--duration-s", 1.0, "--record", out, *ANY_RATE).returncode == 0
+    assert control(MODEL, "--duration-s", 1.0, "--record", out).returncode == 0
     content = out.read_bytes()
     part = tmp_path / "torn.csv.part"
     part.write_bytes(content[:-7])
@@ -116,7 +114,7 @@ def test_an_incomplete_last_line_is_dropped_and_counted(tmp_path: Path) -> None:
 
 def test_an_incomplete_recording_is_never_overwritten(tmp_path: Path) -> None:
     (tmp_path / "rendered.csv.part").write_text("precious", encoding="utf-8")
-    completed = control(MODEL, "--duration-s", 0.8, "--record", tmp_path / "rendered.csv", *ANY_RATE)
+    completed = control(MODEL, "--duration-s", 0.8, "--record", tmp_path / "rendered.csv")
     assert completed.returncode == 0
     assert (tmp_path / "rendered.csv.1.part").read_text(encoding="utf-8") == "precious"
     assert "rendered.csv.1.part" in completed.stderr
@@ -127,7 +125,7 @@ def test_an_existing_recording_is_refused_before_the_run_and_replaced_with_force
 ) -> None:
     out = tmp_path / "rendered.csv"
     out.write_text("precious", encoding="utf-8")
-    arguments = [MODEL, "--duration-s", 0.8, "--record", out, *ANY_RATE]
+    arguments = [MODEL, "--duration-s", 0.8, "--record", out]
     completed = control(*arguments)
     assert completed.returncode == 2
     assert completed.stderr.startswith(f"error: {out} exists already; choose another name, or ")
@@ -140,7 +138,7 @@ def test_an_existing_recording_is_refused_before_the_run_and_replaced_with_force
 
 def test_the_recording_of_a_failed_run_is_not_replaced_by_the_next_run(tmp_path: Path) -> None:
     out, fault = tmp_path / "rendered.csv", tmp_path / "rendered.fault.csv"
-    arguments = [MODEL, "--duration-s", 2, "--record", out, "--fault", "gone@0.8", *ANY_RATE]
+    arguments = [MODEL, "--duration-s", 2, "--record", out, "--fault", "gone@0.8"]
     assert control(*arguments).returncode == 1
     first_contents = out.read_bytes(), fault.read_bytes()
     assert control(*arguments).returncode == 2
@@ -168,30 +166,20 @@ def test_a_second_run_into_the_same_recording_is_refused_and_the_first_keeps_its
     out = tmp_path / "rendered.csv"
     python = [sys.executable, "-m", "palpate"]
     commands = {
-        "palpate-control": [PROGRAM, MODEL, "--record", out, *ANY_RATE],
-        "render": [*python, "render", MODEL, "--record", out, *ANY_RATE],
-        "record": [*python, "record", out, "--object", MODEL, "--probe", *ANY_RATE],
+        "palpate-control": [PROGRAM, MODEL, "--record", out],
+        "render": [*python, "render", MODEL, "--record", out],
+        "record": [*python, "record", out, "--object", MODEL, "--probe"],
     }
-    running = subprocess.Popen(
-        list(map(str, [*commands[first], "--duration-s", "inf", "--json"])),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    running = start(*commands[first], "--duration-s", "inf", "--json")
     try:
-        wait_for_rows(tmp_path / "rendered.csv.part", running)
-        refused = subprocess.run(
-            list(map(str, [*commands[second], "--duration-s", "0.5", *force])),
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=60,
-        )
+        wait_for_rows(tmp_path / "rendered.csv.part", running, 500)
+        running.send_signal(signal.SIGSTOP)
+        refused = run(*commands[second], "--duration-s", 0.5, *force)
         assert refused.returncode == 2, refused.stderr
         assert "rendered.csv.part is being written by another run" in refused.stderr.splitlines()[-1]
         assert os.listdir(tmp_path) == ["rendered.csv.part"]
-        time.sleep(0.7)
     finally:
+        running.send_signal(signal.SIGCONT)
         completed = stop_with_ctrl_c(running)
     assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
@@ -201,9 +189,8 @@ def test_a_second_run_into_the_same_recording_is_refused_and_the_first_keeps_its
 
 def test_a_file_that_appears_while_the_loop_runs_is_not_replaced(tmp_path: Path) -> None:
     out, part = tmp_path / "rendered.csv", tmp_path / "rendered.csv.part"
-    process = start_control(MODEL, "--duration-s", "inf", "--record", out, "--json", *ANY_RATE)
-    wait_for_rows(part, process)
-    time.sleep(0.7)
+    process = start(PROGRAM, MODEL, "--duration-s", "inf", "--record", out, "--json")
+    wait_for_rows(part, process, 500)
     out.write_text("precious", encoding="utf-8")
     completed = stop_with_ctrl_c(process)
     assert completed.returncode == 0
@@ -219,14 +206,8 @@ def test_a_file_that_appears_while_the_loop_runs_is_not_replaced(tmp_path: Path)
 def test_messages_for_a_closed_standard_output_are_not_written_to_the_recording(tmp_path: Path) -> None:
     out = tmp_path / "rendered.csv"
     for arguments in ([], ["--json"]):
-        command = [PROGRAM, MODEL, "--duration-s", "0.8", "--record", out, "--force", *ANY_RATE, *arguments]
-        completed = subprocess.run(
-            ["sh", "-c", '"$@" >&-', "sh", *map(str, command)],
-            stderr=subprocess.PIPE,
-            text=True,
-            check=False,
-            timeout=60,
-        )
+        command = [PROGRAM, MODEL, "--duration-s", "0.8", "--record", out, "--force", *arguments]
+        completed = run("sh", "-c", '"$@" >&-', "sh", *command)
         assert completed.returncode == 1
         assert "error: standard output could not be written" in completed.stderr.splitlines()[-1]
         text = out.read_text(encoding="utf-8")
@@ -238,14 +219,7 @@ def test_messages_for_a_closed_standard_output_are_not_written_to_the_recording(
 @pytest.mark.parametrize("arguments", [["--json"], [], ["--help"], ["--version"]], ids=" ".join)
 def test_a_full_standard_output_exits_with_code_1_and_one_sentence(arguments: list[str]) -> None:
     with open("/dev/full", "w", encoding="utf-8") as full_device:
-        completed = subprocess.run(
-            list(map(str, [PROGRAM, MODEL, "--duration-s", 0.8, *ANY_RATE, *arguments])),
-            stdout=full_device,
-            stderr=subprocess.PIPE,
-            text=True,
-            check=False,
-            timeout=60,
-        )
+        completed = control(MODEL, "--duration-s", 0.8, *arguments, stdout=full_device)
     assert completed.returncode == 1
     assert completed.stderr.splitlines()[-1].startswith("error: standard output could not be written")
 
@@ -265,23 +239,18 @@ def test_a_full_standard_output_exits_with_code_1_and_one_sentence(arguments: li
 def test_the_verdict_is_the_first_line(
     tmp_path: Path, arguments: list[Any], level: str, sentence: str, code: int
 ) -> None:
-    """The first printed line is the verdict, which on a busy machine reports missed ticks."""
     arguments = [
         MODEL,
         *(["--duration-s", 1.2] if "--duration-s" not in arguments else []),
         *arguments,
-        *ANY_RATE,
     ]
     completed = control(*arguments, cwd=tmp_path)
     assert completed.returncode == code, completed.stderr
     first, *other_lines = completed.stdout.splitlines()
-    on_busy_machine = (
-        level == "good" and first == "verdict: usable" and all("deadlines" in o for o in other_lines[:1])
-    )
-    assert first == f"verdict: {level}" or on_busy_machine
+    assert first == f"verdict: {level}"
     assert any(sentence in line for line in other_lines)
     summary = json.loads(control(*arguments, "--json", "--force", cwd=tmp_path).stdout)
-    assert summary["verdict"].startswith(level) or on_busy_machine or "deadlines" in summary["verdict"]
+    assert summary["verdict"].startswith(level)
     assert sentence in summary["verdict"]
 
 
@@ -289,7 +258,7 @@ def expect_cut_recording(completed: subprocess.CompletedProcess[str], out: Path,
     assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
     assert summary["ended"] == "the duration ended"
-    assert summary["ticks"] + summary["missed_deadlines"] >= ticks
+    assert summary["ticks"] == ticks
     assert "the recording stopped, the loop continues" in completed.stderr
     assert 0 < len(every_row(out)) == summary["recorded"] < summary["ticks"]
     assert summary["recorded"] + summary["lost_records"] == summary["ticks"]
@@ -301,7 +270,7 @@ def test_a_file_size_limit_stops_the_recording_but_not_the_loop(tmp_path: Path) 
         resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
 
     out = tmp_path / "rendered.csv"
-    completed = control(MODEL, "--duration-s", 1, "--record", out, "--json", *ANY_RATE, preexec_fn=limit)
+    completed = control(MODEL, "--duration-s", 1, "--record", out, "--json", preexec_fn=limit)
     expect_cut_recording(completed, out, 1000)
 
 
@@ -335,15 +304,8 @@ def test_a_full_disk_stops_the_recording_but_not_the_loop(tmp_path: Path, full_d
         "--record",
         full_disk / "rendered.csv",
         "--json",
-        *ANY_RATE,
     ]
-    completed = subprocess.run(
-        ["unshare", "-m", "sh", "-c", script, "sh", full_disk, *command],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    completed = run("unshare", "-m", "sh", "-c", script, "sh", full_disk, *command)
     expect_cut_recording(completed, tmp_path / "rendered.csv", 2000)
     assert "No space left on device" in completed.stderr
 
@@ -355,42 +317,38 @@ def resident_kib(process: subprocess.Popen[str]) -> int:
 
 def test_a_long_run_loses_no_row_and_its_memory_is_constant(tmp_path: Path) -> None:
     out = tmp_path / "rendered.csv"
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
-        listener.bind(("127.0.0.1", 0))
-        listener.setblocking(False)
-        arguments = ["--telemetry-port", listener.getsockname()[1], "--telemetry-hz", 20, "--json", *ANY_RATE]
-        process = start_control(MODEL, "--duration-s", LONG_RUN_S, "--record", out, *arguments)
-        wait_for_rows(tmp_path / "rendered.csv.part", process)
-        time.sleep(1.0)
-        memory = [resident_kib(process)]
-        lines = []
-        while process.poll() is None:
-            time.sleep(0.25)
-            with contextlib.suppress(OSError, StopIteration):  # the process may already have ended
-                memory.append(resident_kib(process))
-            while True:
-                try:
-                    lines.append(json.loads(listener.recv(4096)))
-                except BlockingIOError:
-                    break
+    process = start(PROGRAM, MODEL, "--duration-s", LONG_RUN_S, "--record", out, "--json")
+    wait_for_rows(tmp_path / "rendered.csv.part", process, 1000)
+    memory = [resident_kib(process)]
+    while process.poll() is None:
+        with contextlib.suppress(OSError, StopIteration):  # the process may already have ended
+            memory.append(resident_kib(process))
+        time.sleep(0.05)
     output, messages = process.communicate()
     assert process.returncode == 0, messages
     summary = json.loads(output)
     print(f"{summary['ticks']} ticks, {summary['lost_records']} lost, {memory[0]} to {max(memory)} KiB")
     assert summary["lost_records"] == 0
-    assert summary["recorded"] == summary["ticks"]
+    assert summary["recorded"] == summary["ticks"] == 1000 * LONG_RUN_S
     assert max(memory) - memory[0] <= 256
-    assert len(lines) >= 0.8 * 20 * LONG_RUN_S * summary["rate_hz"] / 1000.0
+
+
+def test_the_telemetry_sends_states_in_their_order() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        arguments = ["--telemetry-port", listener.getsockname()[1], "--telemetry-hz", 20]
+        completed = control(MODEL, "--duration-s", 4, *arguments)
+        assert completed.returncode == 0, completed.stderr
+        lines = [json.loads(listener.recv(4096)) for _ in range(75)]
     assert {"time_s", "position_rad", "force_Nm", "status"} <= lines[0].keys()
-    times = [line["time_s"] for line in lines]
-    assert times == sorted(times)
+    assert np.diff([line["time_s"] for line in lines]) == pytest.approx(0.05, abs=0.02)
 
 
 def test_rows_with_a_force_changed_by_a_guard_are_dropped_and_counted(tmp_path: Path) -> None:
     """Rows of the start ramp, rows with a clipped force and rows after a fault do not describe the object."""
     out = tmp_path / "rendered.csv"
     arguments = ["--duration-s", 2, "--structure", "direct", "--force-limit", 1.2, "--fault", "nan@0.5x3"]
-    assert control(MODEL, *arguments, "--record", out, "--json", *ANY_RATE).returncode == 0
+    assert control(MODEL, *arguments, "--record", out, "--json").returncode == 0
     statuses = every_row(out)["status"].value_counts()
     assert set(statuses.index) == {"Ok", "Ramp", "Limited", "NonFinite"}
     recording = read_recording(out)
@@ -403,7 +361,7 @@ def test_rows_with_a_force_changed_by_a_guard_are_dropped_and_counted(tmp_path: 
 
 def test_a_record_of_the_ramp_alone_is_refused_with_the_reason(tmp_path: Path) -> None:
     out = tmp_path / "rendered.csv"
-    assert control(MODEL, "--duration-s", 0.1, "--record", out, *ANY_RATE).returncode == 0
+    assert control(MODEL, "--duration-s", 0.1, "--record", out).returncode == 0
     with pytest.raises(
         InputError,
         match=r"has 0 usable rows; .* left out \d+ rows whose force is not the model's force \(\d+ Ramp\)$",
@@ -425,10 +383,9 @@ def test_a_rendered_model_is_identified_as_the_same_model(tmp_path: Path) -> Non
     first, second, figure = (tmp_path / name for name in ("first.json", "again.json", "both.png"))
     sample_recording(seed=1).write(sample)
     palpate("identify", sample, "-o", first)
-    assert control(first, "--duration-s", 5, "--record", rendered, "--compensated", *ANY_RATE).returncode == 0
+    assert control(first, "--duration-s", 5, "--record", rendered, "--compensated").returncode == 0
     palpate("identify", rendered, "-o", second)
     output = palpate("show", first, "--beside", second, "--plot", figure)
-    # On a busy machine the recording has gaps of time, which make the verdict usable.
     assert "a hand notices the difference" not in output
     rows = output.partition("largest force difference, in just noticeable differences\n")[2].splitlines()
     shares = [float(row.split()[-1]) for row in rows]

@@ -144,9 +144,7 @@ def test_control_program_renders_a_force_of_velocity_certified_and_uncertified(t
     path = plan(fluid_by_hand(), PATIENT_KNOB).stored().save(tmp_path / "planned.json")
     for words, expected in (([], "certified: certified"), (["--uncertified"], "certified: no")):
         record = tmp_path / f"felt{len(words)}.csv"
-        answer = control(
-            path, "--duration-s", 0.3, "--record", record, "--lowest-rate-share", 0, *words, "--json"
-        )
+        answer = control(path, "--duration-s", 0.3, "--record", record, *words, "--json")
         assert answer.returncode == 0, answer.stderr
         assert expected in record.read_text(encoding="utf-8")
 

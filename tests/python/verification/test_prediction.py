@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from control_program import ANY_RATE, control, needs_program
+from control_program import control, needs_program
 from models_by_hand import model_by_hand
 from palpate import Model, Recording, identify, read_recording, verify
 from palpate.cli.main import main
@@ -35,7 +35,7 @@ def test_a_flight_record_of_a_model_with_hysteresis_is_verified(
     assert model.play_radius is None
     model.save(tmp_path / "k.json")
     out = tmp_path / "again.csv"
-    words = ["--duration-s", 4, "--record", out, "--structure", structure, "--predict", predict, *ANY_RATE]
+    words = ["--duration-s", 4, "--record", out, "--structure", structure, "--predict", predict]
     answer = control(tmp_path / "k.json", *words)
     assert answer.returncode == 0, answer.stderr
     assert main(["verify", str(tmp_path / "k.json"), str(out), "--json"]) == 0
@@ -58,7 +58,7 @@ def test_a_flight_record_of_a_prediction_is_compared_at_the_predicted_position(
 ) -> None:
     model_by_hand().save(tmp_path / "m.json")
     out = tmp_path / "felt.csv"
-    answer = control(tmp_path / "m.json", "--duration-s", 2, "--record", out, "--predict", 4, *ANY_RATE)
+    answer = control(tmp_path / "m.json", "--duration-s", 2, "--record", out, "--predict", 4)
     assert answer.returncode == 0, answer.stderr
     assert read_recording(out).metadata["structure"] == "direct, predict 4"
     assert main(["verify", str(tmp_path / "m.json"), str(out), "--json"]) == 0

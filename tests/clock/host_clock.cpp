@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clock of a program in lock-step with the emulated device; the emulator loads this library before all others
-// (LD_PRELOAD).
+// Clock of a program under test, as a library that is loaded before all others (LD_PRELOAD).
 //
 // The clock shows virtual time. Time passes only while every thread of the program waits: for a deadline, for another
-// thread or for a file. The next deadline is then reached, or the emulator executes the next USB frame. No result
-// depends on the speed of the computer, and a wait takes no real time. Production code is unchanged: this library
-// replaces the functions of the C library that read the clock or wait.
+// thread or for a file. The next deadline is then reached, or the emulated device executes its next frame, if the
+// variable PALPATE_EMULATOR names its socket. No result depends on the speed of the computer, and a wait takes no real
+// time. Production code is unchanged: this library replaces the functions of the C library that read the clock or wait.
 //
-// Virtual time begins when libusb creates a timer. This fails, so libusb computes its timeouts from this clock.
+// Virtual time begins when the program locks its memory for a control loop, or when libusb or Boost.Asio creates a
+// timer. The timer fails, so that they compute their timeouts from this clock.
 #include <dlfcn.h>
 #include <linux/futex.h>
 #include <poll.h>
 #include <pthread.h>
+#include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/un.h>
@@ -97,14 +99,10 @@ class HostClock {
         }}.join();  // with the first thread, a sanitizer starts a thread that must not take part
         timespec present{};
         REAL(clock_gettime)(CLOCK_MONOTONIC, &present);
-        next_frame_ = of(present);
-        emulator_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-        sockaddr_un address{};
-        address.sun_family = AF_UNIX;
-        // An empty address: the kernel chooses one
-        ::bind(emulator_, reinterpret_cast<const sockaddr*>(&address), sizeof address.sun_family);
-        std::strncpy(address.sun_path, std::getenv("PALPATE_EMULATOR"), sizeof address.sun_path - 1);
-        ::connect(emulator_, reinterpret_cast<const sockaddr*>(&address), sizeof address);
+        if (const char* emulator = std::getenv("PALPATE_EMULATOR"); emulator != nullptr) {
+            connect(emulator);
+            next_frame_ = of(present);
+        }
         (void)own();
         now = of(present);
     }
@@ -207,6 +205,16 @@ class HostClock {
 
     // The caller of these functions holds the mutex.
 
+    void connect(const char* emulator) {
+        emulator_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+        sockaddr_un address{};
+        address.sun_family = AF_UNIX;
+        // An empty address: the kernel chooses one
+        ::bind(emulator_, reinterpret_cast<const sockaddr*>(&address), sizeof address.sun_family);
+        std::strncpy(address.sun_path, emulator, sizeof address.sun_path - 1);
+        ::connect(emulator_, reinterpret_cast<const sockaddr*>(&address), sizeof address);
+    }
+
     Thread* add() {
         threads_.push_back(new Thread);
         return threads_.back();
@@ -276,6 +284,9 @@ class HostClock {
             for (const Thread* thread : threads_) {
                 next = std::min(next, thread->deadline);
             }
+            if (next == never) {
+                return;  // all threads wait for files
+            }
             now = next;
             if (next == next_frame_) {
                 next_frame_ += frame();
@@ -288,7 +299,7 @@ class HostClock {
         }
     }
 
-    /// Orders a USB frame, and returns its duration.
+    /// Orders a frame of the emulated device, and returns its duration.
     [[nodiscard]] Time frame() const {
         constexpr const char* order = "frame";
         ::send(emulator_, order, std::strlen(order), MSG_NOSIGNAL);
@@ -303,7 +314,7 @@ class HostClock {
     std::condition_variable changed_;
     std::vector<Thread*> threads_;
     pthread_key_t own_{};  ///< the calling thread
-    Time next_frame_ = 0;
+    Time next_frame_ = never;
     int emulator_ = -1;
 };
 
@@ -320,6 +331,11 @@ int timerfd_create(int /*clock*/, int /*flags*/) {
     HostClock::get().start();
     errno = ENOSYS;
     return -1;
+}
+
+int mlockall(int flags) {
+    HostClock::get().start();
+    return REAL(mlockall)(flags);
 }
 
 int clock_gettime(clockid_t clock, timespec* time) {
@@ -352,6 +368,17 @@ int poll(pollfd* files, nfds_t count, int timeout_ms) {
         return REAL(poll)(files, count, timeout_ms);
     }
     return HostClock::get().poll(files, count, timeout_ms < 0 ? never : now + timeout_ms * (second / 1000));
+}
+
+int epoll_wait(int set, epoll_event* events, int most, int timeout_ms) {
+    if (is_virtual() && timeout_ms != 0) {
+        pollfd files{set, POLLIN, 0};
+        if (poll(&files, 1, timeout_ms) < 0) {
+            return -1;
+        }
+        timeout_ms = 0;
+    }
+    return REAL(epoll_wait)(set, events, most, timeout_ms);
 }
 
 int pthread_create(pthread_t* id, const pthread_attr_t* attributes, void* (*routine)(void*), void* argument) {
