@@ -5,7 +5,7 @@
 #   make test         build, C++ tests, Python tests, lint                        (minutes)
 #   make control      build palpate-control, the real-time program: build/control/palpate-control
 #   make fuzz         fuzz targets of the C++ readers, FUZZ_SECONDS each: make fuzz FUZZ_SECONDS=3600
-#   make test-full    the same tests with long counts, with sanitizers, and of the installed package  (an hour)
+#   make test-full    all tests: long counts, sanitizers, fuzzing, real time, the installed package     (hours)
 #   make coverage     lines and branches that the tests execute                        (an hour)
 #   make mutants      share of small errors in the C++ headers that the tests find      (hours)
 #   make bench        all studies, JSON and figures in build/bench/
@@ -27,14 +27,16 @@ PYTHON ?= python3
 # give correct results. The environment can set both. The sanitizers make a program ten times slower and get a tenth
 # of the cases.
 test test-cpp test-python: export PALPATE_TEST_SCALE ?= 1
-test-full test-full-native: export PALPATE_TEST_SCALE ?= 100
+test-full: export PALPATE_TEST_SCALE ?= 100
 bench figures: export PALPATE_BENCH_SCALE ?= 1
 # Test processes share the processors: with more threads, matrix products of one test take up to forty times as long.
 test-python docs: export OPENBLAS_NUM_THREADS ?= 1
-# Seconds for each fuzz target: a sample for every change.
-FUZZ_SECONDS ?= 3
+FUZZ_SECONDS ?= 120
 
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
+# A compiler cache, where one is installed.
+export CMAKE_C_COMPILER_LAUNCHER ?= $(shell command -v ccache)
+export CMAKE_CXX_COMPILER_LAUNCHER ?= $(shell command -v ccache)
 # Writes only below this folder: no download cache and no font cache in the home directory.
 export PIP_NO_CACHE_DIR ?= 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -56,7 +58,7 @@ moved := $(shell [ "$$(cat .venv/folder 2>/dev/null)" = "$$(pwd -P)" ] || echo m
 module_names := find python -name '*.py' | LC_ALL=C sort
 renamed := $(shell $(module_names) | cmp -s - $(stamps)/modules 2>/dev/null || echo renamed)
 
-.PHONY: help demo control test test-full test-full-native test-cpp test-python fuzz cpp-tests examples test-packages coverage mutants bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
+.PHONY: help demo control test test-full test-cpp test-python fuzz cpp-tests examples test-packages coverage mutants bench figures docs lint lint-python lint-cpp lint-stubs lint-language format stubs output \
         setup clean moved renamed
 
 help:
@@ -102,17 +104,16 @@ setup: $(stamps)/core $(stamps)/control $(stamps)/test-cpp $(stamps)/test $(stam
 demo: $(stamps)/core
 	.venv/bin/palpate demo
 
-# The linters and the compilers share the processors. The C++ and the Python tests, many of which wait for a clock, do
-# not overlap with them. The Python tests run last, so that their summary is at the end of the output.
+# The linters and the compilers share the processors. The Python tests run last, so that their summary is at the end of
+# the output.
 test: | setup
-	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control cpp-tests fuzz
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint control cpp-tests
 	$(MAKE) --no-print-directory test-cpp
 	$(MAKE) --no-print-directory test-python
 
-# One process more than the number of processors, because many tests wait for a clock. Files keep their order, because
-# the longest ones contain few tests and would start last.
-test-python: setup control examples
-	$(python) -m pytest --numprocesses "$$(($(CMAKE_BUILD_PARALLEL_LEVEL) + 1))" --dist loadfile --no-loadscope-reorder
+# Files keep their order, because the longest ones contain few tests and would start last.
+test-python: setup control
+	$(python) -m pytest --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist loadfile --no-loadscope-reorder
 
 # The real-time program; the build tool detects changed sources.
 control: $(stamps)/control
@@ -136,20 +137,19 @@ test-cpp: setup
 fuzz: $(stamps)/core $(stamps)/fuzz
 	tools/fuzz.sh $(FUZZ_SECONDS)
 
-test-full: test-full-native
-	$(MAKE) --no-print-directory test-python
-
-# Tests that `make test` does not run: sanitizers, the packages, a USB device below a kernel; reports in a browser and
-# exported models on a microcontroller, if Chromium or QEMU was not installed.
-test-full-native: setup control test-packages $(stamps)/simulators
-	tools/cpp_tests.sh release
-	for preset in asan tsan; do tools/cpp_tests.sh $$preset; tools/python_sanitized.sh $$preset; done
-	$(MAKE) --no-print-directory fuzz FUZZ_SECONDS=120
-	$(python) -m pytest tests/usb tests/simulators
+# All tests: with long counts, sanitizers, fuzzing, the packages, a USB device below a kernel, reports in a browser and
+# exported models on a microcontroller. A line states how long each part took.
+part = start=$$SECONDS && $(1) && echo "$$((SECONDS - start)) s: $(1)"
+test-full: setup control examples $(stamps)/simulators
+	$(call part,tools/cpp_tests.sh release)
+	for preset in asan tsan; do \
+	    $(call part,tools/cpp_tests.sh $$preset) && $(call part,tools/python_sanitized.sh $$preset) || exit; done
+	$(call part,$(MAKE) --no-print-directory fuzz)
+	$(call part,$(MAKE) --no-print-directory test-packages)
+	$(call part,$(python) -m pytest tests/usb tests/simulators)
 	$(system_packages) browser
-	$(python) -m pytest tests/browser
 	$(system_packages) portable
-	$(python) -m pytest tests/python/export tests/firmware
+	$(call part,$(python) -m pytest -m "" --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist loadfile --no-loadscope-reorder)
 
 # Lines and branches that the tests execute, and small errors in the C++ headers that they find. For a change of
 # tests: both take an hour or more.
