@@ -2,6 +2,7 @@
 """Tests of the command palpate render, which runs the control loop of palpate-control from Python."""
 
 import json
+import mmap
 import signal
 import subprocess
 import sys
@@ -70,6 +71,16 @@ def test_other_python_threads_run_during_the_loop() -> None:
     stop.set()
     thread.join()
     assert n_counts > 20
+
+
+def test_reserved_memory_stays_unused() -> None:
+    def resident_bytes() -> int:
+        return int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1]) * mmap.PAGESIZE
+
+    with mmap.mmap(-1, 1 << 28) as reserved:
+        before = resident_bytes()
+        render(Scheme(), duration_s=0.05)
+        assert resident_bytes() - before < len(reserved) / 4
 
 
 @pytest.mark.parametrize(

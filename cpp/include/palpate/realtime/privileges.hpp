@@ -25,10 +25,12 @@ struct RealTimeOptions {
     int cpu = -1;       ///< core of the control loop; -1 = highest core number allowed, -2 = any
 };
 
-/// Keeps the memory of the process from being swapped out during the lifetime of this object.
+/// Keeps the memory of the process from being swapped out during the lifetime of this object. Memory that the process
+/// has reserved without using it stays unused: libraries of Python reserve more than a gigabyte.
 class LockedMemory {
   public:
-    LockedMemory() noexcept : error_{mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno} {}
+    LockedMemory() noexcept
+        : error_{mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0 ? 0 : errno} {}
     ~LockedMemory() {
         if (error_ == 0) {
             munlockall();
