@@ -47,8 +47,10 @@ class Service:
     garbage_after: int | None = None
     garbage_messages: int = 1
     renamed_after: int | None = None
-    extra_after: int | None = None
-    extra_states: int = 0
+    extra_states: dict[int, int] = field(default_factory=dict)
+    """Number of states that no message asked for, before the answer to a message"""
+    late_answers: dict[int, int | None] = field(default_factory=dict)
+    """Number of milliseconds by which the answer to a message is late; None: it is lost"""
     silent_after: int | None = None
     messages: list[dict[str, Any]] = field(default_factory=list)
     forces: list[dict[str, float]] = field(default_factory=list)
@@ -68,8 +70,11 @@ class Service:
         state = self.state_message({}, with_config=True)
         return json.dumps({"session_id": 7, **state})
 
-    def answers(self, text: str) -> Iterator[str | None]:
-        """Moves the handle for 1 ms, and returns the answers to a message; None ends the connection."""
+    def answers(self, text: str) -> Iterator[tuple[int, str | None]]:
+        """Moves the handle for 1 ms, and returns the answers to a message; None ends the connection.
+
+        Each answer has the number of milliseconds by which it is late.
+        """
         self._number += 1
         number = self._number
         message = json.loads(text)
@@ -85,19 +90,21 @@ class Service:
             self._position += 0.1 * STEP_S * self._velocity
         self.positions.append(self._position)
         if self.close_after == number:
-            yield None
+            yield 0, None
         if self.silent_after is not None and number >= self.silent_after:
             return
         first = number + 1 if self.garbage_after is None else self.garbage_after
         if first <= number < first + self.garbage_messages:
-            yield "{"
+            yield 0, "{"
             return
         if self.renamed_after == number:
             self.device_id = "0000"
-        for _ in range(self.extra_states if self.extra_after == number else 0):
-            yield json.dumps(self.state_message(force))
+        for _ in range(self.extra_states.get(number, 0)):
+            yield 0, json.dumps(self.state_message(force))
         unplugged = self.unplug_after is not None and number >= self.unplug_after
-        yield json.dumps(self.state_message(force, unplugged=unplugged))
+        late = self.late_answers.get(number, 0)
+        if late is not None:
+            yield late, json.dumps(self.state_message(force, unplugged=unplugged))
 
     def state_message(
         self, force: dict[str, float], *, with_config: bool = False, unplugged: bool = False
@@ -130,11 +137,16 @@ class _Connection:
         self.socket, self.service = accepted, service
         accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.protocol = ServerProtocol()
+        self.late: list[tuple[int, str]] = []
         service.opened()
 
     def step(self) -> bool:
         """Answers all messages that have arrived; returns False at the end of the connection."""
-        over = False
+        self.late = [(left - 1, text) for left, text in self.late]
+        for _, text in filter(lambda each: each[0] <= 0, self.late):
+            self._send_text(text)
+        self.late = [each for each in self.late if each[0] > 0]
+        over = self._send()
         while not over and select([self.socket], [], [], 0.0)[0]:
             try:
                 received = self.socket.recv(65536)
@@ -160,11 +172,17 @@ class _Connection:
             self.protocol.send_response(self.protocol.accept(event))
             self.protocol.send_text(self.service.greeting().encode())
         elif isinstance(event, Frame) and event.opcode.name == "TEXT":
-            for text in self.service.answers(event.data.decode()):
+            for late, text in self.service.answers(event.data.decode()):
                 if text is None:
                     self.protocol.send_close(1000)
-                elif self.protocol.state is State.OPEN:
-                    self.protocol.send_text(text.encode())
+                elif late or self.late:  # the answers keep their order
+                    self.late.append((max(late, *(left for left, _ in self.late), 0), text))
+                else:
+                    self._send_text(text)
+
+    def _send_text(self, text: str) -> None:
+        if self.protocol.state is State.OPEN:
+            self.protocol.send_text(text.encode())
 
     def _send(self) -> bool:
         """Sends the answers; returns True if they end the connection."""

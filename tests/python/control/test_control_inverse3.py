@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,6 +25,10 @@ from palpate import DeviceProfile, load_model, plan, read_recording
 pytestmark = needs_program
 
 STIFFNESS = 100.0
+ALLOWED_MS = 4
+FIRST_FAULT = 220
+"""Number of the first message with a fault, after the start ramp"""
+SCALE = max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 UNCONFIRMED = "zero force sent, but not confirmed by the device"
 MODEL = ROOT / "tests" / "models" / "good" / "spring.json"
 
@@ -136,7 +142,7 @@ def test_states_without_a_command_are_skipped_and_do_not_delay_later_forces(
     spring: Path, tmp_path: Path, extra: int
 ) -> None:
     out = tmp_path / "rendered.csv"
-    service = Service(extra_after=300, extra_states=extra)
+    service = Service(extra_states={300: extra})
     arguments = ["--structure", "direct", "--duration-s", 1, "--ramp-s", 0, "--record", out, "--json"]
     with render_on_service(spring, *arguments, service=service) as (completed, _):
         assert completed.returncode == 0, completed.stderr
@@ -177,6 +183,53 @@ def test_a_force_later_than_certified_ends_the_run_with_its_cause(spring: Path, 
     assert "stopped because the device applied a force" in completed.stderr
     assert "the certificate holds for at most 0.5 ms; plan with a larger delay_s" in completed.stderr
     assert service.forces[-1]["z"] == 0.0
+
+
+def largest_delay(service: Service, last: int) -> int:
+    """Returns the longest time from a state until a force of it or of a later one, up to a message [ms].
+
+    The position of the handle rises, so each force has the number of its state.
+    """
+    positions = np.array(service.positions) - service.start
+    forces = -np.array([force["z"] for force in service.forces])
+    messages = np.arange(FIRST_FAULT, last)
+    sources = np.array([np.argmin(abs(STIFFNESS * positions[:k] - forces[k])) for k in messages])
+    newest = np.maximum.accumulate(sources)
+    states = np.arange(newest[0] + 1, newest[-1])
+    return int((messages[np.searchsorted(newest, states)] - states).max())
+
+
+def test_no_force_is_older_than_certified_whatever_the_service_does(spring: Path, tmp_path: Path) -> None:
+    """Random answers are late, lost or held back together, or come without a message."""
+    model = certified(tmp_path, spring, delay_s=ALLOWED_MS * 1e-3)
+    generator = np.random.default_rng(3)
+    ends = Counter[str]()
+    ticks = 0
+    for run in range(10 * SCALE):
+        service = Service(mass=0.02, sweep=0.02)
+        for number in generator.choice(np.arange(FIRST_FAULT, 480), generator.integers(1, 4)).tolist():
+            kind, length = generator.choice(["late", "lost", "burst", "extra"]), int(generator.integers(1, 8))
+            if kind == "extra":
+                service.extra_states[number] = length
+            elif kind == "burst":
+                service.late_answers |= {number + k: length - k for k in range(length)}
+            else:
+                service.late_answers[number] = None if kind == "lost" else length
+        with serving(service):
+            arguments = ["--device", f"inverse3:z@{service.port}", "--duration-s", 0.48, "--json"]
+            completed = control(model, *arguments, env=service.environment)
+        summary = json.loads(completed.stdout)
+        ticks += summary["ticks"]
+        ends[summary["status"]] += 1
+        last = len(service.forces) - 8
+        if last > FIRST_FAULT + 20:
+            assert largest_delay(service, last) <= ALLOWED_MS, f"run {run}: {service.late_answers}"
+        if completed.returncode == 0:
+            assert summary["largest_delay_s"] <= ALLOWED_MS * 1e-3
+        else:
+            assert service.forces[-1]["z"] == 0.0
+    print(f"{ticks} ticks, runs ended with {dict(ends)}")
+    assert set(ends) >= {"Ok", "Stale", "Timeout"}
 
 
 @pytest.mark.parametrize(
