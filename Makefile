@@ -169,10 +169,11 @@ bench: setup
 figures: setup
 	tools/bench.sh docs
 
-# The documentation site. A warning is an error, and so is a broken link between pages.
+# The documentation site, with the code of its pages, the examples and the README, which are executed. A warning is an
+# error, and so is a broken link between pages.
 docs: $(stamps)/core control $(stamps)/test $(stamps)/docs
 	$(python) -m sphinx --nitpicky --fail-on-warning --keep-going --quiet --jobs auto docs build/docs/html
-	$(python) -m pytest --quiet tests/docs/test_site.py
+	$(python) -m pytest --quiet -m "" tests/docs tests/python/test_readme.py
 
 # ------------------------------------------------------------------------------------------------------------ lint
 

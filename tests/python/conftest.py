@@ -6,8 +6,9 @@ import pty
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,6 +18,12 @@ sys.path.insert(0, str(ROOT / "tests" / "clock"))
 # A shell that starts the tests in the background makes the tests and their child processes ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def full_except(kept: Iterable[Any], cases: Iterable[Any]) -> list[Any]:
+    """Returns the cases of a test; `make test` runs those in `kept`, and `make test-full` runs all."""
+    kept = list(kept)
+    return [case if case in kept else pytest.param(case, marks=pytest.mark.full) for case in cases]
 
 
 def measured_data() -> Path | None:

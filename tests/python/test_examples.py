@@ -84,6 +84,7 @@ def test_every_example_states_a_result_that_is_tested() -> None:
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
+@pytest.mark.full
 def test_an_example_prints_the_numbers_of_its_result(example: str) -> None:
     output = output_in_python(example)
     if skipped := re.search(r"^skipped: (needs .*)", output):
@@ -95,6 +96,7 @@ def test_an_example_prints_the_numbers_of_its_result(example: str) -> None:
 
 
 @pytest.mark.parametrize("example", IN_CPP)
+@pytest.mark.full
 def test_both_languages_print_the_same_numbers(example: str) -> None:
     assert output_in_cpp(example) == output_in_python(example)
 

@@ -27,6 +27,7 @@ def test_the_notebook_has_no_stored_outputs(notebook: nbformat.NotebookNode) -> 
 
 # The kernel is another process, and its client leaves sockets and loops open.
 @pytest.mark.filterwarnings("default")
+@pytest.mark.full
 def test_the_notebook_runs_and_every_result_is_shown() -> None:
     notebook = notebook_page.executed()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import palpate
+from conftest import full_except
 from palpate import _core
 
 ROOT = Path(__file__).parents[2]
@@ -71,7 +72,9 @@ def command_lines() -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("program", command_lines())
-@pytest.mark.parametrize("verb", ["", "identify", "verify", "simulate", "render", "show", "demo"])
+@pytest.mark.parametrize(
+    "verb", full_except([""], ["", "identify", "verify", "simulate", "render", "show", "demo"])
+)
 def test_help_shows_usage_and_an_example(program: str, verb: str) -> None:
     command = [*command_lines()[program], *([verb] if verb else []), "--help"]
     completed = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -35,10 +35,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("snippet", blocks("python"), ids=lambda snippet: snippet.splitlines()[0])
+@pytest.mark.full
 def test_snippet_runs(snippet: str, folder: Path) -> None:
     subprocess.run([sys.executable, "-W", "error", "-c", snippet], cwd=folder, check=True, timeout=300)
 
 
+@pytest.mark.full
 def test_the_cpp_snippet_prints_the_numbers_of_the_python_snippet(folder: Path) -> None:
     (python,), (cpp,) = blocks("python"), blocks("cpp")
     compiler = shutil.which("c++")
@@ -76,6 +78,7 @@ PROGRAMS = {
 
 
 @needs_program
+@pytest.mark.full
 def test_all_commands_except_make_run_in_their_order(folder: Path) -> None:
     commands = [arguments for arguments in shell_commands() if arguments[0] != "make"]
     assert {arguments[0] for arguments in commands} == set(PROGRAMS)
@@ -91,6 +94,7 @@ def test_all_commands_except_make_run_in_their_order(folder: Path) -> None:
         assert completed.returncode == 0, f"{shlex.join(arguments)}: {completed.stdout}{completed.stderr}"
 
 
+@pytest.mark.full
 def test_example_output_equals_the_output_of_the_programs() -> None:
     tool = ROOT / "tools" / "example_output.py"
     completed = subprocess.run([sys.executable, tool, "--check"], capture_output=True, text=True, check=False)

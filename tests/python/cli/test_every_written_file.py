@@ -15,7 +15,7 @@ import shlex
 import shutil
 import signal
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +68,7 @@ RECORDING = {"simulate", "render", "record", "export --table", "export --mcap", 
 WITH_FORCE = {"simulate", "render", "record", "palpate-control"}
 """Commands with the option --force, which replaces a recording"""
 
-SAMPLE = {"plan", "simulate", "render", "export --mcap", "palpate-control"}
+SAMPLE = {"plan", "export --mcap", "palpate-control"}
 """Commands for `make test`: one for each way of writing. `make test-full` takes all."""
 
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
@@ -78,14 +78,18 @@ TEMPORARY = re.compile(r"\.[^/]+\.[0-9a-f]{16}\.tmp")
 needs_control = pytest.mark.skipif(not PROGRAM.exists(), reason="needs palpate-control, run make control")
 
 
-def case(name: str) -> pytest.ParameterSet:  # type: ignore[name-defined]
-    return pytest.param(name, id=name.replace(" ", ""), marks=needs_control if "control" in name else ())
+def cases(kept: Iterable[str], names: Iterable[str] = CASES) -> pytest.MarkDecorator:
+    """Returns a test of these commands; `make test` runs those in `kept`."""
+    marks = {
+        name: [needs_control] * ("control" in name) + [pytest.mark.full] * (name not in kept)
+        for name in names
+    }
+    parameters = [pytest.param(name, id=name.replace(" ", ""), marks=each) for name, each in marks.items()]
+    return pytest.mark.parametrize("name", parameters)
 
 
-every_case = pytest.mark.parametrize("name", [case(name) for name in CASES])
-every_quick_case = pytest.mark.parametrize(
-    "name", [case(name) for name in CASES if name in SAMPLE or (SCALE > 1 and name not in SLOW)]
-)
+every_case = cases(SAMPLE)
+every_quick_case = cases(SAMPLE, sorted(CASES.keys() - SLOW))
 
 
 @pytest.fixture(scope="module")
@@ -243,8 +247,6 @@ def test_at_every_call_each_file_is_absent_old_or_complete(
 ) -> None:
     if before == "old" and (name == "demo" or (name in RECORDING and name not in WITH_FORCE)):
         pytest.skip("replaces no file")
-    if name not in SAMPLE and before == "old" and SCALE == 1:
-        pytest.skip("part of make test-full")
     inputs = files_in(folder)
     if before == "old":
         put_old_outputs(name, folder)
@@ -282,7 +284,7 @@ def calls_to_fault(ended: Ended, name: str, seed: int) -> list[int]:
     return sorted({*chosen, *kinds.values()} if SCALE > 1 else chosen)
 
 
-@every_quick_case
+@cases(sorted(CASES.keys() - SLOW), sorted(CASES.keys() - SLOW))
 def test_after_kill_each_file_is_old_or_complete(
     programs: Programs, name: str, folder: Path, tmp_path: Path
 ) -> None:

@@ -364,6 +364,7 @@ def test_a_usb_device_is_measured_and_its_profile_written(tmp_path: Path) -> Non
     assert not emulated_frames[-1].enabled
 
 
+@pytest.mark.full
 @needs_emulation
 def test_the_friction_of_a_usb_device_is_measured(tmp_path: Path) -> None:
     profile = tmp_path / "knob.toml"
@@ -375,7 +376,13 @@ def test_the_friction_of_a_usb_device_is_measured(tmp_path: Path) -> None:
 
 
 @needs_emulation
-@pytest.mark.parametrize(("hand", "seconds"), [(["--no-hand"], 2.0), ([], 6.0)], ids=["free", "held"])
+@pytest.mark.parametrize(
+    ("hand", "seconds"),
+    [
+        pytest.param(["--no-hand"], 2.0, id="free"),
+        pytest.param([], 6.0, id="held", marks=pytest.mark.full),
+    ],
+)
 def test_a_reversed_motor_is_detected_by_a_push_of_half_a_percent_of_its_force(
     hand: list[str], seconds: float, tmp_path: Path
 ) -> None:
@@ -393,12 +400,22 @@ def test_a_reversed_motor_is_detected_by_a_push_of_half_a_percent_of_its_force(
 
 
 @needs_emulation
-@pytest.mark.parametrize("frame", [1000, 2300], ids=["before the pushes", "during the pushes"])
+@pytest.mark.parametrize(
+    "frame",
+    [
+        pytest.param(1000, id="before the pushes", marks=pytest.mark.full),
+        pytest.param(2300, id="during the pushes"),
+    ],
+)
 @pytest.mark.parametrize(
     ("fault", "named"),
     [
         ("emergency-stop", "reports an emergency stop; remove the cause of the fault"),
-        ("over-temperature", "reports over-temperature; remove the cause of the fault"),
+        pytest.param(
+            "over-temperature",
+            "reports over-temperature; remove the cause of the fault",
+            marks=pytest.mark.full,
+        ),
         ("unplug", "no USB device 1209:0001 with this protocol is connected"),
     ],
 )
@@ -449,6 +466,7 @@ def test_pushing_without_a_terminal_requires_yes() -> None:
     assert "--push moves the handle; without a terminal it needs --yes" in answer.stdout
 
 
+@pytest.mark.real_time
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_check_reports_its_findings(number: signal.Signals) -> None:
     command = [sys.executable, "-m", "palpate", "check-device", "--duration-s", "60", "--json"]

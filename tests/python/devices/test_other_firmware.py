@@ -21,7 +21,7 @@ SPRING = ROOT / "tests" / "models" / "good" / "spring.json"
 SCALE = max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 PALPATE = [sys.executable, "-m", "palpate"]
 
-pytestmark = [needs_emulation, pytest.mark.parametrize("seed", range(1, 1 + 3 * SCALE))]
+pytestmark = [needs_emulation, pytest.mark.parametrize("seed", range(1, 1 + SCALE))]
 
 
 def firmware_of(seed: int, *words: Any) -> list[str]:
