@@ -48,7 +48,7 @@ class Service:
     garbage_messages: int = 1
     renamed_after: int | None = None
     extra_states: dict[int, int] = field(default_factory=dict)
-    """Number of states that no message asked for, before the answer to a message"""
+    """Number of states without a message, sent before the answer to a message"""
     late_answers: dict[int, int | None] = field(default_factory=dict)
     """Number of milliseconds by which the answer to a message is late; None: it is lost"""
     silent_after: int | None = None
