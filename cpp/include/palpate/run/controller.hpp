@@ -7,6 +7,7 @@
 #include "palpate/device/device.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/realtime/nonblocking.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/status.hpp"
 
@@ -23,13 +24,13 @@ struct Tick {
 /// Runs the ticks of the control loop: check the reading, compute the force, limit the force, exchange force and next
 /// reading with the device. Apart from the device's `exchange`, a tick does not allocate, lock, throw, log or make a
 /// system call. After an invalid reading a tick sends zero force.
-template <Device D, Structure S>
+template <Device D>
 class Controller {
   public:
-    Controller(D& device, S structure, Guards guards)
+    Controller(D& device, AnyStructure structure, Guards guards)
         : device_{device}, structure_{std::move(structure)}, guards_{guards} {}
 
-    Controller(D& device, S structure, ForceLimit limit)
+    Controller(D& device, AnyStructure structure, ForceLimit limit)
         : Controller{device, std::move(structure), Guards{.limit = limit}} {}
 
     /// Sends zero force and takes the first sample.
@@ -116,7 +117,7 @@ class Controller {
     }
 
     D& device_;
-    S structure_;
+    AnyStructure structure_;
     Guards guards_;
     Reading reading_;
     bool is_placed_ = false;  ///< true after the virtual object was placed at the handle
