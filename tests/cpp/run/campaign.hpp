@@ -183,7 +183,7 @@ inline std::string run_scene(std::uint64_t seed, Totals& totals) {
             faults, jump};
         if (const Opened opened = device.open(); !opened) {
             broken = opened.reason;
-            return;
+            break;
         }
         Invariants invariants{guards, loop, scene.device};
         const LoopReport report =
@@ -213,7 +213,6 @@ inline std::string run_scene(std::uint64_t seed, Totals& totals) {
             totals.by_status[k] += report.ticks_by_status[k];
         }
     }
-
     ++totals.scenes;
     if (!broken.empty()) {
         std::ostringstream text;

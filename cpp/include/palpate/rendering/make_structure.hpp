@@ -5,16 +5,10 @@
 #include <optional>
 #include <string_view>
 
+#include "palpate/inline.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
-
-// A program of several files compiles make_structure once: it defines PALPATE_COMPILED and compiles cpp/compiled.
-#ifdef PALPATE_COMPILED
-#define PALPATE_INLINE
-#else
-#define PALPATE_INLINE inline
-#endif
 
 namespace palpate {
 
