@@ -12,6 +12,7 @@
 #include "held_maps.hpp"
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/fields/readable.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/energy_consistent.hpp"
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
@@ -135,9 +136,8 @@ inline constexpr double coupling_time = 0.2e-3;
 /// Work of a hand on a free mass [J]. The hand stretches the coupling, waits until the mass has passed the handle,
 /// then slows the mass down with a coupling force just below the force limit of the device. The device clips the force
 /// of the structure.
-template <Structure S>
-[[nodiscard]] double work_of_a_throw(S structure, VirtualCoupling coupling, const DeviceProfile& device,
-                                     double deflection) {
+[[nodiscard]] inline double work_of_a_throw(AnyStructure structure, VirtualCoupling coupling,
+                                            const DeviceProfile& device, double deflection) {
     constexpr int deflecting = 60;  // samples
     constexpr int most_slowing = 4000;
     const double limit = device.force_limit;

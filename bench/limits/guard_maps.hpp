@@ -13,6 +13,7 @@
 #include "held_maps.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/simulation/faulty_device.hpp"
@@ -100,23 +101,21 @@ template <SimulatedHand H>
 [[nodiscard]] GuardedRun guarded_run(const GuardedScene& scene, const H& hand, const Guards& guards) {
     const DeviceProfile device;
     using Handle = SimulatedHandle<H, Midpoint>;
-    return with_structure(scene.model, direct_scheme(), device.period_s, device.force_limit,
-                          [&](auto structure) {
-                              std::vector<Fault> script;
-                              if (scene.fault) {
-                                  script.push_back(*scene.fault);
-                              }
-                              Faulty<Handle> faulty{Handle{device, hand, 20, scene.start}, script, 0.3};
-                              (void)faulty.open();
-                              Controller controller{faulty, std::move(structure), guards};
-                              (void)controller.start();
-                              GuardedRun run;
-                              for (std::size_t k = 0; k < scene.ticks; ++k) {
-                                  run.force.push_back(controller.tick().command.force);
-                                  run.speed.push_back(faulty.device().handle_velocity());
-                              }
-                              return run;
-                          });
+    std::vector<Fault> script;
+    if (scene.fault) {
+        script.push_back(*scene.fault);
+    }
+    Faulty<Handle> faulty{Handle{device, hand, 20, scene.start}, script, 0.3};
+    (void)faulty.open();
+    Controller controller{
+        faulty, make_structure(scene.model, direct_scheme(), device.period_s, device.force_limit), guards};
+    (void)controller.start();
+    GuardedRun run;
+    for (std::size_t k = 0; k < scene.ticks; ++k) {
+        run.force.push_back(controller.tick().command.force);
+        run.speed.push_back(faulty.device().handle_velocity());
+    }
+    return run;
 }
 
 [[nodiscard]] inline double root_mean_square(const std::vector<double>& values, std::size_t first = 0) {

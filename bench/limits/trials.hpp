@@ -12,6 +12,7 @@
 #include "palpate/model/continuation.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/model/hysteresis.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/simulation/closed_loop.hpp"
 
@@ -93,8 +94,7 @@ class Growth {
 };
 
 /// Returns true if a virtual object that is driven by a force oscillates with growing amplitude after a push.
-template <Structure S>
-[[nodiscard]] bool oscillates_force_driven(S structure, std::size_t ticks) noexcept {
+[[nodiscard]] inline bool oscillates_force_driven(AnyStructure structure, std::size_t ticks) noexcept {
     structure.reset(0.0);
     Growth growth{ticks};
     (void)structure.drive(1.0);
@@ -111,9 +111,8 @@ inline constexpr Guards unguarded{.limit = {1e9}};
 
 /// Returns true if a passive hand and a rendered spring with rest position 0 oscillate together with growing
 /// amplitude.
-template <Structure S>
-[[nodiscard]] bool oscillates_with(S structure, DeviceProfile device, const PassiveHand& hand,
-                                   double stiffness, std::size_t ticks) {
+[[nodiscard]] inline bool oscillates_with(AnyStructure structure, DeviceProfile device,
+                                          const PassiveHand& hand, double stiffness, std::size_t ticks) {
     constexpr double endless = 1e150;  // force limit so large that it does not stop the growth [N*m]
     device.force_limit = endless;
     const double inertia = device.inertia + hand.mass;
@@ -136,9 +135,9 @@ struct PacedWork {
     [[nodiscard]] bool negative() const noexcept { return whole - half < -rounding; }
 };
 
-template <Structure S>
-[[nodiscard]] PacedWork work_of_pacing(S structure, DeviceProfile device, const PacingHand& hand,
-                                       double start, std::size_t fewest_ticks = 2000) {
+[[nodiscard]] inline PacedWork work_of_pacing(AnyStructure structure, DeviceProfile device,
+                                              const PacingHand& hand, double start,
+                                              std::size_t fewest_ticks = 2000) {
     constexpr std::size_t fewest_turns = 16;
     device.force_limit = 1e9;
     const auto turn = 2 * static_cast<std::size_t>(hand.ticks);

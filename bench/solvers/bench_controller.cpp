@@ -13,6 +13,7 @@
 
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/model/force_model.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/controller.hpp"
 #include "scene.hpp"
@@ -68,32 +69,30 @@ void tick(benchmark::State& state, const palpate::ForceModel& model, palpate::St
     scheme.structure = kind;
     scheme.compensated = compensated;
     scheme.play_radius = model.hysteresis() != nullptr ? 0.005 : 0.0;
-    palpate::with_structure(model, scheme, 1e-3, 50.0, [&](auto structure) {
-        Playback device{palpate::bench::hand_motion(4000)};
-        palpate::GuardSettings settings;
-        settings.force_limit = 50.0;
-        palpate::Controller controller{device, std::move(structure),
-                                       palpate::Guards{.reading = palpate::reading_guard(settings, 1e-3),
-                                                       .limit = palpate::force_limit(settings),
-                                                       .ramp = palpate::force_ramp(settings, 1e-3),
-                                                       .slew = palpate::slew_limit(settings, 1e-3)}};
-        (void)controller.start();
-        for (auto _ : state) {
-            benchmark::DoNotOptimize(controller.tick());
-        }
-        const double clock = quantile(durations([] {}), 0.5);
-        const std::vector<double> ticks = durations([&] { benchmark::DoNotOptimize(controller.tick()); });
-        state.counters["p50_ns"] = quantile(ticks, 0.5) - clock;
-        state.counters["p999_ns"] = quantile(ticks, 0.999) - clock;
-        int wrong = 0;
-        for (int k = 0; k < 4000; ++k) {
-            const palpate::Tick one = controller.tick();
-            wrong += one.status == palpate::Status::Ok && std::isfinite(one.command.force) ? 0 : 1;
-        }
-        if (wrong > 0) {
-            state.SkipWithError("not every tick was Ok");
-        }
-    });
+    Playback device{palpate::bench::hand_motion(4000)};
+    palpate::GuardSettings settings;
+    settings.force_limit = 50.0;
+    palpate::Controller controller{device, palpate::make_structure(model, scheme, 1e-3, 50.0),
+                                   palpate::Guards{.reading = palpate::reading_guard(settings, 1e-3),
+                                                   .limit = palpate::force_limit(settings),
+                                                   .ramp = palpate::force_ramp(settings, 1e-3),
+                                                   .slew = palpate::slew_limit(settings, 1e-3)}};
+    (void)controller.start();
+    for (auto _ : state) {
+        benchmark::DoNotOptimize(controller.tick());
+    }
+    const double clock = quantile(durations([] {}), 0.5);
+    const std::vector<double> ticks = durations([&] { benchmark::DoNotOptimize(controller.tick()); });
+    state.counters["p50_ns"] = quantile(ticks, 0.5) - clock;
+    state.counters["p999_ns"] = quantile(ticks, 0.999) - clock;
+    int wrong = 0;
+    for (int k = 0; k < 4000; ++k) {
+        const palpate::Tick one = controller.tick();
+        wrong += one.status == palpate::Status::Ok && std::isfinite(one.command.force) ? 0 : 1;
+    }
+    if (wrong > 0) {
+        state.SkipWithError("not every tick was Ok");
+    }
 }
 
 palpate::ForceModel spring_wall() {

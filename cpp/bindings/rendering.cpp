@@ -9,6 +9,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "fields.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/scheme.hpp"
 

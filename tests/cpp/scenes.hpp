@@ -11,6 +11,7 @@
 
 #include "palpate/model/energy.hpp"
 #include "palpate/rendering/compensated.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/simulation/closed_loop.hpp"
 #include "palpate/simulation/hand.hpp"
 #include "palpate/stability/certificate.hpp"
@@ -204,12 +205,10 @@ inline Scene random_scene_of_memory(Random& random) {
 template <SimulatedHand H, class Watch>
 ClosedLoopEnd run(const Scene& scene, H hand, std::size_t ticks, int substeps, Watch watch) {
     const double from = (scene.device.late_samples() + 2) * scene.device.period_s;
-    return with_structure(
-        scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit, [&](auto structure) {
-            const ClosedLoopSettings settings{substeps, scene.start, 0.0, Guards{.limit = {1e9}}};
-            return closed_loop(std::move(structure), scene.device, Later<H>{hand, from}, ticks, settings,
-                               watch);
-        });
+    const ClosedLoopSettings settings{substeps, scene.start, 0.0, Guards{.limit = {1e9}}};
+    return closed_loop(
+        make_structure(scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit),
+        scene.device, Later<H>{hand, from}, ticks, settings, watch);
 }
 
 inline std::ostream& operator<<(std::ostream& out, const Scene& scene) {

@@ -34,6 +34,7 @@
 #include "palpate/device/usb.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/run/session.hpp"
 #include "palpate/run/session_text.hpp"
@@ -251,12 +252,9 @@ class Soak {
             next += static_cast<Nanoseconds>(1e9 * std::max(1.0, fault.answer_s + 0.5));
         };
         const std::atomic<bool> stop_requested{false};
-        const SessionReport report =
-            with_structure(model, scheme, profile.period_s, guards.force_limit, [&](auto structure) {
-                Controller controller{device, std::move(structure),
-                                      guards_of(guards, model, scheme, profile.period_s)};
-                return run_session(controller, settings, sinks, stop_requested, inject);
-            });
+        Controller controller{device, make_structure(model, scheme, profile.period_s, guards.force_limit),
+                              guards_of(guards, model, scheme, profile.period_s)};
+        const SessionReport report = run_session(controller, settings, sinks, stop_requested, inject);
         ++totals_.sessions;
         totals_.ticks += report.loop.ticks();
         check_records(report, sinks, guards);

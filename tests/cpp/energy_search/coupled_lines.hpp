@@ -12,6 +12,8 @@
 #include "held_lines.hpp"
 #include "motions.hpp"
 #include "palpate/model/limited_environment.hpp"
+#include "palpate/rendering/any_structure.hpp"
+#include "palpate/rendering/make_structure.hpp"
 
 namespace palpate::energy_search {
 
@@ -96,15 +98,14 @@ enum class Regime { Usual, Firm, Limited };
 
 /// Returns a trial that optimises one motion. The trial then compares the device damping with the least damping at
 /// which the motion takes no energy out.
-template <class Structure>
-[[nodiscard]] Trial motion_trial(test::Random& random, Structure structure, const CoupledScene& scene,
-                                 const Need& need, int starts, int steps) {
+[[nodiscard]] inline Trial motion_trial(test::Random& random, AnyStructure structure,
+                                        const CoupledScene& scene, const Need& need, int starts, int steps) {
     const double period = scene.device.longest_period_s();
-    auto shared = std::make_shared<Structure>(std::move(structure));
+    auto shared = std::make_shared<AnyStructure>(std::move(structure));
     const auto seed = random();
     const auto worst = [shared, scene, starts, steps, seed](const auto& rate, const auto& gain) {
         test::Random own{seed};
-        MotionSearch<Structure> search{*shared, scene.places, scene.device.force_limit};
+        MotionSearch search{*shared, scene.places, scene.device.force_limit};
         return search.most(own, starts, steps, rate, gain);
     };
     struct Known {
@@ -131,11 +132,11 @@ template <class Structure>
 
 /// Returns a trial that optimises one motion and compares the friction of the device with the least friction at which
 /// the motion takes no energy out.
-template <class Structure>
-[[nodiscard]] Trial friction_trial(test::Random& random, Structure structure, const CoupledScene& scene,
-                                   const Need& need, int starts, int steps) {
+[[nodiscard]] inline Trial friction_trial(test::Random& random, AnyStructure structure,
+                                          const CoupledScene& scene, const Need& need, int starts,
+                                          int steps) {
     const double period = scene.device.longest_period_s();
-    auto shared = std::make_shared<Structure>(std::move(structure));
+    auto shared = std::make_shared<AnyStructure>(std::move(structure));
     struct Known {
         double damping = -1.0;
         double friction = 0.0;
@@ -145,7 +146,7 @@ template <class Structure>
                 const double damping = damping_factor * need.damping / period;
                 if (known->damping != damping) {
                     test::Random own{seed};
-                    MotionSearch<Structure> search{*shared, scene.places, scene.device.force_limit};
+                    MotionSearch search{*shared, scene.places, scene.device.force_limit};
                     const auto rate = [&](const Account& account) {
                         return account.gain(damping, scene.places.held, 0.0);
                     };
@@ -215,11 +216,9 @@ template <class Structure>
         }
         const NetworkCurve& curve = hysteresis ? model.hysteresis()->force() : model.network()->curve();
         placed(0.0, 1.0, model.finest_width(), slope, [&](double x) { return curve.at(x).value; });
-        return with_structure(model, scene.scheme, scene.device.period_s, scene.device.force_limit,
-                              [&](auto structure) -> std::optional<Trial> {
-                                  return motion_trial(random, std::move(structure), scene, *need, starts,
-                                                      steps);
-                              });
+        return motion_trial(
+            random, make_structure(model, scene.scheme, scene.device.period_s, scene.device.force_limit),
+            scene, *need, starts, steps);
     }
     const int count = 12;
     const double step = std::exp(test::uniform(random, -6.0, -2.0));
@@ -242,7 +241,7 @@ template <class Structure>
         if (!need || need->damping <= 0.0) {
             return std::nullopt;
         }
-        const auto run = [&](auto structure) -> std::optional<Trial> {
+        const auto run = [&](AnyStructure structure) -> std::optional<Trial> {
             return motion_trial(random, std::move(structure), scene, *need, starts, steps);
         };
         const double limit = scene.device.force_limit;

@@ -119,9 +119,8 @@ template <class MeanOf>
     HeldScene scene;
     const int nodes = wheel_nodes(delay, slowly);
     scene.read = even_grid(0.0, 1.0 / nodes, nodes, slowly ? 1 : nodes, true);
-    scene.table = with_structure(
-        model, scheme, device.period_s, device.force_limit,
-        [&](const auto& structure) { return table_of(structure, scene.read, 0, sent_on(device)); });
+    scene.table = table_of(make_structure(model, scheme, device.period_s, device.force_limit), scene.read, 0,
+                           sent_on(device));
     scene.held =
         held_energy(scene.read.grid, [&](double x) { return clipped(curve.at(x).value, device) - mean; });
     return trial_of(std::move(scene), *need, device);

@@ -14,7 +14,9 @@
 #include "force_laws.hpp"
 #include "held_scenes.hpp"
 #include "line.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/stability/certificate.hpp"
 
@@ -160,19 +162,16 @@ template <class Force>
     const double place = steepest_place(force) - width * test::uniform(random, 0.3, 0.7);
     HeldScene scene;
     scene.read = even_grid(place, step, fine.nodes, fine.reach);
-    scene.table = with_structure(
-        model, scheme, device.period_s, device.force_limit,
-        [&](const auto& structure) { return table_of(structure, scene.read, 0, sent_on(device)); });
+    AnyStructure structure = make_structure(model, scheme, device.period_s, device.force_limit);
+    scene.table = table_of(structure, scene.read, 0, sent_on(device));
     // Behind a virtual coupling the force at handle position x is the force of the virtual object at its position y,
     // so the rendered force is again static.
-    scene.held = coupled ? with_structure(model, scheme, device.period_s, device.force_limit,
-                                          [&](auto structure) {
-                                              return held_energy(scene.read.grid, [&](double x) {
-                                                  structure.reset(x);
-                                                  return clipped(structure.step(x).force, device);
-                                              });
-                                          })
-                         : held_energy(scene.read.grid, [&](double x) { return clipped(force(x), device); });
+    scene.held = held_energy(scene.read.grid, [&](double x) {
+        if (coupled) {
+            structure.reset(x);
+        }
+        return clipped(coupled ? structure.step(x).force : force(x), device);
+    });
     return trial_of(std::move(scene), *need, device);
 }
 
@@ -271,9 +270,8 @@ template <class Force>
     HeldScene scene;
     scene.read =
         even_grid(steepest_place(stick) - width * test::uniform(random, 0.3, 0.7), step, nodes, reach);
-    scene.table = with_structure(
-        model, scheme, device.period_s, device.force_limit,
-        [&](const auto& structure) { return play_table_of(structure, scene.read, radius, sent_on(device)); });
+    scene.table = play_table_of(make_structure(model, scheme, device.period_s, device.force_limit),
+                                scene.read, radius, sent_on(device));
     scene.held =
         held_energy(scene.read.grid, [&](double x) { return clipped(pair.force().at(x).value, device); });
     return trial_of(std::move(scene), *need, device);

@@ -10,6 +10,7 @@
 
 #include "palpate/device/device.hpp"
 #include "palpate/guard/guards.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/run/controller.hpp"
 #include "value_iteration.hpp"
@@ -38,8 +39,7 @@ struct Sent {
 
     /// Returns the force that the device receives after a start at rest at `first[0]` and ticks at the positions
     /// first[0] to first[count - 1].
-    template <class Structure>
-    [[nodiscard]] double force(const Structure& structure, const double* first, int count) const {
+    [[nodiscard]] double force(const AnyStructure& structure, const double* first, int count) const {
         std::vector<double> read(first, first + count);
         // The controller reads one more position at the end of the last tick
         read.push_back(read.back());
@@ -96,9 +96,8 @@ struct ReadGrid {
 
 /// Returns the forces of a structure without play operator for every possible sequence of stored positions. Each
 /// sequence starts at rest.
-template <class Structure>
-[[nodiscard]] ForceTable table_of(const Structure& structure, const ReadGrid& read, int memory,
-                                  const Sent& sent) {
+[[nodiscard]] inline ForceTable table_of(const AnyStructure& structure, const ReadGrid& read, int memory,
+                                         const Sent& sent) {
     const Windows windows{read.grid, memory};
     ForceTable table;
     table.memory = memory;
@@ -127,9 +126,8 @@ template <class Structure>
 
 /// Returns the forces of a structure whose play operator has a radius of `radius` encoder steps. The play operator
 /// rests only at reported positions.
-template <class Structure>
-[[nodiscard]] ForceTable play_table_of(const Structure& structure, const ReadGrid& read, int radius,
-                                       const Sent& sent) {
+[[nodiscard]] inline ForceTable play_table_of(const AnyStructure& structure, const ReadGrid& read, int radius,
+                                              const Sent& sent) {
     const int nodes = read.grid.nodes();
     const int counts = static_cast<int>(read.of_count.size());
     ForceTable table;

@@ -9,6 +9,8 @@
 #include "coupled_lines.hpp"
 #include "held_lines.hpp"
 #include "line.hpp"
+#include "palpate/rendering/any_structure.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/stability/certificate.hpp"
 
@@ -65,12 +67,10 @@ namespace palpate::energy_search {
                     .late = scene.device.delay_fraction()};
     constexpr int starts = 6;
     constexpr int steps = 60;
-    return with_structure(
-        model, scene.scheme, scene.device.period_s, scene.device.force_limit,
-        [&](auto structure) -> std::optional<Trial> {
-            return encoder ? friction_trial(random, std::move(structure), scene, *need, starts, steps)
-                           : motion_trial(random, std::move(structure), scene, *need, starts, steps);
-        });
+    AnyStructure structure =
+        make_structure(model, scene.scheme, scene.device.period_s, scene.device.force_limit);
+    return encoder ? friction_trial(random, std::move(structure), scene, *need, starts, steps)
+                   : motion_trial(random, std::move(structure), scene, *need, starts, steps);
 }
 
 }  // namespace palpate::energy_search

@@ -81,12 +81,10 @@ struct Places {
     double late = 0.0;  ///< fraction of a sample by which the device's delay exceeds its whole samples
 };
 
-/// Optimises motions of a structure so that they take out energy. `Structure` must have `reset` and `step`; `limit` is
-/// the force limit of the device.
-template <class Structure>
+/// Optimises motions of a structure so that they take out energy. `limit` is the force limit of the device.
 class MotionSearch {
   public:
-    MotionSearch(Structure& structure, const Places& places, double limit)
+    MotionSearch(AnyStructure& structure, const Places& places, double limit)
         : structure_{structure}, places_{places}, limit_{limit} {}
 
     /// Returns the largest `rate(account)` over motions and their lengths, for example the damping below which a
@@ -225,7 +223,7 @@ class MotionSearch {
         return motion;
     }
 
-    Structure& structure_;
+    AnyStructure& structure_;
     Places places_;
     double limit_;
     std::vector<double> sent_;

@@ -136,7 +136,8 @@ TEST(EnergySearch, FindsTheActiveModelThatAForceLimitMakes) {
 /// the force limit of the device is 5 N.
 double thrown_mass_need(double limit_inside) {
     constexpr double period = 1e-3;
-    Implicit structure{test::Spring{0.0}, {0.05, 0.0}, {90.0, 0.0}, period, LoadLineSolver{}, limit_inside};
+    AnyStructure structure{
+        Implicit{test::Spring{0.0}, {0.05, 0.0}, {90.0, 0.0}, period, LoadLineSolver{}, limit_inside}};
     const Places places{.low = -0.5, .high = 0.5, .finest = 1e-3, .widest = 2.0};
     test::Random random{1};
     MotionSearch search{structure, places, 5.0};

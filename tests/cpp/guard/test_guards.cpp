@@ -20,6 +20,7 @@
 #include "palpate/guard/guards.hpp"
 #include "palpate/model/energy.hpp"
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/run/controller.hpp"
 #include "palpate/simulation/closed_loop.hpp"
 #include "palpate/stability/certificate.hpp"
@@ -65,10 +66,9 @@ Guarded render(const ForceModel& model, const DeviceProfile& device, const Guard
     };
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
-    run.energy =
-        with_structure(model, scheme, device.period_s, device.force_limit, [&](auto structure) {
-            return closed_loop(std::move(structure), device, hand, ticks, {20, start, 0.0, guards}, watch);
-        }).energy;
+    run.energy = closed_loop(make_structure(model, scheme, device.period_s, device.force_limit), device, hand,
+                             ticks, {20, start, 0.0, guards}, watch)
+                     .energy;
     return run;
 }
 
@@ -117,15 +117,12 @@ TEST(Guards, DoNotChangeForcesOfCertifiedScenes) {
         guards.reading = {};
         std::size_t acted = 0;
         const Hand hand{50.0, 0.05, 0.1, 0.9, test::uniform(random, 0.5, 8.0)};
-        with_structure(
-            scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit, [&](auto structure) {
-                return closed_loop(
-                    std::move(structure), scene.device, hand, 1000, {8, 0.1, 0.0, guards},
-                    [&](const Tick& tick, const Motion& /*handle*/, const EnergyAccount& /*account*/) {
-                        acted +=
-                            tick.status == Status::EnergyLimited || tick.status == Status::LimitCycleScaled;
-                        return true;
-                    });
+        (void)closed_loop(
+            make_structure(scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit),
+            scene.device, hand, 1000, {8, 0.1, 0.0, guards},
+            [&](const Tick& tick, const Motion& /*handle*/, const EnergyAccount& /*account*/) {
+                acted += tick.status == Status::EnergyLimited || tick.status == Status::LimitCycleScaled;
+                return true;
             });
         EXPECT_EQ(acted, 0U) << scene;
     }
@@ -560,20 +557,20 @@ TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
         Motions motion{random, scene};
         GuidedHandle handle{scene.device, scene.start};
         const Guards guards = certified_guards(scene.model, scene.scheme, scene.device);
-        with_structure(
-            scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit, [&](auto structure) {
-                Controller controller{handle, std::move(structure), guards};
-                ASSERT_EQ(controller.start(), Status::Ok);
-                std::size_t energy_limited = 0;
-                for (int tick = 0; tick < 3000; ++tick) {
-                    handle.move_to(tick < 5 ? scene.start : motion.next(random, tick));
-                    energy_limited += controller.tick().status == Status::EnergyLimited ? 1 : 0;
-                }
-                const EnergyTank& tank = controller.guards().tank;
-                EXPECT_EQ(energy_limited, 0U) << "scene " << k << ": " << scene << "; given "
-                                              << tank.most_given() << " of " << tank.stored().most();
-                most = std::max(most, tank.most_given() / tank.stored().most());
-            });
+        Controller controller{
+            handle,
+            make_structure(scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit),
+            guards};
+        ASSERT_EQ(controller.start(), Status::Ok);
+        std::size_t energy_limited = 0;
+        for (int tick = 0; tick < 3000; ++tick) {
+            handle.move_to(tick < 5 ? scene.start : motion.next(random, tick));
+            energy_limited += controller.tick().status == Status::EnergyLimited ? 1 : 0;
+        }
+        const EnergyTank& tank = controller.guards().tank;
+        EXPECT_EQ(energy_limited, 0U) << "scene " << k << ": " << scene << "; given " << tank.most_given()
+                                      << " of " << tank.stored().most();
+        most = std::max(most, tank.most_given() / tank.stored().most());
     }
     // The bound on the energy that an object stores is close to the largest energy that an object gave.
     EXPECT_GT(most, 0.3);
@@ -595,17 +592,15 @@ TEST(GuardedAccount, AStretchedCouplingOfAHeavyObjectDoesNotEmptyTheTank) {
     const ForceModel soft{NetworkParameters{1, {}, {}, {}, {0.01}, 0.0}, test::unit_domain()};
     ASSERT_TRUE(certify(soft, scheme, device).certified());
     GuidedHandle handle{device, 0.0};
-    with_structure(soft, scheme, device.period_s, device.force_limit, [&](auto structure) {
-        Guards guards = certified_guards(soft, scheme, device);
-        guards.limit_cycle = {};
-        Controller controller{handle, std::move(structure), guards};
-        EXPECT_EQ(controller.start(), Status::Ok);
-        for (int k = 0; k < 2000; ++k) {
-            handle.move_to(0.5 - 0.5 * std::cos(0.01 * k));
-            ASSERT_NE(controller.tick().status, Status::EnergyLimited) << k;
-        }
-        EXPECT_GT(controller.guards().tank.most_given(), 0.1);
-    });
+    Guards guards = certified_guards(soft, scheme, device);
+    guards.limit_cycle = {};
+    Controller controller{handle, make_structure(soft, scheme, device.period_s, device.force_limit), guards};
+    EXPECT_EQ(controller.start(), Status::Ok);
+    for (int k = 0; k < 2000; ++k) {
+        handle.move_to(0.5 - 0.5 * std::cos(0.01 * k));
+        ASSERT_NE(controller.tick().status, Status::EnergyLimited) << k;
+    }
+    EXPECT_GT(controller.guards().tank.most_given(), 0.1);
 }
 
 // A spring of stiffness 2 b / T, moved back and forth at every sample, generates exactly the energy that the device

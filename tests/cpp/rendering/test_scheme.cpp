@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "palpate/rendering/compensated.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
 
 #include <algorithm>
@@ -247,7 +249,7 @@ int expect_equal_forces(A prepared, B reference, const std::string& name) {
     return limited;
 }
 
-// `with_structure` prepares polynomials and tables. The forces are those of the exact model and of Newton's method.
+// `make_structure` prepares polynomials and tables. The forces are those of the exact model and of Newton's method.
 TEST(Scheme, PreparedStructureGivesTheForcesOfTheExactModel) {
     const NetworkParameters network{1, {4.0, 40.0}, {0.5, 0.2}, {0.2, 0.05}, {8.0}, 0.1};
     const ForceModel plain{network, test::unit_domain()};
@@ -261,11 +263,10 @@ TEST(Scheme, PreparedStructureGivesTheForcesOfTheExactModel) {
             int limited = 0;
             const auto compare = [&](const auto& environment, const ForceModel& model, const Scheme& chosen,
                                      const std::string& name) {
-                with_structure(model, chosen, period, limit, [&](auto prepared) {
-                    exact(environment, chosen, limit, model.finest_width(), [&](auto reference) {
-                        limited += expect_equal_forces(std::move(prepared), std::move(reference),
-                                                       std::string(structure_names[k]) + name);
-                    });
+                exact(environment, chosen, limit, model.finest_width(), [&](auto reference) {
+                    limited +=
+                        expect_equal_forces(make_structure(model, chosen, period, limit),
+                                            std::move(reference), std::string(structure_names[k]) + name);
                 });
             };
             compare(*plain.network(), plain, scheme, "");
@@ -297,7 +298,7 @@ TEST(Scheme, PreparedStructureGivesTheForcesOfTheExactModel) {
 
 TEST(Scheme, StructureOfARefusedSchemeIsNotBuilt) {
     Scheme scheme = scheme_of(StructureKind::Direct);
-    const auto build = [&] { with_structure(spring(5.0), scheme, period, infinity, [](const auto&) {}); };
+    const auto build = [&] { (void)make_structure(spring(5.0), scheme, period, infinity); };
     EXPECT_EQ(refusal(build), "");
     scheme.predict = 17;
     EXPECT_EQ(refusal(build), "predict is 17, must be 0 to 16");

@@ -9,11 +9,13 @@
 #include <gtest/gtest.h>
 
 #include "palpate/model/limited_environment.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/energy_consistent.hpp"
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/massless.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/controller.hpp"
@@ -45,7 +47,7 @@ template <class S>
 ForceError force_error(S structure) {
     SimulatedDevice device{DeviceProfile{}, Hand{}};
     EXPECT_TRUE(device.open());
-    Controller<SimulatedDevice, S> controller{device, std::move(structure), ForceLimit{}};
+    Controller<SimulatedDevice> controller{device, std::move(structure), ForceLimit{}};
     EXPECT_EQ(controller.start(), Status::Ok);
     const ClickAndWall object;
     constexpr int ticks = 4000;
@@ -521,12 +523,11 @@ TEST(Structure, ExtremePositionsGiveAFiniteForceOrAreRefused) {
     const ForceModel both{gentle, {{0.1}, 0.0, 0.4}, test::unit_domain(), 0.01};
     const auto check = [](const ForceModel& model, const Scheme& scheme, const std::string& name) {
         for (const double limit : {5.0, std::numeric_limits<double>::infinity()}) {
-            with_structure(model, scheme, period, limit, [&](auto structure) {
-                structure.reset(0.2);
-                (void)structure.step(0.2);
-                (void)structure.step(0.205);
-                expect_finite_or_refused(structure, name);
-            });
+            AnyStructure structure = make_structure(model, scheme, period, limit);
+            structure.reset(0.2);
+            (void)structure.step(0.2);
+            (void)structure.step(0.205);
+            expect_finite_or_refused(structure, name);
         }
     };
     for (const std::string_view word : structure_names) {

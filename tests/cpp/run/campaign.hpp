@@ -16,6 +16,8 @@
 
 #include "invariants.hpp"
 #include "limits/hands.hpp"
+#include "palpate/rendering/any_structure.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/run/render.hpp"
 #include "palpate/simulation/faulty_device.hpp"
@@ -154,63 +156,63 @@ inline std::string run_scene(std::uint64_t seed, Totals& totals) {
     const double period_s = scene.device.period_s;
     const std::string name = name_of_scene(scene, certificate.certified());
     std::string broken;
-    with_structure(scene.model, scene.scheme, period_s, scene.device.force_limit, [&](const auto& structure) {
-        constexpr int runs = 25;
-        for (int run = 0; run < runs && broken.empty(); ++run) {
-            GuardSettings guards = guards_for(scale_of(scene.model, false), scene.device);
-            guards.ramp_s = random() % 2 == 0 ? 0.0 : uniform(random, 0.0, 200.0 * period_s);
-            LoopSettings loop;
-            loop.rate_hz = 1.0 / period_s;
-            loop.lowest_rate_share = random() % 2 == 0 ? 0.0 : 0.8;
-            loop.tolerated = random() % 8;
-            const bool follows_certificate = certificate.certified() && random() % 2 == 0;
-            if (follows_certificate) {
-                palpate::detail::apply_certificate(certificate, guards, loop);
-            }
-            const std::uint64_t ticks = 50 + random() % 8000;
-            loop.duration_s = static_cast<double>(ticks) * period_s;
-            validate(loop);
-            validate(guards);
-            const double largest_step = guards.largest_speed * period_s;
-            const double jump =
-                (random() % 2 == 0 ? -1.0 : 1.0) * largest_step * std::exp(uniform(random, -3.0, 3.0));
-            const std::vector<Fault> faults = random_faults(random, ticks);
-            Faulty device{
-                SimulatedHandle<AnyHand, Midpoint>{scene.device, random_hand(random, scene), 2, scene.start},
-                faults, jump};
-            if (const Opened opened = device.open(); !opened) {
-                broken = opened.reason;
-                return;
-            }
-            Invariants invariants{guards, loop, scene.device};
-            const LoopReport report = run_checked(
-                structure, std::move(device), guards_of(guards, scene.model, scene.scheme, period_s), loop,
-                period_s, random_clock_faults(random, ticks, period_s, totals), invariants,
-                [](const TickRecord&) {});
-            broken = invariants.broken();
-            // A certificate without delay proves that the tank never acts, except with the energy of the start ramp
-            const auto limited = report.ticks_by_status[static_cast<std::size_t>(Status::EnergyLimited)];
-            if (broken.empty() && follows_certificate && faults.empty() && scene.device.delay_s == 0.0 &&
-                guards.ramp_s == 0.0 && limited > 0) {
-                broken = "the energy tank reduces forces of a certified run";
-            }
-            if (!broken.empty()) {
-                broken += ", run " + std::to_string(run) + (follows_certificate ? ", certified" : "");
-            }
-            for (const Fault& fault : faults) {
-                totals.faults[static_cast<std::size_t>(fault.kind)] +=
-                    fault.exchange < invariants.ticks() ? 1 : 0;
-            }
-            ++totals.runs;
-            totals.ticks += invariants.ticks();
-            totals.ticks_by_scene[name] += invariants.ticks();
-            totals.extremes.add(invariants.extremes());
-            ++totals.by_exit.at(static_cast<std::size_t>(report.exit_reason));
-            for (std::size_t k = 0; k < status_texts.size(); ++k) {
-                totals.by_status[k] += report.ticks_by_status[k];
-            }
+    const AnyStructure structure =
+        make_structure(scene.model, scene.scheme, period_s, scene.device.force_limit);
+    constexpr int runs = 25;
+    for (int run = 0; run < runs && broken.empty(); ++run) {
+        GuardSettings guards = guards_for(scale_of(scene.model, false), scene.device);
+        guards.ramp_s = random() % 2 == 0 ? 0.0 : uniform(random, 0.0, 200.0 * period_s);
+        LoopSettings loop;
+        loop.rate_hz = 1.0 / period_s;
+        loop.lowest_rate_share = random() % 2 == 0 ? 0.0 : 0.8;
+        loop.tolerated = random() % 8;
+        const bool follows_certificate = certificate.certified() && random() % 2 == 0;
+        if (follows_certificate) {
+            palpate::detail::apply_certificate(certificate, guards, loop);
         }
-    });
+        const std::uint64_t ticks = 50 + random() % 8000;
+        loop.duration_s = static_cast<double>(ticks) * period_s;
+        validate(loop);
+        validate(guards);
+        const double largest_step = guards.largest_speed * period_s;
+        const double jump =
+            (random() % 2 == 0 ? -1.0 : 1.0) * largest_step * std::exp(uniform(random, -3.0, 3.0));
+        const std::vector<Fault> faults = random_faults(random, ticks);
+        Faulty device{
+            SimulatedHandle<AnyHand, Midpoint>{scene.device, random_hand(random, scene), 2, scene.start},
+            faults, jump};
+        if (const Opened opened = device.open(); !opened) {
+            broken = opened.reason;
+            break;
+        }
+        Invariants invariants{guards, loop, scene.device};
+        const LoopReport report =
+            run_checked(structure, std::move(device), guards_of(guards, scene.model, scene.scheme, period_s),
+                        loop, period_s, random_clock_faults(random, ticks, period_s, totals), invariants,
+                        [](const TickRecord&) {});
+        broken = invariants.broken();
+        // A certificate without delay proves that the tank never acts, except with the energy of the start ramp
+        const auto limited = report.ticks_by_status[static_cast<std::size_t>(Status::EnergyLimited)];
+        if (broken.empty() && follows_certificate && faults.empty() && scene.device.delay_s == 0.0 &&
+            guards.ramp_s == 0.0 && limited > 0) {
+            broken = "the energy tank reduces forces of a certified run";
+        }
+        if (!broken.empty()) {
+            broken += ", run " + std::to_string(run) + (follows_certificate ? ", certified" : "");
+        }
+        for (const Fault& fault : faults) {
+            totals.faults[static_cast<std::size_t>(fault.kind)] +=
+                fault.exchange < invariants.ticks() ? 1 : 0;
+        }
+        ++totals.runs;
+        totals.ticks += invariants.ticks();
+        totals.ticks_by_scene[name] += invariants.ticks();
+        totals.extremes.add(invariants.extremes());
+        ++totals.by_exit.at(static_cast<std::size_t>(report.exit_reason));
+        for (std::size_t k = 0; k < status_texts.size(); ++k) {
+            totals.by_status[k] += report.ticks_by_status[k];
+        }
+    }
     ++totals.scenes;
     if (!broken.empty()) {
         std::ostringstream text;

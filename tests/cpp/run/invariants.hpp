@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "palpate/guard/guards.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/run/loop.hpp"
 #include "palpate/run/session.hpp"
 
@@ -310,9 +311,10 @@ class VirtualClock {
 
 /// Runs the control loop on a device in virtual time, with all promises checked. Calls `each(record)` after every tick.
 /// The device must be open.
-template <Structure S, Device D, class Each>
-LoopReport run_checked(S structure, D device, const Guards& guards, const LoopSettings& loop, double period_s,
-                       std::vector<ClockFault> clock_faults, Invariants& invariants, Each each) {
+template <Device D, class Each>
+LoopReport run_checked(AnyStructure structure, D device, const Guards& guards, const LoopSettings& loop,
+                       double period_s, std::vector<ClockFault> clock_faults, Invariants& invariants,
+                       Each each) {
     struct Sink {
         Invariants& invariants;
         Each& each;
@@ -324,13 +326,12 @@ LoopReport run_checked(S structure, D device, const Guards& guards, const LoopSe
     CheckedDevice<D> checked{std::move(device), invariants};
     Controller controller{checked, std::move(structure), guards};
     invariants.watch(controller.guards());
-    detail::ControllerOf any{controller};
     VirtualClock clock{period_s, std::move(clock_faults), invariants};
     Sink sink{invariants, each};
     const auto progress = std::make_unique<LoopProgress>();
     const auto report = std::make_unique<LoopReport>();
     const std::atomic<bool> stop_requested{false};
-    run_loop(static_cast<detail::AnyController&>(any), loop, clock, stop_requested, sink, *progress, *report);
+    run_loop(controller, loop, clock, stop_requested, sink, *progress, *report);
     invariants.ends(*report);
     return *report;
 }

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "palpate/rendering/any_structure.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/run/controller.hpp"
 
 #include <cstddef>
@@ -47,8 +49,8 @@ TEST(Controller, PutsTheObjectAtRestUnderTheHandleBeforeTheFirstForce) {
     expected.reset(0.2);
     ScriptedDevice device;
     device.next.position = 0.2;
-    Controller<ScriptedDevice, Implicit<test::Spring>> controller{
-        device, Implicit{test::Spring{10.0}, Inertia{}, coupling, 1e-3}, ForceLimit{5.0}};
+    Controller<ScriptedDevice> controller{device, Implicit{test::Spring{10.0}, Inertia{}, coupling, 1e-3},
+                                          ForceLimit{5.0}};
     (void)controller.start();
     EXPECT_EQ(controller.tick().command.force, expected.step(0.2).force);
 }
@@ -56,8 +58,8 @@ TEST(Controller, PutsTheObjectAtRestUnderTheHandleBeforeTheFirstForce) {
 TEST(Controller, RampsTheForceUpFromZeroAndReportsIt) {
     ScriptedDevice device;
     device.next.position = 0.2;
-    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
-                                                                Guards{.limit = {5.0}, .ramp = {4, 0}}};
+    Controller<ScriptedDevice> controller{device, Direct{test::Spring{10.0}},
+                                          Guards{.limit = {5.0}, .ramp = {4, 0}}};
     (void)controller.start();
     for (const double expected : {0.0, 0.5, 1.0, 1.5}) {
         EXPECT_EQ(controller.tick().status, Status::Ramp);
@@ -70,8 +72,7 @@ TEST(Controller, RampsTheForceUpFromZeroAndReportsIt) {
 TEST(Controller, ClipsToTheForceLimitAndReportsIt) {
     ScriptedDevice device;
     device.next.position = -3.0;
-    Controller<ScriptedDevice, Direct<test::Spring>> controller{device, Direct{test::Spring{10.0}},
-                                                                ForceLimit{5.0}};
+    Controller<ScriptedDevice> controller{device, Direct{test::Spring{10.0}}, ForceLimit{5.0}};
     (void)controller.start();
     const Tick tick = controller.tick();
     EXPECT_EQ(device.sent, -5.0);
@@ -97,9 +98,8 @@ TEST(Controller, SendsZeroForceAtOnceAfterAFailedStep) {
     for (const ForceRamp ramp : {ForceRamp{}, ForceRamp{1000, 900}}) {
         ScriptedDevice device;
         device.next.position = 0.3;
-        Controller<ScriptedDevice, Direct<BrokenSpring>> controller{
-            device, Direct{BrokenSpring{10.0, 0.5}},
-            Guards{.limit = {5.0}, .ramp = ramp, .slew = {1.0, 0.0}}};
+        Controller<ScriptedDevice> controller{device, Direct{BrokenSpring{10.0, 0.5}},
+                                              Guards{.limit = {5.0}, .ramp = ramp, .slew = {1.0, 0.0}}};
         ASSERT_EQ(controller.start(), Status::Ok);
         for (int k = 0; k < 4; ++k) {
             (void)controller.tick();
@@ -426,8 +426,7 @@ struct Played {
 };
 
 /// Plays events and then eight samples at rest.
-template <Structure S>
-Played play(const S& structure, const Guards& guards, const GuardSettings& settings,
+Played play(const AnyStructure& structure, const Guards& guards, const GuardSettings& settings,
             const std::vector<std::size_t>& played) {
     LoopSettings loop;
     loop.rate_hz = 1.0 / period_s;
@@ -492,34 +491,33 @@ TEST(Controller, EveryEventInEveryStateOfEveryStructureKeepsThePromises) {
     const std::size_t stride = test::cases(1) > 1 ? 1 : 8;
     std::size_t runs = 0;
     for (const test::Variant& variant : test::all_variants()) {
-        with_structure(variant.model, variant.scheme, period_s, 2.0, [&](const auto& structure) {
-            for (const bool certified : {false, true}) {
-                const GuardSettings settings = guard_settings(certified);
-                const Guards guards = guards_of(settings, variant.model, variant.scheme, period_s);
-                for (const State& state : all_states) {
-                    for (std::size_t first = 0; first < events.size(); ++first) {
-                        for (std::size_t second = 0; second < events.size(); ++second) {
-                            if (second > 0 && (first + second + runs) % stride != 0) {
-                                continue;
-                            }
-                            std::vector<std::size_t> played = state.before;
-                            played.push_back(first);
-                            played.push_back(second);
-                            const Played run = play(structure, guards, settings, played);
-                            ++runs;
-                            const std::string wrong =
-                                !run.broken.empty() ? run.broken
-                                : second == 0
-                                    ? wrong_answer(state, events[first], run, state.before.size(), certified)
-                                    : "";
-                            ASSERT_EQ(wrong, "") << variant.name << (certified ? ", certified" : "")
-                                                 << "; state " << state.name << ", then "
-                                                 << events[first].name << ", then " << events[second].name;
+        const AnyStructure structure = make_structure(variant.model, variant.scheme, period_s, 2.0);
+        for (const bool certified : {false, true}) {
+            const GuardSettings settings = guard_settings(certified);
+            const Guards guards = guards_of(settings, variant.model, variant.scheme, period_s);
+            for (const State& state : all_states) {
+                for (std::size_t first = 0; first < events.size(); ++first) {
+                    for (std::size_t second = 0; second < events.size(); ++second) {
+                        if (second > 0 && (first + second + runs) % stride != 0) {
+                            continue;
                         }
+                        std::vector<std::size_t> played = state.before;
+                        played.push_back(first);
+                        played.push_back(second);
+                        const Played run = play(structure, guards, settings, played);
+                        ++runs;
+                        const std::string wrong = !run.broken.empty() ? run.broken
+                                                  : second == 0 ? wrong_answer(state, events[first], run,
+                                                                               state.before.size(), certified)
+                                                                : "";
+                        ASSERT_EQ(wrong, "")
+                            << variant.name << (certified ? ", certified" : "") << "; state " << state.name
+                            << ", then " << events[first].name << ", then " << events[second].name;
                     }
                 }
             }
-        });
+        }
+
         if (HasFatalFailure()) {
             return;
         }
@@ -530,28 +528,27 @@ TEST(Controller, EveryEventInEveryStateOfEveryStructureKeepsThePromises) {
 // Each sequence of events leads to the state of its name.
 TEST(Controller, EventsReachEveryState) {
     const test::Variant variant = test::all_variants().front();
-    with_structure(variant.model, variant.scheme, period_s, 2.0, [&](const auto& structure) {
-        const GuardSettings settings = guard_settings(false);
-        const Guards guards = guards_of(settings, variant.model, variant.scheme, period_s);
-        for (const State& state : states()) {
-            const Played run = play(structure, guards, settings, state.before);
-            const std::string name = state.name;
-            const auto expects = [&](Status status) {
-                EXPECT_GT(run.report.ticks_by_status[static_cast<std::size_t>(status)], 0U) << name;
-            };
-            EXPECT_EQ(run.broken, "");
-            expects(Status::Ramp);
-            if (name == "limited" || name == "slewing back") {
-                expects(Status::Limited);
-            } else if (name == "tank empty") {
-                expects(Status::EnergyLimited);
-            } else if (name == "limit cycle") {
-                expects(Status::LimitCycleScaled);
-            } else if (name == "almost frozen") {
-                EXPECT_EQ(run.report.status, Status::Frozen);
-            }
+    const AnyStructure structure = make_structure(variant.model, variant.scheme, period_s, 2.0);
+    const GuardSettings settings = guard_settings(false);
+    const Guards guards = guards_of(settings, variant.model, variant.scheme, period_s);
+    for (const State& state : states()) {
+        const Played run = play(structure, guards, settings, state.before);
+        const std::string name = state.name;
+        const auto expects = [&](Status status) {
+            EXPECT_GT(run.report.ticks_by_status[static_cast<std::size_t>(status)], 0U) << name;
+        };
+        EXPECT_EQ(run.broken, "");
+        expects(Status::Ramp);
+        if (name == "limited" || name == "slewing back") {
+            expects(Status::Limited);
+        } else if (name == "tank empty") {
+            expects(Status::EnergyLimited);
+        } else if (name == "limit cycle") {
+            expects(Status::LimitCycleScaled);
+        } else if (name == "almost frozen") {
+            EXPECT_EQ(run.report.status, Status::Frozen);
         }
-    });
+    }
 }
 
 }  // namespace

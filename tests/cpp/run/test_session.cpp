@@ -35,6 +35,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/rendering/direct.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/session.hpp"
 #include "palpate/simulation/simulated_device.hpp"
@@ -199,42 +200,40 @@ Counts run_watched(const ForceModel& rendered, StructureKind kind, ForbiddenActi
     settings.duration_s = 0.1;
     settings.lowest_rate_share = 0.0;
     Counts counts;
-    with_structure(
-        rendered, scheme, 1.0 / settings.rate_hz, GuardSettings{}.force_limit, [&](auto structure) {
-            FaultyHandle<ForbiddenAction> device{action};
-            EXPECT_TRUE(device.open());
-            Controller controller{device, std::move(structure),
-                                  guards_of(GuardSettings{}, rendered, scheme, 1.0 / settings.rate_hz)};
-            RecordSinks sinks;
-            using Recorder = FlightRecorder<TickRecord, RecordSinks>;
-            Recorder recorder{sinks, 4096, std::chrono::milliseconds{5}};
-            LastRecords<TickRecord> last{100};
-            LoopProgress progress;
-            const auto report = std::make_unique<LoopReport>();
-            const std::atomic<bool> stop_requested{false};
-            std::atomic<bool> over{false};
-            std::thread loop{[&] {
-                Periodic clock{100'000};
-                WatchedSink<Recorder> sink{recorder, last};
-                allocations = locks = exceptions = 0;
-                before();
-                watched = true;
-                run_loop(controller, settings, clock, stop_requested, sink, progress, *report);
-                watched = false;
-                over.store(true);
-                after();
-            }};
-            while (!over.load()) {
-                std::this_thread::sleep_for(std::chrono::milliseconds{1});
-            }
-            counts = {allocations, locks, exceptions, report->ticks()};
-            if constexpr (std::is_same_v<After, std::remove_const_t<decltype(nothing)>>) {
-                loop.join();
-            } else {
-                // The system-call filter of this thread allows no other way to end the thread.
-                _exit(counts.ticks > 0 ? 0 : 1);
-            }
-        });
+    FaultyHandle<ForbiddenAction> device{action};
+    EXPECT_TRUE(device.open());
+    Controller controller{
+        device, make_structure(rendered, scheme, 1.0 / settings.rate_hz, GuardSettings{}.force_limit),
+        guards_of(GuardSettings{}, rendered, scheme, 1.0 / settings.rate_hz)};
+    RecordSinks sinks;
+    using Recorder = FlightRecorder<TickRecord, RecordSinks>;
+    Recorder recorder{sinks, 4096, std::chrono::milliseconds{5}};
+    LastRecords<TickRecord> last{100};
+    LoopProgress progress;
+    const auto report = std::make_unique<LoopReport>();
+    const std::atomic<bool> stop_requested{false};
+    std::atomic<bool> over{false};
+    std::thread loop{[&] {
+        Periodic clock{100'000};
+        WatchedSink<Recorder> sink{recorder, last};
+        allocations = locks = exceptions = 0;
+        before();
+        watched = true;
+        run_loop(controller, settings, clock, stop_requested, sink, progress, *report);
+        watched = false;
+        over.store(true);
+        after();
+    }};
+    while (!over.load()) {
+        std::this_thread::sleep_for(std::chrono::milliseconds{1});
+    }
+    counts = {allocations, locks, exceptions, report->ticks()};
+    if constexpr (std::is_same_v<After, std::remove_const_t<decltype(nothing)>>) {
+        loop.join();
+    } else {
+        // The system-call filter of this thread allows no other way to end the thread.
+        _exit(counts.ticks > 0 ? 0 : 1);
+    }
     return counts;
 }
 
@@ -474,20 +473,6 @@ TEST(RunSession, PacesADeviceWithoutAClockByTheRate) {
     EXPECT_GE(report.loop.ticks() + timing.missed, 50U);
     // Each wake-up comes at or after its deadline
     EXPECT_GE(static_cast<double>(timing.last - timing.first) + timing.lateness.quantile(1.0), 49e6);
-}
-
-TEST(ControllerOf, PassesAllCallsToItsController) {
-    PacedHandle device;
-    Controller controller{device, Direct{test::Spring{2.0}}, ForceLimit{}};
-    palpate::detail::ControllerOf any{controller};
-    EXPECT_EQ(any.start(), Status::Ok);
-    (void)any.tick();
-    EXPECT_EQ(any.tick().reading.sequence, 2U);
-    EXPECT_TRUE(any.paced_by_device());
-    EXPECT_EQ(&any.reading_guard(), &controller.reading_guard());
-    EXPECT_EQ(&any.guards(), &controller.guards());
-    EXPECT_EQ(any.stop(), ZeroForce::Commanded);
-    EXPECT_TRUE(device.is_closed);
 }
 
 }  // namespace

@@ -13,6 +13,8 @@
 #include <gtest/gtest.h>
 
 #include "palpate/guard/guards.hpp"
+#include "palpate/rendering/any_structure.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/run/controller.hpp"
 #include "support.hpp"
 #include "tick.hpp"
@@ -61,38 +63,37 @@ const std::vector<double> positions{0.05,
 TEST(Tick, RaisesNoFloatingPointException) {
     constexpr int exceptions = FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW;
     for (const test::Variant& variant : test::all_variants()) {
-        with_structure(variant.model, variant.scheme, period_s, 2.0, [&](const auto& structure) {
-            const Guards guards = guards_of(guard_settings(), variant.model, variant.scheme, period_s);
-            for (const double start : positions) {
-                for (const double first : positions) {
-                    for (const double second : positions) {
-                        // The first valid position is known only to be finite; encoders report at most this one
-                        constexpr double farthest_start = 1e9;
-                        const auto is_valid = [](double position) { return std::isfinite(position); };
-                        const std::array order{start, first, second};
-                        const auto* const found = std::find_if(order.begin(), order.end(), is_valid);
-                        if (found != order.end() && std::abs(*found) > farthest_start) {
-                            continue;
-                        }
-                        std::feclearexcept(FE_ALL_EXCEPT);
-                        test::HeldDevice device;
-                        device.next.position = start;
-                        Controller controller{device, structure, guards};
-                        (void)controller.start();
-                        for (const double position : {start, first, start, second, 0.05}) {
-                            device.next.position = position;
-                            const Status status = controller.tick().status;
-                            ASSERT_EQ(std::fetestexcept(exceptions), 0)
-                                << variant.name << " from " << start << " to " << first << ", " << second
-                                << ": " << text(status).word;
-                            if (is_final(status)) {
-                                break;
-                            }
+        const AnyStructure structure = make_structure(variant.model, variant.scheme, period_s, 2.0);
+        const Guards guards = guards_of(guard_settings(), variant.model, variant.scheme, period_s);
+        for (const double start : positions) {
+            for (const double first : positions) {
+                for (const double second : positions) {
+                    // The first valid position is known only to be finite; encoders report at most this one
+                    constexpr double farthest_start = 1e9;
+                    const auto is_valid = [](double position) { return std::isfinite(position); };
+                    const std::array order{start, first, second};
+                    const auto* const found = std::find_if(order.begin(), order.end(), is_valid);
+                    if (found != order.end() && std::abs(*found) > farthest_start) {
+                        continue;
+                    }
+                    std::feclearexcept(FE_ALL_EXCEPT);
+                    test::HeldDevice device;
+                    device.next.position = start;
+                    Controller controller{device, structure, guards};
+                    (void)controller.start();
+                    for (const double position : {start, first, start, second, 0.05}) {
+                        device.next.position = position;
+                        const Status status = controller.tick().status;
+                        ASSERT_EQ(std::fetestexcept(exceptions), 0)
+                            << variant.name << " from " << start << " to " << first << ", " << second << ": "
+                            << text(status).word;
+                        if (is_final(status)) {
+                            break;
                         }
                     }
                 }
             }
-        });
+        }
     }
 }
 
@@ -171,28 +172,27 @@ TEST(Tick, ExecutesABoundedNumberOfInstructions) {
     ASSERT_EQ(variants.size(), most_instructions.size());
     for (std::size_t k = 0; k < variants.size(); ++k) {
         const test::Variant& variant = variants[k];
-        with_structure(variant.model, variant.scheme, period_s, 2.0, [&](const auto& structure) {
-            const Guards guards = guards_of(guard_settings(), variant.model, variant.scheme, period_s);
-            for (const Input& input : inputs()) {
-                test::HeldDevice device;
-                device.next.position = input.positions.front();
-                Controller controller{device, structure, guards};
-                (void)controller.start();
-                // A tick uses the reading of the exchange before it
-                std::vector<double> played = input.positions;
-                played.push_back(played.back());
-                for (const double& position : played) {
-                    device.next.position = position;
-                    if (all_ticks || &position == &played.back()) {
-                        const std::uint64_t counted = test::instructions([&] { (void)controller.tick(); });
-                        EXPECT_GT(counted, 100U);
-                        EXPECT_LE(counted, most_instructions.at(k)) << variant.name << ": " << input.name;
-                    } else {
-                        (void)controller.tick();
-                    }
+        const AnyStructure structure = make_structure(variant.model, variant.scheme, period_s, 2.0);
+        const Guards guards = guards_of(guard_settings(), variant.model, variant.scheme, period_s);
+        for (const Input& input : inputs()) {
+            test::HeldDevice device;
+            device.next.position = input.positions.front();
+            Controller controller{device, structure, guards};
+            (void)controller.start();
+            // A tick uses the reading of the exchange before it
+            std::vector<double> played = input.positions;
+            played.push_back(played.back());
+            for (const double& position : played) {
+                device.next.position = position;
+                if (all_ticks || &position == &played.back()) {
+                    const std::uint64_t counted = test::instructions([&] { (void)controller.tick(); });
+                    EXPECT_GT(counted, 100U);
+                    EXPECT_LE(counted, most_instructions.at(k)) << variant.name << ": " << input.name;
+                } else {
+                    (void)controller.tick();
                 }
             }
-        });
+        }
     }
 }
 

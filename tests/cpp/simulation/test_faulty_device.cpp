@@ -17,6 +17,7 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/run/session.hpp"
 #include "palpate/run/session_text.hpp"
@@ -109,22 +110,19 @@ Rendering render(const std::vector<Fault>& faults, const LoopSettings& settings,
     const TestRig rig = rig_for(model, true, period_s);
     run.guards = guards_for(rig.scale, rig.device);
     run.guards.ramp_s = 0.02;
-    with_structure(model, rig.scheme(model), period_s, rig.device.force_limit, [&](auto structure) {
-        Observing device{Faulty{SimulatedDevice{rig.device, rig.hand, 4}, faults,
-                                3.0 * run.guards.largest_speed * period_s},
-                         run.observed};
-        EXPECT_TRUE(device.open());
-        Controller controller{device, std::move(structure),
-                              guards_of(run.guards, model, rig.scheme(model), period_s)};
-        VirtualClock clock{late};
-        Collected sink;
-        sink.file = file;
-        LoopProgress progress;
-        const std::atomic<bool> stop_requested{false};
-        run_loop(controller, settings, clock, stop_requested, sink, progress, *run.report);
-        run.ticks = std::move(sink.ticks);
-        return 0;
-    });
+    Observing device{
+        Faulty{SimulatedDevice{rig.device, rig.hand, 4}, faults, 3.0 * run.guards.largest_speed * period_s},
+        run.observed};
+    EXPECT_TRUE(device.open());
+    Controller controller{device, make_structure(model, rig.scheme(model), period_s, rig.device.force_limit),
+                          guards_of(run.guards, model, rig.scheme(model), period_s)};
+    VirtualClock clock{late};
+    Collected sink;
+    sink.file = file;
+    LoopProgress progress;
+    const std::atomic<bool> stop_requested{false};
+    run_loop(controller, settings, clock, stop_requested, sink, progress, *run.report);
+    run.ticks = std::move(sink.ticks);
     return run;
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/solver/sliding_resolvent.hpp"
 
 #include <algorithm>
@@ -264,9 +265,8 @@ TEST(Scheme, TablesRenderTheSameForceAsTheNetwork) {
         const ForceModel model{network, domain};
         const auto compare = [&](const auto& reference, const char* solver) {
             ASSERT_EQ(solver_name(model, scheme, 1e-3).value_or("none"), solver);
-            with_structure(model, scheme, 1e-3, 1e9, [&](auto structure) {
-                expect_same_rendering(random, std::move(structure), reference, 1e-8 * steepest);
-            });
+            expect_same_rendering(random, make_structure(model, scheme, 1e-3, 1e9), reference,
+                                  1e-8 * steepest);
         };
         scheme.structure = StructureKind::Direct;
         compare(Direct{plain}, "none");

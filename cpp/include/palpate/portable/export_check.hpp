@@ -11,7 +11,10 @@
 
 #include "palpate/portable/exported_force.hpp"
 #include "palpate/portable/exported_model.hpp"
+#include "palpate/rendering/any_structure.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/solver/inverse_table.hpp"
 
 namespace palpate {
 
@@ -230,34 +233,33 @@ class ExportComparison {
     void compare_steps(std::size_t ticks) {
         const double limit = model_.target().force_limit;
         const double period = model_.target().period_s > 0.0 ? model_.target().period_s : 1e-3;
-        with_structure(model_.model(), model_.scheme(), period, limit, [&](auto structure) {
-            const double step = model_.target().encoder_step;
-            const CellGrid& grid = model_.law().grid();
-            const double travel = grid.last_count - grid.first_count;
-            double count = 0.5 * (grid.first_count + grid.last_count);
-            auto state = exported_.start(static_cast<std::int32_t>(count));
-            structure.reset(static_cast<std::int32_t>(count) * step);
-            double speed = 0.0;
-            const double of_core = error_of_core(period);
-            bool was_outside = false;
-            for (std::size_t k = 0; k < ticks; ++k) {
-                speed = 0.98 * speed +
-                        std::uniform_real_distribution<double>{-1.0, 1.0}(random_) * 0.003 * travel;
-                count = std::clamp(count + speed, grid.first_count - 0.2 * travel,
-                                   grid.last_count + 0.2 * travel);
-                const auto now = static_cast<std::int32_t>(count);
-                const Rendered rendered = structure.step(now * step);
-                const double right = std::clamp(rendered.force, -limit, limit);
-                const double found = exported_.step(state, now);
-                // A massless object keeps a part of the errors that it made outside the domain
-                was_outside = rendered.extrapolated || (was_outside && model_.massless());
-                const double outside = was_outside ? 16.0 * unit_roundoff(model_.target().precision) *
-                                                         (std::abs(right) + 2.0 * at_ends_)
-                                                   : 0.0;
-                add(check_.step, found - right, model_.step_error() + of_core + outside);
-                add(check_.step, found - right, model_.rendering_error() + of_core);
-            }
-        });
+        AnyStructure structure = make_structure(model_.model(), model_.scheme(), period, limit);
+        const double step = model_.target().encoder_step;
+        const CellGrid& grid = model_.law().grid();
+        const double travel = grid.last_count - grid.first_count;
+        double count = 0.5 * (grid.first_count + grid.last_count);
+        auto state = exported_.start(static_cast<std::int32_t>(count));
+        structure.reset(static_cast<std::int32_t>(count) * step);
+        double speed = 0.0;
+        const double of_core = error_of_core(period);
+        bool was_outside = false;
+        for (std::size_t k = 0; k < ticks; ++k) {
+            speed =
+                0.98 * speed + std::uniform_real_distribution<double>{-1.0, 1.0}(random_) * 0.003 * travel;
+            count =
+                std::clamp(count + speed, grid.first_count - 0.2 * travel, grid.last_count + 0.2 * travel);
+            const auto now = static_cast<std::int32_t>(count);
+            const Rendered rendered = structure.step(now * step);
+            const double right = std::clamp(rendered.force, -limit, limit);
+            const double found = exported_.step(state, now);
+            // A massless object keeps a part of the errors that it made outside the domain
+            was_outside = rendered.extrapolated || (was_outside && model_.massless());
+            const double outside = was_outside ? 16.0 * unit_roundoff(model_.target().precision) *
+                                                     (std::abs(right) + 2.0 * at_ends_)
+                                               : 0.0;
+            add(check_.step, found - right, model_.step_error() + of_core + outside);
+            add(check_.step, found - right, model_.rendering_error() + of_core);
+        }
     }
 
     /// Returns a bound of the core's own error of a massless force F = q - p y, from the error of its tables of y. The

@@ -8,6 +8,7 @@
 
 #include "palpate/model/environment.hpp"
 #include "palpate/model/velocity_network.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/structure.hpp"
 
 namespace palpate {
@@ -163,11 +164,12 @@ class PredictedDirect {
 struct DirectStructure {
     static constexpr StructureTraits traits{.name = "direct", .velocity = true, .predicts = true};
 
-    template <Environment E, class SolverOf, class Visit>
-    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& /*solver_of*/,
-                      Visit& visit) {
-        return numbers.predict > 0 ? visit(PredictedDirect{std::move(environment), numbers.predict})
-                                   : visit(Direct{std::move(environment)});
+    template <Environment E, class SolverOf>
+    static AnyStructure build(E environment, const StructureNumbers& numbers, const SolverOf& /*solver_of*/) {
+        if (numbers.predict > 0) {
+            return PredictedDirect{std::move(environment), numbers.predict};
+        }
+        return Direct{std::move(environment)};
     }
 };
 

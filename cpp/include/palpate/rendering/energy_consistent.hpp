@@ -7,6 +7,7 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/newton.hpp"
 
@@ -259,14 +260,18 @@ struct EnergyConsistentStructure {
     static constexpr StructureTraits traits{
         .name = "energy-consistent", .coupling = true, .mass = true, .may_reduce_hysteresis = true};
 
-    template <Environment E, class SolverOf, class Visit>
-    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,
-                      Visit& visit) {
+    template <Environment E, class SolverOf>
+    static AnyStructure build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of) {
         const double p =
             EnergyConsistent<E>::load_line_slope(numbers.inertia, numbers.coupling, numbers.period_s);
-        return visit(EnergyConsistent{std::move(environment), numbers.inertia, numbers.coupling,
-                                      numbers.period_s, 1e-2 * numbers.finest_width, true,
-                                      numbers.force_limit, solver_of(p)});
+        return EnergyConsistent{std::move(environment),
+                                numbers.inertia,
+                                numbers.coupling,
+                                numbers.period_s,
+                                1e-2 * numbers.finest_width,
+                                true,
+                                numbers.force_limit,
+                                solver_of(p)};
     }
 };
 

@@ -5,6 +5,7 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/structure.hpp"
 
 namespace palpate {
@@ -115,10 +116,9 @@ struct ExplicitStructure {
         return explicit_slope_limit(numbers.inertia, numbers.coupling, numbers.period_s);
     }
 
-    template <Environment E, class SolverOf, class Visit>
-    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& /*solver_of*/,
-                      Visit& visit) {
-        return visit(Explicit{std::move(environment), numbers.inertia, numbers.coupling, numbers.period_s});
+    template <Environment E, class SolverOf>
+    static AnyStructure build(E environment, const StructureNumbers& numbers, const SolverOf& /*solver_of*/) {
+        return Explicit{std::move(environment), numbers.inertia, numbers.coupling, numbers.period_s};
     }
 };
 

@@ -7,6 +7,7 @@
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/newton.hpp"
 
@@ -144,13 +145,12 @@ class Implicit {
 struct ImplicitStructure {
     static constexpr StructureTraits traits{.name = "implicit", .coupling = true, .mass = true};
 
-    template <Environment E, class SolverOf, class Visit>
-    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,
-                      Visit& visit) {
+    template <Environment E, class SolverOf>
+    static AnyStructure build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of) {
         const double p = Implicit<E>::load_line_slope(numbers.inertia, numbers.coupling, numbers.period_s);
         const double uncoupled = Implicit<E>::load_line_slope(numbers.inertia, {0.0, 0.0}, numbers.period_s);
-        return visit(Implicit{std::move(environment), numbers.inertia, numbers.coupling, numbers.period_s,
-                              solver_of(p), numbers.force_limit, solver_of(uncoupled)});
+        return Implicit{std::move(environment), numbers.inertia,     numbers.coupling,    numbers.period_s,
+                        solver_of(p),           numbers.force_limit, solver_of(uncoupled)};
     }
 };
 

@@ -7,6 +7,7 @@
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/model/limited_environment.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/solver/limited_resolvent.hpp"
 #include "palpate/solver/newton.hpp"
@@ -88,15 +89,14 @@ class Massless {
 struct MasslessStructure {
     static constexpr StructureTraits traits{.name = "massless", .coupling = true};
 
-    template <Environment E, class SolverOf, class Visit>
-    static auto build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of,
-                      Visit& visit) {
+    template <Environment E, class SolverOf>
+    static AnyStructure build(E environment, const StructureNumbers& numbers, const SolverOf& solver_of) {
         const double p = numbers.coupling.load_line_slope(numbers.period_s);
         if (std::isfinite(numbers.force_limit)) {
-            return visit(Massless{LimitedEnvironment{std::move(environment), numbers.force_limit},
-                                  numbers.coupling, numbers.period_s, LimitedResolvent{solver_of(p)}});
+            return Massless{LimitedEnvironment{std::move(environment), numbers.force_limit}, numbers.coupling,
+                            numbers.period_s, LimitedResolvent{solver_of(p)}};
         }
-        return visit(Massless{std::move(environment), numbers.coupling, numbers.period_s, solver_of(p)});
+        return Massless{std::move(environment), numbers.coupling, numbers.period_s, solver_of(p)};
     }
 };
 

@@ -2,23 +2,14 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 #include <optional>
-#include <stdexcept>
 #include <string>
-#include <string_view>
 #include <tuple>
-#include <utility>
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/fields/field_table.hpp"
-#include "palpate/model/compiled_network.hpp"
 #include "palpate/model/force_model.hpp"
-#include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/structures.hpp"
-#include "palpate/solver/piecewise_force.hpp"
-#include "palpate/solver/resolvent.hpp"
-#include "palpate/solver/sliding_resolvent.hpp"
 
 namespace palpate {
 
@@ -138,64 +129,6 @@ inline void validate(const Scheme& scheme, const ForceModel& model, double perio
                                                   "; the implicit structure has no such limit");
         }
     });
-}
-
-/// Builds the structure of a scheme for a model and calls `visit` with the structure. Only this function prepares a
-/// model for the control loop, in a few milliseconds: it replaces the model's force by polynomials and the solution of
-/// load lines by tables, where the error is proved to be small enough.
-///
-/// `force_limit` is the force limit of the device [N or N*m], infinity without a limit. The massless, implicit and
-/// energy-consistent structures include the limit in their solution, so that object and device receive the same force.
-/// A force with memory keeps the limit itself. The direct and the explicit structure otherwise ignore `force_limit`: the
-/// guards clip their force, and the stability bound of the explicit structure holds only for forces below the limit.
-template <class Visitor>
-auto with_structure(const ForceModel& given, const Scheme& scheme, double period_s, double force_limit,
-                    Visitor visit) {
-    validate(scheme, given);
-    if (const VelocityNetwork* force = given.velocity()) {
-        return visit(DirectVelocity{*force, period_s});
-    }
-    if (const MemoryNetwork* memory = given.memory()) {
-        // Also a constant ratio gets a table, which is faster than the exact continuation
-        const CompileOptions always{.fewest_wavelets = 0};
-        return visit(
-            Direct{MemoryForce{CompiledCurve{given.network()->curve(), always},
-                               CompiledCurve{memory->ratio(), always}, *memory, period_s, force_limit}});
-    }
-    const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
-    const StructureNumbers numbers{scheme.coupling, scheme.inertia, scheme.predict,
-                                   period_s,        force_limit,    model.finest_width()};
-    const auto build = [&](auto environment, const auto& solver_of) {
-        return with_kind(scheme.structure, [&](auto structure) {
-            return structure.build(std::move(environment), numbers, solver_of, visit);
-        });
-    };
-    if (const HysteresisNetwork* both = model.hysteresis()) {
-        return build(CompiledHysteresis{*both}, [&](double p) { return SlidingResolvent{*both, p}; });
-    }
-    const CompiledNetwork network{*model.network()};
-    const NetworkCurve& curve = network.curve().curve();
-    if (scheme.compensated) {
-        const double stiffness = scheme.coupling.stiffness;
-        return build(Compensated{network, stiffness},
-                     [&](double p) { return CompensatedResolvent{piecewise(curve), stiffness, p}; });
-    }
-    return build(network, [&](double p) { return Resolvent{curve, p}; });
-}
-
-/// Returns the method that solves the load line of a scheme: "table" if a table of solutions is used for at least a
-/// part of the positions, else "newton"; nothing if the structure has no load line. The energy-consistent structure
-/// uses its table only in steps in which the model's force does not generate energy, and Newton's method in the others.
-[[nodiscard]] inline std::optional<std::string_view> solver_name(const ForceModel& model,
-                                                                 const Scheme& scheme, double period_s) {
-    return with_structure(model, scheme, period_s, std::numeric_limits<double>::infinity(),
-                          [&](const auto& structure) -> std::optional<std::string_view> {
-                              if constexpr (requires { structure.solver(); }) {
-                                  return structure.solver().tabulated() ? "table" : "newton";
-                              } else {
-                                  return std::nullopt;
-                              }
-                          });
 }
 
 }  // namespace palpate

@@ -7,6 +7,7 @@
 #include "palpate/device/device.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/realtime/nonblocking.hpp"
+#include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/status.hpp"
 
@@ -23,13 +24,13 @@ struct Tick {
 /// Runs the ticks of the control loop: check the reading, compute the force, limit the force, exchange force and next
 /// reading with the device. Apart from the device's `exchange`, a tick does not allocate, lock, throw, log or make a
 /// system call. After an invalid reading a tick sends zero force.
-template <Device D, Structure S>
+template <Device D>
 class Controller {
   public:
-    Controller(D& device, S structure, Guards guards)
+    Controller(D& device, AnyStructure structure, Guards guards)
         : device_{device}, structure_{std::move(structure)}, guards_{guards} {}
 
-    Controller(D& device, S structure, ForceLimit limit)
+    Controller(D& device, AnyStructure structure, ForceLimit limit)
         : Controller{device, std::move(structure), Guards{.limit = limit}} {}
 
     /// Sends zero force and takes the first sample.
@@ -42,12 +43,13 @@ class Controller {
     /// the virtual object at rest at the position of the handle.
     [[nodiscard]] Tick tick() noexcept PALPATE_NONBLOCKING {
         const Status reading_status = guards_.reading.check(reading_);
-        Tick tick{reading_, {}, {}, reading_status};
-        if (sends_force(reading_status)) {
-            if (!std::exchange(is_placed_, true)) {
-                structure_.reset(reading_.position);
-            }
-            tick.rendered = structure_.step(reading_.position);
+        const bool sends = sends_force(reading_status);
+        if (sends && !std::exchange(is_placed_, true)) {
+            structure_.reset(reading_.position);
+        }
+        // The structure writes its result into the tick; a copy would take ten nanoseconds
+        Tick tick{reading_, sends ? structure_.step(reading_.position) : Rendered{}, {}, reading_status};
+        if (sends) {
             observe(tick.rendered.environment_position);
             tick.status = limit_force(tick.rendered, tick.command.force, reading_status);
         } else {
@@ -116,7 +118,7 @@ class Controller {
     }
 
     D& device_;
-    S structure_;
+    AnyStructure structure_;
     Guards guards_;
     Reading reading_;
     bool is_placed_ = false;  ///< true after the virtual object was placed at the handle

@@ -113,7 +113,7 @@ namespace detail {
                                          : RecordedForce::Object;
     sinks.keeps = options.keep;
     const std::string note = detail::open_sinks(options, options.units, metadata, sinks);
-    const auto run = [&](auto structure) {
+    const auto run = [&](AnyStructure structure) {
         Controller controller{device, std::move(structure),
                               Guards{.reading = reading_guard(guards, period_s),
                                      .limit = force_limit(guards),

@@ -19,6 +19,8 @@
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/guard/guards.hpp"
 #include "palpate/model/force_model.hpp"
+#include "palpate/rendering/any_structure.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/measuring.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/scheme.hpp"
@@ -354,19 +356,17 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
                                     const RenderJob& job, LiveDevice& device, RecordSinks& sinks,
                                     const std::atomic<bool>& stop_requested, const Watch& watch) {
     const double period_s = 1.0 / job.session.loop.rate_hz;
-    const auto run = [&](auto structure, const Guards& guards) {
+    const auto run = [&](AnyStructure structure, const Guards& guards) {
         Controller controller{device, std::move(structure), guards};
         return run_session(controller, job.session, sinks, stop_requested, watch);
     };
     const Domain& domain = model.model.domain();
-    SessionReport report =
-        rendered_by_device(options, model)
-            ? run(Watching{domain}, Guards{.reading = reading_guard(job.guards, period_s),
-                                           .limit = force_limit(job.guards),
-                                           .ramp = force_ramp(job.guards, period_s)})
-            : with_structure(job.model, job.scheme, period_s, job.guards.force_limit, [&](auto structure) {
-                  return run(std::move(structure), guards_of(job.guards, job.model, job.scheme, period_s));
-              });
+    SessionReport report = rendered_by_device(options, model)
+                               ? run(Watching{domain}, Guards{.reading = reading_guard(job.guards, period_s),
+                                                              .limit = force_limit(job.guards),
+                                                              .ramp = force_ramp(job.guards, period_s)})
+                               : run(make_structure(job.model, job.scheme, period_s, job.guards.force_limit),
+                                     guards_of(job.guards, job.model, job.scheme, period_s));
     Summary summary =
         detail::finish(options, job.session.loop, model.units(), job.metadata, sinks, std::move(report),
                        {.encoder_step = job.guards.encoder_step,

@@ -52,37 +52,6 @@ struct SessionReport {
 
 namespace detail {
 
-/// Controller of any structure on any device. Loop and session use this interface, so that a program compiles them
-/// once and not for each structure. A virtual call takes a few nanoseconds of a tick.
-class AnyController {
-  public:
-    virtual ~AnyController() = default;
-    [[nodiscard]] virtual Status start() noexcept = 0;
-    [[nodiscard]] virtual Tick tick() noexcept = 0;
-    [[nodiscard]] virtual ZeroForce stop() noexcept = 0;
-    [[nodiscard]] virtual bool paced_by_device() const noexcept = 0;
-    [[nodiscard]] virtual const ReadingGuard& reading_guard() const noexcept = 0;
-    [[nodiscard]] virtual const Guards& guards() const noexcept = 0;
-};
-
-/// Calls a controller of type `Control`.
-template <class Control>
-class ControllerOf final : public AnyController {
-  public:
-    explicit ControllerOf(Control& controller) noexcept : controller_{controller} {}
-    [[nodiscard]] Status start() noexcept override { return controller_.start(); }
-    [[nodiscard]] Tick tick() noexcept override { return controller_.tick(); }
-    [[nodiscard]] ZeroForce stop() noexcept override { return controller_.stop(); }
-    [[nodiscard]] bool paced_by_device() const noexcept override { return controller_.paced_by_device(); }
-    [[nodiscard]] const ReadingGuard& reading_guard() const noexcept override {
-        return controller_.reading_guard();
-    }
-    [[nodiscard]] const Guards& guards() const noexcept override { return controller_.guards(); }
-
-  private:
-    Control& controller_;
-};
-
 /// Passes the record of each tick to the recorder, and to the memory of the last ticks.
 template <class Recorder>
 struct LoopSink {
@@ -101,12 +70,12 @@ struct LoopSink {
 /// Function that is called fifty times a second while a session runs; it may request the end of the session.
 using Watch = std::function<void(const SessionView&)>;
 
-namespace detail {
-
-/// Runs a session like `palpate::run_session`, for a controller of any type.
-[[nodiscard]] inline SessionReport run_session(AnyController& controller, const SessionSettings& settings,
-                                               RecordSinks& sinks, const std::atomic<bool>& stop_requested,
-                                               const Watch& watch) {
+/// Runs the control loop on an open device until the loop ends. When it returns, the device is closed,
+/// `LoopReport::zero_force` states its force, and `sinks` has received the records of all ticks, except lost ones.
+template <Device D>
+[[nodiscard]] SessionReport run_session(Controller<D>& controller, const SessionSettings& settings,
+                                        RecordSinks& sinks, const std::atomic<bool>& stop_requested,
+                                        const Watch& watch) {
     const auto period = static_cast<Nanoseconds>(std::llround(1e9 / settings.loop.rate_hz));
     const auto capacity = static_cast<std::size_t>(settings.ring_s * settings.loop.rate_hz) + 1;
     SessionReport report;
@@ -124,7 +93,7 @@ namespace detail {
     std::thread loop{[&] {
         report.refused = become_real_time(settings.real_time, memory, inhibitor);
         privileges_known.store(true, std::memory_order_release);
-        LoopSink<Recorder> sink{recorder, last};
+        detail::LoopSink<Recorder> sink{recorder, last};
         const auto run = [&](auto clock) {
             run_loop(controller, settings.loop, clock, stop_requested, sink, progress, *loop_report);
         };
@@ -142,18 +111,6 @@ namespace detail {
     report.lost_records = recorder.lost();
     report.last_ticks = last.in_order();
     return report;
-}
-
-}  // namespace detail
-
-/// Runs the control loop on an open device until the loop ends. When it returns, the device is closed,
-/// `LoopReport::zero_force` states its force, and `sinks` has received the records of all ticks, except lost ones.
-template <class Control>
-[[nodiscard]] SessionReport run_session(Control& controller, const SessionSettings& settings,
-                                        RecordSinks& sinks, const std::atomic<bool>& stop_requested,
-                                        const Watch& watch) {
-    detail::ControllerOf<Control> any{controller};
-    return detail::run_session(any, settings, sinks, stop_requested, watch);
 }
 
 }  // namespace palpate

@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "palpate/fields/readable.hpp"
+#include "palpate/rendering/any_structure.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/rendering/structure.hpp"
 #include "palpate/run/controller.hpp"
@@ -35,8 +37,9 @@ struct SimulatedTick {
 
 /// Runs a structure on a simulated device in simulated time. Calls `watch(SimulatedTick)` after every tick; the loop
 /// ends when `watch` returns false. Returns the number of ticks.
-template <Device D, Structure S, class Watch>
-std::size_t closed_loop(D& device, S structure, const Guards& guards, std::size_t ticks, Watch&& watch) {
+template <Device D, class Watch>
+std::size_t closed_loop(D& device, AnyStructure structure, const Guards& guards, std::size_t ticks,
+                        Watch&& watch) {
     (void)device.open();
     Controller controller{device, std::move(structure), guards};
     (void)controller.start();
@@ -71,9 +74,9 @@ struct ClosedLoopEnd {
 
 /// Runs a structure on a simulated device with an energy account. Calls `watch(tick, handle, account)` after every
 /// tick; the loop ends when `watch` returns false.
-template <Structure S, SimulatedHand H, class Watch>
-[[nodiscard]] ClosedLoopEnd closed_loop(S structure, const DeviceProfile& profile, H hand, std::size_t ticks,
-                                        const ClosedLoopSettings& settings, Watch watch) {
+template <SimulatedHand H, class Watch>
+[[nodiscard]] ClosedLoopEnd closed_loop(AnyStructure structure, const DeviceProfile& profile, H hand,
+                                        std::size_t ticks, const ClosedLoopSettings& settings, Watch watch) {
     SimulatedHandle<H, Midpoint> device{profile, std::move(hand), settings.substeps, settings.start_position,
                                         settings.start_velocity};
     const auto delay = static_cast<std::size_t>(profile.late_samples());
@@ -156,10 +159,9 @@ template <class Each>
         trace.extrapolated.push_back(static_cast<std::uint8_t>(now.tick.rendered.extrapolated));
         return true;
     };
-    with_structure(model, scheme, profile.period_s, profile.force_limit, [&](auto structure) {
-        SimulatedDevice device{profile, hand, substeps, start_position};
-        return closed_loop(device, std::move(structure), Guards{.limit = {profile.force_limit}}, ticks, add);
-    });
+    SimulatedDevice device{profile, hand, substeps, start_position};
+    (void)closed_loop(device, make_structure(model, scheme, profile.period_s, profile.force_limit),
+                      Guards{.limit = {profile.force_limit}}, ticks, add);
     return trace;
 }
 
@@ -177,19 +179,17 @@ template <class Each>
                                                   std::span<const double> position, double period_s,
                                                   Each&& each) {
     validate(scheme, model, period_s);
-    return with_structure(model, scheme, period_s, std::numeric_limits<double>::infinity(),
-                          [&](auto&& structure) {
-                              std::vector<Rendered> rendered;
-                              rendered.reserve(position.size());
-                              if (!position.empty()) {
-                                  structure.reset(position.front());
-                              }
-                              for (const double x : position) {
-                                  each(rendered.size());
-                                  rendered.push_back(structure.step(x));
-                              }
-                              return rendered;
-                          });
+    AnyStructure structure = make_structure(model, scheme, period_s, std::numeric_limits<double>::infinity());
+    std::vector<Rendered> rendered;
+    rendered.reserve(position.size());
+    if (!position.empty()) {
+        structure.reset(position.front());
+    }
+    for (const double x : position) {
+        each(rendered.size());
+        rendered.push_back(structure.step(x));
+    }
+    return rendered;
 }
 
 [[nodiscard]] inline std::vector<Rendered> motion_driven(const ForceModel& model, const Scheme& scheme,
@@ -203,28 +203,23 @@ template <class Each>
 [[nodiscard]] std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,
                                                  std::span<const double> force, double period_s,
                                                  double start_position, Each&& each) {
-    return with_structure(
-        model, scheme, period_s, std::numeric_limits<double>::infinity(),
-        [&](auto&& structure) -> std::vector<Rendered> {
-            if constexpr (requires { structure.drive(0.0); }) {
-                std::vector<Rendered> rendered;
-                rendered.reserve(force.size());
-                structure.reset(start_position);
-                for (const double f : force) {
-                    each(rendered.size());
-                    rendered.push_back(structure.drive(f));
-                }
-                return rendered;
-            } else {
-                std::string right;
-                for (const StructureTraits& traits : structure_traits) {
-                    right += traits.mass ? (right.empty() ? "" : " or ") + std::string(traits.name) : "";
-                }
-                throw std::invalid_argument("structure is " + std::string(name_of(scheme.structure)) +
-                                            ", must be " + right +
-                                            ": a force can move only an object with mass");
-            }
-        });
+    AnyStructure structure = make_structure(model, scheme, period_s, std::numeric_limits<double>::infinity());
+    if (!has_mass(scheme.structure)) {
+        std::string right;
+        for (const StructureTraits& traits : structure_traits) {
+            right += traits.mass ? (right.empty() ? "" : " or ") + std::string(traits.name) : "";
+        }
+        throw std::invalid_argument("structure is " + std::string(name_of(scheme.structure)) + ", must be " +
+                                    right + ": a force can move only an object with mass");
+    }
+    std::vector<Rendered> rendered;
+    rendered.reserve(force.size());
+    structure.reset(start_position);
+    for (const double f : force) {
+        each(rendered.size());
+        rendered.push_back(structure.drive(f));
+    }
+    return rendered;
 }
 
 [[nodiscard]] inline std::vector<Rendered> force_driven(const ForceModel& model, const Scheme& scheme,

@@ -12,6 +12,8 @@
 #include "palpate/fields/readable.hpp"
 #include "palpate/io/recording_file.hpp"
 #include "palpate/model/force_model.hpp"
+#include "palpate/rendering/any_structure.hpp"
+#include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/scheme.hpp"
 #include "palpate/simulation/closed_loop.hpp"
@@ -110,13 +112,10 @@ namespace detail {
                                                              double start) {
     SchemeChoices direct;
     direct.structure = StructureKind::Direct;
-    return with_structure(model, rig.scheme(model, direct), rig.device.period_s, rig.device.force_limit,
-                          [start](auto structure) -> std::function<double(double)> {
-                              structure.reset(start);
-                              return [structure](double position) mutable {
-                                  return structure.step(position).force;
-                              };
-                          });
+    AnyStructure structure =
+        make_structure(model, rig.scheme(model, direct), rig.device.period_s, rig.device.force_limit);
+    structure.reset(start);
+    return [structure](double position) mutable { return structure.step(position).force; };
 }
 
 /// Returns the metadata about the simulated device and hand for a flight record.

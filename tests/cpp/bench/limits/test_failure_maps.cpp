@@ -213,10 +213,9 @@ bool generates(const ForceModel& model, const DeviceProfile& device) {
         for (const int pace : {1, 3, 10}) {
             const PacingHand hand{share * radius, pace, 1e6, device.period_s, device.late_samples() + 2};
             const ClosedLoopEnd end =
-                with_structure(model, scheme, device.period_s, device.force_limit, [&](auto structure) {
-                    return closed_loop(std::move(structure), device, hand, ticks, {2, start, 0.0, unguarded},
-                                       [](const Tick&, const Motion&, const EnergyAccount&) { return true; });
-                });
+                closed_loop(make_structure(model, scheme, device.period_s, device.force_limit), device, hand,
+                            ticks, {2, start, 0.0, unguarded},
+                            [](const Tick&, const Motion&, const EnergyAccount&) { return true; });
             if (end.energy.motor + end.energy.dissipated < -held - 1e-9 * end.energy.throughput) {
                 return true;
             }

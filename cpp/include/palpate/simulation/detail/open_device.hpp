@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "palpate/fields/readable.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/run/live_device.hpp"
+#include "palpate/run/measure.hpp"
+#include "palpate/run/open_inverse3.hpp"
+#include "palpate/run/open_usb.hpp"
+#include "palpate/run/render.hpp"
+#include "palpate/simulation/faulty_device.hpp"
+#include "palpate/simulation/open_device.hpp"
+#include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/test_rig.hpp"
+
+// Definitions of the functions that open every kind of device. The libraries of the devices take long to compile.
+namespace palpate {
+
+/// Opens the simulated device for rendering. Its profile is that of the model's certificate if the run follows the
+/// plan, otherwise the default knob, scaled to the model.
+[[nodiscard]] inline std::unique_ptr<LiveDevice> open_simulated(const RenderOptions& options,
+                                                                const PlannedModel& model) {
+    const bool planned = follows_certificate(options, model);
+    const double rate_hz = planned ? 1.0 / model.certificate->device.period_s : options.loop.rate_hz;
+    if (options.rate_given && std::abs(options.loop.rate_hz - rate_hz) > 1e-6 * rate_hz) {
+        refuse("rate_hz is " + readable(options.loop.rate_hz) + ", but the certificate is for " +
+               readable(rate_hz) +
+               " Hz: make a plan for a device with the period 1 / rate_hz, or set uncertified");
+    }
+    LoopSettings loop = options.loop;
+    loop.rate_hz = rate_hz;
+    validate(loop);
+    const double period_s = 1.0 / rate_hz;
+    TestRig rig = rig_for(model.model, model.position_unit == "rad", period_s);
+    if (planned) {
+        rig.device = model.certificate->device;
+    }
+    const double largest_speed =
+        options.largest_speed.value_or(guards_for(rig.scale, rig.device).largest_speed);
+    std::vector<Fault> faults;
+    faults.reserve(options.faults.size());
+    for (const std::string& fault : options.faults) {
+        faults.push_back(parse_fault(fault, period_s));
+    }
+    auto live = std::make_unique<LiveDeviceOf<Faulty<SimulatedDevice>>>(
+        Faulty{SimulatedDevice{rig.device, rig.hand, simulated_substeps(period_s)}, faults,
+               3.0 * largest_speed * period_s});
+    if (const Opened opened = live->open(); !opened) {
+        refuse(opened.reason);
+    }
+    live->title = rig.device.id + " (simulated: no device moves)";
+    live->profile = rig.device;
+    live->scale = rig.scale;
+    live->rate_hz = rate_hz;
+    live->metadata = simulated_metadata(rig);
+    live->simulated = true;
+    return live;
+}
+
+PALPATE_INLINE std::unique_ptr<LiveDevice> open_device(const RenderOptions& options,
+                                                       const PlannedModel& model) {
+    const std::string kind = options.device.substr(0, options.device.find(':'));
+    const bool whole = options.device == kind;
+    if (!(kind == "simulated" && whole) &&
+        !((kind == "usb" || kind == "inverse3") && (whole || options.device.size() > kind.size() + 1))) {
+        refuse("device is '" + options.device +
+               "', must be simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]");
+    }
+    if (kind != "simulated" && !options.faults.empty()) {
+        refuse(
+            "faults is set: must be empty for a real device, because only the simulated device simulates "
+            "faults");
+    }
+    if (kind != "usb" && rendered_by_device(options, model)) {
+        const DeviceProfile& certified = model.certificate->device;
+        refuse(
+            model.name + " is planned for the motor controller of " + certified.id + " at " +
+            readable(1.0 / certified.period_s) +
+            " Hz: set device to a USB device that contains the exported model, or make a plan for the host "
+            "with 'palpate plan' without on_device");
+    }
+    if (model.force_unit == "A") {
+        refuse("the model's force is a motor current in A: identify it with --torque-constant-Nm-per-A");
+    }
+    return kind == "usb"        ? open_usb(options, model)
+           : kind == "inverse3" ? open_inverse3(options, model)
+                                : open_simulated(options, model);
+}
+
+PALPATE_INLINE std::unique_ptr<LiveDevice> device_to_measure(MeasureOptions& options,
+                                                             const std::optional<ForceModel>& object) {
+    if (options.device == "usb" || options.device.starts_with("usb:")) {
+        return usb_to_measure(options);
+    }
+    detail::require(options.device == "simulated",
+                    "device is '" + options.device + "', must be simulated or usb[:SERIAL]");
+    detail::require(!options.device_renders, "device_renders needs a USB device that contains a model");
+    detail::require(object || options.record.empty(),
+                    "the simulated device has no object: set object to a model file");
+    validate(options.loop);
+    const double period_s = 1.0 / options.loop.rate_hz;
+    TestRig rig;
+    rig.device.period_s = period_s;
+    if (object) {
+        rig = rig_for(*object, options.units.position == "rad", period_s);
+        options.lower = options.lower.value_or(object->domain().lower[0]);
+        options.upper = options.upper.value_or(object->domain().upper[0]);
+    }
+    if (options.moves()) {
+        rig.hand.stiffness = rig.hand.damping = 0.0;  // the device moves the handle, so no hand holds it
+    }
+    rig.device.coulomb_friction = options.friction_share * rig.device.force_limit;
+    validate(rig.device);
+    SimulatedRig device{rig.device, rig.hand, simulated_substeps(period_s)};
+    const bool transducer = object && options.transducer;
+    if (object) {
+        device.mount({object_of(*object, rig, 0.0), transducer});
+    }
+    auto live = std::make_unique<LiveDeviceOf<SimulatedRig>>(std::move(device));
+    live->title = rig.device.id;
+    live->profile = rig.device;
+    live->scale = rig.scale;
+    live->rate_hz = options.loop.rate_hz;
+    live->metadata = {
+        {"simulated",
+         "yes: the device, the hand and the object are simulated, and no value was measured on hardware"},
+        {"device", rig.device.id}};
+    live->simulated = true;
+    live->transducer = transducer;
+    return live;
+}
+
+}  // namespace palpate
