@@ -97,14 +97,16 @@ class Explicit {
     }
 
     E environment_;
-    Inertia inertia_;
-    VirtualCoupling coupling_;
-    double period_;
-    typename E::State state_;
-    double device_ = 0.0;    ///< x_{k-1}, last position of the device
+    // The state of the last step stands between constants. Compilers store adjacent variables together, and the next
+    // step would wait longer for such a store.
     double position_ = 0.0;  ///< y_{k-1}, last position of the object
+    Inertia inertia_;
     double velocity_ = 0.0;  ///< v_{k-1}, last velocity of the object
-    double force_ = 0.0;     ///< F_{k-1}, last force of the coupling
+    VirtualCoupling coupling_;
+    double force_ = 0.0;  ///< F_{k-1}, last force of the coupling
+    double period_;
+    double device_ = 0.0;  ///< x_{k-1}, last position of the device
+    typename E::State state_;
 };
 
 /// Builds the explicit structure.

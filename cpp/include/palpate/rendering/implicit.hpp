@@ -124,8 +124,12 @@ class Implicit {
     E environment_;
     VirtualCoupling coupling_;
     double period_;
-    double force_limit_;      ///< F_max, largest force sent to the device [N or N*m]
+    double force_limit_;  ///< F_max, largest force sent to the device [N or N*m]
+    // The state of the last step stands between constants. Compilers store adjacent variables together, and the next
+    // step would wait longer for such a store.
+    double position_ = 0.0;   ///< y_{k-1}, last position of the object
     double inertial_;         ///< m/T^2
+    double before_ = 0.0;     ///< y_{k-2}, position of the object before the last one
     double coupled_slope_;    ///< slope p of the load line with the coupling
     double uncoupled_slope_;  ///< slope p of the load line without the coupling
     /// Factor of the last position y_{k-1} in the load line's q: 2m/T^2 + B_o/T + B_c/T
@@ -136,9 +140,7 @@ class Implicit {
     Solver uncoupled_;
     typename E::State state_;
     typename Solver::Memory memory_;
-    double device_ = 0.0;    ///< x_{k-1}, last position of the device
-    double position_ = 0.0;  ///< y_{k-1}, last position of the object
-    double before_ = 0.0;    ///< y_{k-2}, position of the object before the last one
+    double device_ = 0.0;  ///< x_{k-1}, last position of the device
 };
 
 /// Builds the implicit structure.

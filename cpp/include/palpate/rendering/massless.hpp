@@ -76,13 +76,15 @@ class Massless {
     }
 
     E environment_;
+    // The state of the last step stands between constants. Compilers store adjacent variables together, and the next
+    // step would wait longer for such a store.
+    double position_ = 0.0;  ///< y_{k-1}, last position of the object
     VirtualCoupling coupling_;
     double period_;
     Solver solver_;
     typename E::State state_;
     typename Solver::Memory memory_;
-    double device_ = 0.0;    ///< x_{k-1}, last position of the device
-    double position_ = 0.0;  ///< y_{k-1}, last position of the object
+    double device_ = 0.0;  ///< x_{k-1}, last position of the device
 };
 
 /// Builds the massless structure.
