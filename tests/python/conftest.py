@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Test fixtures: the folder of measured recordings, small recording files, and a terminal."""
+"""Test fixtures: the folder of measured recordings, small recording files, a terminal; samples of cases."""
 
 import os
 import pty
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,6 +18,11 @@ sys.path.insert(0, str(ROOT / "tests" / "clock"))
 # A shell that starts the tests in the background makes the tests and their child processes ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def sampled(cases: Iterable[Any], *kept: Any) -> list[Any]:
+    """Returns the cases of a parametrised test: `make test` runs those to keep, `make test-full` all."""
+    return [each if each in kept else pytest.param(each, marks=pytest.mark.full) for each in cases]
 
 
 def measured_data() -> Path | None:
