@@ -22,7 +22,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 def sampled(cases: Iterable[Any], *kept: Any) -> list[Any]:
     """Returns the cases of a parametrised test: `make test` runs those to keep, `make test-full` all."""
-    return [each if each in kept else pytest.param(each, marks=pytest.mark.full) for each in cases]
+
+    def of_the_full_run(case: Any) -> Any:
+        values = case if isinstance(case, tuple) else (case,)
+        return pytest.param(*values, marks=pytest.mark.full)
+
+    return [case if case in kept else of_the_full_run(case) for case in cases]
 
 
 def measured_data() -> Path | None:

@@ -17,6 +17,7 @@ import pandas as pd
 import pytest
 
 import palpate
+from conftest import sampled
 from palpate.cli.main import main
 from palpate.errors import InputError
 from palpate.identification.identify_files import (
@@ -100,7 +101,7 @@ def test_scatter_within_cells_is_the_noise() -> None:
 
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
-@pytest.mark.parametrize("step", [0.0, 1e-3], ids=["any-position", "encoder"])
+@pytest.mark.parametrize("step", sampled([0.0, 1e-3], 1e-3), ids=["any-position", "encoder"])
 def test_the_model_is_that_of_all_rows_at_once(tmp_path: Path, suffix: str, step: float) -> None:
     file, frame = tmp_path / f"press.{suffix}", rows(30_000, step=step)
     frame.to_csv(file, index=False) if suffix == "csv" else frame.to_parquet(file, row_group_size=4_000)
@@ -414,7 +415,7 @@ def read(recording: LongRecording) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("size", sampled(SIZES, "half", "one-and-a-row", "two-and-a-half"))
 @pytest.mark.parametrize("columns", ["numbers", "text", "direction"])
 def test_every_row_is_used_once(tmp_path: Path, suffix: str, size: str, columns: str) -> None:
     n = SIZES[size]
@@ -431,7 +432,7 @@ def test_every_row_is_used_once(tmp_path: Path, suffix: str, size: str, columns:
     assert palpate.identify_files(file, max_wavelets=1).data.rows == n
 
 
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("size", sampled(SIZES, "half", "one-and-a-row", "two-and-a-half"))
 @pytest.mark.parametrize("part_rows", [150, 1_000_000], ids=["parts", "one-part"])
 def test_every_row_is_used_once_where_text_appears_late(tmp_path: Path, size: str, part_rows: int) -> None:
     n = SIZES[size]
@@ -460,7 +461,7 @@ def test_dropped_rows_are_reported_by_the_command(tmp_path: Path, capsys: pytest
     assert "dropped 1 row without a direction in direction (first: line 502)" in printed
 
 
-@pytest.mark.parametrize("part_rows", [20, 90, 333, 1_000_000])
+@pytest.mark.parametrize("part_rows", sampled([20, 90, 333, 1_000_000], 90, 1_000_000))
 @pytest.mark.parametrize("separator", [",", ";", "\t"], ids=["comma", "semicolon", "tab"])
 def test_line_breaks_in_quotes_and_blank_lines_lose_no_row(
     tmp_path: Path, part_rows: int, separator: str

@@ -23,7 +23,7 @@ from any_input import SCALE
 from palpate import IdentifyOptions, SearchOptions, WaveletNetworkRegressor
 
 
-@parametrize_with_checks([WaveletNetworkRegressor(max_wavelets=2 if SCALE == 1 else 50)])
+@parametrize_with_checks([WaveletNetworkRegressor(**({"max_wavelets": 2} if SCALE == 1 else {}))])
 @pytest.mark.filterwarnings("ignore")
 def test_scikit_learn_estimator_checks_pass(estimator: Any, check: Any) -> None:
     check(estimator)

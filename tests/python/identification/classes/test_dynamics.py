@@ -25,7 +25,8 @@ SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
 DRAWS = 100 if SCALE > 1 else 1
 MOST_MISJUDGED = 5 if SCALE > 1 else 0
 SECONDS = 10.0 if SCALE > 1 else 3.0
-"""Duration of a recording."""
+"""Duration of a recording [s]."""
+
 
 ENCODER_STEP = 2.0 * np.pi / 65536
 NOISE = 0.02
@@ -72,7 +73,7 @@ def test_mass_and_damping_are_recovered_from_one_recording() -> None:
         ({}, "position", "position"),
         ({"damping": 0.03}, "velocity", "position"),
         ({"hysteresis": 0.1}, "hysteresis", "hysteresis"),
-        ({"hysteresis": 0.1, "damping": 0.03}, "velocity", "hysteresis"),
+        pytest.param({"hysteresis": 0.1, "damping": 0.03}, "velocity", "hysteresis", marks=pytest.mark.full),
     ],
     ids=["neither", "velocity", "hysteresis", "both"],
 )
@@ -143,6 +144,7 @@ def test_friction_without_passive_hysteresis_makes_velocity_an_input() -> None:
     )
 
 
+@pytest.mark.full
 def test_friction_explained_by_hysteresis_is_hysteresis() -> None:
     model = identify(jointed(1, 0.3, viscous=0.0))
     assert model.kind == "hysteresis"
@@ -244,6 +246,7 @@ def test_values_of_the_first_round_stay_if_the_second_has_none(monkeypatch: pyte
     assert (model.fit.model_class, model.damping) == ("velocity", pytest.approx(0.03, rel=0.1))
 
 
+@pytest.mark.full
 def test_gaps_and_uneven_steps_do_not_disturb_mass_and_damping() -> None:
     whole = moved(3, seconds=6.0 * SECONDS, mass=2e-3, damping=0.06)
     random = np.random.default_rng(0)

@@ -57,7 +57,11 @@ def identified(*tau: float) -> Model:
     return palpate.identify(position, force, time=time)
 
 
-@pytest.mark.parametrize("tau", [[0.7], [0.3, 4.0], [0.2, 1.1, 6.0]], ids=["one", "two", "three"])
+@pytest.mark.parametrize(
+    "tau",
+    [[0.7], pytest.param([0.3, 4.0], marks=pytest.mark.full), [0.2, 1.1, 6.0]],
+    ids=["one", "two", "three"],
+)
 def test_known_branches_are_found(tau: list[float]) -> None:
     model = identified(*tau)
     assert model.kind == model.fit.model_class == "memory"
@@ -96,6 +100,7 @@ def test_nonlinear_damping_does_not_become_a_branch_with_fewer_parameters() -> N
     assert any("may raise it by at most" in line for line in model.notes["model_selection"])
 
 
+@pytest.mark.full
 def test_a_curved_force_at_rest_does_not_hide_a_branch() -> None:
     time, position = ramps_and_holds(21)
     memory = Memory(
