@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Test fixtures: the folder of measured recordings, small recording files, and a terminal."""
+"""Test fixtures: the folder of measured recordings, small recording files, a terminal; samples of cases."""
 
 import os
 import pty
@@ -20,10 +20,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def full_except(kept: Iterable[Any], cases: Iterable[Any]) -> list[Any]:
-    """Returns the cases of a test; `make test` runs those in `kept`, and `make test-full` runs all."""
-    kept = list(kept)
-    return [case if case in kept else pytest.param(case, marks=pytest.mark.full) for case in cases]
+def sampled(cases: Iterable[Any], *kept: Any) -> list[Any]:
+    """Returns the cases of a parametrized test: `make test` runs those to keep, `make test-full` all."""
+
+    def of_the_full_run(case: Any) -> Any:
+        values = case if isinstance(case, tuple) else (case,)
+        return pytest.param(*values, marks=pytest.mark.full)
+
+    return [case if case in kept else of_the_full_run(case) for case in cases]
 
 
 def measured_data() -> Path | None:

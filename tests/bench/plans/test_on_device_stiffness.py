@@ -14,6 +14,7 @@ PAGE = ROOT / "docs" / "certificate.md"
 NUMBERS = PAGE.parent / "figures" / "on-device.json"
 
 
+@pytest.mark.full
 def test_writes_figure_numbers_and_tables(tmp_path: Path) -> None:
     page = tmp_path / PAGE.name
     page.write_text(PAGE.read_text(encoding="utf-8"), encoding="utf-8")

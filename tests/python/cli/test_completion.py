@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import full_except
+from conftest import sampled
 from palpate.cli.completion import SHELLS, files_with
 
 PROGRAMS = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
@@ -71,11 +71,10 @@ CASES = [
 """Words, and what the shell receives for the last of them"""
 
 
-@pytest.mark.parametrize("case", full_except(CASES[1::5], CASES), ids=lambda case: " ".join(case[0]))
+@pytest.mark.parametrize(("words", "expected"), sampled(CASES, *CASES[1::5]), ids=" ".join)
 def test_bash_completes_verbs_options_values_and_files_by_type(
-    case: tuple[list[str], list[str]], folder: Path
+    words: list[str], expected: list[str], folder: Path
 ) -> None:
-    words, expected = case
     assert in_bash(folder, "palpate", *words) == expected
 
 

@@ -199,7 +199,9 @@ def largest_delay(service: Service, last: int) -> int:
     return int((messages[np.searchsorted(newest, states)] - states).max())
 
 
-def test_no_force_is_older_than_certified_with_random_faults_of_the_service(spring: Path, tmp_path: Path) -> None:
+def test_no_force_is_older_than_certified_with_random_faults_of_the_service(
+    spring: Path, tmp_path: Path
+) -> None:
     """Random answers are late, lost or held back together, or come without a message."""
     model = certified(tmp_path, spring, delay_s=ALLOWED_MS * 1e-3)
     generator = np.random.default_rng(3)

@@ -5,6 +5,8 @@ import importlib.util
 import sys
 from types import ModuleType
 
+import pytest
+
 from any_input import SCALE
 from conftest import ROOT
 
@@ -21,5 +23,6 @@ def compare_readers() -> ModuleType:
     return module
 
 
+@pytest.mark.full
 def test_the_readers_agree_on_mutated_files() -> None:
     assert compare_readers().compare(2000 * SCALE, 1) == []

@@ -8,7 +8,9 @@ from typing import Any
 import openpyxl
 import pytest
 
+from any_input import SCALE
 from palpate import InputError, read_recording
+from palpate.recording.files import MEMORY_LIMIT
 
 HEADER = ("position_mm", "force_N")
 
@@ -87,8 +89,13 @@ def test_columns_without_a_name_are_refused(tmp_path: Path, first: int) -> None:
 
 
 @pytest.mark.parametrize("element", ["<c/>", "<row/>", "<x/>", "<row><c/></row>"])
-def test_a_workbook_that_needs_too_much_memory_is_refused(tmp_path: Path, element: str) -> None:
-    path, count = tmp_path / "a.xlsx", 4 * 11_000_000 // element.count("<")
+def test_a_workbook_that_needs_too_much_memory_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, element: str
+) -> None:
+    """The short run divides the limit and the size of the workbook by 100."""
+    limit = MEMORY_LIMIT // (100 if SCALE == 1 else 1)
+    monkeypatch.setattr("palpate.recording.files.MEMORY_LIMIT", limit)
+    path, count = tmp_path / "a.xlsx", limit // 98 // element.count("<")
     good_path = workbook(tmp_path / "b.xlsx", ("run", "visible", rows()))
     with zipfile.ZipFile(good_path) as good, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as bad:
         for name in good.namelist():
@@ -98,6 +105,7 @@ def test_a_workbook_that_needs_too_much_memory_is_refused(tmp_path: Path, elemen
                 content = before + element.encode() * count + mark + after
             bad.writestr(name, content)
     with pytest.raises(
-        InputError, match=r"a.xlsx needs at least \d+(\.\d+)? GiB of memory, and the limit is 4"
+        InputError,
+        match=rf"a.xlsx needs at least \d+(\.\d+)? GiB of memory, and the limit is {limit / 2**30:.3g} GiB",
     ):
         read_recording(path)

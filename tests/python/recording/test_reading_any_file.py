@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-from any_input import cases, is_one_sentence
+from any_input import SCALE, cases, is_one_sentence
 from palpate import InputError, Recording, read_recording
 from palpate.recording import sample_recording
 
@@ -186,7 +186,7 @@ OPTIONS = st.fixed_dictionaries(
 )
 
 
-@cases(150)
+@cases(50 if SCALE == 1 else 150)
 @given(table=tables(), options=st.one_of(st.just({}), st.just({"invalid": "drop"}), OPTIONS))
 def test_any_table_is_read_or_refused(
     table: tuple[bytes, int | None], options: dict[str, Any], tmp_path_factory: pytest.TempPathFactory

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import palpate
-from conftest import measured_data
+from conftest import measured_data, sampled
 from palpate import InputError, Recording, read_recording
 from palpate.recording import sample_recording
 from palpate.recording.units import unit_of
@@ -167,7 +167,7 @@ def read(path: Path) -> Recording:
     return read_recording(path, **options_in(str(refused.value)))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("seed", range(VARIANTS))
+@pytest.mark.parametrize("seed", sampled(range(VARIANTS), *range(0, VARIANTS, 7)))
 def test_a_variant_is_read_as_the_clean_recording(tmp_path: Path, seed: int) -> None:
     random = np.random.default_rng(seed)
     all_sources = sources()
@@ -202,7 +202,7 @@ def same_model(model: palpate.Model, expected: palpate.Model, clean: Recording) 
         assert np.abs(difference).max() < 0.01 * np.ptp(clean.force)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", sampled(range(8), 0, 1, 2))
 def test_thousands_separators_are_refused_and_the_command_gives_the_clean_recording(
     tmp_path: Path, seed: int
 ) -> None:

@@ -223,6 +223,7 @@ def test_model_with_a_small_error_has_no_finding() -> None:
     assert explained_findings(x, wall(x), wall(x) - wall(x).mean(), None, 1.0) == []
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not DATA.is_dir(), reason="needs measured data, set PALPATE_DATA")
 @pytest.mark.parametrize(
     ("name", "least"),

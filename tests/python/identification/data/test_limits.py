@@ -2,6 +2,7 @@
 """Repeated rows, held samples, coarse forces and correlated noise give no false structure."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -65,16 +66,21 @@ IMPERFECT: dict[str, Callable[[Law], palpate.Recording]] = {
 }
 
 
+@cache
+def identified(name: str, law: Law) -> palpate.Model:
+    return palpate.identify(IMPERFECT[name](law))
+
+
 @pytest.mark.parametrize("name", IMPERFECT)
 def test_straight_line_is_found_in_imperfect_rows(name: str) -> None:
-    model = palpate.identify(IMPERFECT[name](line))
+    model = identified(name, line)
     assert model.n_wavelets <= 1
     assert true_nrmse(model, line) < 0.01
 
 
 @pytest.mark.parametrize("name", IMPERFECT)
 def test_wall_is_found_with_few_wavelets(name: str) -> None:
-    model = palpate.identify(IMPERFECT[name](wall))
+    model = identified(name, wall)
     assert 3 <= model.n_wavelets <= 8
     assert true_nrmse(model, wall) < 0.008
 
@@ -125,7 +131,7 @@ def test_position_noise_is_that_of_pauses() -> None:
 
 
 def test_correlation_is_named_in_the_notes() -> None:
-    model = palpate.identify(correlated(0.9)(wall))
+    model = identified("noise of correlation 0.9", wall)
     assert any("The noise is correlated" in note for note in model.notes["identification"])
     assert model.fit.nrmse == pytest.approx(NOISE / np.std(wall(sweep(N))), rel=0.25)
 

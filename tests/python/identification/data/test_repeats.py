@@ -5,11 +5,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from any_input import SCALE
+from conftest import sampled
 from palpate.identification.data.repeats import Repeats, band_of, deviations, pure_error, row_noise
 
 Array = NDArray[np.float64]
 
 X = np.linspace(0.0, 1.0, 300)
+
+DRAWS = 100 if SCALE == 1 else 300
 
 
 def draw(random: np.random.Generator, shared: float, by_row: float) -> Array:
@@ -19,12 +23,12 @@ def draw(random: np.random.Generator, shared: float, by_row: float) -> Array:
     return np.asarray(smooth + by_row * (0.3 + X) * random.normal(size=len(X)))
 
 
-@pytest.mark.parametrize("n", [3, 5, 10])
+@pytest.mark.parametrize("n", sampled([3, 5, 10], 3, 10))
 @pytest.mark.parametrize(("shared", "by_row"), [(0.0, 1.0), (1.0, 0.0), (1.0, 0.3), (0.3, 1.0)])
 def test_the_band_contains_95_percent_of_a_further_recording(n: int, shared: float, by_row: float) -> None:
     random = np.random.default_rng(n)
     inside = []
-    for _ in range(300):
+    for _ in range(DRAWS):
         *seen, unseen = (draw(random, shared, by_row) for _ in range(n + 1))
         mean = np.polynomial.Polynomial.fit(np.tile(X, n), np.concatenate(seen), 5)(X)
         residual = np.concatenate([each - mean for each in seen])
@@ -38,7 +42,7 @@ def test_the_band_contains_95_percent_of_a_further_recording(n: int, shared: flo
 def test_the_band_of_objects_contains_95_percent_of_a_further_object() -> None:
     random = np.random.default_rng(1)
     inside, inside_repeat = [], []
-    for _ in range(300):
+    for _ in range(DRAWS):
         of_object = [draw(random, 3.0, 0.0) for _ in range(7)]
         *seen, unseen = ([each + draw(random, 0.5, 0.1) for _ in range(3)] for each in of_object)
         rows = [row for group in seen for row in group]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import palpate
+from any_input import SCALE
 from palpate import InputError, Recording, identify, load_model, read_recording, verify
 from palpate._core.dynamics import environment_filters
 from palpate.cli.main import main
@@ -149,7 +150,8 @@ def test_hysteresis_is_not_tested_if_one_recording_lacks_direction() -> None:
 def test_measured_probing_of_organs_is_a_force_of_depth_and_place(data: Path) -> None:
     """The models have three inputs (depth and two coordinates of the place); every fifth row is held out."""
     errors = []
-    for path in sorted((data / "organ_probing").glob("*.csv"))[::3]:
+    files = sorted((data / "organ_probing").glob("*.csv"))[::3]
+    for path in files[1:2] if SCALE == 1 else files:
         recording = palpate.read_recording(
             path, position="depth_mm", force="normal_force_N", inputs=("contact_x_mm", "contact_y_mm")
         )
@@ -234,6 +236,7 @@ def test_a_period_of_several_inputs_is_refused() -> None:
         fit_environment(X, X.sum(axis=1), None, IdentifyOptions(period=1.0), names=("position", "load"))
 
 
+@pytest.mark.full
 def test_measured_turns_are_identified_with_their_period(data: Path) -> None:
     for path in sorted((data / "motor_cogging").glob("map_*.csv")):
         kept, held = read_recording(path, position="angle_rad", force="hold_current_A").split(5)
@@ -274,12 +277,13 @@ def test_target_is_force_minus_filtered_motion() -> None:
 
 
 def test_the_model_holds_the_assumed_mass_and_damping() -> None:
-    recording = sample_recording(1, duration_s=5.0)
+    recording = sample_recording(1, duration_s=2.0)
     model = identify(recording, search=SearchOptions(filters="paper-explicit"))
     assert (model.mass, model.damping) == (1e-3, 0.5)
     assert identify(recording, search=SearchOptions(filters="paper-implicit")).damping is None
 
 
+@pytest.mark.full
 def test_matched_identification_of_a_moving_object_is_closer_to_its_force() -> None:
     """Known truth: the lag of the paper causes an error, the matched route uses raw positions and forces."""
     recording = sample_recording(1, duration_s=20.0)

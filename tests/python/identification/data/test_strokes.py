@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from any_input import SCALE
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate.cli.main import main
 from palpate.identification.data.strokes import strokes_of
@@ -236,7 +237,7 @@ def test_measured_strokes_are_found_in_the_order_of_rows(data: Path) -> None:
 
 def test_measured_recordings_without_direction_are_identified_as_well(data: Path) -> None:
     """The NRMSE is at most 1.05 times that of the file with directions; equal strokes give equal models."""
-    for path in measured_files(data):
+    for path in measured_files(data)[:: 16 if SCALE == 1 else 1]:
         stated = replace(read_recording(path), time=None)
         unstated = replace(stated, direction=None)
         assert stated.direction is not None
