@@ -199,7 +199,7 @@ def largest_delay(service: Service, last: int) -> int:
     return int((messages[np.searchsorted(newest, states)] - states).max())
 
 
-def test_no_force_is_older_than_certified_with_random_faults_of_the_service(
+def test_random_faults_of_the_service_make_no_force_older_than_certified(
     spring: Path, tmp_path: Path
 ) -> None:
     """Random answers are late, lost or held back together, or come without a message."""
