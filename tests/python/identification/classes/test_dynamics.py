@@ -261,6 +261,7 @@ def test_gaps_and_uneven_steps_do_not_disturb_mass_and_damping() -> None:
     assert model.damping == pytest.approx(0.06, rel=0.05)
 
 
+@pytest.mark.full
 def test_several_recordings_of_one_object_are_one_regression() -> None:
     parts = [moved(seed, seconds=2.0 * SECONDS, mass=2e-3, damping=0.06) for seed in range(3)]
     model = identify(parts)

@@ -44,7 +44,7 @@ def test_a_motion_that_begins_in_the_middle_of_its_play_is_fitted_to_its_noise()
 @pytest.mark.parametrize(
     ("radius", "noise"),
     [
-        (0.0033, 0.0),
+        pytest.param(0.0033, 0.0, marks=pytest.mark.full),
         pytest.param(0.0071, 0.0, marks=pytest.mark.full),
         pytest.param(0.0033, 2e-3, marks=pytest.mark.full),
         (0.0071, 2e-3),
