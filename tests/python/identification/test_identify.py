@@ -158,7 +158,6 @@ def test_error_of_measured_strokes_does_not_grow(
     "folder",
     sampled(
         ["motor_cogging", "vhb4910_viscoelastic", "afm_indentation", "magnet_attraction"],
-        "afm_indentation",
         "magnet_attraction",
     ),
 )

@@ -128,6 +128,7 @@ def jointed(seed: int, friction: float, viscous: float = 0.3) -> Recording:
     return Recording.from_arrays(x, force, time, units={"position": "rad", "force": "N*m"})
 
 
+@pytest.mark.full
 def test_friction_without_passive_hysteresis_makes_velocity_an_input() -> None:
     """Torque of a motor that drives the joint: it has the opposite sign."""
     kept, held = jointed(1, -0.3).split(5)

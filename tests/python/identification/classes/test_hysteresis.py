@@ -63,6 +63,7 @@ def test_play_radius_between_the_options_is_found_without_more_wavelets(radius: 
     assert model.fit.nrmse * np.std(force) < 1.02 * noise + 1e-4 * np.ptp(force)
 
 
+@pytest.mark.full
 def test_short_strokes_along_a_sweep_are_as_simple_as_long_ones() -> None:
     """Press a little, release a little, while the mean advances: both strokes cover every position."""
     k = np.arange(10_000)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from any_input import SCALE
 from palpate._core.model import wavelet_columns
 from palpate._typing import Float1D, Float2D
 from palpate.identification import IdentifyOptions
@@ -32,8 +31,6 @@ from palpate.identification.search.growth import (
 )
 
 OPTIONS = IdentifyOptions()
-
-ROWS = 8000 if SCALE == 1 else 20_000
 
 
 def kinked(noise: float, seed: int = 0) -> SeparableProblem:
@@ -190,12 +187,13 @@ def test_wavelets_use_only_the_inputs_that_they_need() -> None:
     assert error_on_fresh_rows(found) < 0.008
 
 
+@pytest.mark.full
 def test_growth_on_parts_of_many_rows_costs_less_at_the_same_error(monkeypatch: pytest.MonkeyPatch) -> None:
     """Counts the rows of all refinement steps: they take most of the time."""
-    step, problem = SeparableProblem.normal_equations, over_four_inputs(ROWS, 0.05)
+    step, problem = SeparableProblem.normal_equations, over_four_inputs(20_000, 0.05)
     monkeypatch.setattr(growth, "MOST_LIBRARY_ROWS", 1000)
     rows, errors = [0, 0], []
-    for case, least in enumerate((1000, ROWS)):
+    for case, least in enumerate((1000, 20_000)):
 
         def counted(at: SeparableProblem, solution: Solution, case: int = case) -> tuple[Float2D, Float1D]:
             rows[case] += sum(len(block.target) for block in at.blocks)
