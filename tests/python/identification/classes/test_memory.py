@@ -153,7 +153,7 @@ def test_irregular_times_and_several_recordings_are_one_object() -> None:
 
 
 @pytest.mark.parametrize(
-    ("tau", "seconds"), [([0.3], 2.0), pytest.param([0.3, 2.0], 8.0, marks=pytest.mark.full)]
+    ("tau", "seconds"), [([0.3], 1.5), pytest.param([0.3, 2.0], 8.0, marks=pytest.mark.full)]
 )
 def test_a_rendered_memory_is_identified_again_within_a_just_noticeable_difference(
     tau: list[float], seconds: float

@@ -299,7 +299,7 @@ def test_the_model_holds_the_assumed_mass_and_damping() -> None:
     recording = sample_recording(1, duration_s=5.0)
 
     def filtered(filters: str) -> Model:
-        return identify(recording, max_wavelets=1, search=SearchOptions(filters=filters))
+        return identify(recording, inputs="position", max_wavelets=1, search=SearchOptions(filters=filters))
 
     model = filtered("paper-explicit")
     assert (model.mass, model.damping) == (1e-3, 0.5)
