@@ -167,7 +167,7 @@ def test_the_order_of_recordings_has_no_effect(kind: str) -> None:
     assert np.abs(forces(turned) - forces(model)).max() <= NOISE * spread
 
 
-@pytest.mark.parametrize("kind", sampled(KINDS, "hysteresis"))
+@pytest.mark.parametrize("kind", sampled(KINDS, "position"))
 def test_a_recording_that_is_given_twice_has_no_other_model(kind: str) -> None:
     model = identified([recorded(kind), recorded(kind)], kind)
     assert model.kind == kind

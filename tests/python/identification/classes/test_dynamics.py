@@ -216,14 +216,14 @@ def to_and_fro(seed: int, speeds: list[float], *, damping: float, noise: float =
 def test_damping_is_not_tested_at_one_speed_but_at_two() -> None:
     """At one speed the velocity is proportional to its sign, and Coulomb friction explains a loop of constant
     height equally well."""
-    repeats = 1 if SCALE == 1 else 2
+    rounds = 1 if SCALE == 1 else 2
     for seed in range(1 if SCALE == 1 else 20):
-        one = identify(to_and_fro(seed, [0.3] * 3 * repeats, damping=0.06))
+        one = identify(to_and_fro(seed, [0.3] * 2 * rounds, damping=0.06))
         assert (one.kind, one.damping) == ("hysteresis", None)
         decisions = [line for line in one.notes["model_selection"] if line.startswith("damping: not tested")]
         assert len(decisions) == 1
         assert "the speed was nearly constant: it varies by " in decisions[0]
-        two = identify(to_and_fro(seed, [0.15, 0.15, 0.45, 0.45] * repeats, damping=0.06))
+        two = identify(to_and_fro(seed, [0.15, 0.15, 0.45, 0.45] * rounds, damping=0.06))
         assert two.kind == "position"
         assert two.damping == pytest.approx(0.06, rel=0.05)
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import palpate
-from any_input import SCALE
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate._core.dynamics import environment_filters
 from palpate.cli.main import main
@@ -148,11 +147,11 @@ def test_hysteresis_is_not_tested_if_one_recording_lacks_direction() -> None:
     assert identify([stated, Recording.from_arrays(x, force)]).kind == "hysteresis"
 
 
+@pytest.mark.full
 def test_measured_probing_of_organs_is_a_force_of_depth_and_place(data: Path) -> None:
     """The models have three inputs (depth and two coordinates of the place); every fifth row is held out."""
     errors = []
-    files = sorted((data / "organ_probing").glob("*.csv"))[::3]
-    for path in files[1:2] if SCALE == 1 else files:
+    for path in sorted((data / "organ_probing").glob("*.csv"))[::3]:
         recording = palpate.read_recording(
             path, position="depth_mm", force="normal_force_N", inputs=("contact_x_mm", "contact_y_mm")
         )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from any_input import SCALE
 from palpate._core.model import wavelet_columns
 from palpate._typing import Float1D, Float2D
 from palpate.identification import IdentifyOptions
@@ -179,7 +180,7 @@ def error_on_fresh_rows(found: Grown) -> float:
 
 
 def test_wavelets_use_only_the_inputs_that_they_need() -> None:
-    problem = over_four_inputs(3000, 0.02)
+    problem = over_four_inputs(1000 if SCALE == 1 else 3000, 0.02)
     found = grown(problem)
     used = found.solution.basis.used
     assert np.count_nonzero(used.sum(axis=1) <= 2) > 0.6 * len(used)
