@@ -9,10 +9,15 @@ from bench.identification.noise import CASES, coarse_force, held_force, identifi
 
 UNEVEN = "noise that grows with position"
 
+SAMPLED = ("white noise", UNEVEN)
+
 DRAWS = 2 if os.environ.get("PALPATE_TEST_SCALE", "1") == "1" else 4
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [case if case in SAMPLED else pytest.param(case, marks=pytest.mark.full) for case in CASES],
+)
 def test_noise_on_a_line_adds_no_wavelet_and_no_hysteresis(case: str) -> None:
     found = measure(case, DRAWS, jobs=1)
     assert (found["no_wavelet"], found["no_hysteresis"], found["draws"]) == (DRAWS, DRAWS, DRAWS)

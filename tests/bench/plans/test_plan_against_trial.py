@@ -7,11 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "plan-against-trial.md"
 NUMBERS = PAGE.parent / "figures" / "plan-against-trial.json"
 
 
+@pytest.mark.full
 def test_runs_without_measured_data_and_names_the_omitted_objects(tmp_path: Path) -> None:
     page = tmp_path / PAGE.name
     page.write_text(PAGE.read_text(encoding="utf-8"), encoding="utf-8")

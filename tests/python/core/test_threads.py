@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from any_input import SCALE
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import Hand, plan, simulate, verify
 from palpate.identification import IdentifyOptions, fit_environment
 from palpate.recording.sample import sample_recording
 
 THREADS = 4
-ROUNDS = 5
+ROUNDS = 2 if SCALE == 1 else 5
 
 
 def evaluation() -> Any:

@@ -112,6 +112,7 @@ def magnitudes(case: Case) -> Array:
     )
 
 
+@pytest.mark.full
 def test_force_slope_and_energy_are_equal_in_cpp_and_python(program: Path) -> None:
     all_cases = list(cases())
     stream = b"".join(case.stream() for case in all_cases)
@@ -131,7 +132,7 @@ def test_force_slope_and_energy_are_equal_in_cpp_and_python(program: Path) -> No
             assert is_equal.all(), (case, python[~is_equal], expected[~is_equal])
 
 
-def test_inside_the_domain_the_force_is_equation_4(program: Path) -> None:
+def test_inside_the_domain_the_force_is_equation_4() -> None:
     for case in list(cases())[: NETWORKS // 4]:
         x = case.x[(case.x >= case.lower) & (case.x <= case.upper)]
         u = case.alpha * (x[:, None] - case.beta)

@@ -31,19 +31,24 @@ def with_time(n: int = 4000, amplitude: float = 2e-3) -> Recording:
     return Recording.from_arrays(0.01 * np.sin(time), force, time, units={"position": "m", "force": "N"})
 
 
+@pytest.fixture(scope="module")
+def timed() -> dict[str, Axes]:
+    """Returns the views of a recording with time."""
+    return views(with_time())
+
+
 def mesh_of(axes: Axes) -> Any:
     (mesh,) = (each for each in axes.collections if isinstance(each, QuadMesh))
     return mesh
 
 
-def test_labels_state_the_units_of_a_recording_with_time() -> None:
-    axes = views(with_time())
-    assert axes["history"].get_xlabel() == "time [s]"
-    assert axes["history"].get_ylabel() == "force [mN]"
-    assert axes["position"].get_xlabel() == "position [mm]"
-    assert axes["spectrum"].get_xlabel() == "power [mN\u00b2]"
-    assert {axes[name].get_ylabel() for name in VIEWS[2:]} == {"frequency [Hz]"}
-    bars = [each.get_xlabel() for each in axes["history"].figure.axes if each not in axes.values()]
+def test_labels_state_the_units_of_a_recording_with_time(timed: dict[str, Axes]) -> None:
+    assert timed["history"].get_xlabel() == "time [s]"
+    assert timed["history"].get_ylabel() == "force [mN]"
+    assert timed["position"].get_xlabel() == "position [mm]"
+    assert timed["spectrum"].get_xlabel() == "power [mN\u00b2]"
+    assert {timed[name].get_ylabel() for name in VIEWS[2:]} == {"frequency [Hz]"}
+    bars = [each.get_xlabel() for each in timed["history"].figure.axes if each not in timed.values()]
     assert bars == ["amplitude [mN]", "amplitude [mN]"]
 
 
@@ -65,23 +70,21 @@ def test_labels_state_the_units_of_a_recording_without_time(unit: str, label: st
     assert axes["spectrum"].get_xlabel() == "power [(N\u00b7m)\u00b2]"
 
 
-def test_the_transforms_share_one_frequency_axis() -> None:
-    axes = views(with_time())
-    assert len({axes[name].get_ylim() for name in VIEWS[2:]}) == 1
-    assert axes["spectrum"].get_ylim() == pytest.approx((0.25, 500.0), rel=1e-3)
+def test_the_transforms_share_one_frequency_axis(timed: dict[str, Axes]) -> None:
+    assert len({timed[name].get_ylim() for name in VIEWS[2:]}) == 1
+    assert timed["spectrum"].get_ylim() == pytest.approx((0.25, 500.0), rel=1e-3)
 
 
-def test_drawn_amplitudes_are_in_the_unit_of_the_colour_bar() -> None:
-    axes = views(with_time())
+def test_drawn_amplitudes_are_in_the_unit_of_the_colour_bar(timed: dict[str, Axes]) -> None:
     for name in ("short-time", "wavelet"):
-        mesh = mesh_of(axes[name])
+        mesh = mesh_of(timed[name])
         assert mesh.norm.vmax == pytest.approx(2.0, rel=0.15)
         assert mesh.norm.vmin == pytest.approx(mesh.norm.vmax / SHOWN_RANGE)
         assert mesh.get_array().shape[1] <= MOST_COLUMNS
 
 
 def test_a_short_peak_stays_visible_in_few_columns() -> None:
-    time = 1e-3 * np.arange(20_000)
+    time = 1e-3 * np.arange(10_000)
     force = np.exp(-0.5 * ((time - 7.0) / 0.003) ** 2)
     mesh = mesh_of(views(Recording.from_arrays(np.sin(time), force, time))["wavelet"])
     amplitude = np.asarray(mesh.get_array())

@@ -2,7 +2,7 @@
 """Any file is read with consistent numbers of rows, or refused with one sentence; in all formats."""
 
 import re
-import time
+from cProfile import Profile
 from pathlib import Path
 from typing import Any
 
@@ -17,19 +17,19 @@ from any_input import SCALE, cases, is_one_sentence
 from palpate import InputError, Recording, read_recording
 from palpate.recording import sample_recording
 
-LONGEST_S = 60.0
-"""A file of a few kilobytes that takes longer is a hang [s]."""
+MOST_CALLS = 1_000_000
+"""A file of a few kilobytes that needs more function calls is a hang; most need less than 20 000."""
 
 
 def result_of(path: Path, **options: Any) -> Recording | None:
     """Returns the recording in a file after checking it; None if the file is refused."""
-    start = time.monotonic()
+    profile = Profile()
     try:
-        recording = read_recording(path, **options)
+        recording = profile.runcall(read_recording, path, **options)
     except InputError as error:
         refusal = str(error)
         recording = None
-    assert time.monotonic() - start < LONGEST_S
+    assert sum(each.callcount for each in profile.getstats()) < MOST_CALLS
     if recording is None:
         assert is_one_sentence(refusal), refusal
         return None

@@ -314,17 +314,16 @@ def test_without_bokeh_the_message_names_the_command(
     assert not list(tmp_path.iterdir())
 
 
-def test_an_existing_page_keeps_its_mode_and_a_missing_folder_is_named(
-    planned: Model, tmp_path: Path
-) -> None:
+def test_an_existing_page_keeps_its_mode_and_a_missing_folder_is_named(tmp_path: Path) -> None:
+    model = model_by_hand()
     target = tmp_path / "report.html"
     target.write_text("old", encoding="utf-8")
     target.chmod(0o640)
-    write_report(planned, to=target)
+    write_report(model, to=target)
     assert target.stat().st_mode & 0o777 == 0o640
     assert target.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     with pytest.raises(InputError, match="there is no folder"):
-        write_report(planned, to=tmp_path / "missing" / "report.html")
+        write_report(model, to=tmp_path / "missing" / "report.html")
 
 
 @pytest.mark.parametrize("change", [lambda r: dataclasses.replace(r, time=None, direction=None)])
@@ -354,12 +353,10 @@ def test_the_section_of_a_plan_states_the_profile_of_the_device() -> None:
 
 
 def test_a_line_does_not_break_inside_an_option() -> None:
-    html = report_of(Subject.of(model_by_hand()).compared_with(recording(model_by_hand()))).html
-    html_of_finding = html_of(
-        "t", "s", [Section("verdict", "v", "e", ["s"], verdict=Verdict((usable("give --inputs <b>"),)))]
-    )
+    finding = Verdict((usable("give --inputs <b>"),))
+    html = html_of("t", "s", [Section("verdict", "v", "e", ["s"], verdict=finding)])
     assert ".option { white-space: nowrap; }" in html
-    assert '<span class="option">--inputs</span> &lt;b&gt;' in html_of_finding
+    assert '<span class="option">--inputs</span> &lt;b&gt;' in html
 
 
 def test_one_wavelet_is_not_plural() -> None:

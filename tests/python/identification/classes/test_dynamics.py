@@ -128,6 +128,7 @@ def jointed(seed: int, friction: float, viscous: float = 0.3) -> Recording:
     return Recording.from_arrays(x, force, time, units={"position": "rad", "force": "N*m"})
 
 
+@pytest.mark.full
 def test_friction_without_passive_hysteresis_makes_velocity_an_input() -> None:
     """Torque of a motor that drives the joint: it has the opposite sign."""
     kept, held = jointed(1, -0.3).split(5)
@@ -215,14 +216,14 @@ def to_and_fro(seed: int, speeds: list[float], *, damping: float, noise: float =
 def test_damping_is_not_tested_at_one_speed_but_at_two() -> None:
     """At one speed the velocity is proportional to its sign, and Coulomb friction explains a loop of constant
     height equally well."""
-    repeats = 1 if SCALE == 1 else 2
+    rounds = 1 if SCALE == 1 else 2
     for seed in range(1 if SCALE == 1 else 20):
-        one = identify(to_and_fro(seed, [0.3] * 3 * repeats, damping=0.06))
+        one = identify(to_and_fro(seed, [0.3] * 2 * rounds, damping=0.06))
         assert (one.kind, one.damping) == ("hysteresis", None)
         decisions = [line for line in one.notes["model_selection"] if line.startswith("damping: not tested")]
         assert len(decisions) == 1
         assert "the speed was nearly constant: it varies by " in decisions[0]
-        two = identify(to_and_fro(seed, [0.15, 0.15, 0.45, 0.45] * repeats, damping=0.06))
+        two = identify(to_and_fro(seed, [0.15, 0.15, 0.45, 0.45] * rounds, damping=0.06))
         assert two.kind == "position"
         assert two.damping == pytest.approx(0.06, rel=0.05)
 
@@ -261,6 +262,7 @@ def test_gaps_and_uneven_steps_do_not_disturb_mass_and_damping() -> None:
     assert model.damping == pytest.approx(0.06, rel=0.05)
 
 
+@pytest.mark.full
 def test_several_recordings_of_one_object_are_one_regression() -> None:
     parts = [moved(seed, seconds=2.0 * SECONDS, mass=2e-3, damping=0.06) for seed in range(3)]
     model = identify(parts)

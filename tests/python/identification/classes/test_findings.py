@@ -142,21 +142,6 @@ def test_noise_alone_gives_no_wavelet() -> None:
     assert model.verdict.level == "no"
 
 
-def test_force_far_beyond_the_recorded_range_between_rows_is_not_good() -> None:
-    """The motion reverses at the start of the play: the rows contain no pressed force there."""
-    time = 1e-3 * np.arange(8000)
-    x = 2.0 * np.pi * (1.0 - np.cos(2.0 * np.pi * time / 4.0))
-    force = (
-        np.sin(3.0 * x) + 0.2 * np.sign(np.gradient(x)) + 0.01 * np.random.default_rng(2).normal(size=8000)
-    )
-    model = palpate.identify(palpate.Recording.from_arrays(x, force, time), period=2.0 * np.pi)
-    q = np.linspace(0.0, 0.02, 200)
-    largest = max(np.abs(model.force(q, direction=np.full(200, side))).max() for side in (1.0, -1.0))
-    reported = any("between the rows the force of the model is" in reason for reason in model.verdict.reasons)
-    assert reported == (largest > 1.25 * float(np.ptp(force)))
-    assert model.verdict.level == "no" or largest < 2.0 * float(np.ptp(force))
-
-
 def test_a_force_within_the_recorded_ones_gives_no_finding() -> None:
     rows = sweep(400)
     model = palpate.identify(recorded(rows, wall(rows) + noise(400)))

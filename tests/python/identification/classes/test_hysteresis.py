@@ -44,7 +44,7 @@ def test_a_motion_that_begins_in_the_middle_of_its_play_is_fitted_to_its_noise()
 @pytest.mark.parametrize(
     ("radius", "noise"),
     [
-        (0.0033, 0.0),
+        pytest.param(0.0033, 0.0, marks=pytest.mark.full),
         pytest.param(0.0071, 0.0, marks=pytest.mark.full),
         pytest.param(0.0033, 2e-3, marks=pytest.mark.full),
         (0.0071, 2e-3),
@@ -63,6 +63,7 @@ def test_play_radius_between_the_options_is_found_without_more_wavelets(radius: 
     assert model.fit.nrmse * np.std(force) < 1.02 * noise + 1e-4 * np.ptp(force)
 
 
+@pytest.mark.full
 def test_short_strokes_along_a_sweep_are_as_simple_as_long_ones() -> None:
     """Press a little, release a little, while the mean advances: both strokes cover every position."""
     k = np.arange(10_000)

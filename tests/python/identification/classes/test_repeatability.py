@@ -87,7 +87,7 @@ def test_recordings_of_different_strokes_have_no_band() -> None:
 def test_recordings_of_different_speeds_keep_their_damping() -> None:
     random = np.random.default_rng(0)
     made = []
-    for seconds in (0.4, 1.0, 3.0):
+    for seconds in (0.3, 1.2) if SCALE == 1 else (0.4, 1.0, 3.0):
         time = np.arange(0.0, seconds, 1e-3)
         x = 0.005 - 0.005 * np.cos(2.0 * np.pi * time / seconds)
         velocity = np.gradient(x, time)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import palpate
+from conftest import sampled
 from imperfect import NOISE, TRAVEL, Array, Law, line, noise, recorded, strokes, sweep, true_nrmse, wall
 from palpate.identification.data.limits import (
     NO_LIMITS,
@@ -71,7 +72,9 @@ def identified(name: str, law: Law) -> palpate.Model:
     return palpate.identify(IMPERFECT[name](law))
 
 
-@pytest.mark.parametrize("name", IMPERFECT)
+@pytest.mark.parametrize(
+    "name", sampled(IMPERFECT, *(name for name in IMPERFECT if name != "noise of correlation 0.9"))
+)
 def test_straight_line_is_found_in_imperfect_rows(name: str) -> None:
     model = identified(name, line)
     assert model.n_wavelets <= 1

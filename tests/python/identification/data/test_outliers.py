@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 
 import palpate
+from conftest import sampled
 from imperfect import TRAVEL, Array, noise, recorded, strokes, sweep, true_nrmse, wall
 from palpate.identification.data.outliers import suspects, without_isolated
 from palpate.identification.identify_files import identify_files
@@ -127,7 +128,7 @@ def with_outliers(y: Array, share: float) -> Array:
 
 
 @pytest.mark.parametrize("positions", ["strokes", "shuffled"])
-@pytest.mark.parametrize("share", [0.01, 0.05])
+@pytest.mark.parametrize("share", sampled([0.01, 0.05], 0.05))
 def test_outliers_of_ten_ranges_do_not_change_the_error(share: float, positions: str) -> None:
     x = strokes(FEW) if positions == "strokes" else np.random.default_rng(9).permutation(sweep(FEW))
     y = wall(x) + noise(FEW)
@@ -138,7 +139,7 @@ def test_outliers_of_ten_ranges_do_not_change_the_error(share: float, positions:
     assert "likely wrong readings and were dropped" in str(model.verdict)
 
 
-@pytest.mark.parametrize("share", [0.01, 0.05])
+@pytest.mark.parametrize("share", sampled([0.01, 0.05], 0.05))
 def test_outliers_do_not_hide_hysteresis(share: float) -> None:
     x = strokes(FEW)
     side = np.where(np.gradient(x) > 0.0, 1, -1)

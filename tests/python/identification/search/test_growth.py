@@ -33,8 +33,6 @@ from palpate.identification.search.growth import (
 
 OPTIONS = IdentifyOptions()
 
-ROWS = 8000 if SCALE == 1 else 20_000
-
 
 def kinked(noise: float, seed: int = 0) -> SeparableProblem:
     """Returns the fit problem of 200 rows of a force with two kinks, which are 100 rows apart."""
@@ -182,7 +180,7 @@ def error_on_fresh_rows(found: Grown) -> float:
 
 
 def test_wavelets_use_only_the_inputs_that_they_need() -> None:
-    problem = over_four_inputs(3000, 0.02)
+    problem = over_four_inputs(1000 if SCALE == 1 else 3000, 0.02)
     found = grown(problem)
     used = found.solution.basis.used
     assert np.count_nonzero(used.sum(axis=1) <= 2) > 0.6 * len(used)
@@ -190,12 +188,13 @@ def test_wavelets_use_only_the_inputs_that_they_need() -> None:
     assert error_on_fresh_rows(found) < 0.008
 
 
+@pytest.mark.full
 def test_growth_on_parts_of_many_rows_costs_less_at_the_same_error(monkeypatch: pytest.MonkeyPatch) -> None:
     """Counts the rows of all refinement steps: they take most of the time."""
-    step, problem = SeparableProblem.normal_equations, over_four_inputs(ROWS, 0.05)
+    step, problem = SeparableProblem.normal_equations, over_four_inputs(20_000, 0.05)
     monkeypatch.setattr(growth, "MOST_LIBRARY_ROWS", 1000)
     rows, errors = [0, 0], []
-    for case, least in enumerate((1000, ROWS)):
+    for case, least in enumerate((1000, 20_000)):
 
         def counted(at: SeparableProblem, solution: Solution, case: int = case) -> tuple[Float2D, Float1D]:
             rows[case] += sum(len(block.target) for block in at.blocks)
