@@ -218,7 +218,7 @@ def test_damping_is_not_tested_at_one_speed_but_at_two() -> None:
     height equally well."""
     rounds = 1 if SCALE == 1 else 2
     for seed in range(1 if SCALE == 1 else 20):
-        one = identify(to_and_fro(seed, [0.3] * 2 * rounds, damping=0.06))
+        one = identify(to_and_fro(seed, [0.3] * (2 if SCALE == 1 else 6), damping=0.06))
         assert (one.kind, one.damping) == ("hysteresis", None)
         decisions = [line for line in one.notes["model_selection"] if line.startswith("damping: not tested")]
         assert len(decisions) == 1
