@@ -19,7 +19,8 @@ int main(int count, char** words) {
     for (const auto& entry : std::filesystem::directory_iterator(words[1])) {
         std::ifstream file{entry.path(), std::ios::binary};
         const std::vector<std::uint8_t> input{std::istreambuf_iterator<char>{file}, {}};
-        std::cout << entry.path().filename().string() << std::endl;  // the last name is that of an input that fails
+        std::cout << entry.path().filename().string()
+                  << std::endl;  // the last name is that of an input that fails
         LLVMFuzzerTestOneInput(input.data(), input.size());
         ++inputs;
     }

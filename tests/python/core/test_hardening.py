@@ -83,8 +83,7 @@ def test_the_compiler_protects_large_stacks_and_jumps(binary: Path) -> None:
     database = folder / "compile_commands.json"
     if not database.exists():
         pytest.skip("the folder of the build is not here")
-    source = "cpp/control/" if binary == PROGRAM else "cpp/bindings/"
-    commands = [each["command"] for each in json.loads(database.read_text()) if source in each["file"]]
+    commands = [each["command"] for each in json.loads(database.read_text())]
     assert commands
     protections = {"-fstack-protector-strong", "-fstack-clash-protection"} | (
         {"-fcf-protection=full"} if platform.machine() == "x86_64" else {"-mbranch-protection=standard"}

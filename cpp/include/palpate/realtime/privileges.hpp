@@ -29,8 +29,7 @@ struct RealTimeOptions {
 /// has reserved without using it stays unused: libraries of Python reserve more than a gigabyte.
 class LockedMemory {
   public:
-    LockedMemory() noexcept
-        : error_{mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0 ? 0 : errno} {}
+    LockedMemory() noexcept : error_{mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0 ? 0 : errno} {}
     ~LockedMemory() {
         if (error_ == 0) {
             munlockall();

@@ -18,6 +18,7 @@ class AnyStructure {
   public:
     template <class S>
         requires(!std::same_as<S, AnyStructure> && Structure<S>)
+    // NOLINTNEXTLINE(google-explicit-constructor): a structure of any type is used as this class
     AnyStructure(S structure) : held_{std::make_unique<Holder<S>>(std::move(structure))} {}
     AnyStructure(const AnyStructure& other) : held_{other.held_->copy()} {}
     AnyStructure(AnyStructure&&) noexcept = default;

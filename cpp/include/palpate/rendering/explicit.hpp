@@ -97,7 +97,7 @@ class Explicit {
     }
 
     E environment_;
-    // The state of the last step stands between constants. Compilers store adjacent variables together, and the next
+    // The state of the last step is stored between constants. Compilers store adjacent variables together, and the next
     // step would wait longer for such a store.
     double position_ = 0.0;  ///< y_{k-1}, last position of the object
     Inertia inertia_;

@@ -125,7 +125,7 @@ class Implicit {
     VirtualCoupling coupling_;
     double period_;
     double force_limit_;  ///< F_max, largest force sent to the device [N or N*m]
-    // The state of the last step stands between constants. Compilers store adjacent variables together, and the next
+    // The state of the last step is stored between constants. Compilers store adjacent variables together, and the next
     // step would wait longer for such a store.
     double position_ = 0.0;   ///< y_{k-1}, last position of the object
     double inertial_;         ///< m/T^2
