@@ -24,8 +24,10 @@ needs_program = pytest.mark.skipif(not PROGRAM.exists(), reason="needs palpate-c
 
 def in_virtual_time(environment: Mapping[str, str] = os.environ) -> dict[str, str]:
     """Returns the environment of a program whose clock shows virtual time while its control loop runs."""
-    libraries = [str(host_clock()), environment.get("LD_PRELOAD", "")]
-    return {**environment, "LD_PRELOAD": ":".join(filter(None, libraries))}
+    clock = host_clock()
+    first = {"LD_PRELOAD": clock.name, "LD_LIBRARY_PATH": str(clock.parent)}
+    lists = {name: ":".join(filter(None, [value, environment.get(name)])) for name, value in first.items()}
+    return {**environment, **lists}
 
 
 def run(*command: Any, timeout: float = 60.0, **options: Any) -> subprocess.CompletedProcess[str]:

@@ -52,7 +52,7 @@ def emulator() -> Path | str:
     program = programs[-1]
     program.parent.mkdir(exist_ok=True)
     temporary = program.with_suffix(f".{os.getpid()}")
-    clock = f'-DPALPATE_HOST_CLOCK="{host_clock()}"'
+    clock = f'-DPALPATE_HOST_CLOCK_FOLDER="{host_clock().parent}"'
     build_emulator("umockdev_emulator.cpp", temporary, clock, *compiler_flags.stdout.split())
     temporary.rename(program)
     return program

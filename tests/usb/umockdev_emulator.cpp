@@ -50,12 +50,16 @@ class Emulation {
     int run() {
         const Orders orders{[this](const std::string& order) { return executed(order); }};
         std::string libraries = settings_.preload_first.empty() ? "" : settings_.preload_first + ":";
+        std::vector<std::string> variables{orders.variable()};
         if (settings_.lock_step) {
-            libraries += PALPATE_HOST_CLOCK ":";
+            libraries += "libhost_clock.so:";
+            // LD_PRELOAD itself cannot name a folder with a space
+            const char* folders = std::getenv("LD_LIBRARY_PATH");
+            variables.push_back("LD_LIBRARY_PATH=" PALPATE_HOST_CLOCK_FOLDER ":" +
+                                std::string(folders == nullptr ? "" : folders));
         }
-        Command command{settings_.command, {orders.variable(), "LD_PRELOAD=" + libraries + preload}, [this] {
-                            give_up_rights();
-                        }};
+        variables.push_back("LD_PRELOAD=" + libraries + preload);
+        Command command{settings_.command, variables, [this] { give_up_rights(); }};
         std::thread frames;
         if (!settings_.lock_step) {
             frames = std::thread{[this] { run_frames(); }};
