@@ -4,6 +4,7 @@
 import ast
 import json
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -46,8 +47,10 @@ def pasted(text: str, folder: Path) -> list[str]:
     """Runs a command in a shell, in which `palpate` and `sudo` store their arguments; returns these."""
     commands = folder / "commands"
     commands.mkdir(exist_ok=True)
+    (folder / "stored.py").write_text(STORED)
+    program = shlex.join([INTERPRETER, str(folder / "stored.py")])
     for name in ("palpate", "sudo"):
-        (commands / name).write_text(f"#!{INTERPRETER}\n{STORED}")
+        (commands / name).write_text(f'#!/bin/sh\nexec {program} "$@"\n')
         (commands / name).chmod(0o755)
     environment = {"PATH": f"{commands}:/usr/bin:/bin", "HOME": "/nonexistent"}
     subprocess.run(["/bin/sh", "-c", text], cwd=folder, env=environment, check=True, timeout=30)
