@@ -40,10 +40,6 @@ class Emulation {
             plug(identity, settings_.script);
         }
     }
-    ~Emulation() {
-        places_.clear();
-        g_object_unref(testbed_);
-    }
     Emulation(const Emulation&) = delete;
     Emulation& operator=(const Emulation&) = delete;
 
@@ -79,6 +75,9 @@ class Emulation {
         for (int k = 0; k < frames_after_command; ++k) {
             execute_frame();
         }
+        trace_.close();
+        locked.unlock();
+        g_object_unref(testbed_);
         return code;
     }
 
@@ -229,8 +228,8 @@ int main(int count, char** words) {
             std::cerr << "Usage: umockdev_emulator [OPTIONS] -- COMMAND...\n\n" << emulator::options_text;
             return help_only ? 0 : 2;
         }
-        emulator::Emulation emulation{std::move(settings)};
-        return emulation.run();
+        // Never destroyed: a thread of umockdev may still execute an ioctl of a killed program
+        return (new emulator::Emulation{std::move(settings)})->run();
     } catch (const std::exception& error) {
         std::cerr << "umockdev_emulator: " << error.what() << "\n";
         return 2;

@@ -35,10 +35,6 @@ class UsbfsFiles {
         }
         make_fifo();
     }
-    ~UsbfsFiles() {
-        umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
-        ::close(fifo_);
-    }
     UsbfsFiles(const UsbfsFiles&) = delete;
     UsbfsFiles& operator=(const UsbfsFiles&) = delete;
 

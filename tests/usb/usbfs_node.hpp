@@ -29,10 +29,6 @@ class UsbfsNode {
                          nullptr);
         files_ = std::make_unique<UsbfsFiles>(testbed, handler_, port_.device().identity(), address);
     }
-    ~UsbfsNode() {
-        files_.reset();
-        g_object_unref(handler_);
-    }
     UsbfsNode(const UsbfsNode&) = delete;
     UsbfsNode& operator=(const UsbfsNode&) = delete;
 
