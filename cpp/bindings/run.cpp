@@ -49,8 +49,10 @@ class Watcher {
                          view.progress.position.load(std::memory_order_relaxed),
                          (view.progress.*force_).load(std::memory_order_relaxed),
                          view.progress.lost.load(std::memory_order_relaxed));
-        } catch (const py::error_already_set&) {
-            error_ = std::current_exception();
+        } catch (const py::error_already_set& error) {
+            if (!error.matches(PyExc_KeyboardInterrupt)) {
+                error_ = std::current_exception();
+            }
             stop_requested.store(true, std::memory_order_relaxed);
         }
     }

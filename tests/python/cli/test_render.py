@@ -3,6 +3,7 @@
 
 import json
 import mmap
+import os
 import signal
 import subprocess
 import sys
@@ -128,6 +129,11 @@ def test_an_exception_of_the_progress_callback_ends_the_run() -> None:
     with pytest.raises(KeyError, match="enough"):
         render(Scheme(), duration_s=20.0, progress=record_report)
     assert [ticks for ticks, *_ in reports] == sorted(ticks for ticks, *_ in reports)
+
+
+def test_ctrl_c_during_the_progress_callback_only_ends_the_run() -> None:
+    summary = render(Scheme(), duration_s=20.0, progress=lambda *state: os.kill(os.getpid(), signal.SIGINT))
+    assert summary["ended"] == "stopped on request"
 
 
 def test_the_verdict_is_in_the_summary_and_in_the_first_line(tmp_path: Path) -> None:
