@@ -112,8 +112,9 @@ test: | setup
 	$(MAKE) --no-print-directory test-python
 
 # Files keep their order, because the longest ones contain few tests and would start last.
+parallel_pytest = $(python) -m pytest --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist loadfile --no-loadscope-reorder
 test-python: setup control
-	$(python) -m pytest --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist loadfile --no-loadscope-reorder
+	$(parallel_pytest)
 
 # The real-time program; the build tool detects changed sources.
 control: $(stamps)/control
@@ -149,7 +150,7 @@ test-full: setup control examples $(stamps)/simulators
 	$(call part,$(python) -m pytest tests/usb tests/simulators)
 	$(system_packages) browser
 	$(system_packages) portable
-	$(call part,$(python) -m pytest -m "" --numprocesses "$(CMAKE_BUILD_PARALLEL_LEVEL)" --dist loadfile --no-loadscope-reorder)
+	$(call part,$(parallel_pytest) -m "")
 
 # Lines and branches that the tests execute, and small errors in the C++ headers that they find. For a change of
 # tests: both take an hour or more.

@@ -12,8 +12,9 @@
 
 namespace palpate {
 
-/// Builds the structure of a scheme for a model. Only this function prepares a model for the control loop, in a few milliseconds: it replaces the model's force by polynomials and the solution of
-/// load lines by tables, where the error is proved to be small enough.
+/// Builds the structure of a scheme for a model. Only this function prepares a model for the control loop, in a few
+/// milliseconds: it replaces the model's force by polynomials and the solution of load lines by tables, where the error
+/// is proved to be small enough.
 ///
 /// `force_limit` is the force limit of the device [N or N*m], infinity without a limit. The massless, implicit and
 /// energy-consistent structures include the limit in their solution, so that object and device receive the same force.
