@@ -18,7 +18,6 @@ from ..arguments import parameter_texts, shown
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording, Source, read_recording
-from ..recording.lag import ForceLag, lag_of
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
@@ -27,7 +26,7 @@ from .classes.findings import identified, verdict_of
 from .classes.memory import IdentifyRest, better_with_memory
 from .classes.model_selection import select
 from .data.limits import ForceScale
-from .data.outliers import without_isolated
+from .data.outliers import without_wrong_readings
 from .data.rows import Rows, require_in_range, require_usable, rows_of
 from .data.sections import in_sections
 from .decision import latest
@@ -134,7 +133,7 @@ def identify(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify each one "
                 "separately"
             )
-    recordings, isolated = without_isolated(recordings)
+    recordings, isolated, wrong = without_wrong_readings(recordings)
     for each in recordings:
         require_in_range("position", each.position)
         require_in_range("force", each.force)
@@ -145,16 +144,14 @@ def identify(
     # The matrices are small: several threads make the computation slower and change the last digits of the
     # result.
     with threadpool_limits(limits=1, user_api="blas"):
-        rows = replace(rows, findings=(*isolated, *rows.findings), notes=(*sections, *rows.notes))
+        rows = replace(rows, findings=(*isolated, *rows.findings), notes=(*wrong, *sections, *rows.notes))
         network = fit_rows(rows, settings)
         rest = _resting(rows, settings)
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
-    with threadpool_limits(limits=1, user_api="blas"):
-        lag = lag_of(recordings)
-    return model_of(network, recordings[0].units, source, settings, verdict, lag)
+    return model_of(network, recordings[0].units, source, settings, verdict)
 
 
 def _groups(objects: object, inputs: Sequence[str]) -> list[list[Recording]]:
@@ -276,7 +273,7 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     side = rows.side
     if side is not None and not ((side > 0).any() and (side < 0).any()):
         rows, side = replace(rows, side=None), None
-    if side is None or side.all() or not (options.inputs == "auto" or "hysteresis" in options.inputs):
+    if side is None or side[rows.reported].all() or not (options.inputs == "auto" or "hysteresis" in options.inputs):
         return identified(select(rows, options))
     left_out = f"{np.count_nonzero(side == 0)} rows without a direction are not used to test hysteresis."
     found = identified(select(replace(rows, notes=(*rows.notes, left_out)).only(side != 0), options))
@@ -317,9 +314,8 @@ def model_of(
     source: Source,
     options: IdentifyOptions,
     verdict: Verdict,
-    lag: ForceLag | None = None,
 ) -> Model:
-    """Returns the model of an identified network, with its verdict and the lag of the force."""
+    """Returns the model of an identified network, with its verdict."""
     return Model(
         kind=_kind(network),
         inputs=network.inputs,
@@ -341,7 +337,6 @@ def model_of(
             "model_selection": [str(decision) for decision in network.decisions],
             "identification": [*network.notes, *network.band_check],
             "verdict": verdict.record(),
-            **({} if lag is None else {"force_lag": lag.record()}),
         },
     )
 

@@ -91,8 +91,8 @@ def strokes_from_order(position: Float1D) -> Int8Vector | None:
     if not 0.0 < travel < np.inf:
         return None
     x = np.asarray((position - position.min()) / travel)
-    noise = _noise(x)
-    turn = max(TURN_SHARE, TURN_NOISE * noise, TURN_STEPS * _resolution(x))
+    noise = noise_of(x)
+    turn = max(TURN_SHARE, TURN_NOISE * noise, TURN_STEPS * resolution_of(x))
     if turn > LARGEST_TURN:
         return None
     direction = np.zeros(len(x), dtype=np.int8)
@@ -135,7 +135,7 @@ def turns_of(direction: Int8Vector) -> int:
     return int(np.count_nonzero(moving[1:] != moving[:-1]))
 
 
-def _noise(x: Float1D) -> float:
+def noise_of(x: Float1D) -> float:
     """Returns the standard deviation of the position noise from third differences of adjacent positions.
 
     Reversals are too few to change their median.
@@ -144,7 +144,7 @@ def _noise(x: Float1D) -> float:
     return float(np.median(differences[:: max(1, len(x) // MOST_DIFFERENCES)]) / (0.6745 * math.sqrt(20.0)))
 
 
-def _resolution(x: Float1D) -> float:
+def resolution_of(x: Float1D) -> float:
     """Returns the smallest change of position between adjacent rows that is not a rounding error."""
     steps = np.abs(np.diff(x))
     return float(np.min(steps[steps > 1e-9]))

@@ -91,7 +91,7 @@ class ClassSelection:
         single = data.side is None and (data.starts is None or len(data.names) > 1)
         self.growth = Growth(options, single=single)
         self._fixed_force = self._fixed_in_box()
-        self.spread = float(np.std(data.force)) or 1.0
+        self.spread = float(np.std(data.force[data.reported])) or 1.0
         given = len(data.force) if data.weight is None else int(np.count_nonzero(data.weight))
         if self.samples.used < given:
             self.report.notes.append(f"{self.samples.used} of {given} rows are used, evenly spread.")

@@ -28,6 +28,7 @@ from scipy.spatial import cKDTree
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...recording import Recording
+from ...recording.motion import strokes_from_order
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
 from .limits import FORCE_RESOLUTION, standard_deviation
@@ -63,6 +64,29 @@ MOST_SAMPLED_ROWS = 10_000
 
 MOST_NAMED_ROWS = 3
 """Largest number of isolated rows or outliers that a finding lists with row number or position."""
+
+
+def without_wrong_readings(
+    recordings: Sequence[Recording],
+) -> tuple[list[Recording], list[Finding], list[str]]:
+    """Returns the recordings without isolated rows and wrong readings, findings on the isolated rows, and notes
+    on the wrong readings."""
+    kept, findings = without_isolated(recordings)
+    notes: list[str] = []
+    for number, recording in enumerate(kept):
+        wrong = wrong_readings(recording)
+        if not wrong.any():
+            continue
+        rows, unit = np.flatnonzero(wrong), recording.file_unit("force")
+        named = ", ".join(f"row {row} at {unit.text(recording.force[row])}" for row in rows[:MOST_NAMED_ROWS])
+        more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
+        where = f"recording {number + 1}: " if len(kept) > 1 else ""
+        notes.append(
+            f"{where}{len(rows)} of {len(recording)} rows ({named}{more}) lie outside the values of the rows before "
+            "and after them. They are taken as wrong readings and were dropped."
+        )
+        kept[number] = recording.without(wrong)
+    return kept, findings, notes
 
 
 @np.errstate(over="ignore", invalid="ignore")  # huge values, refused later, may overflow
@@ -216,6 +240,67 @@ def _longest_run(rows: NDArray[np.bool_]) -> int:
     """Returns the largest number of successive rows that are True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(np.int8), [0]])))
     return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+WRONG_RATIO = 8.0
+"""Deviation of a value from its neighbours above which the value is a wrong reading [typical changes between
+successive rows nearby]."""
+
+LEAST_WRONG = 0.01
+"""Smallest deviation of a wrong reading [share of the range of the column]: a hand does not feel less."""
+
+MOST_ROUNDS = 4
+"""Largest number of times that wrong readings are searched, each time without those found before."""
+
+MOST_WRONG_SHARE = 0.1
+"""Share of the rows above which deviating values are not wrong readings [-]: so many belong to the object."""
+
+
+def wrong_readings(recording: Recording) -> NDArray[np.bool_]:
+    """Returns True (n,) for rows with a wrong reading of position or force.
+
+    A wrong reading is outside the interval between the median values of the rows before it and after it, so that
+    no row of a steep wall or of a click is one. The distance is compared with the changes from row to row
+    nearby. At the largest and smallest positions a wall may be touched by a single row. A recording
+    whose rows are not in the order of a motion has none.
+    """
+    found = np.zeros(len(recording), dtype=bool)
+    few = len(recording) <= 2 * LOCAL_ROWS or len(recording.input_names) > 0
+    if few or strokes_from_order(recording.motion.position) is None:
+        return found
+    for values, at_ends in ((recording.position, True), (recording.force, False)):
+        found |= _deviating(values, recording.position, ~found, at_ends)
+    return found if found.mean() <= MOST_WRONG_SHARE else np.zeros(len(recording), dtype=bool)
+
+
+LOCAL_ROWS = 8
+"""Number of rows before a row, and after it, whose typical change is that of the motion nearby."""
+
+
+def _deviating(
+    values: Float1D, position: Float1D, given: NDArray[np.bool_], at_ends: bool
+) -> NDArray[np.bool_]:
+    """Returns True (n,) for the given rows whose value deviates from those before and after them."""
+    found = np.zeros(len(values), dtype=bool)
+    floor = LEAST_WRONG * float(np.subtract(*np.quantile(values[given], (0.99, 0.01))))
+    for _ in range(MOST_ROUNDS):
+        rows = np.flatnonzero(given & ~found)
+        v, x = values[rows], position[rows]
+        around = np.pad(v, NEIGHBOUR_ROWS, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(around, NEIGHBOUR_ROWS)
+        before, after = (np.median(each, axis=1) for each in (windows[: len(v)], windows[-len(v) :]))
+        apart = np.maximum(v - np.maximum(before, after), np.minimum(before, after) - v)
+        changes = np.pad(np.abs(np.diff(v)), LOCAL_ROWS, mode="edge")
+        nearby = np.median(np.lib.stride_tricks.sliding_window_view(changes, LOCAL_ROWS), axis=1)
+        usual = np.maximum(nearby[: len(v)], nearby[-len(v) :])
+        wrong = apart > np.maximum(WRONG_RATIO * usual, floor)
+        if not at_ends and wrong.any():
+            ordinary = x[~wrong]
+            wrong &= (x > ordinary.min()) & (x < ordinary.max())
+        if not wrong.any():
+            break
+        found[rows[wrong]] = True
+    return found
 
 
 HUBER_THRESHOLD = 2.0

@@ -26,6 +26,7 @@ from .compression import HELD_OUT_EVERY, held_out_rows
 from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, position_noise, repeated
 from .outliers import Robust
 from .repeats import Repeats
+from .roles import Role, roles_of, unused_rows
 from .strokes import strokes_of
 
 LARGEST_MAGNITUDE = 1e100
@@ -86,6 +87,8 @@ class Rows:
     the force, and noise of the position"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) smallest and largest position of the unit box; None: those of the rows"""
+    fitted: NDArray[np.bool_] | None = None
+    """(n,) True for the rows that show the force law; the others belong to the motion only. None: all rows"""
     repeats: Repeats | None = None
     """Recording and object of each row; None for one recording"""
     position_unit: Unit = UNSTATED_UNIT
@@ -127,6 +130,7 @@ class Rows:
     def reported(self) -> NDArray[np.bool_]:
         """(n,) True for rows that are used for the reported error."""
         rows = np.ones(len(self.force), dtype=bool) if self.counted is None else self.counted > 0.0
+        rows = rows if self.fitted is None else rows & self.fitted
         return rows if self.robust is None else rows & ~self.robust.outliers
 
     def held_out(self) -> NDArray[np.bool_]:
@@ -153,6 +157,7 @@ class Rows:
             weight=weight,
             within=self.within * float(share),
             parts=(),
+            fitted=None if self.fitted is None else self.fitted[rows],
             repeats=None if self.repeats is None else self.repeats.only(rows),
         )
 
@@ -177,9 +182,10 @@ class Rows:
         noise = position_noise(self.positions[:, 0] / self.reach[0]) if len(self.names) == 1 else 0.0
         limits = RowLimits(force_error=STEP_ERROR * force_step(self.force), position_noise=noise)
         again, repeats = repeated(self.positions, self.force, self.side)
-        if not repeats:
-            return replace(self, limits=limits)
-        return replace(self, limits=limits, weight=np.where(again, 0.0, 1.0), notes=(*self.notes, repeats))
+        notes = (*self.notes, repeats) if repeats else self.notes
+        unused = again if self.fitted is None else again | ~self.fitted
+        weight = np.where(unused, 0.0, 1.0) if unused.any() else None
+        return replace(self, limits=limits, weight=weight, notes=notes)
 
 
 def require_usable(rows: Rows, options: IdentifyOptions) -> None:
@@ -276,7 +282,7 @@ def rows_of(
     if side is None and all(part.time is not None for part in recordings):
         starts = _starts(recordings, kept)
     elif side is None and len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs):
-        strokes = strokes_of(recordings, named=options.inputs != "auto")
+        strokes = strokes_of(recordings)
         side, notes, findings = strokes.side, notes + strokes.notes, strokes.findings
         decisions = strokes.decisions
     if options.search.filters == "matched":
@@ -284,6 +290,13 @@ def rows_of(
     else:
         forces, parts = [paper_target(part, options) for part in recordings], ()
     force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
+    role = np.concatenate([roles_of(part)[rows] for part, rows in zip(recordings, kept, strict=True)])
+    positions, fitted = np.concatenate(columns), role == Role.MOVING
+    corners = None
+    if not fitted.all():
+        shown = positions[fitted]
+        corners = shown.min(axis=0), shown.max(axis=0)
+        notes = (*notes, unused_rows(role))
     first_equal = _first_equal(recordings)
     repeats = None
     if len(set(first_equal)) > 1:
@@ -291,7 +304,7 @@ def rows_of(
         repeats = Repeats(number.astype(np.intp), tuple(objects or (0,) * len(recordings)))
     return Rows(
         names,
-        np.concatenate(columns),
+        positions,
         force,
         side,
         starts,
@@ -300,6 +313,8 @@ def rows_of(
         decisions=decisions,
         notes=notes,
         findings=findings,
+        corners=corners,
+        fitted=None if fitted.all() else fitted,
         repeats=repeats,
         position_unit=recordings[0].file_unit("position"),
         force_unit=recordings[0].file_unit("force"),

@@ -71,19 +71,11 @@ class Strokes:
     decisions: tuple[Decision, ...] = ()
 
 
-def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
+def strokes_of(recordings: Sequence[Recording]) -> Strokes:
     """Returns the directions of recordings; without a direction column they follow from the order of rows.
 
     If the position of all recordings changes in the same direction, the recordings with the higher force are
-    press: the press force of a passive object is above its release force. If press and release do not differ,
-    hysteresis is not tested.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    named : bool
-        True if the options name hysteresis as an input; directions are then returned even if press and
-        release do not differ.
+    press: the press force of a passive object is above its release force.
     """
     found = [
         recording.direction if recording.direction is not None else ordered_strokes(recording)
@@ -119,9 +111,6 @@ def strokes_of(recordings: Sequence[Recording], *, named: bool) -> Strokes:
                 f"separately. If they repeat one stroke, give --inputs position. Else {DIRECTION_CURE}"
             ),
         )
-    elif not named and not _Cells.of(position, force, side).differ:
-        reason = f"press and release force do not differ by {SIGNIFICANT_STANDARD_ERRORS:g} standard errors"
-        return Strokes(None, (f"{note}.",), decisions=(Decision("hysteresis", "not accepted", reason),))
     return Strokes(side, (f"{note}.",), findings)
 
 
@@ -163,19 +152,6 @@ class _Cells:
         floor = (1e-7 * float(np.ptp(f))) ** 2
         variance = np.maximum(ff - slope * xf, 0.0)[used] / (n_in + n_out - 3.0)[used] + floor
         return cls(difference[used], np.sqrt(variance * (1.0 / n_in[used] + 1.0 / n_out[used])))
-
-    @property
-    def differ(self) -> bool:
-        """True if press and release force differ on average, or in some cells."""
-        if not len(self.difference) or not self.error.all():  # the recorded force is constant
-            return False
-        weight = self.error**-2.0
-        mean = float(weight @ self.difference / np.sqrt(weight.sum()))
-        squares = float(np.sum((self.difference / self.error) ** 2))
-        m = len(self.difference)
-        return abs(mean) > SIGNIFICANT_STANDARD_ERRORS or squares > m + SIGNIFICANT_STANDARD_ERRORS * np.sqrt(
-            2.0 * m
-        )
 
 
 def _press(recordings: Sequence[Recording]) -> Float1D | None:

@@ -334,10 +334,8 @@ class Candidate:
     @cached_property
     def error(self) -> RowError:
         """Error on all rows except outliers; the rows have the weights `data.counted`."""
-        error, robust = self.error_on(self.data.counted), self.data.robust
-        return (
-            error if robust is None else replace(error, weight=np.where(robust.outliers, 0.0, error.weight))
-        )
+        error = self.error_on(self.data.counted)
+        return replace(error, weight=np.where(self.data.reported, error.weight, 0.0))
 
     def error_on(self, samples: Float1D | None) -> RowError:
         """Returns the error if each row represents the given number of samples (n,), or 1 sample each. Rows
