@@ -66,7 +66,7 @@ class SearchOptions:
     resolved_by: int = 7
     """Least number of distinct positions, on every stroke, in a wavelet's core |u| <= sqrt(3) [-]; 5 may
     suffice if the residual is not noise"""
-    max_positions: int = 1024
+    max_positions: int = 4096
     """Largest number of distinct positions with one input; twice as many with two inputs, 64 times as many
     with three or more, and doubled while cells are too wide (at most three times). More positions are
     gathered in about this number of cells [-]"""

@@ -243,7 +243,7 @@ def fit_regression(
     names = tuple(f"x{column}" for column in columns)
     rows = Rows(names, X[:, columns], y, weight=weight, corners=(lower, upper))
     with threadpool_limits(limits=1, user_api="blas"):
-        selection = select(rows, options, on_held_out=False)
+        selection = select(rows, options)
         best = selection.best
         some = slice(None, None, max(1, -(-len(y) // MOST_ERROR_ROWS)))
         error = RowError(y[some] - best.force_at(some), y[some], weight[some])

@@ -40,14 +40,6 @@ REGROWTH_ERROR_RATIO = 1.01
 """Ratio of the RMS error with constraints to the RMS error without constraints, above which a network is
 grown again on forces that keep the constraints [-]."""
 
-SMALLER_NETWORK_STANDARD_ERRORS = 3.0
-"""Decrease of the error on held-out rows that a network of reduced size must show [standard errors]. The
-value is above 1 because each further trial may succeed by chance."""
-
-HELD_OUT_STOP_REASON = "held-out rows"
-"""Text of the reason why the growth of a network stopped, if the error on held-out rows refused a larger
-network."""
-
 VELOCITY_INPUTS = ("position", "velocity")
 """Inputs of a network of the model class velocity."""
 
@@ -68,8 +60,6 @@ class ClassSelection:
         Largest number of distinct positions; with more, positions are gathered in cells.
     previous : ClassSelection, optional
         Model selection over nearly the same rows: growth starts with its final wavelets.
-    on_held_out : bool
-        False: the criterion decides without held-out rows.
     """
 
     def __init__(
@@ -79,15 +69,13 @@ class ClassSelection:
         classes: Sequence[type[ModelClass]],
         cells: int,
         previous: ClassSelection | None = None,
-        *,
-        on_held_out: bool = True,
     ) -> None:
         self.data, self.options, self.classes, self.cells = data, options, classes, cells
         self.report: Report = Report(list(previous.report.path) if previous else [])
         self.start_basis: dict[str, Basis] = dict(previous.start_basis) if previous else {}
         """Wavelets with which the growth of a network starts, by the name of the model class"""
         self.samples = Samples(data, options, cells)
-        self.judge = Judge(self.samples, options, self.report, on_held_out=on_held_out)
+        self.judge = Judge(self.samples, options, self.report)
         single = data.side is None and (data.starts is None or len(data.names) > 1)
         self.growth = Growth(options, single=single)
         self._fixed_force = self._fixed_in_box()
@@ -114,7 +102,6 @@ class ClassSelection:
             self.classes,
             cells or self.cells,
             self if keep else None,
-            on_held_out=self.judge.on_held_out,
         )
 
     @cached_property
@@ -284,36 +271,15 @@ class Network(ModelClass):
         return selection.options.max_wavelets > 0
 
     def better(self, below: Candidate) -> Candidate:
-        """Returns the accepted network, or the simpler candidate.
-
-        If the error on held-out rows refuses a network that the criterion prefers, networks of half the size
-        are tried.
-        """
-        size, errors = self._selection.options.max_wavelets, 1.0
+        selection, most = self._selection, self._selection.options.max_wavelets
         if below.problem.n_parameters(Basis.empty(below.problem.dimension), more=1) >= below.problem.samples:
             return below
-        while size > 0:
-            above = self._of_size(size)
-            judged = self._selection.judge.noted(below, above, errors=errors)
-            if judged.accepted:
-                return above
-            size = above.n_wavelets // 2 if judged.criterion_falls else 0
-            errors = SMALLER_NETWORK_STANDARD_ERRORS
-        return below
-
-    def _of_size(self, size: int) -> Candidate:
-        """Returns a network of at most `size` wavelets, with constraints imposed."""
-        selection = self._selection
-        whole = size == selection.options.max_wavelets
         problem = selection.samples.problem(selection.rows)
-        start = Basis.empty(problem.dimension)
-        if whole:
-            start = selection.start_basis.get(self.name, start)
-        grown = selection.grown(problem, start, self.name, size)
-        if whole:
-            selection.start_basis[self.name] = grown.solution.basis
-        reason = grown.stop_reason if whole else HELD_OUT_STOP_REASON
-        return selection.constrained(selection.candidate(self.name, grown.problem, grown.solution, reason))
+        start = selection.start_basis.get(self.name, Basis.empty(problem.dimension))
+        grown = selection.grown(problem, start, self.name, most)
+        selection.start_basis[self.name] = grown.solution.basis
+        found = selection.candidate(self.name, grown.problem, grown.solution, grown.stop_reason)
+        return selection.judge.better(below, selection.constrained(found))
 
 
 def constant(selection: ClassSelection) -> Candidate:

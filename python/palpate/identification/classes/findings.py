@@ -97,10 +97,6 @@ def verdict_of(
     return Verdict(tuple(dict.fromkeys(findings)))
 
 
-LARGE_UNEXPLAINED_SHARE = 0.5
-"""If at least this share of the mean squared error cannot be explained by position, narrow wavelets are not
-used [-]."""
-
 REPORTED_UNEXPLAINED_SHARE = 0.25
 """If at least this share of the mean squared error cannot be explained by position, a finding reports the
 share [-]."""
@@ -169,12 +165,6 @@ def unexplained_share(position: Float1D, force: Float1D, side: Float1D | None) -
     full = np.abs(side[rows]) > FULL_STROKE_STATE
     variance = unexplained_variance(position[full], force[full], np.sign(side[rows][full]))
     return float(np.mean(full)) * variance / spread
-
-
-def large_unexplained_share(nrmse: float) -> float:
-    """Returns the share of the force variance that, if position cannot explain it, is half of the mean
-    squared error of a model with this NRMSE."""
-    return LARGE_UNEXPLAINED_SHARE * nrmse**2
 
 
 def _thinned(values: Float1D) -> slice:
@@ -259,13 +249,6 @@ def explained_findings(
         )
     ]
 
-
-CELL_ERROR_RATIO = 1.5
-"""Ratio of the RMS error on the rows to that on the position cells of the fit, above which the cells were too
-wide [-]."""
-
-REPORTED_NRMSE = 0.02
-"""NRMSE on all rows below which no finding reports position cells that are too wide [-]."""
 
 MOST_SAMPLED_ROWS = 10_000
 """Largest number of rows from which the standard deviation of the force is computed; of more rows an evenly
@@ -374,29 +357,6 @@ def excess_findings(
     ]
 
 
-def cell_findings(
-    on_rows: RowError,
-    on_cells: float,
-    travel: float,
-    cells: int,
-    *,
-    position_unit: Unit = UNSTATED_UNIT,
-    force_unit: Unit = UNSTATED_UNIT,
-) -> list[Finding]:
-    """Returns a finding if the RMS error on the rows is far above the RMS error on the fitted position
-    cells."""
-    if on_rows.nrmse <= REPORTED_NRMSE or on_rows.rmse <= CELL_ERROR_RATIO * on_cells:
-        return []
-    return [
-        no(
-            f"the RMS error is {force_unit.text(on_rows.rmse)} on the rows, but "
-            f"{force_unit.text(on_cells)} on the fitted cells. The cells are too wide for this force: "
-            f"1/{cells} of the travel of {position_unit.text(travel)}. Remove rows with wrong positions, "
-            "or increase max_positions"
-        )
-    ]
-
-
 def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     """Returns a finding if growth ended at max_wavelets although neighbouring residuals are still
     correlated."""
@@ -428,8 +388,6 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         findings += data.robust.findings(best.residual, data.force_unit)
     units = {"position_unit": data.position_unit, "force_unit": data.force_unit}
     findings += extreme_force_findings(error, data.force_unit)
-    on_rows, travel = best.error_on(data.weight), float(data.reach[0])
-    findings += cell_findings(on_rows, best.rmse, travel, best.rows.cells, **units)
     findings += excess_findings(network, data.force[counted > 0.0], repeats=data.period is not None, **units)
     if data.counted is None and single:
         rows = np.flatnonzero(counted)

@@ -19,32 +19,19 @@ from ..data.limits import (
 from ..data.outliers import robust_weights, suspects
 from ..data.rows import Rows
 from ..decision import decided, in_words, lowered
-from ..network.separable import HALF_CORE_NOISE_RATIO
 from ..options import IdentifyOptions
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
 from .class_selection import VELOCITY_INPUTS, ClassSelection, Linear, ModelClass, Network
-from .findings import USABLE_NRMSE, large_unexplained_share, unexplained_share
+from .findings import USABLE_NRMSE
 from .hysteresis import Hysteresis
 from .repeatability import no_finer_than_repeats
-
-MOST_HALVINGS = 3
-"""Largest number of times that position cells are halved because they are too wide for the force law."""
 
 MOST_DYNAMIC_SELECTIONS = 2
 """Number of times that the model is selected again, each time with better values of damping and mass."""
 
-LEAST_GAIN_OVER_DAMPING = 0.05
-"""Least relative decrease of the squared error for velocity as an input if constant damping without mass was
-accepted [-]. A force of two inputs is harder to render."""
-
-LEAST_GAIN_WITHOUT_DAMPING = 0.25
-"""Least relative decrease of the squared error for velocity as an input if neither this damping nor
-hysteresis was accepted [-], for example for Coulomb friction, whose sign changes with that of the
-velocity."""
-
-LEAST_GAIN_OVER_HYSTERESIS = 0.75
-"""Least relative decrease of the squared error for velocity as an input if hysteresis was accepted, but not
-constant damping without mass [-]: hysteresis is easier to render and certify."""
+LEAST_GAIN = 0.25
+"""Least share of the squared error that velocity as an input must explain [-]: a force of two inputs is harder
+to render and to certify."""
 
 MOST_CORRELATION_ESTIMATES = 5
 """Largest number of times that the correlation of the noise of successive rows is estimated."""
@@ -57,23 +44,15 @@ SETTLED_INDEPENDENT_RATIO = 0.8
 """Ratio of the new to the previous share of independent rows, above which the model selection is not repeated
 [-]."""
 
-LARGE_NRMSE = 0.2
-"""NRMSE above which narrow wavelets are not used if position cannot explain most of the error [-]."""
-
-LEAST_HALF_CORE = 1.0 / 64.0
-"""Least distance from the centre of a wavelet to its side lobe if position cannot explain most of the error
-[share of the travel]."""
-
 POSITION_FACTORS = (1, 2, 64)
 """Largest number of distinct positions over that of one input, with one, two, and three or more inputs [-]. A
 regular grid over many inputs has few cells along each of them, so that the rows themselves are used there."""
 
 
-def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) -> ClassSelection:
+def select(rows: Rows, options: IdentifyOptions) -> ClassSelection:
     """Selects a model: first the model classes without velocity, mass and damping, then those with them.
 
-    The width of position cells is halved until their error is small, at most three times. Outliers get less
-    weight if the loss is Huber's.
+    Outliers get less weight if the loss is Huber's.
     """
     rows = rows.limited()
     given, robust = rows.weight, options.loss == "huber"
@@ -82,22 +61,17 @@ def select(rows: Rows, options: IdentifyOptions, *, on_held_out: bool = True) ->
         rows = replace(rows, weight=np.where(suspect, 0.0, 1.0 if given is None else given))
     inputs = min(rows.box.shape[1], len(POSITION_FACTORS))
     cells = options.search.max_positions * POSITION_FACTORS[inputs - 1]
-    found = ClassSelection(rows, options, STATIC_CLASSES, cells, on_held_out=on_held_out)
-    for _ in range(MOST_HALVINGS):
-        if not found.best.cells_too_wide():
-            break
-        found = found.repeated(rows, cells=2 * found.cells, keep=True)
+    found = ClassSelection(rows, options, STATIC_CLASSES, cells)
     if robust:
-        halved = found
+        first = found
 
         def fit(weight: Float1D) -> Float1D:
-            return halved.repeated(replace(rows, weight=weight), keep=True).best.force_at()
+            return first.repeated(replace(rows, weight=weight), keep=True).best.force_at()
 
         weights = robust_weights(fit, found.best.force_at(), rows.force, given, suspect)
         found = found.repeated(replace(rows, weight=weights.weight, robust=weights), keep=True)
         found.report.notes.append(weights.note)
-    for revised in REVISIONS:
-        found = revised(found)
+    found = correlated_noise(found)
     found.try_classes(DYNAMIC_CLASSES)
     return no_finer_than_repeats(found)
 
@@ -137,33 +111,6 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
         # The residual of this network is a part of the force that needs more wavelets, not noise.
         return first
     return chosen
-
-
-def no_finer_than_explained(first: ClassSelection) -> ClassSelection:
-    """Selects the model again with wide wavelets if position cannot explain most of a large error.
-
-    Rows that differ for another reason, such as time during a pause, differ by as much between neighbouring
-    positions as anywhere: narrow wavelets then give slopes that the object does not have.
-    """
-    data, best = first.data, first.best
-    if data.counted is not None or len(data.names) > 1:
-        return first
-    rows = data.reported
-    force, side = data.force[rows], None if best.side is None else best.side[rows]
-    spread = float(np.std(force))
-    if best.rmse <= LARGE_NRMSE * spread or best.n_wavelets == 0:
-        return first
-    error = float(np.std(force - best.force_at()[rows])) / spread
-    if unexplained_share(data.box[rows, 0], force, side) < large_unexplained_share(error):
-        return first
-    noise = max(LEAST_HALF_CORE / HALF_CORE_NOISE_RATIO, data.limits.position_noise)
-    wide = first.repeated(replace(data, limits=replace(data.limits, position_noise=noise)))
-    wide.report.replaces(
-        first.report,
-        f"Wavelets narrower than {200 * LEAST_HALF_CORE:.3g} % of the travel were not tried: position does "
-        "not explain most of the error.",
-    )
-    return wide
 
 
 class MassAndDamping(ModelClass):
@@ -226,10 +173,7 @@ class Velocity(ModelClass):
         if not (damped or below.error.nrmse > USABLE_NRMSE):
             return below
         residual = (data.force if moving is None else data.force - moving.force) - below.force_at()
-        least_share = LEAST_GAIN_OVER_DAMPING if damped else LEAST_GAIN_WITHOUT_DAMPING
-        if below.strokes is not None and not damped:
-            least_share = LEAST_GAIN_OVER_HYSTERESIS
-        if motion.share_of_velocity(residual, below.solution.basis, friction=not damped) < least_share:
+        if motion.share_of_velocity(residual, below.solution.basis, friction=not damped) < LEAST_GAIN:
             return below
         velocity, known = motion.velocity()
         rows = known if data.weight is None else known & (data.weight > 0.0)
@@ -252,10 +196,10 @@ class Velocity(ModelClass):
         constant = moving is not None and moving.damping is not None
         compared = "constant damping" if constant else in_words(below.model_class)
         change = f"{lowered('the squared error', 100 * share)} % compared with {compared}"
-        bound = f"must lower it by at least {100 * least_share:g} %"
+        bound = f"must lower it by at least {100 * LEAST_GAIN:g} %"
         report.path += both.report.path
-        report.decisions.append(decided("velocity", share >= least_share, f"{change}, {bound}"))
-        if share < least_share:
+        report.decisions.append(decided("velocity", share >= LEAST_GAIN, f"{change}, {bound}"))
+        if share < LEAST_GAIN:
             return below
         over_both_inputs = [f"Over position and velocity: {decision}." for decision in both.report.decisions]
         report.notes += [*over_both_inputs, *both.report.notes]
@@ -266,10 +210,6 @@ class Velocity(ModelClass):
 
 STATIC_CLASSES = (Linear, Network, Hysteresis)
 """Model classes other than constant that do not depend on velocity, the simplest first."""
-
-REVISIONS = (correlated_noise, no_finer_than_explained)
-"""Functions that repeat a model selection without velocity, mass and damping, if its residual is correlated
-or large."""
 
 DYNAMIC_CLASSES = (MassAndDamping, Velocity)
 """Model classes with velocity, mass or damping, tried last."""

@@ -54,7 +54,6 @@ def no_finer_than_repeats(first: ClassSelection) -> ClassSelection:
             replace(options, max_wavelets=size),
             first.classes,
             first.cells,
-            on_held_out=first.judge.on_held_out,
         )
         if trial.best.rmse <= least and trial.best.n_parameters <= best.n_parameters:
             smaller = trial

@@ -183,16 +183,6 @@ class Compressor:
         return _ranked(np.ravel_multi_index(tuple(pooled), grid), self._weight)[0]
 
 
-def binning_error(rows: Compressed, curvature: Float2D) -> float:
-    """Estimates the RMS error [force] from cells for a force with second derivatives `curvature` (m, d) at
-    the rows.
-
-    The mean of the force f over a cell differs from f at the mean position by about sum_j f_jj Var(x_j) / 2.
-    """
-    bias = 0.5 * np.sum(curvature * rows.spread, axis=1)
-    return float(np.sqrt(np.average(bias * bias, weights=rows.weight)))
-
-
 def _without_slopes(values: Float1D, over: Float2D, block: NDArray[np.int64], weight: Float1D) -> Float1D:
     """Returns values (n,) minus a linear function of the columns of `over` (n, d), fitted in each block
     (n,)."""
@@ -266,10 +256,6 @@ HELD_OUT_BLOCKS = 50
 """Number of sections of a recording, of which every fifth is held out as a whole: adjacent samples are
 correlated."""
 
-TRIMMED_SHARE = 0.1
-"""A trimmed mean of the change of error over groups of rows drops this share of the groups twice: those with
-the largest and those with the smallest change [-]."""
-
 MOST_HELD_OUT_ROWS = 20_000
 """Largest number of held-out rows; of more held-out rows an evenly spread part is used."""
 
@@ -331,27 +317,3 @@ def inside(rows: Float2D, others: Float2D) -> NDArray[np.bool_]:
         return np.zeros(len(rows), dtype=np.bool_)
     within: NDArray[np.bool_] = (rows >= others.min(axis=0)) & (rows <= others.max(axis=0))
     return np.asarray(within.all(axis=1))
-
-
-def gain(below: Float1D, above: Float1D, *, trim: float = 0.0) -> tuple[float, float]:
-    """Returns the relative decrease of the mean squared error from `below` (k,) to `above` (k,), and its
-    standard error.
-
-    The standard error is computed from HELD_OUT_BLOCKS groups of rows, because errors of adjacent rows are
-    correlated. `trim` is the share of groups to drop at both ends: those with the largest increase and those
-    with the largest decrease of the error.
-    """
-    square = np.array([below * below, above * above])
-    groups = np.array(
-        [part.mean(axis=1) for part in np.array_split(square, min(HELD_OUT_BLOCKS, len(below)), axis=1)]
-    )
-    if trim:
-        cut = int(np.ceil(trim * len(groups)))
-        order = np.argsort(groups[:, 1] - groups[:, 0], kind="stable")
-        groups = groups[order[cut : len(groups) - cut]]
-    before, after = groups.mean(axis=0)
-    if before == 0.0:
-        return 0.0, 0.0
-    ratio = after / before
-    scatter = (groups[:, 1] - ratio * groups[:, 0]) / before
-    return float(1.0 - ratio), float(scatter.std() / np.sqrt(max(len(groups) - 1, 1)))

@@ -9,7 +9,6 @@ nearby.
 
 from __future__ import annotations
 
-import warnings
 from enum import IntEnum
 
 import numpy as np
@@ -131,14 +130,14 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
     if travelled[-1] <= step:
         return np.zeros(len(x), dtype=bool)
     # First and last row of each step of distance: interpolated, because a row can travel several steps.
-    moved, first_row = np.unique(travelled, return_index=True)
-    reached = np.interp(np.arange(0.0, travelled[-1], step), moved, first_row)
+    moved, at_row = np.unique(travelled, return_index=True)
+    reached = np.interp(np.arange(0.0, travelled[-1], step), moved, at_row)
     rows = np.diff(reached, append=len(x) - 1.0)
     around = np.pad(rows, STEPS_AROUND, constant_values=np.nan)
     windows = np.lib.stride_tricks.sliding_window_view(around, STEPS_AROUND)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # no step before the first one, none after the last
-        typical = np.nanmedian(windows, axis=1)
+    typical = np.full(len(windows), np.nan)  # unknown at the start and at the end of the motion
+    enough = np.count_nonzero(np.isfinite(windows), axis=1) >= min(STEPS_AROUND // 2, len(rows) - 1)
+    typical[enough] = np.nanmedian(windows[enough], axis=1)
     nearby = np.fmax(typical[: len(rows)], typical[-len(rows) :])[
         np.minimum((travelled / step).astype(np.int64), len(rows) - 1)
     ]
@@ -149,5 +148,8 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
     slow[0] = slow[1]
     found = np.zeros(len(x), dtype=bool)
     for begin, end in np.flatnonzero(np.diff(slow, prepend=False, append=False)).reshape(-1, 2).tolist():
-        found[begin:end] = (end - begin) * float(speed[begin:end].max()) >= LEAST_WAIT
+        # The tool stops between two rows: the last row that moves less than half of a step waits as well.
+        stopped = begin > 1 and travelled[begin - 1] - travelled[begin - 2] < 0.5 * speed[begin - 1]
+        first_row = begin - int(stopped)
+        found[first_row:end] = (end - first_row) * float(speed[begin:end].max()) >= LEAST_WAIT
     return found

@@ -25,37 +25,22 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._core.model import wavelet_columns, wavelet_curvature_columns
+from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...verdict import Finding
 from ..data.compression import (
-    TRIMMED_SHARE,
     Compressed,
     Compressor,
     HeldOutRows,
     around_seam,
-    binning_error,
-    gain,
-    inside,
 )
 from ..data.rows import Rows
 from ..data.strokes import HysteresisInput
-from ..decision import Decision, decided, in_words, lowered, squared_error_change
+from ..decision import Decision, decided, in_words, lowered
 from ..network.fitted import FittedNetwork, PathPoint
 from ..network.separable import TINY, SeparableProblem, Solution, problem_of
 from ..options import IdentifyOptions
-
-MOST_BINNING_SHARE = 0.05
-"""Largest force error from replacing positions by cell means, as a share of the RMS error of the model [-].
-If the error is larger, the width of the cells is halved."""
-
-LEAST_TRIMMED_GAIN = 0.5
-"""Relative decrease of the trimmed mean squared error above which it is used in place of the full mean, if
-the full mean decreases by at most its standard error [-]."""
-
-LEAST_HELD_OUT = 20
-"""Least number of held-out rows that can refuse a model class. The error on fewer rows is too uncertain."""
 
 MOST_NOISE_ROWS = 50_000
 """Largest number of rows from which the noise where two models differ is computed; of more rows an evenly
@@ -270,28 +255,6 @@ class Candidate:
         criterion."""
         return PathPoint(self.model_class, self.n_wavelets, self.rmse, self.criterion(name))
 
-    def held_out_errors(self, fitted: SeparableProblem, rows: HeldOutRows) -> Float1D:
-        """Returns the force errors (k,) on held-out rows, with weights, slopes and bias fitted to the other
-        rows."""
-        if self.model_class == "constant":
-            (block,) = fitted.blocks
-            root = block.channels[:, 0]
-            return np.asarray(rows.force - block.target @ root / (root @ root))
-        fitted = replace(fitted, prior=self.problem.prior)
-        return fitted.errors(fitted.solve(self.solution.basis), rows)
-
-    def cells_too_wide(self) -> bool:
-        """True if the force error from replacing positions by cell means is above its limit
-        `MOST_BINNING_SHARE`."""
-        if not self.rows.spread.any():
-            return False
-        basis, weights = self.solution.basis, self.solution.coefficients[:, 1 + self.problem.dimension :]
-        bends = wavelet_curvature_columns(self.rows.positions, basis.alpha, basis.beta)
-        curvature = np.column_stack([np.abs(bend @ weights.T).max(axis=1) for bend in bends])
-        return binning_error(self.rows, curvature) > MOST_BINNING_SHARE * self.problem.resolved_rmse(
-            self.solution
-        )
-
     def force_at(self, rows: slice = ALL_ROWS) -> Float1D:
         """Returns the force (n,) of the candidate without the forces of mass and damping, at all rows or at
         the rows of a slice."""
@@ -447,29 +410,6 @@ class Samples:
         solution = problem.with_coefficients(solved, below.solution.coefficients)
         return replace(below, problem=problem, solution=solution)
 
-    def held_out_gain(self, below: Candidate, above: Candidate) -> tuple[float, float]:
-        """Returns the relative decrease of the squared error on held-out rows, and its standard error.
-
-        Only held-out rows inside the position range of the fitted rows are used. If the mean over all groups
-        of rows shows no significant decrease, but the trimmed mean shows a large decrease, the trimmed mean
-        is returned: then a few groups hold rows far from all fitted rows.
-        """
-        known = None if above.strokes is None else above.strokes.known
-        fitted = ~self._held_out if known is None else ~self._held_out & known
-        errors = []
-        for one in (below, above):
-            compressed = self._compressor.rows(one.side, fitted)
-            problem = problem_of(compressed, resolved_by=self._resolved_by)
-            rows = self.held_out_rows(one.strokes, known)
-            errors.append(one.held_out_errors(problem, rows)[inside(rows.positions, self.data.box[fitted])])
-        if len(errors[0]) < LEAST_HELD_OUT:
-            return gain(*errors) if len(errors[0]) else (0.0, 0.0)
-        share, error = gain(*errors)
-        if share > error:
-            return share, error
-        trimmed = gain(*errors, trim=TRIMMED_SHARE)
-        return trimmed if trimmed[0] > max(trimmed[1], LEAST_TRIMMED_GAIN) else (share, error)
-
 
 def local_noise_ratio(below: Candidate, above: Candidate) -> float:
     """Returns the mean squared residual where two candidates differ divided by that of all rows, at least 1.
@@ -497,41 +437,30 @@ class Judgement:
     accepted: bool
     """True if the more complex of two compared candidates is accepted"""
     reason: str
-    """Changes of the criterion and of the squared error on held-out rows if it was tested, in words"""
-    criterion_falls: bool
-    """True if the criterion decreases enough and held-out rows are used; a more complex candidate that is not
-    accepted was then refused because of its error on held-out rows"""
+    """Change of the criterion, in words"""
 
 
 class Judge:
-    """Decides which of two candidates is accepted, by the criterion and then on held-out rows.
+    """Decides which of two candidates is accepted, by the criterion.
 
     Parameters
     ----------
     samples : Samples
     options : IdentifyOptions
     report : Report
-        Receives the decisions of `noted` and `better`.
-    on_held_out : bool
-        False: the criterion decides without held-out rows.
+        Receives the decisions of `better`.
     """
 
-    def __init__(
-        self, samples: Samples, options: IdentifyOptions, report: Report, *, on_held_out: bool = True
-    ) -> None:
+    def __init__(self, samples: Samples, options: IdentifyOptions, report: Report) -> None:
         self.criterion, self.evidence = options.criterion, options.search.evidence
-        self._samples, self._report, self.on_held_out = samples, report, on_held_out
+        self._samples, self._report = samples, report
 
     def better(self, below: Candidate, above: Candidate) -> Candidate:
         """Returns the more complex candidate if it is accepted, else the simpler candidate; adds the decision
         to the report."""
-        return above if self.noted(below, above).accepted else below
-
-    def noted(self, below: Candidate, above: Candidate, *, errors: float = 1.0) -> Judgement:
-        """Compares two candidates and adds the decision to the report."""
-        judged = self.compared(below, above, errors=errors)
+        judged = self.compared(below, above)
         self._report.decisions.append(decided(above.model_class, judged.accepted, judged.reason))
-        return judged
+        return above if judged.accepted else below
 
     def accepts(self, below: Candidate, above: Candidate) -> bool:
         """True if the more complex of two compared candidates is accepted"""
@@ -552,29 +481,16 @@ class Judge:
         cost = penalty(n, above.n_parameters) - penalty(n, below.n_parameters)
         return (falls + cost) / local_noise_ratio(below, above) - cost
 
-    def compared(self, below: Candidate, above: Candidate, *, errors: float = 1.0) -> Judgement:
-        """Compares the upper candidate with the lower one.
-
-        On at least LEAST_HELD_OUT held-out rows, the squared error must decrease by more than `errors` of its
-        standard errors. Without `on_held_out` only the criterion decides.
-        """
+    def compared(self, below: Candidate, above: Candidate) -> Judgement:
+        """Compares the upper candidate with the lower one."""
         name, evidence = self.criterion, self.evidence
-        if not self.on_held_out:
-            falls = self.fall(below, above)
-            return Judgement(falls >= evidence, lowered(CRITERION_NAMES[name], falls), False)
         if enough(name, below.criterion(name)):
             reason = f"the error of the {in_words(below.model_class)} is below the just noticeable difference"
-            return Judgement(False, reason, False)
+            return Judgement(False, reason)
         falls = self.fall(below, above)
         change = lowered(CRITERION_NAMES[name], falls)
-        rows = self._samples.held_out_rows(above.strokes)
         if name in ON_HELD_OUT_ROWS:
-            evidence = max(evidence, standard_error(len(rows.force)))
+            evidence = max(evidence, standard_error(len(self._samples.held_out_rows(above.strokes).force)))
         if falls < evidence:
-            return Judgement(False, f"{change}, must lower it by at least {evidence:.4g}", False)
-        share, error = self._samples.held_out_gain(below, above)
-        measured = squared_error_change(share, error, "held-out rows")
-        if share <= errors * error and len(rows.force) >= LEAST_HELD_OUT:
-            bound = f"must lower it by more than {100.0 * errors * error:.2g} %"
-            return Judgement(False, f"{measured}, {bound}; {change}", True)
-        return Judgement(True, f"{measured}, {change}", True)
+            return Judgement(False, f"{change}, must lower it by at least {evidence:.4g}")
+        return Judgement(True, change)
