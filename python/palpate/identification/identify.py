@@ -22,16 +22,19 @@ from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
-from .classes.findings import identified, verdict_of
+from .classes.findings import USABLE_NRMSE, identified, verdict_of
 from .classes.memory import IdentifyRest, better_with_memory
 from .classes.model_selection import select
 from .data.limits import ForceScale
 from .data.outliers import without_wrong_readings
+from .data.period import period_of
 from .data.rows import Rows, require_in_range, require_usable, rows_of
 from .data.sections import in_sections
 from .decision import latest
 from .network.fitted import FittedNetwork
+from .network.separable import TINY
 from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fields, kind_of, options_from
+from .search.evidence import deviance
 
 
 def identify(
@@ -140,18 +143,50 @@ def identify(
         for name, column in zip(each.input_names, each.inputs.T, strict=True):
             require_in_range(name, column)
     fitted, sections = in_sections(recordings)
-    rows = rows_of(fitted, settings, object_of)
     # The matrices are small: several threads make the computation slower and change the last digits of the
     # result.
     with threadpool_limits(limits=1, user_api="blas"):
-        rows = replace(rows, findings=(*isolated, *rows.findings), notes=(*wrong, *sections, *rows.notes))
-        network = fit_rows(rows, settings)
+        network, settings, rows = _fitted_with_period(fitted, settings, object_of)
+        network = replace(
+            network,
+            findings=(*isolated, *network.findings),
+            notes=(*wrong, *sections, *network.notes),
+        )
         rest = _resting(rows, settings)
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
     return model_of(network, recordings[0].units, source, settings, verdict)
+
+
+def _fitted_with_period(
+    recordings: Sequence[Recording], options: IdentifyOptions, objects: Sequence[int]
+) -> tuple[FittedNetwork, IdentifyOptions, Rows]:
+    """Returns the identified force law, the options with the period that it has, and its rows.
+
+    If the force repeats over position, a good periodic force law is taken. Otherwise it is compared with one
+    that is not periodic.
+    """
+    found = period_of(recordings) if options.period is None and options.inputs == "auto" else None
+    tried = []
+    for period in (found, options.period)[found is None :]:
+        chosen = replace(options, period=period)
+        rows = rows_of(recordings, chosen, objects)
+        tried.append((fit_rows(rows, chosen), chosen, rows))
+        if found is not None and tried[0][0].nrmse <= USABLE_NRMSE:
+            break
+
+    def value(network: FittedNetwork) -> float:
+        n = min(network.independent_rows, network.residuals)
+        return deviance("bic", max(network.rmse**2, TINY) * n, n, network.n_parameters)
+
+    network, chosen, rows = min(tried, key=lambda each: value(each[0])) if len(tried) > 1 else tried[0]
+    if chosen.period is not None and found is not None:
+        text = recordings[0].file_unit("position").text(found)
+        note = f"The force repeats every {text}: positions are taken modulo this period (--period)."
+        network = replace(network, notes=(note, *network.notes))
+    return network, chosen, rows
 
 
 def _groups(objects: object, inputs: Sequence[str]) -> list[list[Recording]]:
@@ -273,7 +308,11 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     side = rows.side
     if side is not None and not ((side > 0).any() and (side < 0).any()):
         rows, side = replace(rows, side=None), None
-    if side is None or side[rows.reported].all() or not (options.inputs == "auto" or "hysteresis" in options.inputs):
+    if (
+        side is None
+        or side[rows.reported].all()
+        or not (options.inputs == "auto" or "hysteresis" in options.inputs)
+    ):
         return identified(select(rows, options))
     left_out = f"{np.count_nonzero(side == 0)} rows without a direction are not used to test hysteresis."
     found = identified(select(replace(rows, notes=(*rows.notes, left_out)).only(side != 0), options))

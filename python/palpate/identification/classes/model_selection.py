@@ -30,8 +30,8 @@ MOST_DYNAMIC_SELECTIONS = 2
 """Number of times that the model is selected again, each time with better values of damping and mass."""
 
 LEAST_GAIN = 0.25
-"""Least share of the squared error that velocity as an input must explain [-]: a force of two inputs is harder
-to render and to certify."""
+"""Least share of the squared error that velocity as an input must explain [-]: a force of two inputs is
+harder to render and to certify."""
 
 MOST_CORRELATION_ESTIMATES = 5
 """Largest number of times that the correlation of the noise of successive rows is estimated."""

@@ -69,8 +69,8 @@ MOST_NAMED_ROWS = 3
 def without_wrong_readings(
     recordings: Sequence[Recording],
 ) -> tuple[list[Recording], list[Finding], list[str]]:
-    """Returns the recordings without isolated rows and wrong readings, findings on the isolated rows, and notes
-    on the wrong readings."""
+    """Returns the recordings without isolated rows and wrong readings, findings on the isolated rows, and
+    notes on the wrong readings."""
     kept, findings = without_isolated(recordings)
     notes: list[str] = []
     for number, recording in enumerate(kept):
@@ -82,8 +82,8 @@ def without_wrong_readings(
         more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
         where = f"recording {number + 1}: " if len(kept) > 1 else ""
         notes.append(
-            f"{where}{len(rows)} of {len(recording)} rows ({named}{more}) lie outside the values of the rows before "
-            "and after them. They are taken as wrong readings and were dropped."
+            f"{where}{len(rows)} of {len(recording)} rows ({named}{more}) lie outside the values of the rows "
+            "before and after them. They are taken as wrong readings and were dropped."
         )
         kept[number] = recording.without(wrong)
     return kept, findings, notes
@@ -259,9 +259,9 @@ MOST_WRONG_SHARE = 0.1
 def wrong_readings(recording: Recording) -> NDArray[np.bool_]:
     """Returns True (n,) for rows with a wrong reading of position or force.
 
-    A wrong reading is outside the interval between the median values of the rows before it and after it, so that
-    no row of a steep wall or of a click is one. The distance is compared with the changes from row to row
-    nearby. At the largest and smallest positions a wall may be touched by a single row. A recording
+    A wrong reading is outside the interval between the median values of the rows before it and after it, so
+    that no row of a steep wall or of a click is one. The distance is compared with the changes from row to
+    row nearby. At the largest and smallest positions a wall may be touched by a single row. A recording
     whose rows are not in the order of a motion has none.
     """
     found = np.zeros(len(recording), dtype=bool)

@@ -50,8 +50,8 @@ STEPS_AROUND = 8
 it."""
 
 AIR_MARGIN = 0.25
-"""Distance before the contact that is fitted, as a share of the travel in contact [-]: the force is zero further
-away, however long the approach is."""
+"""Distance before the contact that is fitted, as a share of the travel in contact [-]: the force is zero
+further away, however long the approach is."""
 
 AIR_SHARE = 0.05
 """Share of the rows, those at the smallest positions, whose median force is that of the air [-]."""
@@ -96,7 +96,10 @@ def unused_rows(role: Int8Vector) -> str:
     }
     counts = {reason: int(np.count_nonzero(role == each)) for each, reason in reasons.items()}
     listed = ", ".join(f"{count} {reason}" for reason, count in counts.items() if count)
-    return f"{sum(counts.values())} of {len(role)} rows are not fitted, because they show no force over position: {listed}."
+    return (
+        f"{sum(counts.values())} of {len(role)} rows are not fitted, because they show no force over position: "
+        f"{listed}."
+    )
 
 
 def contact_at(position: Float1D, force: Float1D) -> float:
@@ -119,8 +122,8 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
     """Returns True (n,) for rows at which the tool waits; positions (n,) are in recorded order.
 
     The distance that the tool has travelled is that of a play operator as wide as the noise, which noise does
-    not move. The speed around a row is the smaller one of the median speeds of `STEPS_AROUND` distances before
-    it and after it, which a wait among them does not change.
+    not move. The speed around a row is the smaller one of the median speeds of `STEPS_AROUND` distances
+    before it and after it, which a wait among them does not change.
     """
     x = (position - position.min()) / float(np.ptp(position))
     noise = max(map(noise_of, np.array_split(x, max(1, min(SECTIONS, len(x) // LEAST_SECTION_ROWS)))))

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Period of a force that repeats over position, as of a knob with detents, from its autocorrelation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..._typing import Float1D
+from ...recording import Recording
+from ...recording.motion import ordered_strokes
+
+CELLS = 8192
+"""Largest number of position cells whose mean forces are correlated."""
+
+LEAST_CELLS = 16
+"""Least number of cells in a period: fewer do not show its curve."""
+
+LEAST_CORRELATION = 0.5
+"""Correlation of the force with itself, one period apart, from which a periodic model is tried [-]."""
+
+SAME_PEAK = 0.95
+"""Share of the largest correlation from which the correlation at a shorter distance is that of the period
+[-]: the force repeats after two periods as well."""
+
+
+def period_of(recordings: Sequence[Recording]) -> float | None:
+    """Returns the distance after which the force repeats [position]; None without at least two repeats.
+
+    The strokes of one direction are compared, because hysteresis has the same sign in them.
+    """
+    ways = [each.direction if each.direction is not None else ordered_strokes(each) for each in recordings]
+    if any(way is None or len(each.input_names) for way, each in zip(ways, recordings, strict=True)):
+        return None
+    press = np.concatenate([way > 0 for way in ways if way is not None])
+    if not press.any():
+        return None
+    position = np.concatenate([each.position for each in recordings])[press]
+    force = np.concatenate([each.force for each in recordings])[press]
+    travel, cells = float(np.ptp(position)), min(CELLS, len(force) // 2)
+    if cells < 2 * LEAST_CELLS or not travel > 0.0:
+        return None
+    peak = _first_peak(_autocorrelation(_curve((position - position.min()) / travel, force, cells)))
+    return None if peak is None else peak * travel / cells
+
+
+def _curve(box: Float1D, force: Float1D, cells: int) -> Float1D:
+    """Returns the mean force in each cell; a cell without rows gets the force between its neighbours."""
+    cell = np.minimum((box * cells).astype(np.intp), cells - 1)
+    count = np.bincount(cell, minlength=cells)
+    known = np.flatnonzero(count)
+    mean = np.bincount(cell, force, minlength=cells)[known] / count[known]
+    return np.interp(np.arange(cells), known, mean)
+
+
+def _autocorrelation(curve: Float1D) -> Float1D:
+    """Returns the correlation of a curve (n,) with itself at distances of 0 to n/2 - 1 cells, from the cells
+    that both have."""
+    n = len(curve)
+    centred = curve - curve.mean()
+    spectrum = np.fft.rfft(centred, 2 * n)
+    products = np.fft.irfft(spectrum * spectrum.conj())[: n // 2]
+    squares = np.concatenate([[0.0], np.cumsum(centred**2)])
+    lag = np.arange(n // 2)
+    both = np.sqrt(squares[n - lag] * (squares[n] - squares[lag]))
+    return np.divide(products, both, out=np.zeros(n // 2), where=both > 0.0)
+
+
+def _first_peak(correlation: Float1D) -> float | None:
+    """Returns the distance of the first repeat, refined by the last one [cells]; None without a repeat."""
+    inner, apart = correlation[1:-1], np.flatnonzero(correlation < 0.0)
+    peaks = 1 + np.flatnonzero((inner >= correlation[:-2]) & (inner > correlation[2:]))
+    # A smooth force is similar to itself at short distances; a repeat follows a distance at which it is not.
+    peaks = peaks[peaks >= max(LEAST_CELLS, int(apart[0]) if len(apart) else len(correlation))]
+    if not len(peaks) or correlation[peaks].max() < LEAST_CORRELATION:
+        return None
+    first = float(peaks[correlation[peaks] >= SAME_PEAK * correlation[peaks].max()][0])
+    for repeat in range(1, int((len(correlation) - 1) / first) + 1):
+        around = np.arange(int(repeat * first - 0.25 * first), int(repeat * first + 0.25 * first) + 1)
+        around = around[(around > 0) & (around < len(correlation) - 1)]
+        if not len(around):
+            break
+        top = int(around[np.argmax(correlation[around])])
+        left, middle, right = correlation[top - 1 : top + 2]
+        bend = left - 2.0 * middle + right
+        shift = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
+        first = (top + float(np.clip(shift, -0.5, 0.5))) / repeat
+    return first
