@@ -306,6 +306,8 @@ def _constant_position_findings(recording: Recording, travel: Travel, force_rang
     for k in np.flatnonzero(lengths >= many).tolist():
         start, stop = int(edges[k]), int(edges[k + 1])
         jump = abs(float(x[stop] - x[stop - 1])) if stop < len(x) else 0.0
+        # After a hold the tool moves on from where it is; a stuck sensor jumps to where it has gone.
+        jump -= abs(float(x[stop + 1] - x[stop])) if stop + 1 < len(x) else 0.0
         if jump > LEAST_JUMP_RATIO * usual and _inner_range(f[start:stop]) > bound:
             return [
                 usable(

@@ -403,6 +403,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         below="free" if left_there else "linear",
         rmse=error.rmse,
         nrmse=error.nrmse,
+        rmse_of_all=best.error_on(None).rmse,
         residuals=int(np.count_nonzero(counted)),
         residual_correlation=neighbour_correlation(best.residual[counted > 0.0]),
         path=tuple(report.path),

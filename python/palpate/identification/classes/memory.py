@@ -302,7 +302,7 @@ def better_with_memory(
     choice = grown(recorded, options)
     if choice.shape is None:
         return _refused(found, "no branch lowers the criterion")
-    before = found.nrmse**2
+    before = (found.rmse_of_all / recorded.spread) ** 2
     in_sample = 1.0 - choice.rms() ** 2 / before
     if in_sample < LEAST_GAIN:
         return _refused(found, _gain_text(in_sample, 0.0))

@@ -51,7 +51,7 @@ def _curve(box: Float1D, force: Float1D, cells: int) -> Float1D:
     count = np.bincount(cell, minlength=cells)
     known = np.flatnonzero(count)
     mean = np.bincount(cell, force, minlength=cells)[known] / count[known]
-    return np.interp(np.arange(cells), known, mean)
+    return np.asarray(np.interp(np.arange(cells), known, mean))
 
 
 def _autocorrelation(curve: Float1D) -> Float1D:
@@ -64,7 +64,7 @@ def _autocorrelation(curve: Float1D) -> Float1D:
     squares = np.concatenate([[0.0], np.cumsum(centred**2)])
     lag = np.arange(n // 2)
     both = np.sqrt(squares[n - lag] * (squares[n] - squares[lag]))
-    return np.divide(products, both, out=np.zeros(n // 2), where=both > 0.0)
+    return np.asarray(np.divide(products, both, out=np.zeros(n // 2), where=both > 0.0))
 
 
 def _first_peak(correlation: Float1D) -> float | None:

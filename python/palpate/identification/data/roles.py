@@ -97,8 +97,8 @@ def unused_rows(role: Int8Vector) -> str:
     counts = {reason: int(np.count_nonzero(role == each)) for each, reason in reasons.items()}
     listed = ", ".join(f"{count} {reason}" for reason, count in counts.items() if count)
     return (
-        f"{sum(counts.values())} of {len(role)} rows are not fitted, because they show no force over position: "
-        f"{listed}."
+        f"{sum(counts.values())} of {len(role)} rows are not fitted, because they show no force over "
+        f"position: {listed}."
     )
 
 

@@ -102,6 +102,8 @@ class FittedNetwork:
     """RMS error on the samples of the identification [force]"""
     nrmse: float = 0.0
     """RMS error divided by the standard deviation of the force [-]"""
+    rmse_of_all: float = 0.0
+    """RMS error on every row of the recordings, also on those that are not fitted [force]"""
     residuals: int = 0
     """Number of rows with a residual"""
     residual_correlation: float = 0.0
@@ -171,7 +173,7 @@ class FittedNetwork:
         scaled = ("weight", "linear", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
         values: dict[str, Any] = {
             name: None if (value := getattr(self, name)) is None else value / factor
-            for name in (*scaled, "mass", "damping", "rmse")
+            for name in (*scaled, "mass", "damping", "rmse", "rmse_of_all")
         }
         return replace(
             self,
