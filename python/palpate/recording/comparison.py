@@ -83,10 +83,17 @@ class CellRows:
     """(k,) force of each row minus the mean force of its stroke at the same position"""
     cells: int
     """Number of position cells"""
-    loop: Float1D
-    """(m,) press minus release force, at m positions where both strokes have rows"""
+    press: Float1D
+    """(m,) mean force of the press, at m rising positions where both strokes have rows"""
+    release: Float1D
+    """(m,) mean force of the release at these positions"""
     loop_error: Float1D
     """(m,) standard error of each force difference in `loop`"""
+
+    @property
+    def loop(self) -> Float1D:
+        """(m,) press minus release force"""
+        return self.press - self.release
 
 
 def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
@@ -114,12 +121,12 @@ def cell_rows(recording: Recording, travel: Travel) -> CellRows | None:
         scatter = np.bincount(cell, residual**2, 2 * cells)[of][compared]
         curves.append((*curve, np.sqrt(scatter) / count[of][compared]))
     (press_x, press_f, press_error), (release_x, release_f, release_error) = curves
-    loop, error = np.empty(0), np.empty(0)
+    press, released, error = np.empty(0), np.empty(0), np.empty(0)
     if len(press_x) and len(release_x):
         shared = (release_x >= press_x[0]) & (release_x <= press_x[-1])
-        loop = np.interp(release_x, press_x, press_f)[shared] - release_f[shared]
+        press, released = np.interp(release_x, press_x, press_f)[shared], release_f[shared]
         error = np.hypot(np.interp(release_x, press_x, press_error), release_error)[shared]
-    return CellRows(row, cell, place - at, residual, cells, loop, error)
+    return CellRows(row, cell, place - at, residual, cells, press, released, error)
 
 
 def sides(recording: Recording, travel: Travel) -> NDArray[np.int8]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._typing import Float1D
-from ..verdict import Finding, usable
+from ..verdict import Finding, no, usable
 from .comparison import CellRows, Travel, cell_rows, merged_findings, scale_findings, sides
 from .conversion import MIN_ROWS, mirror_notes
 from .lag import LONGEST_LAG_S
@@ -43,6 +43,17 @@ LEAST_LOOP_SHARE = 0.02
 
 LEAST_LOOP_ERRORS = 5.0
 """Least mean of press minus release force that is hysteresis, divided by the standard error of this mean."""
+
+MIRRORED_CORRELATION, MIRRORED_RANGE = 0.5, 0.2
+"""A release is the mirrored press if the correlation of press and negative release is above the first value,
+and each stroke has at least the second value of the range of the force: a constant friction has none [-]."""
+
+LOWEST_ROWS = 5
+"""Number of rows of the release at its smallest positions, whose median force is that of its end."""
+
+LEAST_ZERO_SHIFT = 0.02
+"""A release that ends below minus this share of the range of the force, after a press that is never below it,
+has another zero [-]. No release of 56 measured switches and domes does."""
 
 LEAST_CLIPPED_ROWS = 5
 """Least number of rows at the largest or least force (or position) that are reported as a clipped sensor."""
@@ -152,6 +163,7 @@ def quality_findings(recording: Recording, *, relaxes: bool = False) -> list[Fin
     return [
         *magnitude_findings(recording, travel),
         *sign_findings(recording, travel, cells),
+        *zero_findings(recording, cells),
         *saturation_findings(recording, travel),
         *hold_findings(recording),
         *gap_findings(recording, travel),
@@ -218,6 +230,34 @@ def sign_findings(recording: Recording, travel: Travel, cells: CellRows | None) 
     if is_loop or not (np.ptp(f) > 0.0 and np.ptp(x) > 0.0):
         return []
     return [usable(sentence) for sentence in mirror_notes(float(np.corrcoef(x, f)[0, 1]))]
+
+
+def zero_findings(recording: Recording, cells: CellRows | None) -> list[Finding]:
+    """Returns findings on a release with another zero than its press, and on a stroke with the wrong sign."""
+    if cells is None or len(cells.press) < 4:
+        return []
+    press, release, unit = cells.press, cells.release, recording.file_unit("force")
+    reach = _inner_range(recording.force)  # without the few rows of a hard stop
+    varied = min(np.ptp(press), np.ptp(release)) > MIRRORED_RANGE * reach
+    if varied and float(np.corrcoef(press, -release)[0, 1]) > MIRRORED_CORRELATION:
+        return [
+            no(
+                "the force of the release is that of the press with the opposite sign: one stroke was "
+                "recorded with the wrong sign. Change the sign of the force of one stroke"
+            )
+        ]
+    released = cells.row[cells.cell >= cells.cells]
+    lowest = released[np.argsort(recording.position[released], kind="stable")[:LOWEST_ROWS]]
+    shift, end = LEAST_ZERO_SHIFT * reach, float(np.median(recording.force[lowest]))
+    if end > -shift or press.min() < -shift or not varied:
+        return []
+    return [
+        usable(
+            f"the release ends at {unit.text(end)}, but the press never pulls the tool. If the tool is not "
+            "fixed to the object, the zero of the force changed between the strokes: record again without a "
+            "tare in between"
+        )
+    ]
 
 
 def _loop(recording: Recording, cells: CellRows | None) -> tuple[float, bool]:
