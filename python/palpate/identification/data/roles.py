@@ -18,7 +18,7 @@ from ..._core.model import play
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
 from ...recording.motion import TURN_NOISE, TURN_STEPS, noise_of, resolution_of, strokes_from_order
-from .limits import FORCE_RESOLUTION, standard_deviation
+from .limits import FORCE_RESOLUTION
 
 
 class Role(IntEnum):
@@ -106,10 +106,14 @@ def contact_at(position: Float1D, force: Float1D) -> float:
     """Returns the smallest position at which the force of moving rows (n,) differs from that at the smallest
     positions by more than its noise: there the tool meets the object."""
     order = np.argsort(position, kind="stable")
+    reach = float(np.ptp(force))
+    if not reach > 0.0:
+        return float(position.min())
+    force = (force - force.min()) / reach
     x, f = position[order], force[order]
     air = f[: max(2, int(AIR_SHARE * len(f)))]
     level = float(np.median(air))
-    noise = standard_deviation(air - level) + FORCE_RESOLUTION * float(np.ptp(f))
+    noise = max(noise_of(force), 0.5 * resolution_of(force), FORCE_RESOLUTION)
     starts = np.linspace(0, len(f), min(AIR_BLOCKS, len(f)), endpoint=False).astype(np.intp)
     rows = np.diff(starts, append=len(f))
     mean = np.add.reduceat(f, starts) / rows
