@@ -361,7 +361,7 @@ def model_of(
         units=units,
         **network.parameters(),
         below=network.below,
-        above="linear",
+        above=options.above,
         period=options.period,
         memory=None if network.memory is None else network.memory.memory(),
         play_radius=network.play_radius,
@@ -375,6 +375,7 @@ def model_of(
         notes={
             "model_selection": [str(decision) for decision in network.decisions],
             "identification": [*network.notes, *network.band_check],
+            "left_out_nrmse": network.left_out_nrmse,
             "verdict": verdict.record(),
         },
     )

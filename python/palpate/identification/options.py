@@ -25,6 +25,8 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "refinement": ("projection", "quasi-newton"),
     "loss": ("squares", "huber"),
     "filters": ("matched", "paper-implicit", "paper-explicit"),
+    "below": ("auto", "free", "linear"),
+    "above": ("linear", "free"),
 }
 """Options whose value is one of several words, and the allowed words of each."""
 
@@ -144,6 +146,11 @@ class IdentifyOptions:
     period: float | None = None
     """Period of a repeating force [m or rad]. It is the change of position after which the force repeats,
     such as one revolution of a knob."""
+    below: str = "auto"
+    """Force below the recorded positions: free (falls to zero, the tool leaves), linear (continues straight), or
+    auto. With "auto" it is free, unless the recording shows that the object pulls the tool."""
+    above: str = "linear"
+    """Force above the recorded positions: linear (continues straight) or free (falls to zero)."""
     search: SearchOptions = field(default_factory=SearchOptions)
     """Settings of the search, which few identifications need to change."""
 

@@ -21,7 +21,10 @@ from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate, RowError
 from .class_selection import ClassSelection
-from .repeatability import band_with_check
+from .repeatability import band_with_check, left_out_nrmse
+
+PULLING_ROWS = 0.002
+"""If more than this share of the rows pulls the tool, the tool cannot leave the object [-]."""
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: the RMS error is then a tenth of the standard
@@ -93,7 +96,13 @@ def verdict_of(
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
     findings = [*findings_of(recordings, side, relaxes=network.memory is not None), *network.findings]
     findings += size_findings(network, recordings)
-    findings += error_findings(network.nrmse, "the rows of the identification")
+    told = max(network.nrmse, network.left_out_nrmse)
+    rows = (
+        "rows of the identification that were left out in turn"
+        if told > network.nrmse
+        else "the rows of the identification"
+    )
+    findings += error_findings(told, rows)
     return Verdict(tuple(dict.fromkeys(findings)))
 
 
@@ -396,14 +405,19 @@ def identified(selection: ClassSelection) -> FittedNetwork:
             position, data.force[rows], best.residual[rows], side, error.nrmse, data.force_unit
         )
     band, checked = band_with_check(best)
-    near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(data.force[data.reported])))
-    left_there = single and abs(best.at_lower) <= near_zero and data.period is None
+    below = options.below
+    if below == "auto":
+        force = data.force[data.reported]
+        near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(force)))
+        pulls = float(np.quantile(force, PULLING_ROWS)) < -near_zero
+        below = "free" if single and data.period is None and not pulls else "linear"
     return replace(
         network,
-        below="free" if left_there else "linear",
+        below=below,
         rmse=error.rmse,
         nrmse=error.nrmse,
         rmse_of_all=best.error_on(None).rmse,
+        left_out_nrmse=left_out_nrmse(best),
         residuals=int(np.count_nonzero(counted)),
         residual_correlation=neighbour_correlation(best.residual[counted > 0.0]),
         path=tuple(report.path),

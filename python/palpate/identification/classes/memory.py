@@ -64,9 +64,6 @@ Branches that explain the share LEAST_GAIN of the squared error therefore give a
 LEAST_GAIN = 0.25
 """Least relative decrease of the squared error by a memory [-]: it is harder to render and to certify."""
 
-PULLING_ROWS = 0.002
-"""If more than this share of the rows pulls the tool, the tool cannot leave the object [-]."""
-
 CONTACT_SHARE = 0.02
 """Share of the force range below which a tool that can leave the object has left it, after it was in contact
 [-]."""
@@ -170,9 +167,7 @@ class Recorded:
         force = np.concatenate([part.force for part in recordings])
         position = np.concatenate([part.position for part in recordings])
         lower, travel = float(position.min()), float(np.ptp(position))
-        pulls = float(np.quantile(force, PULLING_ROWS)) < -CONTACT_SHARE * float(np.ptp(force))
-        contact = found.below == "free" and not pulls
-        return cls(recordings, lower, travel, float(np.std(force)), contact)
+        return cls(recordings, lower, travel, float(np.std(force)), found.below == "free")
 
     @cached_property
     def motions(self) -> tuple[Motion, ...]:

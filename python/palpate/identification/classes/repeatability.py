@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...model.band import BAND_LEVEL, Band
-from ..data.compression import Compressor, HeldOutRows, inside
+from ..data.compression import HELD_OUT_EVERY, Compressor, HeldOutRows, inside
 from ..data.repeats import Repeats, band_of, pure_error
 from ..network.separable import problem_of
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
@@ -114,6 +114,31 @@ def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
         share = f", {coverage:.1%} of its rows in the band of the others (expected {BAND_LEVEL:.0%})"
     error = data.force_unit.text(band.unseen_error)
     return band, (f"One {band.left_out} left out of the fit at a time: RMS error {error} on it{share}.",)
+
+
+def left_out_nrmse(best: Candidate) -> float:
+    """Returns the NRMSE on rows that are left out of the fit, a fifth of them at a time.
+
+    Weights, slopes and bias are fitted to the other rows with the wavelets of the model. Rows with correlated
+    noise are left out together.
+    """
+    data, used = best.data, best.error.weight > 0.0
+    force = data.force if best.moving is None else data.force - best.moving.force
+    compressor = Compressor(
+        data.box, force, weight=data.weight, max_positions=best.rows.cells, limits=data.limits
+    )
+    rows = np.flatnonzero(used)
+    together = max(1, round(len(rows) / best.problem.independent))
+    fold = np.full(len(used), -1)
+    fold[rows] = np.arange(len(rows)) // together % HELD_OUT_EVERY
+    error = best.error
+    residual = error.residual.copy()
+    for number in range(HELD_OUT_EVERY):
+        others = used & (fold != number)
+        if others.any():
+            again, left = _left_out(best, compressor, force, others, used & (fold == number))
+            residual[left] = again[left]
+    return replace(error, residual=residual).nrmse
 
 
 def _pure_error(best: Candidate, repeats: Repeats) -> float | None:
