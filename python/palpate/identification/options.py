@@ -147,10 +147,10 @@ class IdentifyOptions:
     """Period of a repeating force [m or rad]. It is the change of position after which the force repeats,
     such as one revolution of a knob."""
     below: str = "auto"
-    """Force below the recorded positions: free (falls to zero, the tool leaves), linear (continues straight), or
-    auto. With "auto" it is free, unless the recording shows that the object pulls the tool."""
+    """Force below the recorded positions: free, linear or auto. free falls to zero, because the tool leaves;
+    linear continues straight. auto is free, unless the recording shows that the object pulls the tool."""
     above: str = "linear"
-    """Force above the recorded positions: linear (continues straight) or free (falls to zero)."""
+    """Force above the recorded positions: linear or free. linear continues straight, free falls to zero."""
     search: SearchOptions = field(default_factory=SearchOptions)
     """Settings of the search, which few identifications need to change."""
 

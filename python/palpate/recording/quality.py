@@ -246,10 +246,12 @@ def zero_findings(recording: Recording, cells: CellRows | None) -> list[Finding]
                 "recorded with the wrong sign. Change the sign of the force of one stroke"
             )
         ]
-    released = cells.row[cells.cell >= cells.cells]
-    lowest = released[np.argsort(recording.position[released], kind="stable")[:LOWEST_ROWS]]
-    shift, end = LEAST_ZERO_SHIFT * reach, float(np.median(recording.force[lowest]))
-    if end > -shift or press.min() < -shift or not varied:
+    shift = LEAST_ZERO_SHIFT * reach
+    start, end = (
+        _lowest_force(recording, cells.row[(cells.cell >= cells.cells) == way]) for way in (False, True)
+    )
+    # The friction of an object that holds the tool is above zero in the press and below it in the release.
+    if end > -shift or press.min() < -shift or abs(start) > 0.5 * abs(end) or not varied:
         return []
     return [
         usable(
@@ -258,6 +260,12 @@ def zero_findings(recording: Recording, cells: CellRows | None) -> list[Finding]
             "tare in between"
         )
     ]
+
+
+def _lowest_force(recording: Recording, rows: NDArray[np.intp]) -> float:
+    """Returns the median force of the rows at the smallest positions, among some rows."""
+    lowest = rows[np.argsort(recording.position[rows], kind="stable")[:LOWEST_ROWS]]
+    return float(np.median(recording.force[lowest]))
 
 
 def _loop(recording: Recording, cells: CellRows | None) -> tuple[float, bool]:

@@ -292,7 +292,7 @@ def _deviating(
         apart = np.maximum(v - np.maximum(before, after), np.minimum(before, after) - v)
         changes = np.pad(np.abs(np.diff(v)), LOCAL_ROWS, mode="edge")
         nearby = np.median(np.lib.stride_tricks.sliding_window_view(changes, LOCAL_ROWS), axis=1)
-        usual = np.maximum(nearby[: len(v)], nearby[-len(v) :])
+        usual = np.maximum(np.maximum(nearby[: len(v)], nearby[-len(v) :]), float(np.median(changes)))
         wrong = apart > np.maximum(WRONG_RATIO * usual, floor)
         if not at_ends and wrong.any():
             ordinary = x[~wrong]

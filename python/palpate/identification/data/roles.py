@@ -134,7 +134,7 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
     band = max(TURN_NOISE * noise, TURN_STEPS * resolution_of(x))
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(play(x, 0.5 * band, start=x[0]))))])
     step = max(STEP, 2.0 * band)
-    if travelled[-1] <= step:
+    if travelled[-1] <= 2.0 * step:
         return np.zeros(len(x), dtype=bool)
     # First and last row of each step of distance: interpolated, because a row can travel several steps.
     moved, at_row = np.unique(travelled, return_index=True)
@@ -143,12 +143,13 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
     around = np.pad(rows, STEPS_AROUND, constant_values=np.nan)
     windows = np.lib.stride_tricks.sliding_window_view(around, STEPS_AROUND)
     typical = np.full(len(windows), np.nan)  # unknown at the start and at the end of the motion
-    enough = np.count_nonzero(np.isfinite(windows), axis=1) >= min(STEPS_AROUND // 2, len(rows) - 1)
+    known = np.count_nonzero(np.isfinite(windows), axis=1)
+    enough = known >= max(1, min(STEPS_AROUND // 2, len(rows) - 1))
     typical[enough] = np.nanmedian(windows[enough], axis=1)
     nearby = np.fmax(typical[: len(rows)], typical[-len(rows) :])[
         np.minimum((travelled / step).astype(np.int64), len(rows) - 1)
     ]
-    speed = step / np.maximum(nearby, 1e-9)
+    speed = step / nearby
     row = np.arange(len(x))
     first = np.maximum(row - np.maximum(np.ceil(2.0 * band / speed), 1.0).astype(np.int64), 0)
     slow = travelled - travelled[first] < SLOW_RATIO * speed * (row - first)

@@ -105,7 +105,7 @@ class FittedNetwork:
     rmse_of_all: float = 0.0
     """RMS error on every row of the recordings, also on those that are not fitted [force]"""
     left_out_nrmse: float = 0.0
-    """NRMSE on rows that are left out of the fit, a fifth of the recording at a time [-]; 0 if not computed"""
+    """NRMSE on rows that are left out of the fit, a fifth of them at a time [-]; 0 if not computed"""
     residuals: int = 0
     """Number of rows with a residual"""
     residual_correlation: float = 0.0

@@ -250,6 +250,19 @@ class Candidate:
         """Returns the value of a criterion for this candidate; a smaller value is better."""
         return criterion_of(self.problem, self.solution, name, self.n_parameters)
 
+    def on_rows(self, name: str, weight: Float1D) -> float:
+        """Returns the value of a criterion from the residuals of all rows, each of which represents `weight`
+        (n,) samples.
+
+        The rows of a fit are compressed in another way for each model class, and their sums of squares differ
+        by the slopes inside the cells. The residuals of the rows do not.
+        """
+        problem, rows = self.problem, float(weight.sum())
+        squares = float(weight @ self.residual**2) + self.data.within
+        total = problem.total(squares * problem.samples / rows - problem.within)
+        n = problem.independent * rows / problem.samples
+        return deviance(name, total * n / problem.samples, n, self.n_parameters)
+
     def point(self, name: str) -> PathPoint:
         """Returns this candidate as an entry of the list of tested networks, with the value of the named
         criterion."""
@@ -394,22 +407,6 @@ class Samples:
         rows = self._held_out if known is None else self._held_out & known
         return HeldOutRows.of(self.data.box, self.data.force, None if strokes is None else strokes.side, rows)
 
-    def on_known_rows(self, below: Candidate, above: Candidate) -> Candidate:
-        """Returns the simpler candidate `below` on the rows whose direction state is known for candidate
-        `above`.
-
-        The random error of the rows without direction state can be as large as the decrease of the criterion
-        that a model class must show.
-        """
-        strokes = above.strokes
-        if strokes is None or strokes.known.all() or self._for_criterion:
-            return below
-        rows = self._compressor.rows(below.side, strokes.known).reweighted_to(above.rows.samples)
-        problem = self.problem(rows)
-        solved = problem.solve(below.solution.basis)
-        solution = problem.with_coefficients(solved, below.solution.coefficients)
-        return replace(below, problem=problem, solution=solution)
-
 
 def local_noise_ratio(below: Candidate, above: Candidate) -> float:
     """Returns the mean squared residual where two candidates differ divided by that of all rows, at least 1.
@@ -473,9 +470,11 @@ class Judge:
         If the noise is larger where two single-valued candidates differ, the decrease of the error counts
         less. The residuals of a hysteresis are not noise, because its reversals are not fitted exactly.
         """
-        known = self._samples.on_known_rows(below, above)
-        falls = known.criterion(self.criterion) - above.criterion(self.criterion)
-        if self.criterion in ON_HELD_OUT_ROWS or above.strokes is not None:
+        if self.criterion in ON_HELD_OUT_ROWS:
+            return below.criterion(self.criterion) - above.criterion(self.criterion)
+        weight = above.error_on(above.data.weight).weight
+        falls = below.on_rows(self.criterion, weight) - above.on_rows(self.criterion, weight)
+        if above.strokes is not None:
             return falls
         penalty, n = CRITERIA[self.criterion], above.problem.independent
         cost = penalty(n, above.n_parameters) - penalty(n, below.n_parameters)

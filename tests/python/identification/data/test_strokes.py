@@ -109,7 +109,7 @@ def test_repetitions_of_one_stroke_are_not_hysteresis() -> None:
 def test_two_repetitions_of_both_strokes_are_parted_in_pairs() -> None:
     rows = [PRESS, RELEASE[::-1], PRESS, RELEASE[::-1]]
     recordings = [bare(each, loop(seed)) for seed, each in enumerate(rows)]
-    side = strokes_of(recordings, named=False).side
+    side = strokes_of(recordings).side
     assert side is not None
     assert side.tolist() == np.repeat([1.0, -1.0, 1.0, -1.0], 400).tolist()
 
@@ -143,14 +143,14 @@ def test_a_difference_below_the_noise_is_bounded_where_rows_are_in_no_order() ->
 def test_one_stroke_with_noise_gives_no_finding(noise: float, step: float) -> None:
     force = loop(noise=noise)
     force = np.round(force / step) * step if step else force
-    assert not strokes_of([bare(PRESS, force)], named=False).findings
+    assert not strokes_of([bare(PRESS, force)]).findings
 
 
 @pytest.mark.parametrize("times", [2, 3, 4, 5, 6, 7, 10])
 def test_repeated_rows_of_one_stroke_with_noise_give_no_finding(times: int) -> None:
     rows = np.repeat(PRESS, times)
     for seed in range(4):
-        assert not strokes_of([bare(rows, IN_AND_OUT + loop(seed, noise=0.3))], named=False).findings
+        assert not strokes_of([bare(rows, IN_AND_OUT + loop(seed, noise=0.3))]).findings
 
 
 def test_equal_strokes_do_not_change_the_model() -> None:
@@ -160,10 +160,10 @@ def test_equal_strokes_do_not_change_the_model() -> None:
     decision = "hysteresis: not accepted (press and release force do not differ by 4 standard errors)"
     assert decision in notes(ordered)
     rows = np.random.default_rng(5).permutation(800)
-    shuffled = strokes_of([bare(rows, force)], named=False)
+    shuffled = strokes_of([bare(rows, force)])
     assert shuffled.side is None
     sorted_rows = np.sort(IN_AND_OUT)
-    assert strokes_of([Recording.from_arrays(sorted_rows, sorted_rows)], named=False).side is None
+    assert strokes_of([Recording.from_arrays(sorted_rows, sorted_rows)]).side is None
 
 
 def test_verify_takes_strokes_from_the_order_of_rows() -> None:
@@ -244,7 +244,7 @@ def test_measured_recordings_without_direction_are_identified_as_well(data: Path
         stated = replace(read_recording(path), time=None)
         unstated = replace(stated, direction=None)
         assert stated.direction is not None
-        found = strokes_of([unstated], named=False).side
+        found = strokes_of([unstated]).side
         assert found is not None, path.name
         if np.count_nonzero(found != stated.direction) < 3:
             continue
