@@ -68,10 +68,9 @@ class SearchOptions:
     resolved_by: int = 7
     """Least number of distinct positions, on every stroke, in a wavelet's core |u| <= sqrt(3) [-]; 5 may
     suffice if the residual is not noise"""
-    max_positions: int = 4096
+    max_positions: int = 1024
     """Largest number of distinct positions with one input; twice as many with two inputs, 64 times as many
-    with three or more, and doubled while cells are too wide (at most three times). More positions are
-    gathered in about this number of cells [-]"""
+    with three or more. More positions are gathered in about this number of cells [-]"""
     filters: str = "matched"
     """Filters for the forces of mass and damping: matched, or as published with an assumed mass:
     paper-implicit (figure 11), paper-explicit (figure 13)"""
