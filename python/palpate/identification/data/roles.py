@@ -49,8 +49,8 @@ STEPS_AROUND = 8
 """Number of distances before a row, and after it, whose median speeds are the speed of the motion around
 it."""
 
-AIR_MARGIN = 0.25
-"""Distance before the contact that is fitted, as a share of the travel in contact [-]: the force is zero
+AIR_MARGIN = 1.0
+"""Distance before the contact that is fitted, as a share of the travel in contact [-]: the force is the same
 further away, however long the approach is."""
 
 AIR_SHARE = 0.05
@@ -67,11 +67,12 @@ LEAST_WAIT = 0.01
 shorter one has no weight in a fit."""
 
 
-def roles_of(recording: Recording) -> Int8Vector:
+def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     """Returns the role of each row (n,) as the number of a :class:`Role`, from position and force in recorded
     order.
 
-    A recording with further inputs, or whose rows are not in the order of a motion, has only moving rows.
+    `deepest` is the largest position of all recordings of the object, by default that of this one. A
+    recording with further inputs, or whose rows are not in the order of a motion, has only moving rows.
     """
     role = np.full(len(recording), Role.MOVING, dtype=np.int8)
     motion = recording.motion
@@ -82,7 +83,8 @@ def roles_of(recording: Recording) -> Int8Vector:
         return role
     position = recording.position
     contact = contact_at(position[~waiting], recording.force[~waiting])
-    role[position < contact - AIR_MARGIN * (position.max() - contact)] = Role.APPROACH
+    deepest = float(position.max()) if deepest is None else deepest
+    role[position < contact - AIR_MARGIN * (deepest - contact)] = Role.APPROACH
     role[waiting] = np.where(position < contact, Role.REST, Role.HOLD)[waiting]
     return role
 
@@ -146,10 +148,9 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
     known = np.count_nonzero(np.isfinite(windows), axis=1)
     enough = known >= max(1, min(STEPS_AROUND // 2, len(rows) - 1))
     typical[enough] = np.nanmedian(windows[enough], axis=1)
-    nearby = np.fmax(typical[: len(rows)], typical[-len(rows) :])[
-        np.minimum((travelled / step).astype(np.int64), len(rows) - 1)
-    ]
-    speed = step / nearby
+    nearby = np.fmax(typical[: len(rows)], typical[-len(rows) :])
+    nearby = np.maximum(np.nan_to_num(nearby, nan=1.0), np.finfo(float).tiny)
+    speed = step / nearby[np.minimum((travelled / step).astype(np.int64), len(rows) - 1)]
     row = np.arange(len(x))
     first = np.maximum(row - np.maximum(np.ceil(2.0 * band / speed), 1.0).astype(np.int64), 0)
     slow = travelled - travelled[first] < SLOW_RATIO * speed * (row - first)

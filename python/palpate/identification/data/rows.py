@@ -290,7 +290,10 @@ def rows_of(
     else:
         forces, parts = [paper_target(part, options) for part in recordings], ()
     force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
-    role = np.concatenate([roles_of(part)[rows] for part, rows in zip(recordings, kept, strict=True)])
+    deepest = max(float(part.position.max()) for part in recordings)
+    role = np.concatenate(
+        [roles_of(part, deepest)[rows] for part, rows in zip(recordings, kept, strict=True)]
+    )
     positions, fitted = np.concatenate(columns), role == Role.MOVING
     corners = None
     if not fitted.all():
