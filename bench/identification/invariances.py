@@ -71,7 +71,7 @@ def inserted(rows: Rows, random: Generator, at: int, n: int, force: Array | None
     motion = replace(
         longer.motion,
         time=longer.motion.time + step * np.cumsum(waiting),
-        side=np.where(waiting, 0, longer.motion.side).astype(np.int8),
+        velocity=np.where(waiting, 0.0, longer.motion.velocity),
     )
     exact, noises = longer.force.copy(), {}
     if force is not None:
@@ -145,8 +145,8 @@ def through_air(rows: Rows, random: Generator) -> Changed | None:
     end = len(rows.force) - 1
     longer = inserted(inserted(rows, random, end, n), random, 0, n)
     depth = np.interp(np.arange(len(longer.force)), [0, n, end + n, end + 2 * n], [way, 0.0, 0.0, way])
-    side = np.where(depth > 0.0, np.where(np.arange(len(depth)) < n, 1, -1), longer.motion.side)
-    motion = replace(longer.motion, x=longer.motion.x - depth, side=side.astype(np.int8))
+    velocity = longer.motion.velocity - np.gradient(depth, longer.motion.time)
+    motion = replace(longer.motion, x=longer.motion.x - depth, velocity=velocity)
     return Changed(replace(longer, motion=motion).recording())
 
 

@@ -75,8 +75,7 @@ class Truth:
         lower = 0.0 if object.leaves else float(x.min())
         press = np.linspace(lower, float(x.max()), POINTS)
         position, side = np.r_[press, press[::-1]], np.repeat([1.0, -1.0], POINTS)
-        speed = np.abs(np.gradient(rows.motion.x, rows.motion.time))[rows.contact & (rows.motion.side != 0)]
-        velocity = float(np.median(speed))
+        velocity = float(np.median(np.abs(rows.motion.velocity[rows.contact & (rows.motion.side != 0)])))
         time = (press[1] - press[0]) / velocity * np.arange(2.0 * POINTS)
         force = object.force(time, position, side, velocity * side)
         state = object.state(np.r_[position[POINTS:], position])[POINTS:]

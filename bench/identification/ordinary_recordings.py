@@ -36,8 +36,13 @@ class Motion:
     """(n,) [s]"""
     x: Array
     """(n,) [m or rad]"""
-    side: NDArray[np.int8]
-    """(n,) +1 into the object, -1 out of it, 0 at rest"""
+    velocity: Array
+    """(n,) [m/s or rad/s]"""
+
+    @property
+    def side(self) -> NDArray[np.int8]:
+        """(n,) +1 into the object, -1 out of it, 0 at rest"""
+        return np.sign(self.velocity).astype(np.int8)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +87,7 @@ class Rows:
 
     def take(self, rows: NDArray[Any]) -> Rows:
         """Returns some of the rows."""
-        motion = Motion(self.motion.time[rows], self.motion.x[rows], self.motion.side[rows])
+        motion = Motion(self.motion.time[rows], self.motion.x[rows], self.motion.velocity[rows])
         arrays = {
             each.name: getattr(self, each.name)[rows]
             for each in fields(self)
@@ -135,7 +140,7 @@ def along(knots: Array, at: Array, step: float) -> Motion:
     [s]."""
     time = np.arange(0.0, knots[-1], step)
     segment = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
-    return Motion(time, np.interp(time, knots, at), np.sign(np.diff(at))[segment].astype(np.int8))
+    return Motion(time, np.interp(time, knots, at), (np.diff(at) / np.diff(knots))[segment])
 
 
 def strokes(
@@ -189,9 +194,8 @@ def hand_motion(object: Object, random: Generator) -> Motion:
     phase = 2.0 * np.pi * frequency * step * np.cumsum(speed)
     depth = np.interp(time, knots, random.uniform(0.9, 1.0, cycles + 1))
     lower = -0.03 if object.leaves else object.lower
-    u = lower + (1.0 - lower) * depth * (0.5 - 0.5 * np.cos(phase))
-    side = np.where(np.gradient(u) >= 0.0, 1, -1).astype(np.int8)
-    return Motion(time, object.travel * u, side)
+    x = object.travel * (lower + (1.0 - lower) * depth * (0.5 - 0.5 * np.cos(phase)))
+    return Motion(time, x, np.gradient(x, time))
 
 
 def measured(object: Object, random: Generator, motion: Motion, **given: Any) -> Rows:
@@ -202,7 +206,7 @@ def measured(object: Object, random: Generator, motion: Motion, **given: Any) ->
     time, x, n = motion.time, motion.x, len(motion.x)
     last_moving = np.maximum.accumulate(np.where(motion.side != 0, time, 0.0))
     state = object.state(x) * (1.0 - CREEP * (1.0 - np.exp((last_moving - time) / CREEP_S)))
-    force = object.force(time, x, state, np.gradient(x, time))
+    force = object.force(time, x, state, motion.velocity)
     clean = Rows(
         object=object,
         motion=motion,
