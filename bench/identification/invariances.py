@@ -56,21 +56,21 @@ def drawn(draw: int) -> tuple[Rows, Generator]:
 
 
 def inserted(rows: Rows, random: Generator, at: int, n: int, force: Array | None = None) -> Rows:
-    """Returns rows with n waiting rows after row `at`.
+    """Returns rows with n waiting rows after row `at`, before the first row if `at` is -1.
 
     Parameters
     ----------
     force : (n,), optional
         Exact force of the waiting rows [N or N*m]; by default that of row `at`.
     """
-    index = np.insert(np.arange(len(rows.force)), at + 1, np.full(n, at))
+    index = np.insert(np.arange(len(rows.force)), at + 1, np.full(n, max(at, 0)))
     waiting = np.zeros(len(index), dtype=bool)
     waiting[at + 1 : at + 1 + n] = True
     longer, time = rows.take(index), rows.motion.time
     step = float(np.median(np.diff(time)))
     motion = replace(
         longer.motion,
-        time=longer.motion.time + step * np.cumsum(waiting),
+        time=longer.motion.time + step * (np.cumsum(waiting) - (at < 0) * waiting),
         velocity=np.where(waiting, 0.0, longer.motion.velocity),
     )
     exact, noises = longer.force.copy(), {}
@@ -90,7 +90,7 @@ def turns(rows: Rows) -> list[int]:
 
 def waiting_rows(rows: Rows, random: Generator) -> Changed:
     """Adds 30 to 20 000 waiting rows before, between or after the strokes."""
-    place = random.choice([0, *turns(rows)[1::2], len(rows.force) - 1])
+    place = random.choice([-1, *turns(rows)[1::2], len(rows.force) - 1])
     return Changed(inserted(rows, random, place, int(10.0 ** random.uniform(1.5, 4.3))).recording())
 
 
@@ -143,7 +143,7 @@ def through_air(rows: Rows, random: Generator) -> Changed | None:
         return None
     n, way = int(10.0 ** random.uniform(1.5, 3.5)), rows.object.travel * 10.0 ** random.uniform(-1.0, 2.0)
     end = len(rows.force) - 1
-    longer = inserted(inserted(rows, random, end, n), random, 0, n)
+    longer = inserted(inserted(rows, random, end, n), random, -1, n)
     depth = np.interp(np.arange(len(longer.force)), [0, n, end + n, end + 2 * n], [way, 0.0, 0.0, way])
     velocity = longer.motion.velocity - np.gradient(depth, longer.motion.time)
     motion = replace(longer.motion, x=longer.motion.x - depth, velocity=velocity)

@@ -17,7 +17,7 @@ from palpate import Recording
 from palpate._core.model import play
 
 ROUNDED_TO = 1e-5
-"""Step of the stored numbers [share of their range]"""
+"""Step of the stored numbers [travel or scale of the object]"""
 
 CREEP = 0.5
 """Share of the friction that a pause removes, with the time constant CREEP_S"""
@@ -116,8 +116,8 @@ class Rows:
 
     def _stored(self, x: Array, force: Array, directed: bool) -> Recording:
         return Recording.from_arrays(
-            rounded(x),
-            rounded(force),
+            rounded(x, self.object.travel),
+            rounded(force, self.object.scale),
             self.motion.time if self.timed else None,
             self.motion.side if directed else None,
             units=self.object.units,
@@ -129,10 +129,9 @@ def settled(state: Array, side: NDArray[Any]) -> NDArray[np.bool_]:
     return np.asarray(state * side > 0.999)
 
 
-def rounded(values: Array) -> Array:
+def rounded(values: Array, size: float) -> Array:
     """Returns numbers rounded as a file with five digits stores them."""
-    step = ROUNDED_TO * max(float(np.ptp(values)), np.finfo(float).tiny)
-    return np.asarray(np.round(values / step) * step)
+    return np.asarray(np.round(values / (ROUNDED_TO * size)) * (ROUNDED_TO * size))
 
 
 def along(knots: Array, at: Array, step: float) -> Motion:
