@@ -216,10 +216,19 @@ def measure(draw: int) -> dict[str, Any]:
     except InputError as error:
         return {**row, "rows": len(recording), "verdict": "refused", "reasons": [str(error)]}
     seconds = time.process_time() - start
-    return {**row, "rows": len(recording), "seconds": seconds, **judged(model, reference(rows), rows)}
+    try:
+        best = reference(rows)
+    except InputError as error:
+        return {**row, "rows": len(recording), "verdict": "no reference", "reasons": [str(error)]}
+    return {**row, "rows": len(recording), "seconds": seconds, **judged(model, best, rows)}
 
 
 Row = Mapping[str, Any]
+
+
+def fitted(rows: Sequence[Row]) -> list[Row]:
+    """Returns the draws that have a model and a reference fit."""
+    return [row for row in rows if row["verdict"] not in ("refused", "no reference")]
 
 
 def silent(row: Row) -> bool:
@@ -292,14 +301,15 @@ MARKS = (
 
 
 def values_of(mark: Mark, rows: Sequence[Row]) -> Array:
-    """Returns the values (n,) of a judged quantity over the draws that have a model and determine it."""
-    values = [mark.value(row) for row in rows if row["verdict"] != "refused"]
+    """Returns the values (n,) of a judged quantity over the draws that determine it."""
+    values = [mark.value(row) for row in fitted(rows)]
     return np.array([value for value in values if value is not None], dtype=float)
 
 
 def report(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Prints and returns the table of judged quantities, with the marks that are not met."""
-    print(f"{sum(row['verdict'] == 'refused' for row in rows)} of {len(rows)} recordings are refused")
+    for verdict in ("refused", "no reference"):
+        print(f"{verdict}: {sum(row['verdict'] == verdict for row in rows)} of {len(rows)} recordings")
     summary: list[dict[str, Any]] = []
     for mark in MARKS:
         values = values_of(mark, rows)
@@ -363,8 +373,8 @@ def report_of(key: str, names: Sequence[str], rows: Sequence[Row]) -> list[dict[
 
 def line_of(row: Row) -> str:
     """Returns one line on a draw."""
-    start = f"{row['draw']:5} {row['object']:18} {row['operator']:23} {row['rows']:5} {row['verdict']:8}"
-    if row["verdict"] == "refused":
+    start = f"{row['draw']:5} {row['object']:18} {row['operator']:23} {row['rows']:5} {row['verdict']:8} "
+    if "true_error" not in row:
         return start + row["reasons"][0]
     return (
         f"{start}{row['true_error']:8.4f} true {row['reported_error']:8.4f} reported "

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.identification.ordinary import Truth, judged, main, measure, resolvable, silent
+from bench.identification.ordinary import Truth, judged, main, measure, report, report_of, resolvable, silent
 from bench.identification.ordinary_objects import OBJECTS, Array, Object
 from bench.identification.ordinary_recordings import OPERATORS, Rows, drawn, measured, strokes
 
@@ -141,6 +141,18 @@ def test_a_force_below_zero_outside_the_strokes_is_a_pull() -> None:
 def test_a_loop_that_the_operator_adds_is_not_judged() -> None:
     assert resolvable(spring())["hysteresis"]
     assert not resolvable(spring(loop=True))["hysteresis"]
+
+
+def test_a_refused_recording_is_counted_and_not_judged(capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = judged(line(2.0 * SCALE / TRAVEL), line(SCALE / TRAVEL), spring())
+    rows = [{**wrong, "object": "spring", "seconds": 0.1}, {"verdict": "refused", "object": "spring"}]
+    shares = {each["name"]: each for each in report(rows)}
+    assert shares["good, but wrong"]["share"] == 1.0
+    assert shares["good, but wrong"]["met"] is False
+    assert shares["class right: hysteresis"]["met"] is True
+    assert "refused: 1 of 2 recordings" in capsys.readouterr().out
+    found = report_of("object", ["spring"], rows)
+    assert (found[0]["draws"], found[0]["refused"], found[0]["silent"]) == (2, 1, 1)
 
 
 def test_the_bench_judges_a_draw_and_writes_its_results(
