@@ -178,12 +178,12 @@ def without_the_end(rows: Rows, random: Generator) -> Changed:
 
 
 def other_units(rows: Rows, random: Generator) -> Changed:
-    """Stores the columns in units of a file: mm or deg, gf or N*mm, and ms."""
+    """Stores the columns in units of a file: mm or deg, gf or mN*m, and ms."""
     recording, rotary = rows.recording(), rows.object.rotary
     columns = {
         "time_ms": 1e3 * rows.motion.time,
         "angle_deg" if rotary else "travel_mm": recording.position * (180.0 / np.pi if rotary else 1e3),
-        "torque_Nmm" if rotary else "force_gf": recording.force * (1e3 if rotary else 1e3 / g),
+        "torque_mNm" if rotary else "force_gf": recording.force * (1e3 if rotary else 1e3 / g),
     }
     return Changed(Recording.from_frame(pd.DataFrame(columns)))
 

@@ -195,8 +195,8 @@ def of_lag(model: Model, rows: Rows, truth: Truth, error: float) -> dict[str, An
     """Returns whether the interval of the lag contains the true one, and whether its correction raises the
     error."""
     recording = rows.recording()
-    lag = recording.force_lag if rows.timed else None
-    if lag is None or not lag.known:
+    lag = recording.force_lag
+    if rows.lag_s is None or not lag.known:
         return {"lag": None, "lag_raises": None}
     raises = None
     if lag.is_late:

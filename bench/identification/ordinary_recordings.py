@@ -71,7 +71,8 @@ class Rows:
     """True if the speed varies enough to determine damping"""
     held: bool = False
     """True if the tool was held long enough to determine a memory"""
-    lag_s: float = 0.0
+    lag_s: float | None = 0.0
+    """Lag of the force [s]; None if it varies"""
 
     @property
     def stroke(self) -> NDArray[np.intp]:
@@ -283,13 +284,14 @@ def coarse_force(object: Object, random: Generator) -> Rows:
     time = rows.motion.time
     rate = random.choice([10.0, 80.0])
     converted = np.searchsorted(time, np.floor(time * rate) / rate, side="right") - 1
-    return replace(rows, force_noise=force[converted] - rows.force, loop=True)
+    return replace(rows, force_noise=force[converted] - rows.force, loop=True, lag_s=None)
 
 
 def late_force(object: Object, random: Generator) -> Rows:
-    rows = replace(tester_or_hand(object, random), timed=True, loop=True, lag_s=random.uniform(0.0, 0.05))
+    rows, lag_s = tester_or_hand(object, random), random.uniform(0.0, 0.05)
     time = rows.motion.time
-    return replace(rows, force_error=np.interp(time - rows.lag_s, time, rows.force) - rows.force)
+    late = np.interp(time - lag_s, time, rows.force) - rows.force
+    return replace(rows, force_error=late, timed=True, loop=True, lag_s=lag_s)
 
 
 def backlash(object: Object, random: Generator) -> Rows:
