@@ -338,24 +338,21 @@ def report(rows: Sequence[Row]) -> list[dict[str, Any]]:
     return summary
 
 
-def report_of(key: str, names: Sequence[str], rows: Sequence[Row]) -> list[dict[str, Any]]:
+def report_of(key: str, rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Prints and returns the draws of each object or operator: wrong models called good, error ratio."""
-    summary = []
-    for name in names:
+    summary: list[dict[str, Any]] = []
+    for name in dict.fromkeys(row[key] for row in rows):
         own = [row for row in rows if row[key] == name]
-        fitted = [row for row in own if row["verdict"] != "refused"]
-        if own:
-            summary.append(
-                {
-                    key: name,
-                    "draws": len(own),
-                    "refused": len(own) - len(fitted),
-                    "silent": sum(map(silent, fitted)),
-                    "median_error_ratio": float(
-                        np.median([row["error_ratio"] for row in fitted] or [np.nan])
-                    ),
-                }
-            )
+        ratios = [row["error_ratio"] for row in fitted(own)]
+        summary.append(
+            {
+                key: name,
+                "draws": len(own),
+                "refused": sum(row["verdict"] == "refused" for row in own),
+                "silent": sum(map(silent, fitted(own))),
+                "median_error_ratio": float(np.median(ratios)) if ratios else None,
+            }
+        )
     lines = [
         (
             each[key],
@@ -396,12 +393,10 @@ def main() -> None:
         rows.append(row)
         if options.each:
             print(line_of(row), flush=True)
-    objects = list(dict.fromkeys(row["object"] for row in rows))
-    operators = list(dict.fromkeys(row["operator"] for row in rows))
     results = {
         "marks": report(rows),
-        "objects": report_of("object", objects, rows),
-        "operators": report_of("operator", operators, rows),
+        "objects": report_of("object", rows),
+        "operators": report_of("operator", rows),
         "draws": rows,
     }
     write_results(options.json, results)

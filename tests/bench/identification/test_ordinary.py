@@ -145,14 +145,17 @@ def test_a_loop_that_the_operator_adds_is_not_judged() -> None:
 
 def test_a_refused_recording_is_counted_and_not_judged(capsys: pytest.CaptureFixture[str]) -> None:
     wrong = judged(line(2.0 * SCALE / TRAVEL), line(SCALE / TRAVEL), spring())
-    rows = [{**wrong, "object": "spring", "seconds": 0.1}, {"verdict": "refused", "object": "spring"}]
+    refused, not_fitted = (
+        {"verdict": verdict, "object": "spring"} for verdict in ("refused", "no reference")
+    )
+    rows = [{**wrong, "object": "spring", "seconds": 0.1}, refused, not_fitted]
     shares = {each["name"]: each for each in report(rows)}
     assert shares["good, but wrong"]["share"] == 1.0
     assert shares["good, but wrong"]["met"] is False
     assert shares["class right: hysteresis"]["met"] is True
-    assert "refused: 1 of 2 recordings" in capsys.readouterr().out
-    found = report_of("object", ["spring"], rows)
-    assert (found[0]["draws"], found[0]["refused"], found[0]["silent"]) == (2, 1, 1)
+    assert "no reference: 1 of 3 recordings" in capsys.readouterr().out
+    found = report_of("object", rows)
+    assert (found[0]["draws"], found[0]["refused"], found[0]["silent"]) == (3, 1, 1)
 
 
 def test_the_bench_judges_a_draw_and_writes_its_results(
