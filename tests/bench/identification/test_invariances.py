@@ -9,6 +9,7 @@ from bench.identification.invariances import (
     CHANGES,
     few_rows,
     half_the_rate,
+    measure,
     one_file_a_stroke,
     order_alone,
     pauses,
@@ -26,6 +27,22 @@ from bench.identification.ordinary_objects import OBJECTS
 from palpate import Recording
 
 ADDING = waiting_rows, repeated_rows, pauses, through_air
+
+KEPT = {
+    "repeated_rows": {"class"},
+    "half_the_rate": {"class"},
+    "stored_by_change": {"class"},
+    "with_direction": {"class", "verdict"},
+    "order_alone": {"class", "verdict"},
+    "one_file_a_stroke": {"class"},
+    "without_the_end": {"class", "verdict"},
+    "other_units": {"class", "verdict"},
+    "other_zero": {"error", "class", "verdict"},
+    "release_first": {"class", "verdict"},
+    "small_drift": {"class", "verdict"},
+    "few_rows": {"class"},
+}
+"""What each change kept in all of 20 draws; the study prints the shares of all changes and measures."""
 
 KEEPING = with_direction, order_alone, one_file_a_stroke, release_first
 
@@ -81,3 +98,10 @@ def test_a_recording_that_begins_with_the_release_has_no_jump() -> None:
         travel = np.ptp(position)
         assert position[0] > position.max() - 0.05 * travel
         assert np.abs(np.diff(position)).max() < 0.05 * travel
+
+
+@pytest.mark.parametrize("draw", [5, 13], ids=["spring with wall", "pedal"])
+def test_changes_without_new_information_keep_class_and_verdict(draw: int) -> None:
+    for change, agreed in measure(draw, list(KEPT)).items():
+        lost = [name for name in KEPT[change] if not agreed[name]]
+        assert not lost, change
