@@ -55,6 +55,8 @@ identification/real_data.py --json build/bench/real_data.json
 identification/dynamic.py --json build/bench/dynamic.json
 identification/repeats.py --json build/bench/repeats.json
 identification/memory.py
+identification/ordinary.py --jobs 1 --json build/bench/ordinary.json
+identification/invariances.py --jobs 1 --json build/bench/invariances.json
 limits/certificate_table.py build/bench/certificate_search.txt --to $to
 limits/failure_maps.py --to $to --points $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 9 }')
 limits/prediction.py --to $to

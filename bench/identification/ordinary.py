@@ -1,0 +1,406 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Judges models of ordinary recordings, such as a button on a tester or a knob in a hand, on the exact force.
+
+python bench/identification/ordinary.py [--draws 400] [--seed 1000] [--jobs 2] [--each] [--json FILE]
+
+Each draw is an object and an operator (motion and measuring chain) with random parameters and noise. Draws
+below 1000 are for development; published results use draws from 1000 on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.identification.ordinary_objects import Array, Object
+from bench.identification.ordinary_recordings import Rows, drawn, settled
+from bench.studies import count, markdown_table, write_results
+
+import palpate
+from palpate import InputError, Model, Recording
+from palpate.verdict import FORCE_JND
+from palpate.verification.metrics import force_floor, normalised, root_mean_square
+
+DRAWS = 400
+
+PUBLISHED = 1000
+"""First draw of the published results"""
+
+POINTS = 4001
+"""Number of positions of a stroke at which a model is judged"""
+
+PLACE = 0.01
+"""Length of the smallest place of a stroke that is judged [share of the stroke]"""
+
+ALLOWED_RATIO = 1.3
+"""Largest true error divided by the reported error of a good model"""
+
+OUTSIDE = 0.3
+"""Range below and above the strokes in which the force is judged [share of the stroke]"""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Exact force of an object along one press and one release at constant speed, from rest."""
+
+    time: Array
+    """(n,) [s]"""
+    position: Array
+    """(n,) [m or rad], evenly spaced"""
+    side: Array
+    """(n,) +1 press, -1 release"""
+    speed: float
+    """[m/s or rad/s]"""
+    force: Array
+    """(n,) [N or N*m]"""
+    judged: NDArray[np.bool_]
+    """(n,) False after each turn, while the friction of the object reverses"""
+    object: Object
+
+    @classmethod
+    def of(cls, rows: Rows) -> Truth:
+        """Returns the truth over the recorded strokes, at the median speed of the recording."""
+        object, x = rows.object, rows.motion.x[rows.contact]
+        lower = 0.0 if object.leaves else float(x.min())
+        press = np.linspace(lower, float(x.max()), POINTS)
+        position, side = np.r_[press, press[::-1]], np.repeat([1.0, -1.0], POINTS)
+        velocity = float(np.median(np.abs(rows.motion.velocity[rows.contact & (rows.motion.side != 0)])))
+        time = (press[1] - press[0]) / velocity * np.arange(2.0 * POINTS)
+        force = object.force(time, position, side, velocity * side)
+        state = object.state(np.r_[position[POINTS:], position])[POINTS:]
+        return cls(time, position, side, velocity, force, settled(state, side), object)
+
+    def modelled(self, model: Model) -> Array:
+        """Returns the force (n,) of a model along the same motion."""
+        if model.memory is not None:
+            return np.asarray(model.force_over_time(self.time, self.position)[0])
+        return _at_speed(model, self.position, self.side, self.speed)
+
+    def error(self, model: Model) -> float:
+        """Returns the RMS error of a model divided by the standard deviation of the exact force."""
+        error = (self.modelled(model) - self.force)[self.judged]
+        return normalised(root_mean_square(error), self.force[self.judged])
+
+    def worst_place(self, model: Model) -> float:
+        """Returns the largest error that holds over a place of a stroke [just noticeable differences]."""
+        allowed = np.maximum(FORCE_JND * np.abs(self.force), force_floor(self.force))
+        error = np.abs(self.modelled(model) - self.force) / allowed * self.judged
+        place = round(PLACE * POINTS)
+        strokes = error.reshape(2, POINTS)
+        windows = np.lib.stride_tricks.sliding_window_view(strokes, place, axis=1)
+        return float(windows.min(axis=-1).max())
+
+    def steepest(self, force: Array) -> float:
+        """Returns the largest |slope| of a force (n,) over the position of a stroke [N/m or N*m/rad]."""
+        steps = np.diff(force.reshape(2, POINTS), axis=1)
+        return float(np.abs(steps).max() / (self.position[1] - self.position[0]))
+
+    def pull(self, model: Model) -> float | None:
+        """Returns the largest force with which a model pulls below and above the strokes [just noticeable
+        differences]; None for an object that can pull."""
+        if not self.object.leaves:
+            return None
+        lower, upper = self.position[0], self.position[POINTS - 1]
+        beyond = np.linspace(0.0, OUTSIDE * (upper - lower), POINTS)
+        position = np.r_[lower - beyond, upper + beyond]
+        forces = [_at_speed(model, position, np.full(len(position), side), 0.0) for side in (1.0, -1.0)]
+        return max(0.0, -float(np.min(forces))) / force_floor(self.force)
+
+
+def _at_speed(model: Model, position: Array, side: Array, speed: float) -> Array:
+    """Returns the force (n,) of a model without its memory, at positions (n,) and directions (n,)."""
+    if model.dimension > 1:
+        columns = [position, speed * side, *([side] if model.hysteretic else [])]
+        return np.asarray(model.predict(np.column_stack(columns)))
+    return np.asarray(model.force(position, direction=side) + (model.damping or 0.0) * speed * side)
+
+
+def classes_of(model: Model) -> dict[str, bool]:
+    """Returns the model classes of a model: name -> True if the model has it."""
+    return {
+        "hysteresis": model.hysteretic,
+        "velocity": model.of_velocity or model.damping is not None,
+        "memory": model.memory is not None,
+        "period": model.period is not None,
+    }
+
+
+def resolvable(rows: Rows) -> dict[str, bool]:
+    """Returns True for each model class that the recording determines, present or not."""
+    exists = rows.object.classes
+    speeds = rows.timed and rows.varied
+    unknown_loop = rows.loop or (exists["velocity"] and not speeds) or (exists["memory"] and not rows.held)
+    return {
+        "hysteresis": not unknown_loop,
+        "velocity": not rows.loop and (speeds if exists["velocity"] else not exists["memory"] or rows.held),
+        "memory": not rows.loop and (rows.held if exists["memory"] else not exists["velocity"] or speeds),
+        "period": exists["period"],
+    }
+
+
+def reference(rows: Rows) -> Model:
+    """Identifies a model from the clean rows of a recording with the true class."""
+    exists, known = rows.object.classes, resolvable(rows)
+    if exists["memory"] and rows.held:
+        inputs = "auto"
+    elif exists["velocity"] and rows.timed and rows.varied:
+        inputs = "position,velocity"
+    elif exists["hysteresis"] or exists["velocity"] or exists["memory"]:
+        inputs = "position,hysteresis"
+    else:
+        inputs = "position"
+    period = rows.object.period
+    options = {} if period is None or not known["period"] else {"period": period * rows.object.travel}
+    return palpate.identify(rows.clean(), inputs=inputs, **options)
+
+
+def judged(model: Model, best: Model, rows: Rows) -> dict[str, Any]:
+    """Returns what the exact force shows about a model, compared with the reference fit `best`."""
+    truth = Truth.of(rows)
+    error, place, best_error = truth.error(model), truth.worst_place(model), truth.error(best)
+    found, known = classes_of(model), resolvable(rows)
+    reported = model.fit.nrmse
+    return {
+        "true_error": error,
+        "reported_error": reported,
+        "reference_error": best_error,
+        "error_ratio": error / best_error if best_error > 0.0 else float(error > 0.0),
+        "worst_place_jnd": place,
+        "slope_ratio": truth.steepest(truth.modelled(model)) / truth.steepest(truth.force),
+        "pull_jnd": truth.pull(model),
+        "verdict": model.verdict.level,
+        "reasons": list(model.verdict.reasons),
+        "parameter_ratio": model.n_parameters / best.n_parameters,
+        "wavelets": model.n_wavelets,
+        "understated": error > ALLOWED_RATIO * reported,
+        "wrong_place": place > 2.0,
+        "faultless": error <= reported and place <= 1.0,
+        **{name: found[name] == rows.object.classes[name] if known[name] else None for name in found},
+        **of_lag(model, rows, truth, error),
+    }
+
+
+def of_lag(model: Model, rows: Rows, truth: Truth, error: float) -> dict[str, Any]:
+    """Returns whether the interval of the lag contains the true one, and whether its correction raises the
+    error."""
+    recording = rows.recording()
+    lag = recording.force_lag
+    if rows.lag_s is None or not lag.known:
+        return {"lag": None, "lag_raises": None}
+    raises = None
+    if lag.is_late:
+        corrected = palpate.identify(recording.with_force_earlier("auto"))
+        raises = truth.error(corrected) > error
+    return {"lag": bool(lag.lower_s <= rows.lag_s <= lag.upper_s), "lag_raises": raises}
+
+
+def measure(draw: int) -> dict[str, Any]:
+    """Identifies the recording of a draw and its reference fit, and judges the model."""
+    operator, rows = drawn(draw)
+    row: dict[str, Any] = {"draw": draw, "object": rows.object.name, "operator": operator}
+    recording: Recording = rows.recording()
+    start = time.process_time()
+    try:
+        model = palpate.identify(recording)
+    except InputError as error:
+        return {**row, "rows": len(recording), "verdict": "refused", "reasons": [str(error)]}
+    seconds = time.process_time() - start
+    try:
+        best = reference(rows)
+    except InputError as error:
+        return {**row, "rows": len(recording), "verdict": "no reference", "reasons": [str(error)]}
+    return {**row, "rows": len(recording), "seconds": seconds, **judged(model, best, rows)}
+
+
+Row = Mapping[str, Any]
+
+
+def fitted(rows: Sequence[Row]) -> list[Row]:
+    """Returns the draws that have a model and a reference fit."""
+    return [row for row in rows if row["verdict"] not in ("refused", "no reference")]
+
+
+def silent(row: Row) -> bool:
+    """Returns True for a model called good although its error exceeds the reported one or is perceptible."""
+    return row["verdict"] == "good" and (row["understated"] or row["wrong_place"])
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A judged quantity: its values over the draws, and what is required of them."""
+
+    name: str
+    value: Callable[[Row], float | bool | None]
+    """Value of a draw; None if the draw does not determine it"""
+    required: str
+    met: Callable[[Array], bool] | None = None
+    """True if the values (n,) meet the requirement; None if nothing is required"""
+
+
+def _at(key: str) -> Callable[[Row], Any]:
+    return lambda row: row[key]
+
+
+def _good_and(key: str) -> Callable[[Row], bool]:
+    return lambda row: row["verdict"] == "good" and row[key]
+
+
+def _at_least(share: float) -> Callable[[Array], bool]:
+    return lambda values: float(np.mean(values)) >= share
+
+
+def _at_most(share: float) -> Callable[[Array], bool]:
+    return lambda values: float(np.mean(values)) <= share
+
+
+def _ratios(median: float, most: float = np.inf) -> Callable[[Array], bool]:
+    return lambda values: bool(np.median(values) <= median and np.percentile(values, 95) <= most)
+
+
+def _slope_right(row: Row) -> bool:
+    return 0.8 <= row["slope_ratio"] <= 1.25
+
+
+def _pulls(row: Row) -> bool | None:
+    return None if row["pull_jnd"] is None else row["pull_jnd"] > 1.0
+
+
+def _needless(row: Row) -> bool:
+    return row["faultless"] and row["verdict"] != "good"
+
+
+CLASSES = ("hysteresis", "velocity", "memory", "period")
+
+MARKS = (
+    Mark("error over reference", _at("error_ratio"), "median <= 1.1, 95 % <= 1.5", _ratios(1.1, 1.5)),
+    Mark("- of models called good", lambda row: row["error_ratio"] if row["verdict"] == "good" else None, ""),
+    Mark("steepest slope over true", _at("slope_ratio"), ""),
+    Mark("slope 0.8 to 1.25 of true", _slope_right, ">= 95 %", _at_least(0.95)),
+    Mark("pulls outside", _pulls, "0 %", _at_most(0.0)),
+    *(Mark(f"class right: {name}", _at(name), ">= 95 %", _at_least(0.95)) for name in CLASSES),
+    Mark("good, but wrong", silent, "<= 1 %", _at_most(0.01)),
+    Mark("- larger than reported", _good_and("understated"), ""),
+    Mark("- place above 2 JND", _good_and("wrong_place"), ""),
+    Mark("not good without need", _needless, "<= 5 %", _at_most(0.05)),
+    Mark("lag in its interval", _at("lag"), "93 to 97 %", lambda values: 0.93 <= np.mean(values) <= 0.97),
+    Mark("proposed lag raises error", _at("lag_raises"), "0 %", _at_most(0.0)),
+    Mark("parameters over reference", _at("parameter_ratio"), "median <= 1.2", _ratios(1.2)),
+    Mark("CPU seconds", _at("seconds"), ""),
+)
+
+
+def values_of(mark: Mark, rows: Sequence[Row]) -> Array:
+    """Returns the values (n,) of a judged quantity over the draws that determine it."""
+    values = [mark.value(row) for row in fitted(rows)]
+    return np.array([value for value in values if value is not None], dtype=float)
+
+
+def report(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Prints and returns the table of judged quantities, with the marks that are not met."""
+    for verdict in ("refused", "no reference"):
+        print(f"{verdict}: {sum(row['verdict'] == verdict for row in rows)} of {len(rows)} recordings")
+    summary: list[dict[str, Any]] = []
+    for mark in MARKS:
+        values = values_of(mark, rows)
+        if not len(values):
+            continue
+        if np.isin(values, (0.0, 1.0)).all():
+            numbers = {"share": float(np.mean(values))}
+        else:
+            numbers = {"median": float(np.median(values)), "95 %": float(np.percentile(values, 95))}
+        met = None if mark.met is None else bool(mark.met(values))
+        judged = {"name": mark.name, "draws": len(values), **numbers, "mark": mark.required, "met": met}
+        summary.append(judged)
+    lines = [
+        (
+            each["name"],
+            str(each["draws"]),
+            f"{each['median']:.3g}" if "median" in each else "",
+            f"{each['95 %']:.3g}" if "95 %" in each else "",
+            f"{100.0 * each['share']:.3g} %" if "share" in each else "",
+            each["mark"],
+            "short" if each["met"] is False else "",
+        )
+        for each in summary
+    ]
+    print(markdown_table(("judged", "draws", "median", "95 %", "share", "mark", ""), lines, (0, 5, 6)))
+    return summary
+
+
+def report_of(key: str, rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Prints and returns the draws of each object or operator: wrong models called good, error ratio."""
+    summary: list[dict[str, Any]] = []
+    for name in dict.fromkeys(row[key] for row in rows):
+        own = [row for row in rows if row[key] == name]
+        ratios = [row["error_ratio"] for row in fitted(own)]
+        summary.append(
+            {
+                key: name,
+                "draws": len(own),
+                "refused": sum(row["verdict"] == "refused" for row in own),
+                "silent": sum(map(silent, fitted(own))),
+                "median_error_ratio": float(np.median(ratios)) if ratios else None,
+            }
+        )
+    lines = [
+        (
+            each[key],
+            str(each["draws"]),
+            str(each["refused"]),
+            str(each["silent"]),
+            f"{100.0 * each['silent'] / each['draws']:.0f} %",
+            "" if each["median_error_ratio"] is None else f"{each['median_error_ratio']:.2f}",
+        )
+        for each in summary
+    ]
+    print(markdown_table((key, "draws", "refused", "good, but wrong", "share", "error ratio"), lines))
+    return summary
+
+
+def line_of(row: Row) -> str:
+    """Returns one line on a draw."""
+    start = f"{row['draw']:5} {row['object']:18} {row['operator']:23} {row['rows']:5} {row['verdict']:8} "
+    if "true_error" not in row:
+        return start + row["reasons"][0]
+    return (
+        f"{start}{row['true_error']:8.4f} true {row['reported_error']:8.4f} reported "
+        f"{row['error_ratio']:7.2f} of reference {row['worst_place_jnd']:7.2f} JND{'  WRONG' * silent(row)}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draws", type=int, default=count(DRAWS))
+    parser.add_argument("--seed", type=int, default=PUBLISHED, help="first draw; development uses 0 to 999")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--each", action="store_true", help="print a line for each draw")
+    parser.add_argument("--json", type=Path, default=None)
+    options = parser.parse_args()
+    draws = range(options.seed, options.seed + options.draws)
+    rows = []
+    for row in Parallel(n_jobs=options.jobs, return_as="generator")(delayed(measure)(draw) for draw in draws):
+        rows.append(row)
+        if options.each:
+            print(line_of(row), flush=True)
+    results = {
+        "marks": report(rows),
+        "objects": report_of("object", rows),
+        "operators": report_of("operator", rows),
+        "draws": rows,
+    }
+    write_results(options.json, results)
+
+
+if __name__ == "__main__":
+    main()

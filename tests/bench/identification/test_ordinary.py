@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests the bench of ordinary recordings: its draws, its exact forces, and its judgement of known models."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bench.identification.ordinary import Truth, judged, main, measure, report, report_of, resolvable, silent
+from bench.identification.ordinary_objects import OBJECTS, Array, Object
+from bench.identification.ordinary_recordings import OPERATORS, Rows, drawn, measured, strokes
+
+from palpate import Model
+
+ALL_PAIRS = len(OBJECTS) * len(OPERATORS)
+
+TRAVEL = 0.01
+
+SCALE = 3.0
+
+
+def straight(u: Array, s: Array) -> Array:
+    return u
+
+
+def spring(**changes: object) -> Rows:
+    """Returns rows of a spring of 300 N/m, recorded by a tester."""
+    random = np.random.default_rng(3)
+    known = Object(name="spring", shape=straight, travel=TRAVEL, scale=SCALE, hysteretic=False)
+    motion = strokes(known, random)
+    return replace(measured(known, random, motion, timed=True, directed=True), **changes)
+
+
+def line(stiffness: float, below: str = "free", bias: float = 0.0) -> Model:
+    """Returns a model of a spring [N/m] with 5 parameters, reported error 1e-3 and verdict good."""
+    model = Model.from_network(
+        alpha=np.empty((0, 1)),
+        beta=np.empty((0, 1)),
+        weight=[],
+        linear=[stiffness],
+        bias=bias,
+        lower=[0.0],
+        upper=[TRAVEL],
+        below=below,
+    )
+    content = model.to_dict()
+    content["fit"]["nrmse"] = 1e-3
+    return Model.from_dict(content)
+
+
+def test_240_successive_draws_contain_every_pair_of_object_and_operator() -> None:
+    pairs = {(rows.object.name, operator) for operator, rows in map(drawn, range(1000, 1000 + ALL_PAIRS))}
+    assert len(pairs) == ALL_PAIRS == 240
+
+
+def test_a_draw_gives_the_same_recording_again() -> None:
+    first, repeated, other = (drawn(draw)[1].recording() for draw in (7, 7, 7 + ALL_PAIRS))
+    assert np.array_equal(first.force, repeated.force)
+    assert len(first) != len(other) or not np.array_equal(first.force, other.force)
+
+
+def test_clean_rows_lie_on_the_exact_strokes() -> None:
+    for draw in range(ALL_PAIRS):
+        operator, rows = drawn(draw)
+        known = rows.object
+        if known.branch or known.damping or known.jerk or operator.startswith("coarse"):
+            continue
+        clean = rows.clean()
+        assert clean.direction is not None
+        still = np.zeros(len(clean))
+        x = clean.position
+        nearby = [
+            known.force(still, x + shift * known.travel, clean.direction.astype(float), still)
+            for shift in np.linspace(-1e-3, 1e-3, 21)
+        ]
+        allowed = 6.0 * rows.force_noise.std() + 1e-4 * np.ptp(rows.force)
+        outside = np.maximum(np.min(nearby, axis=0) - clean.force, clean.force - np.max(nearby, axis=0))
+        assert outside.max() < allowed, (draw, known.name, operator)
+
+
+@pytest.mark.parametrize(
+    "operator",
+    ["late_force", "backlash", "drift", "second_zero", "wrong_sign", "saturation", "wrong_readings"],
+)
+def test_an_avoidable_error_is_in_the_recording_and_not_in_the_clean_rows(operator: str) -> None:
+    draw = [each.__name__ for each in OPERATORS].index(operator)
+    _, rows = drawn(draw)
+    careful = replace(rows, force_error=0.0 * rows.force, position_error=0.0 * rows.force)
+    assert np.array_equal(careful.clean().force, rows.clean().force)
+    assert not (
+        np.array_equal(careful.recording().force, rows.recording().force)
+        and np.array_equal(careful.recording().position, rows.recording().position)
+    )
+
+
+def test_the_exact_model_has_no_error() -> None:
+    rows = spring()
+    found = judged(line(SCALE / TRAVEL), line(1.1 * SCALE / TRAVEL), rows)
+    assert found["true_error"] == pytest.approx(0.0, abs=1e-12)
+    assert found["worst_place_jnd"] == pytest.approx(0.0, abs=1e-9)
+    assert found["slope_ratio"] == pytest.approx(1.0)
+    assert found["pull_jnd"] == 0.0
+    assert found["faultless"]
+    assert not silent(found)
+
+
+def test_a_model_that_is_twice_as_stiff_is_a_silent_error() -> None:
+    rows = spring()
+    stiff, exact = line(2.0 * SCALE / TRAVEL), line(1.05 * SCALE / TRAVEL)
+    found = judged(stiff, exact, rows)
+    rms_over_deviation = 2.0  # of a straight line from 0
+    assert found["true_error"] == pytest.approx(rms_over_deviation, rel=0.01)
+    assert found["error_ratio"] == pytest.approx(20.0)
+    assert found["slope_ratio"] == pytest.approx(2.0)
+    assert found["worst_place_jnd"] == pytest.approx(1.0 / 0.07)
+    assert found["verdict"] == "good"
+    assert found["understated"]
+    assert found["wrong_place"]
+    assert silent(found)
+
+
+def test_only_an_error_over_a_hundredth_of_the_stroke_is_a_wrong_place() -> None:
+    truth = Truth.of(spring())
+    for share, wrong in ((0.005, False), (0.02, True)):
+        content = line(SCALE / TRAVEL).to_dict()
+        width = share * TRAVEL / 1.1  # the wavelet of 0.4 N exceeds 2 JND, 0.21 N, on 1.1 widths
+        content["network"].update(alpha=[[1.0 / width]], beta=[[TRAVEL / 2.0]], weight=[0.4])
+        content["fit"].update(n_wavelets=1, n_parameters=5)
+        content["slope_bounds"] = None
+        assert (truth.worst_place(Model.from_dict(content)) > 2.0) == wrong
+
+
+def test_a_force_below_zero_outside_the_strokes_is_a_pull() -> None:
+    truth = Truth.of(spring())
+    assert truth.pull(line(SCALE / TRAVEL, below="linear")) == pytest.approx(30.0, rel=0.02)
+    assert truth.pull(line(SCALE / TRAVEL, below="free")) == 0.0
+
+
+def test_a_loop_that_the_operator_adds_is_not_judged() -> None:
+    assert resolvable(spring())["hysteresis"]
+    assert not resolvable(spring(loop=True))["hysteresis"]
+
+
+def test_a_refused_recording_is_counted_and_not_judged(capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = judged(line(2.0 * SCALE / TRAVEL), line(SCALE / TRAVEL), spring())
+    refused, not_fitted = (
+        {"verdict": verdict, "object": "spring"} for verdict in ("refused", "no reference")
+    )
+    rows = [{**wrong, "object": "spring", "seconds": 0.1}, refused, not_fitted]
+    shares = {each["name"]: each for each in report(rows)}
+    assert shares["good, but wrong"]["share"] == 1.0
+    assert shares["good, but wrong"]["met"] is False
+    assert shares["class right: hysteresis"]["met"] is True
+    assert "no reference: 1 of 3 recordings" in capsys.readouterr().out
+    found = report_of("object", rows)
+    assert (found[0]["draws"], found[0]["refused"], found[0]["silent"]) == (3, 1, 1)
+
+
+def test_the_bench_judges_a_draw_and_writes_its_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "ordinary.json"
+    monkeypatch.setattr(
+        sys, "argv", ["ordinary.py", "--draws", "1", "--seed", "5", "--jobs", "1", "--json", str(file)]
+    )
+    main()
+    results = json.loads(file.read_text())["results"]
+    assert results["draws"][0]["object"] == measure(5)["object"] == "spring with wall"
+    table = capsys.readouterr().out
+    assert "error over reference" in table
+    assert "| variable rate | 1 | 0 |" in table
