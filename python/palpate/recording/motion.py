@@ -136,12 +136,16 @@ def turns_of(direction: Int8Vector) -> int:
 
 
 def noise_of(x: Float1D) -> float:
-    """Returns the standard deviation of the position noise from third differences of adjacent positions.
+    """Returns the standard deviation of the noise of positions or forces (n,) from their sixth differences; 0
+    for fewer than seven rows.
 
-    Reversals are too few to change their median.
+    A motion leaves almost nothing in them, and reversals are too few to change their median.
     """
-    differences = np.abs(x[3:] - x[:-3] - 3.0 * (x[2:-1] - x[1:-2]))
-    return float(np.median(differences[:: max(1, len(x) // MOST_DIFFERENCES)]) / (0.6745 * math.sqrt(20.0)))
+    if len(x) < 7:
+        return 0.0
+    differences = np.abs(np.diff(x, 6))
+    median = float(np.median(differences[:: max(1, len(x) // MOST_DIFFERENCES)]))
+    return median / (0.6745 * math.sqrt(math.comb(12, 6)))
 
 
 def resolution_of(x: Float1D) -> float:

@@ -18,10 +18,10 @@ from ..._core.model import ForceModel, wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
 from ..data.limits import FORCE_RESOLUTION
-from ..decision import Decision, decided, squared_error_change
+from ..decision import Decision, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
-from ..search.evidence import ON_HELD_OUT_ROWS
+from ..search.evidence import ON_HELD_OUT_ROWS, deviance
 from .memory_fit import STEPS, MemoryFit, Motion, Resting, Shape
 
 MOST_ROWS = 12_000
@@ -299,7 +299,8 @@ def better_with_memory(
         return _refused(found, "no branch lowers the criterion")
     before = (found.rmse_of_all / recorded.spread) ** 2
     in_sample = 1.0 - choice.rms() ** 2 / before
-    if in_sample < LEAST_GAIN:
+    over_velocity = "velocity" in found.inputs
+    if in_sample < LEAST_GAIN and not over_velocity:
         return _refused(found, _gain_text(in_sample, 0.0))
     at_rest = recorded.at_rest(choice, identify_rest)
     fit = MemoryFit(recorded.motions, recorded.wavelets(at_rest), recorded.least, choice.rms())
@@ -327,7 +328,15 @@ def better_with_memory(
     scatter = float(held_out.std(ddof=1)) / before / np.sqrt(len(held_out)) if len(held_out) > 1 else 0.0
     n_parameters = network.n_parameters + refined.n_parameters
     text = _gain_text(gain, scatter)
-    if gain - scatter < LEAST_GAIN:
+    accepted = gain - scatter >= LEAST_GAIN
+    if over_velocity:
+        # Both are as hard to render. At one speed both fit the same recording, a branch with fewer parameters.
+        n = min(found.independent_rows, fit.n_rows)
+        errors = (before, found.n_parameters), (before * (1.0 - gain), n_parameters)
+        falls = -float(np.diff([deviance("bic", n * square, n, p) for square, p in errors])[0])
+        text = f"{lowered('BIC', falls)}, must lower it by at least {options.search.evidence:.4g}"
+        accepted = falls >= options.search.evidence
+    if not accepted:
         return _refused(found, text)
     decision = decided("memory", True, text)
     return replace(

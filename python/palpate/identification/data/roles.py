@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 from ..._core.model import play
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
-from ...recording.motion import TURN_NOISE, TURN_STEPS, noise_of, resolution_of, strokes_from_order
+from ...recording.motion import (
+    LEAST_STROKE_ROWS,
+    TURN_NOISE,
+    TURN_STEPS,
+    noise_of,
+    resolution_of,
+    strokes_from_order,
+)
 from .limits import FORCE_RESOLUTION
 
 
@@ -109,7 +116,7 @@ def contact_at(position: Float1D, force: Float1D) -> float:
     positions by more than its noise: there the tool meets the object."""
     order = np.argsort(position, kind="stable")
     reach = float(np.ptp(force))
-    if not reach > 0.0:
+    if not reach > 0.0 or len(force) < LEAST_STROKE_ROWS:
         return float(position.min())
     force = (force - force.min()) / reach
     x, f = position[order], force[order]
@@ -136,7 +143,7 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
     band = max(TURN_NOISE * noise, TURN_STEPS * resolution_of(x))
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(play(x, 0.5 * band, start=x[0]))))])
     step = max(STEP, 2.0 * band)
-    if travelled[-1] <= 2.0 * step:
+    if travelled[-1] <= 2 * STEPS_AROUND * step:
         return np.zeros(len(x), dtype=bool)
     # First and last row of each step of distance: interpolated, because a row can travel several steps.
     moved, at_row = np.unique(travelled, return_index=True)
@@ -160,5 +167,8 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
         # The tool stops between two rows: the last row that moves less than half of a step waits as well.
         stopped = begin > 1 and travelled[begin - 1] - travelled[begin - 2] < 0.5 * speed[begin - 1]
         first_row = begin - int(stopped)
-        found[first_row:end] = (end - first_row) * float(speed[begin:end].max()) >= LEAST_WAIT
+        # One slow row is a turn between two rows.
+        found[first_row:end] = (
+            end - first_row > 1 and (end - first_row) * speed[begin:end].max() >= LEAST_WAIT
+        )
     return found
