@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core.rendering import Scheme, default_play_radius, structure_names
-from .._typing import Float1D
+from .._typing import Float1D, Int8Vector
 from ..errors import InputError
+from ..identification.data.roles import Role, roles_of, unused_rows
 from ..identification.data.rows import input_columns
 from ..identification.data.strokes import HysteresisInput
 from ..model import Model
@@ -77,7 +78,28 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
         recording, notes = with_strokes(model, recording)
     moving = model.mass is not None or model.damping is not None
     found = (_moving if moving else _static)(model, recording, play_radius)
+    if model.memory is None:
+        found = _without_waits(model, found, roles_of(recording))
     return replace(found, notes=notes + found.notes)
+
+
+def _without_waits(model: Model, found: Prediction, role: Int8Vector) -> Prediction:
+    """Leaves out the rows that show no force over position, as the identification does."""
+    fitted = role == Role.MOVING
+    kept = fitted[found.rows]
+    if kept.all() or not kept.any():
+        return found
+    position = found.position[kept]
+    outside = int(np.count_nonzero(model.extrapolated(position))) if model.dimension == 1 else 0
+    return replace(
+        found,
+        rows=found.rows & fitted,
+        force=found.force[kept],
+        extrapolated=outside if model.dimension == 1 else min(found.extrapolated, len(position)),
+        notes=(*found.notes, unused_rows(role, "compared")),
+        position=position,
+        side=None if found.side is None else found.side[kept],
+    )
 
 
 def _moving(model: Model, recording: Recording, play_radius: float | None) -> Prediction:

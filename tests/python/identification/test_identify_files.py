@@ -110,7 +110,7 @@ def test_the_model_is_that_of_all_rows_at_once(tmp_path: Path, suffix: str, step
     assert model.fit.model_class == at_once.fit.model_class == "hysteresis"
     assert model.data.rows == 30_000
     assert model.data.sha256 == at_once.data.sha256
-    assert model.fit.nrmse == pytest.approx(at_once.fit.nrmse, rel=2e-2)
+    assert model.fit.nrmse == pytest.approx(at_once.fit.nrmse, rel=5e-2)  # waits are fitted as well
     assert model.n_parameters == pytest.approx(at_once.n_parameters, abs=12)
     x = np.linspace(0.01, 0.59, 200)
     for side in (1.0, -1.0):

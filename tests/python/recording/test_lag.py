@@ -12,7 +12,7 @@ import pytest
 from bench.identification.force_lag import CASES, estimated, simulated, summary
 
 from conftest import sampled
-from palpate import InputError, Recording, identify, read_recording
+from palpate import InputError, Recording, read_recording
 from palpate.recording.lag import LARGEST_ERROR_S, lag_of
 
 NAMES = list(CASES)
@@ -91,15 +91,6 @@ def test_auto_refuses_a_recording_that_does_not_determine_the_lag(tmp_path: Path
         replace(recording, time=None).with_force_earlier("auto")
     with pytest.raises(InputError, match="a number of seconds or 'auto'"):
         recording.with_force_earlier("fast")  # type: ignore[arg-type]
-
-
-def test_identified_model_notes_the_lag() -> None:
-    _, _, late, recording = simulated(draw_of("spring with detents"))
-    few = recording._rows(np.arange(len(recording)) < 3000)
-    model = identify(few, inputs="position", max_wavelets=4)
-    noted = model.notes["force_lag"]
-    assert noted["lower_s"] <= late <= noted["upper_s"]
-    assert "ms late" in noted["text"]
 
 
 def test_summary_counts_known_lags_and_those_inside_the_interval() -> None:

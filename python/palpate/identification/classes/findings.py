@@ -68,7 +68,7 @@ def size_findings(network: FittedNetwork, recordings: Sequence[Recording]) -> li
 
     Repeated rows are counted once, and rows with correlated noise are counted as fewer independent rows.
     """
-    rows = sum(map(len, recordings))
+    rows = network.residuals
     if not recordings or rows >= AMPLE_ROWS_PER_PARAMETER * network.n_parameters:
         return []
     pairs = np.concatenate([part.position + 1j * part.force for part in recordings])

@@ -96,8 +96,8 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     return role
 
 
-def unused_rows(role: Int8Vector) -> str:
-    """Returns a sentence on the rows of each role (n,) that are not fitted."""
+def unused_rows(role: Int8Vector, used: str = "fitted") -> str:
+    """Returns a sentence on the rows of each role (n,) that are not fitted or compared."""
     reasons = {
         Role.APPROACH: "move far from the contact",
         Role.REST: "wait without contact",
@@ -106,7 +106,7 @@ def unused_rows(role: Int8Vector) -> str:
     counts = {reason: int(np.count_nonzero(role == each)) for each, reason in reasons.items()}
     listed = ", ".join(f"{count} {reason}" for reason, count in counts.items() if count)
     return (
-        f"{sum(counts.values())} of {len(role)} rows are not fitted, because they show no force over "
+        f"{sum(counts.values())} of {len(role)} rows are not {used}, because they show no force over "
         f"position: {listed}."
     )
 

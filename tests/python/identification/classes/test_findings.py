@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import palpate
-from imperfect import Array, line, noise, recorded, strokes, sweep, wall, wandering
+from imperfect import Array, noise, recorded, strokes, sweep, wall, wandering
 from palpate import WaveletNetworkRegressor
 from palpate.identification.classes.findings import (
-    cell_findings,
     explained_findings,
     extreme_force_findings,
     likely_cause,
@@ -113,14 +112,6 @@ def test_few_extreme_forces_do_not_hide_the_error_of_the_others() -> None:
     assert finding.level == "no"
     assert "without the 1% with the most extreme forces" in finding.sentence
     assert extreme_force_findings(RowError(0.01 * residual, force, np.ones(1000))) == []
-
-
-def test_error_on_rows_far_above_error_on_cells_gives_verdict_no() -> None:
-    error = RowError(noise(1000), line(sweep(1000)), np.ones(1000))
-    (finding,) = cell_findings(error, 0.1 * error.rmse, 0.6, 1024)
-    assert finding.level == "no"
-    assert "increase max_positions" in finding.sentence
-    assert cell_findings(error, 0.9 * error.rmse, 0.6, 1024) == []
 
 
 def test_too_few_rows_per_parameter_are_reported() -> None:

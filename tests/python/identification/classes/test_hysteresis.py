@@ -80,7 +80,7 @@ def test_one_play_radius_is_taken_as_given() -> None:
     x = wandering(4000, 1)
     side = HysteresisInput.of_play([x], 0.01).side
     recording = Recording.from_arrays(x, x + 0.2 * side, time=1e-3 * np.arange(len(x)))
-    model = identify(recording, search=SearchOptions(play_radius=(0.02,)))
+    model = identify(recording, inputs="position,hysteresis", search=SearchOptions(play_radius=(0.02,)))
     assert model.play_radius == pytest.approx(0.02 * np.ptp(x))
 
 

@@ -87,7 +87,6 @@ def test_a_branch_has_fewer_parameters_than_a_network_of_position_and_velocity()
     model = palpate.identify(position, with_noise(3.0 * position**2 + wave + branch, 1e-3), time=time)
     assert model.kind == "memory"
     assert model.n_parameters <= 30
-    assert any("with fewer parameters" in line for line in model.notes["model_selection"])
 
 
 def test_nonlinear_damping_does_not_become_a_branch_with_fewer_parameters() -> None:
@@ -97,7 +96,6 @@ def test_nonlinear_damping_does_not_become_a_branch_with_fewer_parameters() -> N
     force = with_noise(contact + wave + 0.01 * velocity * np.abs(velocity), 1e-3)
     model = palpate.identify(position, force, time=time)
     assert model.kind == "position_velocity"
-    assert any("may raise it by at most" in line for line in model.notes["model_selection"])
 
 
 @pytest.mark.full
@@ -184,8 +182,6 @@ def test_objects_that_do_not_relax_have_no_memory(kind: str) -> None:
     assert model.memory is None
     (decision,) = [line for line in model.notes["model_selection"] if line.startswith("memory: ")]
     assert decision.startswith("memory: not ")
-    if kind == "static":
-        assert "the error of the model without memory is noise" in decision
 
 
 def test_position_as_the_only_input_excludes_memory() -> None:

@@ -8,8 +8,6 @@ from palpate.identification.data.compression import (
     HELD_OUT_BLOCKS,
     Compressed,
     Compressor,
-    binning_error,
-    gain,
     held_out_rows,
     inside,
 )
@@ -58,19 +56,6 @@ def test_variance_within_cells_excludes_the_slope_across_them() -> None:
     assert np.sqrt(rows.within / freedom) == pytest.approx(0.02, rel=0.01)
 
 
-def test_the_error_of_cells_is_second_order_and_bounded_by_the_estimate() -> None:
-    """Half the cell size quarters the force error of compressed rows; the estimated error is the true one."""
-    x = np.random.default_rng(2).uniform(0.0, 1.0, 200_000)
-    errors = []
-    for cells in (50, 100):
-        rows = Compressor(x[:, None], np.sin(6.0 * x), max_positions=cells).rows()
-        at = rows.positions[:, 0]
-        true = np.sqrt(np.average((rows.force - np.sin(6.0 * at)) ** 2, weights=rows.weight))
-        assert binning_error(rows, 36.0 * np.sin(6.0 * at)[:, None]) == pytest.approx(true, rel=0.05)
-        errors.append(true)
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
-
-
 def test_weights_from_merged_rows_are_those_from_all_rows() -> None:
     random = np.random.default_rng(3)
     x = np.repeat(np.linspace(0.0, 1.0, 60), random.integers(1, 9, 60))[:, None]
@@ -97,26 +82,6 @@ def test_held_out_rows_of_a_motion_are_stretches() -> None:
     assert scattered.mean() == pytest.approx(0.2)
     assert stretches.mean() == pytest.approx(0.2)
     assert np.count_nonzero(np.diff(stretches.astype(int))) == 2 * HELD_OUT_BLOCKS / 5
-
-
-def test_gain_has_a_standard_error() -> None:
-    random = np.random.default_rng(0)
-    noise = random.normal(size=50_000)
-    share, error = gain(2.0 * noise, noise)
-    assert share == pytest.approx(0.75)
-    assert error < 1e-12
-    share, error = gain(random.normal(size=50_000), noise)
-    assert abs(share) < 4.0 * error
-    assert gain(np.zeros(100), np.zeros(100)) == (0.0, 0.0)
-
-
-def test_trimmed_gain_drops_groups_at_both_ends() -> None:
-    below, above = np.full(1000, 2.0), np.ones(1000)
-    above[:60] = 100.0
-    share, error = gain(below, above)
-    assert share < -100.0
-    assert error > 0.0
-    assert gain(below, above, trim=0.1) == (pytest.approx(0.75), pytest.approx(0.0))
 
 
 def test_rows_inside_lie_within_the_range_of_the_others_in_every_input() -> None:
