@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._core.dynamics import TransferFunction
+from .._core.model import play
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
 
@@ -194,6 +195,69 @@ def _rest(x: Float1D, row: int, within: float) -> tuple[int, int]:
     first = int(before[-1]) + 1 if len(before) else 0
     last = row + int(after[0]) - 1 if len(after) else len(x) - 1
     return first, last
+
+
+SLOW_RATIO = 0.05
+"""Speed of a wait over the speed of the motion around it [-]. A hand that turns is slower than this in less
+than 1 % of the time and of the travel."""
+
+SECTIONS, LEAST_SECTION_ROWS = 16, 32
+"""Number of sections of a recording, and least number of rows of a section, of which the one with the most
+position noise decides: a position can have noise only while the tool waits."""
+
+STEP = 0.0025
+"""Distance over which a speed of the motion is taken, unless the noise needs more [share of the travel]."""
+
+STEPS_AROUND = 8
+"""Number of distances before a row, and after it, whose median speeds are the speed of the motion around
+it."""
+
+LEAST_WAIT = 0.01
+"""Distance that the tool would travel during the shortest wait that is left out [share of the travel]: a
+shorter one has no weight in a fit."""
+
+
+def waits(position: Float1D) -> NDArray[np.bool_]:
+    """Returns True (n,) for rows at which the tool waits; positions (n,) are in recorded order.
+
+    The distance that the tool has travelled is that of a play operator as wide as the noise, which noise does
+    not move. The speed around a row is the smaller one of the median speeds of `STEPS_AROUND` distances
+    before it and after it, which a wait among them does not change.
+    """
+    x = (position - position.min()) / float(np.ptp(position))
+    noise = max(map(noise_of, np.array_split(x, max(1, min(SECTIONS, len(x) // LEAST_SECTION_ROWS)))))
+    band = max(TURN_NOISE * noise, TURN_STEPS * resolution_of(x))
+    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(play(x, 0.5 * band, start=x[0]))))])
+    step = max(STEP, 2.0 * band)
+    if travelled[-1] <= 2 * STEPS_AROUND * step:
+        return np.zeros(len(x), dtype=bool)
+    # First and last row of each step of distance: interpolated, because a row can travel several steps.
+    moved, at_row = np.unique(travelled, return_index=True)
+    reached = np.interp(np.arange(0.0, travelled[-1], step), moved, at_row)
+    rows = np.diff(reached, append=len(x) - 1.0)
+    around = np.pad(rows, STEPS_AROUND, constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(around, STEPS_AROUND)
+    typical = np.full(len(windows), np.nan)  # unknown at the start and at the end of the motion
+    known = np.count_nonzero(np.isfinite(windows), axis=1)
+    enough = known >= max(1, min(STEPS_AROUND // 2, len(rows) - 1))
+    typical[enough] = np.nanmedian(windows[enough], axis=1)
+    nearby = np.fmax(typical[: len(rows)], typical[-len(rows) :])
+    nearby = np.maximum(np.nan_to_num(nearby, nan=1.0), np.finfo(float).tiny)
+    speed = step / nearby[np.minimum((travelled / step).astype(np.int64), len(rows) - 1)]
+    row = np.arange(len(x))
+    first = np.maximum(row - np.maximum(np.ceil(2.0 * band / speed), 1.0).astype(np.int64), 0)
+    slow = travelled - travelled[first] < SLOW_RATIO * speed * (row - first)
+    slow[0] = slow[1]
+    found = np.zeros(len(x), dtype=bool)
+    for begin, end in np.flatnonzero(np.diff(slow, prepend=False, append=False)).reshape(-1, 2).tolist():
+        # The tool stops between two rows: the last row that moves less than half of a step waits as well.
+        stopped = begin > 1 and travelled[begin - 1] - travelled[begin - 2] < 0.5 * speed[begin - 1]
+        first_row = begin - int(stopped)
+        # One slow row is a turn between two rows.
+        found[first_row:end] = (
+            end - first_row > 1 and (end - first_row) * speed[begin:end].max() >= LEAST_WAIT
+        )
+    return found
 
 
 GAP_RATIO = 2.5

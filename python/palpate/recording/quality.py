@@ -8,6 +8,7 @@ gaps, and (in `comparison`) files that hold two objects or recordings that do no
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,7 @@ from ..verdict import Finding, no, usable
 from .comparison import CellRows, Travel, cell_rows, merged_findings, scale_findings, sides
 from .conversion import MIN_ROWS, mirror_notes
 from .lag import LONGEST_LAG_S
-from .motion import GAP_RATIO
+from .motion import GAP_RATIO, strokes_from_order, waits
 
 if TYPE_CHECKING:
     from .recording import Recording
@@ -159,7 +160,7 @@ def quality_findings(recording: Recording, *, relaxes: bool = False) -> list[Fin
     if len(recording) < MIN_ROWS:
         return []
     travel = Travel.of(recording.position)
-    cells = None if recording.input_names else cell_rows(recording, travel)
+    cells = None if recording.input_names else _moving_cells(recording)
     return [
         *magnitude_findings(recording, travel),
         *sign_findings(recording, travel, cells),
@@ -169,6 +170,18 @@ def quality_findings(recording: Recording, *, relaxes: bool = False) -> list[Fin
         *gap_findings(recording, travel),
         *merged_findings(recording, None if relaxes else cells),
     ]
+
+
+def _moving_cells(recording: Recording) -> CellRows | None:
+    """Returns the rows of a recording by position cell, without the rows at which the tool waits."""
+    if strokes_from_order(recording.position) is None:
+        return cell_rows(recording, Travel.of(recording.position))
+    waiting = waits(recording.position)
+    moving, kept = np.flatnonzero(~waiting), recording.without(waiting)
+    if not len(moving):
+        return None
+    cells = cell_rows(kept, Travel.of(kept.position))
+    return None if cells is None else replace(cells, row=moving[cells.row])
 
 
 def magnitude_findings(recording: Recording, travel: Travel) -> list[Finding]:

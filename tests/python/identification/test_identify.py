@@ -11,6 +11,7 @@ import palpate
 from conftest import sampled
 from palpate import InputError, Model, Recording, identify
 from palpate._core.model import play
+from palpate.identification.data.roles import Role, roles_of
 from palpate.recording.sample import sample_recording
 
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
@@ -121,7 +122,7 @@ def held_out_nrmse(path: Path, **options: object) -> tuple[float, Model]:
     kept, held = palpate.read_recording(path).split(every=5)
     model = identify(kept, **options)
     assert held.direction is not None
-    rows = held.direction != 0
+    rows = (held.direction != 0) & (roles_of(held) == Role.MOVING)
     error = model.force(held.position[rows], direction=held.direction[rows].astype(float)) - held.force[rows]
     return float(np.sqrt(np.mean(error**2)) / np.std(held.force[rows])), model
 

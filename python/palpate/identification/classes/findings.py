@@ -366,6 +366,29 @@ def excess_findings(
     ]
 
 
+def wait_findings(best: Candidate) -> list[Finding]:
+    """Returns a finding if the force at rows that are not fitted differs much from the model; between press and
+    release any force is possible."""
+    data = best.data
+    if data.fitted is None or best.error.spread == 0.0:
+        return []
+    residual = best.residual[~data.fitted]
+    if best.strokes is not None:
+        middle, half = best.parts_at(data.box[~data.fitted])
+        residual = np.maximum(np.abs(data.force[~data.fitted] - middle) - half, 0.0)
+    error = float(np.sqrt(np.mean(residual**2)))
+    if error <= USABLE_NRMSE * best.error.spread:
+        return []
+    return [
+        usable(
+            f"in {np.count_nonzero(~data.fitted)} rows in which the tool waits, the force differs from the model "
+            f"by {data.force_unit.text(error)} RMS: it changes with time at a constant position (relaxation, "
+            "creep or drift), which a model of position does not show. Cure: record time, so that a memory can "
+            "be identified, or use the model only while the tool moves"
+        )
+    ]
+
+
 def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     """Returns a finding if growth ended at max_wavelets although neighbouring residuals are still
     correlated."""
@@ -392,7 +415,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         positions = data.lower[0] + data.reach[0] * data.path[:, 0]
         note, of_period = period_notes(positions, data.period, data.position_unit.si)
         notes, findings = [*notes, note], findings + of_period
-    findings += report.findings + limit_findings(best, options)
+    findings += report.findings + limit_findings(best, options) + wait_findings(best)
     if data.robust is not None:
         findings += data.robust.findings(best.residual, data.force_unit)
     units = {"position_unit": data.position_unit, "force_unit": data.force_unit}

@@ -176,7 +176,7 @@ class Velocity(ModelClass):
         if motion.share_of_velocity(residual, below.solution.basis, friction=not damped) < LEAST_GAIN:
             return below
         velocity, known = motion.velocity()
-        rows = known if data.weight is None else known & (data.weight > 0.0)
+        rows = known
         over_both = Rows(
             VELOCITY_INPUTS,
             np.column_stack([data.positions, velocity])[rows],
@@ -191,7 +191,8 @@ class Velocity(ModelClass):
             force_unit=data.force_unit,
         )
         both = select(over_both, self._selection.options)
-        before = float(np.mean(residual[rows] ** 2))
+        fitted = rows if data.weight is None else rows & (data.weight > 0.0)
+        before = float(np.mean(residual[fitted] ** 2))
         share = 1.0 - both.best.error.rmse**2 / before if before > 0.0 else 0.0
         constant = moving is not None and moving.damping is not None
         compared = "constant damping" if constant else in_words(below.model_class)

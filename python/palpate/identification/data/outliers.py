@@ -256,6 +256,7 @@ MOST_WRONG_SHARE = 0.1
 """Share of the rows above which deviating values are not wrong readings [-]: so many belong to the object."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # huge values, refused later, may overflow
 def wrong_readings(recording: Recording) -> NDArray[np.bool_]:
     """Returns True (n,) for rows with a wrong reading of position or force.
 

@@ -59,6 +59,7 @@ def _autocorrelation(curve: Float1D) -> Float1D:
     that both have."""
     n = len(curve)
     centred = curve - curve.mean()
+    centred = centred / (float(np.abs(centred).max()) or 1.0)  # no overflow of a large force
     spectrum = np.fft.rfft(centred, 2 * n)
     products = np.fft.irfft(spectrum * spectrum.conj())[: n // 2]
     squares = np.concatenate([[0.0], np.cumsum(centred**2)])
