@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from itertools import chain
 from pathlib import Path
@@ -341,10 +341,7 @@ def identify(
                     "error": f"{rms}NRMSE {number(nrmse)} on {judged}",
                     **_band_text(model, recordings),
                     **dict(note.split(": ", 1) for note in model.notes["model_selection"][-_MOST_DECISIONS:]),
-                    **_lag_line(
-                        model.notes.get("force_lag"),
-                        max((part.corrected_lag_s for part in recordings), default=0.0),
-                    ),
+                    **_corrected_lag(recordings),
                     "time": f"{seconds:.2f} s",
                 }
             )
@@ -394,16 +391,10 @@ def _print_sketch(model: Model, recordings: Sequence[Recording]) -> None:
             print_line(line)
 
 
-def _lag_line(lag: Mapping[str, Any] | None, corrected_s: float) -> dict[str, str]:
-    """Returns the line of the summary on the lag of the force; empty if it was not examined."""
-    if lag is None:
-        return {}
-    text = str(lag["text"])
-    if corrected_s:
-        text = f"{1e3 * corrected_s:.3g} ms corrected; then {text}"
-    elif (lag["lower_s"] or 0.0) > 0.0:
-        text += f"; not corrected: --force-late-s auto or {lag['late_s']:.3g}"
-    return {"force lag": text}
+def _corrected_lag(recordings: Sequence[Recording]) -> dict[str, str]:
+    """Returns the line of the summary on a corrected lag of the force; empty without correction."""
+    corrected_s = max((part.corrected_lag_s for part in recordings), default=0.0)
+    return {"force lag": f"{1e3 * corrected_s:.3g} ms corrected"} if corrected_s else {}
 
 
 def _require_unused(**others: Any) -> None:

@@ -33,7 +33,13 @@ def is_recording(file: Path) -> bool:
 
 
 def show_recording(
-    file: Path, reading: ReadingOptions, *, plot: Path | None, frame: FrameFigure | None, as_json: bool
+    file: Path,
+    reading: ReadingOptions,
+    *,
+    lag: bool,
+    plot: Path | None,
+    frame: FrameFigure | None,
+    as_json: bool,
 ) -> None:
     """Prints a recording, its verdict first, and draws its views."""
     recording = reading.read(file)
@@ -47,10 +53,12 @@ def show_recording(
     with finishing():
         write_figures()
         if as_json:
-            print_json(_record(file, recording, strokes) | {"verdict": str(verdict)})
+            found = {"force_lag": recording.force_lag.record()} if lag else {}
+            print_json(_record(file, recording, strokes) | found | {"verdict": str(verdict)})
         else:
             print_verdict(verdict)
-            print_numbers(_summary(recording, strokes))
+            estimated = {"force lag": str(recording.force_lag)} if lag else {}
+            print_numbers(_summary(recording, strokes) | estimated)
             for note in notes:
                 print_paragraph(note, indent="  ")
         end_with(verdict)

@@ -217,6 +217,12 @@ LEAST_WAIT = 0.01
 shorter one has no weight in a fit."""
 
 
+def noise_band(x: Float1D) -> float:
+    """Returns the width within which noise and resolution move positions (n,) in recorded order."""
+    sections = np.array_split(x, max(1, min(SECTIONS, len(x) // LEAST_SECTION_ROWS)))
+    return max(TURN_NOISE * max(map(noise_of, sections)), TURN_STEPS * resolution_of(x))
+
+
 def waits(position: Float1D) -> NDArray[np.bool_]:
     """Returns True (n,) for rows at which the tool waits; positions (n,) are in recorded order.
 
@@ -225,8 +231,7 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
     before it and after it, which a wait among them does not change.
     """
     x = (position - position.min()) / float(np.ptp(position))
-    noise = max(map(noise_of, np.array_split(x, max(1, min(SECTIONS, len(x) // LEAST_SECTION_ROWS)))))
-    band = max(TURN_NOISE * noise, TURN_STEPS * resolution_of(x))
+    band = noise_band(x)
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(play(x, 0.5 * band, start=x[0]))))])
     step = max(STEP, 2.0 * band)
     if travelled[-1] <= 2 * STEPS_AROUND * step:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...recording import Recording
+from ...recording.motion import noise_band
 from ...recording.quality import findings_of
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, Verdict, no, usable
@@ -367,24 +368,29 @@ def excess_findings(
 
 
 def wait_findings(best: Candidate) -> list[Finding]:
-    """Returns a finding if the force at rows that are not fitted differs much from the model; between press and
-    release any force is possible."""
+    """Returns a finding if the force at rows that are not fitted differs much from the model.
+
+    Between press and release any force is possible, and a position within its noise.
+    """
     data = best.data
     if data.fitted is None or best.error.spread == 0.0:
         return []
-    residual = best.residual[~data.fitted]
-    if best.strokes is not None:
-        middle, half = best.parts_at(data.box[~data.fitted])
-        residual = np.maximum(np.abs(data.force[~data.fitted] - middle) - half, 0.0)
-    error = float(np.sqrt(np.mean(residual**2)))
+    box, force, band = data.box[~data.fitted], data.force[~data.fitted], noise_band(data.path[:, 0])
+    low, high = np.full(len(force), np.inf), np.full(len(force), -np.inf)
+    for shift in (-band, 0.0, band):
+        near = np.clip(box + shift, 0.0, 1.0)
+        middle, half = best.parts_at(near) if best.strokes is not None else (best.force_near(near), 0.0)
+        low, high = np.minimum(low, middle - half), np.maximum(high, middle + half)
+    outside = np.maximum(force - high, low - force).clip(min=0.0)
+    error = float(np.sqrt(np.mean(outside**2)))
     if error <= USABLE_NRMSE * best.error.spread:
         return []
     return [
         usable(
-            f"in {np.count_nonzero(~data.fitted)} rows in which the tool waits, the force differs from the model "
-            f"by {data.force_unit.text(error)} RMS: it changes with time at a constant position (relaxation, "
-            "creep or drift), which a model of position does not show. Cure: record time, so that a memory can "
-            "be identified, or use the model only while the tool moves"
+            f"in {len(force)} rows in which the tool waits, the force differs from the model by "
+            f"{data.force_unit.text(error)} RMS: it changes with time at a constant position (relaxation, creep "
+            "or drift), which a model of position does not show. Cure: record time, so that a memory can be "
+            "identified, or use the model only while the tool moves"
         )
     ]
 

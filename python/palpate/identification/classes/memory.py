@@ -331,7 +331,7 @@ def better_with_memory(
     accepted = gain - scatter >= LEAST_GAIN
     if over_velocity:
         # Both are as hard to render. At one speed both fit the same recording, a branch with fewer numbers.
-        n = fit.independent(refined)
+        n = min(found.independent_rows, fit.n_rows)
         errors = (before, found.n_parameters), (before * (1.0 - gain), n_parameters)
         falls = -float(np.diff([deviance("bic", n * square, n, p) for square, p in errors])[0])
         text = f"{lowered('BIC', falls)}, must lower it by at least {options.search.evidence:.4g}"

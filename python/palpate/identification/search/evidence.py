@@ -273,6 +273,10 @@ class Candidate:
         the rows of a slice."""
         return self._force(self.data.box[rows], None if self.side is None else self.side[rows])
 
+    def force_near(self, positions: Float2D) -> Float1D:
+        """Returns the force (k,) of a candidate without hysteresis at positions (k, d) in the unit box."""
+        return self._force(positions, None)
+
     def parts_at(self, positions: Float2D) -> tuple[Float1D, Float1D]:
         """Returns the mean force g (k,) of both strokes and the hysteresis h (k,) at positions (k, d) in the
         unit box."""
