@@ -14,7 +14,7 @@ void translate_invalid_argument(std::exception_ptr thrown) {
         std::rethrow_exception(std::move(thrown));
     } catch (const std::invalid_argument& error) {
         const pybind11::object type = pybind11::module_::import("palpate.errors").attr("InputError");
-        pybind11::set_error(type, error.what());
+        pybind11::set_error(type, palpate::bindings::text_of(error.what()));
     }
 }
 

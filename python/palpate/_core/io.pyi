@@ -19,7 +19,7 @@ def checked_certificate(model: palpate._core.model.ForceModel, plan: typing.Any,
     Computes the certificate of a model file again from the rendered model and returns it. Raises
     ValueError with the field that differs, its value and the correct value.
     """
-def follow_links(path: str) -> str:
+def follow_links(path: os.PathLike | str | bytes) -> pathlib.Path:
     """
     Returns the file to which a chain of symbolic links leads; the file may be missing. Raises
     ValueError if a link in a folder that all users share belongs to another user.
@@ -29,7 +29,7 @@ def profile_of(content: typing.Any) -> palpate._core.device.DeviceProfile:
     Returns the device profile in the content of a file. Raises ValueError with the first wrong
     field, its value and the correct values.
     """
-def read_json(path: str) -> typing.Any:
+def read_json(path: os.PathLike | str | bytes) -> typing.Any:
     """
     Returns the content of a JSON file. Raises ValueError with one sentence that begins with the
     name of the file.
