@@ -21,7 +21,6 @@ void bind_model(pybind11::module_& module);
 void bind_wavelet(pybind11::module_& module);
 void bind_dynamics(pybind11::module_& module);
 void bind_device(pybind11::module_& module);
-void bind_wire(pybind11::module_& module);
 void bind_rendering(pybind11::module_& module);
 void bind_stability(pybind11::module_& module);
 void bind_portable(pybind11::module_& module);

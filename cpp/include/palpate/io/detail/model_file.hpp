@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/io/detail/plan_file.hpp"
 #include "palpate/io/json_field.hpp"
 #include "palpate/io/json_text.hpp"
 #include "palpate/io/parse_model.hpp"
-#include "palpate/io/plan_file.hpp"
 #include "palpate/model/force_model.hpp"
 
 // Definitions of parse_model and load_model_file, which take seconds to compile.
