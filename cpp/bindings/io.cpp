@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include "bindings.hpp"
 #include "palpate/io/growing_file.hpp"
-#include "palpate/io/model_file.hpp"
+#include "palpate/io/parse_model.hpp"
+#include "palpate/io/plan_file.hpp"
 
 namespace palpate::bindings {
 
@@ -116,18 +119,20 @@ void bind_io(py::module_& module) {
     module.attr("largest_json_bytes") = largest_json_bytes;
     module.def(
         "follow_links",
-        [](const std::string& path) {
+        [](const std::filesystem::path& path) {
             std::string target;
-            if (const std::string reason = palpate::detail::follow_links(path, target); !reason.empty()) {
-                throw py::value_error{reason};
+            if (const std::string reason = palpate::detail::follow_links(path.string(), target);
+                !reason.empty()) {
+                throw std::invalid_argument{reason};
             }
-            return target;
+            return std::filesystem::path{target};
         },
         "path"_a,
         "Returns the file to which a chain of symbolic links leads; the file may be missing. Raises\n"
-        "ValueError if a link in a folder that all users share belongs to another user.");
+        "InputError if a link in a folder that all users share belongs to another user.");
     module.def(
-        "read_json", [](const std::string& path) { return to_python(read_json(path)); }, "path"_a,
+        "read_json", [](const std::filesystem::path& path) { return to_python(read_json(path.string())); },
+        "path"_a,
         "Returns the content of a JSON file. Raises ValueError with one sentence that begins with the\n"
         "name of the file.");
     module.def(

@@ -14,7 +14,7 @@ void translate_invalid_argument(std::exception_ptr thrown) {
         std::rethrow_exception(std::move(thrown));
     } catch (const std::invalid_argument& error) {
         const pybind11::object type = pybind11::module_::import("palpate.errors").attr("InputError");
-        pybind11::set_error(type, error.what());
+        pybind11::set_error(type, palpate::bindings::text_of(error.what()));
     }
 }
 
@@ -36,7 +36,7 @@ PYBIND11_MODULE(_core, module) {
     submodule("status", "Status of a tick of the control loop or of a solver.", bind_status);
     submodule("model", "Force laws and their proved bounds.", bind_wavelet, bind_model);
     submodule("dynamics", "Transfer functions and the filters of the paper.", bind_dynamics);
-    submodule("device", "Profiles of devices, and the packets of USB devices.", bind_device, bind_wire);
+    submodule("device", "Profiles of devices, and the packets of USB devices.", bind_device);
     submodule("rendering", "Structures between a model and a device.", bind_rendering);
     submodule("stability", "Certificates and their inequalities.", bind_stability);
     submodule("portable", "Models as tables for programs in C.", bind_portable);

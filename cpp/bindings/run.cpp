@@ -75,19 +75,6 @@ class Watcher {
 
 py::object python_of(const NamedValues& fields);
 
-template <class T>
-py::object python_of(const std::vector<T>& values) {
-    py::list list;
-    for (const T& value : values) {
-        if constexpr (std::is_same_v<T, NamedValues>) {
-            list.append(python_of(value));
-        } else {
-            list.append(value);
-        }
-    }
-    return list;
-}
-
 py::object python_of(std::monostate /*nothing*/) {
     return py::none();
 }
@@ -96,9 +83,26 @@ py::object python_of(double value) {
     return std::isfinite(value) ? py::object(py::float_(value)) : py::none();
 }
 
+py::object python_of(const std::string& text) {
+    return text_of(text);
+}
+
+py::object python_of(const std::pair<std::string, std::string>& line) {
+    return py::make_tuple(text_of(line.first), text_of(line.second));
+}
+
 template <class T>
 py::object python_of(const T& value) {
     return py::cast(value);
+}
+
+template <class T>
+py::object python_of(const std::vector<T>& values) {
+    py::list list;
+    for (const T& value : values) {
+        list.append(python_of(value));
+    }
+    return list;
 }
 
 py::object python_of(const NamedValues& fields) {
@@ -151,7 +155,7 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
     }();
     watcher.rethrow();
     py::dict result = python_of(fields(summary));
-    result["lines"] = lines(summary);
+    result["lines"] = python_of(lines(summary));
     return result;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include "palpate/fields/field_table.hpp"
 
@@ -18,6 +20,8 @@ template <class V>
 [[nodiscard]] V value_of(const pybind11::handle& given, const char* field) {
     if constexpr (requires(V value) { requires HasWords<typename V::value_type>; }) {
         return named<typename V::value_type>(given.cast<std::string>(), field);
+    } else if constexpr (std::is_same_v<V, std::string>) {
+        return given.cast<std::filesystem::path>().string();  // may be a file name that is not UTF-8
     } else {
         return given.cast<V>();
     }

@@ -10,7 +10,7 @@
 
 #include "fuzzing.hpp"
 #include "palpate/guard/limits.hpp"
-#include "palpate/io/model_file.hpp"
+#include "palpate/io/parse_model.hpp"
 #include "palpate/model/environment.hpp"
 #include "palpate/model/fingerprint.hpp"
 

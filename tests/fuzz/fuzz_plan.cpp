@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "fuzzing.hpp"
-#include "palpate/io/model_file.hpp"
+#include "palpate/io/parse_model.hpp"
 
 namespace palpate::fuzz {
 namespace {

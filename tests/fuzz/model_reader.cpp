@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "palpate/io/model_file.hpp"
+#include "palpate/io/parse_model.hpp"
 #include "palpate/model/fingerprint.hpp"
 
 /// Reads a model file. Returns 0 and writes the fingerprint of the model to `text`, or returns 1 and writes the reason

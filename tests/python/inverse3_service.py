@@ -48,13 +48,19 @@ class Service:
     garbage_messages: int = 1
     renamed_after: int | None = None
     extra_states: dict[int, int] = field(default_factory=dict)
-    """Number of states without a message, sent before the answer to a message"""
+    """Number of states without a message, sent just before a message arrives"""
     late_answers: dict[int, int | None] = field(default_factory=dict)
     """Number of milliseconds by which the answer to a message is late; None: it is lost"""
     silent_after: int | None = None
     messages: list[dict[str, Any]] = field(default_factory=list)
     forces: list[dict[str, float]] = field(default_factory=list)
     positions: list[float] = field(default_factory=list)
+    times: list[int] = field(default_factory=list)
+    """Time of each message [ms]"""
+    answered: dict[int, int] = field(default_factory=dict)
+    """Time at which the answer to a message is sent [ms]"""
+    now: int = 0
+    """Time of the service [ms]"""
     closed: bool = False
     close_code: int | None = None
     environment: dict[str, str] = field(default_factory=dict)
@@ -82,6 +88,9 @@ class Service:
         command = message["inverse3"][0]["commands"]["set_cursor_force"]
         force = command.get(self.force_key, {"x": 0.0, "y": 0.0, "z": 0.0})
         self.forces.append(force)
+        self.times.append(self.now)
+        for _ in range(self.extra_states.get(number, 0)):
+            yield 0, json.dumps(self.state_message(self.forces[number - 1]))
         lead = 0.5 * self.sweep * (1.0 - math.cos(2.0 * math.pi * number * STEP_S))
         hand = self.hand_stiffness * (self.start + lead - self._position)
         for _ in range(10):
@@ -99,11 +108,10 @@ class Service:
             return
         if self.renamed_after == number:
             self.device_id = "0000"
-        for _ in range(self.extra_states.get(number, 0)):
-            yield 0, json.dumps(self.state_message(force))
         unplugged = self.unplug_after is not None and number >= self.unplug_after
         late = self.late_answers.get(number, 0)
         if late is not None:
+            self.answered[number] = self.now + late
             yield late, json.dumps(self.state_message(force, unplugged=unplugged))
 
     def state_message(
@@ -142,6 +150,7 @@ class _Connection:
 
     def step(self) -> bool:
         """Answers all messages that have arrived; returns False at the end of the connection."""
+        self.service.now += 1
         self.late = [(left - 1, text) for left, text in self.late]
         for _, text in filter(lambda each: each[0] <= 0, self.late):
             self._send_text(text)

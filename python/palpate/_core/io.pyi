@@ -3,10 +3,12 @@
 Model files.
 """
 from __future__ import annotations
+import os
 import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import palpate._core.stability
+import pathlib
 import typing
 __all__: list[str] = ['check_model', 'checked_certificate', 'follow_links', 'largest_json_bytes', 'profile_of', 'read_json', 'scheme_of']
 def check_model(content: typing.Any) -> None:
@@ -19,17 +21,17 @@ def checked_certificate(model: palpate._core.model.ForceModel, plan: typing.Any,
     Computes the certificate of a model file again from the rendered model and returns it. Raises
     ValueError with the field that differs, its value and the correct value.
     """
-def follow_links(path: str) -> str:
+def follow_links(path: os.PathLike | str | bytes) -> pathlib.Path:
     """
     Returns the file to which a chain of symbolic links leads; the file may be missing. Raises
-    ValueError if a link in a folder that all users share belongs to another user.
+    InputError if a link in a folder that all users share belongs to another user.
     """
 def profile_of(content: typing.Any) -> palpate._core.device.DeviceProfile:
     """
     Returns the device profile in the content of a file. Raises ValueError with the first wrong
     field, its value and the correct values.
     """
-def read_json(path: str) -> typing.Any:
+def read_json(path: os.PathLike | str | bytes) -> typing.Any:
     """
     Returns the content of a JSON file. Raises ValueError with one sentence that begins with the
     name of the file.

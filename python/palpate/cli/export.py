@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from ..errors import InputError
 from ..export.request import Request, Written
@@ -16,6 +17,7 @@ from .exit_status import end_with, finishing
 from .printing import print_json, print_numbers, print_verdict, talk
 from .verb import (
     PATH,
+    READING_NAMES,
     ReadingOptions,
     json_option,
     options,
@@ -25,22 +27,48 @@ from .verb import (
 )
 
 FORMATS = {
-    "c": ("c_header", "A C header for a microcontroller: force law and structure with proved errors."),
-    "fmu": ("fmu", "An FMU (FMI 3.0, co-simulation) of the force law for simulators; needs a C compiler."),
-    "table": ("table", "A CSV table of the force over the position."),
-    "schema": ("schema", "The JSON schema of model files; needs no MODEL.json."),
-    "mcap": ("mcap", "An MCAP file of a recording or flight record, for tools that show logs."),
+    "c": (
+        "c_header",
+        "A C header for a microcontroller: force law and structure with proved errors.",
+        {"source", "precision", "name", "uncertified", "encoder_step", "force_limit"},
+    ),
+    "fmu": (
+        "fmu",
+        "An FMU (FMI 3.0, co-simulation) of the force law for simulators; needs a C compiler.",
+        {"source", "name"},
+    ),
+    "table": ("table", "A CSV table of the force over the position.", {"source"}),
+    "schema": ("schema", "The JSON schema of model files; needs no MODEL.json.", set[str]()),
+    "mcap": (
+        "mcap",
+        "An MCAP file of a recording or flight record, for tools that show logs.",
+        {"source", *READING_NAMES},
+    ),
 }
-"""Formats: option -> module of `palpate.export` with a function `write`, and the help."""
+"""Formats: option -> module of `palpate.export` with a function `write`, the help, the parameters it uses."""
+
+_EVERY_FORMAT = {"kind", "output", "as_json", "quiet"}
+"""Parameters that every format uses."""
 
 format_options: Callable[[Any], Any] = options(
     *(
         click.option(
             f"--{name}", "kind", flag_value=name, type=str, default=None, show_default=False, help=text
         )
-        for name, (_, text) in FORMATS.items()
+        for name, (_, text, _) in FORMATS.items()
     )
 )
+
+
+def _require_use(kind: str) -> None:
+    """Refuses parameters that the format does not use."""
+    context = click.get_current_context()
+    for param in context.command.params:
+        name = str(param.name)
+        is_given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if is_given and name not in _EVERY_FORMAT | FORMATS[kind][2]:
+            word = param.opts[0] if isinstance(param, click.Option) else context.params[name]
+            raise InputError(f"{word} is given, but --{kind} does not use it: leave it out")
 
 
 @verb("palpate export knob.json --c -o knob.h")
@@ -105,6 +133,7 @@ def export(
     """
     if kind is None:
         raise InputError(f"no format is given: one of {', '.join(f'--{each}' for each in FORMATS)}")
+    _require_use(kind)
     require_writable(output, inputs=(source,))
     talk(f"writing {output} ...")
     module = import_module(f"palpate.export.{FORMATS[kind][0]}")

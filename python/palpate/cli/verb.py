@@ -29,8 +29,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 PATH = FileName(path_type=Path)
 
-_READ = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows", "zero",
-         "force_late_s", "invalid")  # fmt: skip
+READING_NAMES = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows",
+                 "zero", "force_late_s", "invalid")  # fmt: skip
 """Arguments of `read_recording` that are also options of the command line."""
 
 _SCHEME = Scheme()
@@ -185,7 +185,7 @@ def reading_options(command: F) -> F:
 
     @wraps(command)
     def invoke(*args: Any, **given: Any) -> Any:
-        reading = ReadingOptions({name: given.pop(name) for name in _READ})
+        reading = ReadingOptions({name: given.pop(name) for name in READING_NAMES})
         return command(*args, reading=reading, **given)
 
     return cast(F, _READING(invoke))

@@ -320,7 +320,8 @@ class Model(ForceModel):
             "slope_bounds": None if bounds is None else {"min": bounds[0], "max": bounds[1]},
             "data": {
                 "sha256": self.data.sha256,
-                "files": list(self.data.files),
+                # a name that is not UTF-8 contains surrogates, which JSON cannot store
+                "files": [name.encode(errors="backslashreplace").decode() for name in self.data.files],
                 "rows": self.data.rows,
                 "columns": dict(self.data.columns),
             },
@@ -470,7 +471,7 @@ def load_model(path: str | os.PathLike[str], *, with_plan: bool = True) -> Model
     """
     file = path_of("path", path)
     require_file(file)
-    content = read_json(str(file))
+    content = read_json(file)
     if not with_plan and isinstance(content, dict):
         content = {**content, "plan": None, "certificate": None}
     try:

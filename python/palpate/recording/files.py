@@ -169,10 +169,7 @@ def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator
     InputError
         The folder does not exist or cannot be written, or the file exists or is not a regular file.
     """
-    try:
-        target = Path(follow_links(os.fspath(path)))
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    target = follow_links(path)
     if not target.parent.is_dir():
         raise InputError(f"{path} cannot be written: there is no folder {target.parent}")
     if target.is_dir():

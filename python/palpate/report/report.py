@@ -49,7 +49,7 @@ class Report:
         """
         target = path_of("path", path)
         with replacing(target) as temporary:
-            temporary.write_text(self.html, encoding="utf-8")
+            temporary.write_text(self.html, encoding="utf-8", errors="backslashreplace")
         return target
 
 

@@ -198,7 +198,7 @@ def _of_file(file: Path) -> Subject:
         refused = error
     try:
         model = load_model(file, with_plan=False)
-        content = read_json(str(file))
+        content = read_json(file)
     except InputError:
         raise refused from None
     reason = str(refused).removeprefix(f"{file}: ")

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/io/model_file.hpp"
+#include "palpate/io/parse_model.hpp"
 
 namespace palpate {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/run/open_inverse3.hpp"
+#include "palpate/run/detail/open_inverse3.hpp"
 #include "palpate/run/open_usb.hpp"
 #include "support.hpp"
 

@@ -41,7 +41,7 @@ CASES = {
     "show": "show a.csv --plot p.png --plot-frame frame.png",
     "report": "report m.json a.csv -o out.html",
     "export --c": "export m.json --c --uncertified --encoder-step 1e-4 --force-limit 2 -o out.h",
-    "export --fmu": "export m.json --fmu --uncertified -o out.fmu",
+    "export --fmu": "export m.json --fmu -o out.fmu",
     "export --table": "export m.json --table -o out.csv",
     "export --schema": "export --schema -o out.json",
     "export --mcap": "export a.csv --mcap -o out.mcap",

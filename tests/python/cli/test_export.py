@@ -223,6 +223,36 @@ def test_format_is_required(planned: Path, tmp_path: Path, capsys: pytest.Captur
     assert "one of --c, --fmu, --table, --schema, --mcap" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "unused"),
+    [
+        ("m.json --fmu --encoder-step 1e-4", "--encoder-step"),
+        ("m.json --fmu --force-limit 1", "--force-limit"),
+        ("m.json --fmu --precision single", "--precision"),
+        ("m.json --fmu --uncertified", "--uncertified"),
+        ("m.json --table --name knob", "--name"),
+        ("m.json --table --position x", "--position"),
+        ("m.json --schema", "m.json"),
+        ("m.json --mcap --force-limit 1", "--force-limit"),
+        ("m.json --c --invalid refuse", "--invalid"),
+    ],
+)
+def test_a_parameter_that_the_format_does_not_use_is_refused(
+    arguments: str,
+    unused: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    model_by_hand().save("m.json")
+    assert main(["export", *arguments.split(), "-o", "out"]) == 2
+    kind = arguments.removeprefix("m.json ").split()[0]
+    message = f"error: {unused} is given, but {kind} does not use it: leave it out\n"
+    assert capsys.readouterr().err == message
+    assert not Path("out").exists()
+
+
 def test_failed_comparison_writes_nothing_and_exits_with_code_1(
     planned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

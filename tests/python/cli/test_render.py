@@ -111,6 +111,14 @@ def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path
     assert len(every_row(out)) == 800
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="needs file names of any bytes")
+def test_a_recording_whose_name_is_not_utf_8_is_written(tmp_path: Path) -> None:
+    out = tmp_path / os.fsdecode(b"rend\xffered.csv")
+    summary = render(Scheme(), duration_s=0.3, record=out)
+    assert summary["record"] == str(out)
+    assert len(every_row(out)) == summary["recorded"] > 0
+
+
 def test_an_incomplete_recording_is_renamed_and_reported(tmp_path: Path) -> None:
     (tmp_path / "rendered.csv.part").write_text("precious", encoding="utf-8")
     summary = render(Scheme(), duration_s=0.3, record=str(tmp_path / "rendered.csv"))

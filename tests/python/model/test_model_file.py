@@ -8,6 +8,7 @@ import json
 import os
 import random
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from conftest import ROOT
 from palpate import InputError, Model, identify, load_model
 from palpate._core.io import check_model, checked_certificate, largest_json_bytes, scheme_of
 from palpate._core.model import most_wavelets
+from palpate.cli.main import main
 
 CORPUS = ROOT / "tests" / "models"
 GOOD: list[dict[str, str]] = json.loads((CORPUS / "good.json").read_text(encoding="utf-8"))
@@ -78,6 +80,27 @@ def refused(path: Path) -> str | None:
     except InputError as error:
         return str(error)
     return None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs file names of any bytes")
+def test_a_file_whose_name_is_not_utf_8_is_written_read_and_named_in_messages(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / os.fsdecode(b"kn\xffob.json")
+    model = load_model(CORPUS / "good" / "position.json")
+    assert model.save(path) == path
+    assert load_model(path).to_dict() == model.to_dict()
+    assert main(["show", str(path)]) == 0
+    assert main(["report", str(path), "-o", str(tmp_path / "knob.html")]) == 0
+    recording = tmp_path / os.fsdecode(b"pr\xffess.csv")
+    recording.write_text("position_rad,force_N*m\n" + "\n".join(f"{k / 100},{k / 50}" for k in range(100)))
+    assert identify(recording).save(path) == path
+    assert load_model(path).data.files == (str(tmp_path / "pr\\udcffess.csv"),)
+    path.write_text("{", encoding="utf-8")
+    with pytest.raises(InputError, match=f"{path}: this is not JSON"):
+        load_model(path)
+    assert main(["show", str(path)]) == 2
+    assert "kn\\udcffob.json: this is not JSON" in capsys.readouterr().err
 
 
 def test_the_list_of_the_corpus_names_every_good_file() -> None:

@@ -308,7 +308,6 @@ class Inverse3Device {
     [[nodiscard]] Status exchanged(double force) {
         Link& link = *link_;
         const bool has_skipped = skip_waiting_states();
-        const Time found = Clock::now();
         const bool answered = is_answered(link.is_wrong ? 0.0 : force);
         if (link.disconnected || link.is_wrong) {
             return Status::Fault;
@@ -316,10 +315,8 @@ class Inverse3Device {
         read_state();
         const auto seconds = [](Clock::duration time) { return std::chrono::duration<double>(time).count(); };
         const Time now = Clock::now();
-        last_.delay = seconds(now - link.late_from);
-        if (has_skipped) {
-            last_.delay = std::max(last_.delay, seconds(found - link.late_from_before));
-        }
+        // A skipped state can be the answer to the last command; the one read before it is then older.
+        last_.delay = seconds(now - (has_skipped ? link.late_from_before : link.late_from));
         if (answered) {
             link.late_from_before = std::exchange(link.late_from, link.sent);
         }
