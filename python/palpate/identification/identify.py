@@ -288,7 +288,7 @@ def fit_environment(
     options = options or IdentifyOptions()
     given = names or ("position", *(f"input {k}" for k in range(2, positions.shape[-1] + 1)))
     side = None if side is None else np.sign(side).astype(float)
-    rows = Rows(tuple(given), positions, force, side, starts, (), weight, within, options.period)
+    rows = Rows(tuple(given), positions, force, side, None, starts, (), weight, within, options.period)
     if units is not None:
         rows = replace(rows, position_unit=units["position"], force_unit=units["force"])
     return fit_rows(rows, options)

@@ -373,7 +373,7 @@ def wait_findings(best: Candidate) -> list[Finding]:
     Between press and release any force is possible, and a position within its noise.
     """
     data = best.data
-    if data.fitted is None or best.error.spread == 0.0:
+    if data.fitted is None or data.fitted.all() or best.error.spread == 0.0:
         return []
     box, force, band = data.box[~data.fitted], data.force[~data.fitted], noise_band(data.path[:, 0])
     low, high = np.full(len(force), np.inf), np.full(len(force), -np.inf)
@@ -388,8 +388,8 @@ def wait_findings(best: Candidate) -> list[Finding]:
     return [
         usable(
             f"in {len(force)} rows in which the tool waits, the force differs from the model by "
-            f"{data.force_unit.text(error)} RMS: it changes with time at a constant position (relaxation, creep "
-            "or drift), which a model of position does not show. Cure: record time, so that a memory can be "
+            f"{data.force_unit.text(error)} RMS: it changes with time at a constant position (relaxation, "
+            "creep or drift), which a model of position does not show. Cure: record time, so that a memory can be "
             "identified, or use the model only while the tool moves"
         )
     ]
@@ -448,7 +448,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         rmse_of_all=best.error_on(None).rmse,
         left_out_nrmse=left_out_nrmse(best),
         residuals=int(np.count_nonzero(counted)),
-        residual_correlation=neighbour_correlation(best.residual[counted > 0.0]),
+        residual_correlation=neighbour_correlation(best.residual[best.error_on(None).weight > 0.0]),
         path=tuple(report.path),
         decisions=decisions,
         notes=(*notes, *report.notes, *(f"Replaced decision: {each}." for each in replaced)),

@@ -86,6 +86,10 @@ class Hysteresis(ModelClass):
             assert self._selection.data.side is not None
             return self._of(below, HysteresisInput.of_strokes(self._selection.data.side))
         strokes = self._play.best_of_options(below.solution.basis)
+        if strokes is not None and self._play.strokes_are_better(strokes, below.solution.basis):
+            self._play, order = None, self._selection.data.order
+            assert order is not None
+            return self._of(below, HysteresisInput(order, order != 0.0))
         if strokes is not None:
             return self._play.with_first_states(self._of(below, strokes))
         untested = "the motions of the recording between gaps of time are too short, or never turn back"
@@ -268,6 +272,20 @@ class PlaySearch:
         )
         falls = math.log(self._residual_squares(strokes, basis, known) / found.fun) * np.count_nonzero(known)
         return self._of(math.exp(found.x)) if falls > self._evidence else strokes
+
+    def strokes_are_better(self, strokes: HysteresisInput, basis: Basis) -> bool:
+        """True if the strokes from the order of rows fit better, on given wavelets, than the best play radius
+        near that of `strokes`: the direction then changes at once at a turn."""
+        order = self._samples.data.order
+        if order is None or not {-1.0, 1.0} <= set(order.tolist()):
+            return False
+        best = self.with_best_radius(strokes, basis)
+        known = _thinned(best.known & (order != 0.0))
+        squares = (
+            self._residual_squares(each, basis, known)
+            for each in (HysteresisInput(order, order != 0.0), best)
+        )
+        return next(squares) <= next(squares)
 
     def with_first_states(self, found: Candidate) -> Candidate:
         """Returns the candidate for which the direction state at the start of each motion is computed from

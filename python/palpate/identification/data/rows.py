@@ -17,7 +17,7 @@ from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...recording import Recording
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
-from ...recording.motion import Piece, pieces, velocity
+from ...recording.motion import Piece, ordered_strokes, pieces, velocity
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
 from ..decision import Decision
@@ -60,6 +60,9 @@ class Rows:
     """(n,)"""
     side: Float1D | None = None
     """(n,) direction: +1 press, -1 release, 0 neither; None if the direction is not known"""
+    order: Float1D | None = None
+    """(n,) direction of each row from the order of rows, where `side` is not known but a play operator can be
+    used; None if the order shows no strokes"""
     starts: Sequence[int] | None = None
     """Indices of the rows at which a motion without gaps in time starts, for the play operator (only for one
     input)"""
@@ -147,7 +150,9 @@ class Rows:
 
     def only(self, rows: NDArray[np.bool_]) -> Rows:
         """Returns some of the rows, without their continuous motions."""
-        side, weight = (None if each is None else each[rows] for each in (self.side, self.weight))
+        side, weight, order = (
+            None if each is None else each[rows] for each in (self.side, self.weight, self.order)
+        )
         share = np.mean(rows) if self.weight is None else self.weight[rows].sum() / self.weight.sum()
         return replace(
             self,
@@ -155,6 +160,7 @@ class Rows:
             force=self.force[rows],
             side=side,
             weight=weight,
+            order=order,
             within=self.within * float(share),
             parts=(),
             fitted=None if self.fitted is None else self.fitted[rows],
@@ -279,8 +285,13 @@ def rows_of(
         )
     decisions: tuple[Decision, ...] = ()
     findings: tuple[Finding, ...] = ()
+    order = None
     if side is None and all(part.time is not None for part in recordings):
         starts = _starts(recordings, kept)
+        ordered = [ordered_strokes(part) for part in recordings] if len(names) == 1 else [None]
+        if all(each is not None for each in ordered):
+            pairs = zip(ordered, kept, strict=True)
+            order = np.concatenate([np.asarray(each, dtype=float)[rows] for each, rows in pairs])
     elif side is None and len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs):
         strokes = strokes_of(recordings)
         side, notes, findings = strokes.side, notes + strokes.notes, strokes.findings
@@ -296,6 +307,8 @@ def rows_of(
     )
     positions, fitted = np.concatenate(columns), role == Role.MOVING
     corners = None
+    # During a wait the object keeps the direction of the stroke before it.
+    side, order = (None if each is None else _kept(each, ~fitted) for each in (side, order))
     if not fitted.all():
         shown = positions[fitted]
         corners = shown.min(axis=0), shown.max(axis=0)
@@ -310,6 +323,7 @@ def rows_of(
         positions,
         force,
         side,
+        order,
         starts,
         parts,
         period=options.period,
@@ -322,6 +336,13 @@ def rows_of(
         position_unit=recordings[0].file_unit("position"),
         force_unit=recordings[0].file_unit("force"),
     )
+
+
+def _kept(side: Float1D, waiting: NDArray[np.bool_]) -> Float1D:
+    """Returns directions (n,) in which a wait without direction has that of the rows before it."""
+    known = np.where((side == 0.0) & waiting, -1, np.arange(len(side)))
+    last = np.maximum.accumulate(known)
+    return np.where(last >= 0, side[np.maximum(last, 0)], side)
 
 
 def _first_equal(recordings: Sequence[Recording]) -> list[int]:
