@@ -80,7 +80,7 @@ class SearchOptions:
     assumed_damping: float = 0.5
     """Object damping B_o that the filter paper-explicit assumes, as in the paper's figure 13 [force
     s/position]"""
-    play_radius: tuple[float, ...] = (0.0025, 0.005, 0.01, 0.02, 0.05)
+    play_radius: tuple[float, ...] = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.06)
     """Play radii tried for hysteresis if a recording has time but no direction; the best radius between the
     smallest and the largest is searched [share of the travel]"""
     contact_share: float = 0.02

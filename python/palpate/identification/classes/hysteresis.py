@@ -20,7 +20,7 @@ from ..decision import Decision
 from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
 from ..options import IdentifyOptions
-from ..search.evidence import Candidate, Samples
+from ..search.evidence import ON_HELD_OUT_ROWS, Candidate, Samples
 from .class_selection import ClassSelection, ModelClass, straight_line
 from .findings import USABLE_NRMSE
 
@@ -85,18 +85,34 @@ class Hysteresis(ModelClass):
         if self._play is None:
             assert self._selection.data.side is not None
             return self._of(below, HysteresisInput.of_strokes(self._selection.data.side))
-        strokes = self._play.best_of_options(below.solution.basis)
-        if strokes is not None and self._play.strokes_are_better(strokes, below.solution.basis):
-            self._play, order = None, self._selection.data.order
-            assert order is not None
-            return self._of(below, HysteresisInput(order, order != 0.0))
-        if strokes is not None:
-            return self._play.with_first_states(self._of(below, strokes))
+        play, report, of_order, basis = self._play, self._selection.report, None, below.solution.basis
+        order = self._selection.data.order
+        if order is not None and {-1.0, 1.0} <= set(order.tolist()):
+            # The direction can also change at once at a turn. Its wavelets show the radius better than those
+            # without hysteresis.
+            self._play = None
+            of_order = self._of(below, HysteresisInput(order, order != 0.0))
+            self._play, basis = play, of_order.solution.basis
+        before, strokes = list(report.decisions), play.best_of_options(basis)
+        of_play = None if strokes is None else play.with_first_states(self._of(below, strokes))
+        if of_order is not None and (of_play is None or self._fits_better(of_order, of_play)):
+            report.decisions[:] = before
+            return of_order
+        if of_play is not None:
+            return of_play
         untested = "the motions of the recording between gaps of time are too short, or never turn back"
         if self._named:
             raise InputError(f"inputs names hysteresis: {untested}")
         self._selection.report.decisions.append(Decision("hysteresis", "not tested", untested))
         return below
+
+    def _fits_better(self, one: Candidate, other: Candidate) -> bool:
+        """True if the first of two candidates has the smaller criterion on the rows that both can use."""
+        weight = one.error_on(one.data.weight).weight * (other.error_on(None).weight > 0.0)
+        name = self._selection.judge.criterion
+        if name in ON_HELD_OUT_ROWS:
+            name = "bic"
+        return one.on_rows(name, weight) <= other.on_rows(name, weight)
 
     def _of(self, below: Candidate, strokes: HysteresisInput) -> Candidate:
         """Returns the better of the simpler candidate and a network with hysteresis for given direction
@@ -272,20 +288,6 @@ class PlaySearch:
         )
         falls = math.log(self._residual_squares(strokes, basis, known) / found.fun) * np.count_nonzero(known)
         return self._of(math.exp(found.x)) if falls > self._evidence else strokes
-
-    def strokes_are_better(self, strokes: HysteresisInput, basis: Basis) -> bool:
-        """True if the strokes from the order of rows fit better, on given wavelets, than the best play radius
-        near that of `strokes`: the direction then changes at once at a turn."""
-        order = self._samples.data.order
-        if order is None or not {-1.0, 1.0} <= set(order.tolist()):
-            return False
-        best = self.with_best_radius(strokes, basis)
-        known = _thinned(best.known & (order != 0.0))
-        squares = (
-            self._residual_squares(each, basis, known)
-            for each in (HysteresisInput(order, order != 0.0), best)
-        )
-        return next(squares) <= next(squares)
 
     def with_first_states(self, found: Candidate) -> Candidate:
         """Returns the candidate for which the direction state at the start of each motion is computed from
