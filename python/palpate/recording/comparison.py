@@ -150,7 +150,7 @@ LEAST_EXPLAINED_SHARE = 0.4
 The scatter is the sum of the squared differences between force and mean force at the same position.
 """
 
-LEAST_PART_DISTANCE = 0.02
+LEAST_PART_DISTANCE = 0.1
 """Least RMS force difference of two parts of a file at which the file is reported to hold two objects.
 
 It is a share of the force's standard deviation.

@@ -266,10 +266,26 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
 
 
 GAP_RATIO = 2.5
-"""Ratio of a time step to the median time step above which the time step is a gap of the recording.
+"""Ratio of a time step to the median time step above which the time step can be a gap of the recording.
 
 Derivatives and filters are not computed across a gap.
 """
+
+GAP_SHARE = 0.02
+"""A long time step is a gap if the tool can move further in it, at the speed around it [share of the travel]:
+a recorder that stores a row for each change of position or force leaves no gap."""
+
+
+def gaps_of(time: Float1D, position: Float1D) -> NDArray[np.intp]:
+    """Returns the indices of the rows after which a motion (n,) continues beyond a gap of time."""
+    steps = np.diff(time)
+    if not len(steps):
+        return np.empty(0, dtype=np.intp)
+    speed = np.abs(np.diff(position)) / steps
+    around = np.maximum(speed, np.maximum(np.append(speed[1:], 0.0), np.insert(speed[:-1], 0, 0.0)))
+    moved = around * steps > GAP_SHARE * float(np.ptp(position))
+    return np.flatnonzero((steps > GAP_RATIO * np.median(steps)) & moved) + 1
+
 
 LARGEST_STEP_DEVIATION = 0.01
 """Rows between two gaps are resampled if a time step differs from the period by more than this share."""
@@ -369,7 +385,7 @@ def pieces(recording: Recording) -> list[Piece]:
         )
     steps = np.diff(motion.time)
     period = float(np.median(steps))
-    edges = [0, *(np.flatnonzero(steps > GAP_RATIO * period) + 1), len(motion.time)]
+    edges = [0, *gaps_of(motion.time, motion.position), len(motion.time)]
     found = []
     for start, stop in pairwise(edges):
         first, last = np.searchsorted(motion.rows, [start, stop])

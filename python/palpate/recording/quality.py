@@ -19,7 +19,7 @@ from ..verdict import Finding, no, usable
 from .comparison import CellRows, Travel, cell_rows, merged_findings, scale_findings, sides
 from .conversion import MIN_ROWS, mirror_notes
 from .lag import LONGEST_LAG_S
-from .motion import GAP_RATIO, strokes_from_order, waits
+from .motion import TURN_STEPS, gaps_of, strokes_from_order, waits
 
 if TYPE_CHECKING:
     from .recording import Recording
@@ -252,7 +252,9 @@ def zero_findings(recording: Recording, cells: CellRows | None) -> list[Finding]
     press, release, unit = cells.press, cells.release, recording.file_unit("force")
     reach = _inner_range(recording.force)  # without the few rows of a hard stop
     varied = min(np.ptp(press), np.ptp(release)) > MIRRORED_RANGE * reach
-    if varied and float(np.corrcoef(press, -release)[0, 1]) > MIRRORED_CORRELATION:
+    # A damper mirrors its force as well, but not at the turn, where it is slow.
+    turned = min(abs(each[-1]) / np.abs(each).max() for each in (press, release)) > 0.5
+    if turned and varied and float(np.corrcoef(press, -release)[0, 1]) > MIRRORED_CORRELATION:
         return [
             no(
                 "the force of the release is that of the press with the opposite sign: one stroke was "
@@ -416,6 +418,9 @@ def hold_findings(recording: Recording) -> list[Finding]:
     """
     x, f = recording.position, recording.force
     rows = {"position": _held_for(x), "force": _held_for(f)}
+    moved = np.abs(np.diff(x))[np.diff(x) != 0.0]
+    if len(moved) and np.median(moved) <= TURN_STEPS * moved.min():
+        rows["position"] = 1  # steps of a coarse sensor, not repeated values
     if rows["position"] == rows["force"]:
         return (
             []
@@ -508,7 +513,7 @@ def _time_gaps(recording: Recording) -> list[Finding]:
         return []
     steps = np.diff(recording.time)
     period = float(np.median(steps))
-    gaps = steps[steps > GAP_RATIO * period]
+    gaps = steps[gaps_of(recording.time, recording.position) - 1]
     duration = float(recording.time[-1] - recording.time[0])
     lost = float(np.sum(gaps - period)) / duration
     if lost < LEAST_LOST_SHARE:

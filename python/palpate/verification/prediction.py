@@ -20,7 +20,7 @@ from ..identification.data.strokes import HysteresisInput
 from ..model import Model
 from ..recording import Recording
 from ..recording.conversion import Motion
-from ..recording.motion import GAP_RATIO, acceleration, ordered_strokes, turns_of, velocity
+from ..recording.motion import acceleration, gaps_of, ordered_strokes, turns_of, velocity
 
 NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are not compared."
 """Note on rows without velocity, with their number."""
@@ -200,7 +200,7 @@ def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius
         whole = recording.motion
     else:
         whole = Motion(flight.object_position, recording.time, np.arange(len(recording)))
-    play = HysteresisInput.of_play(np.split(whole.position, _gaps(whole.time)), radius)
+    play = HysteresisInput.of_play(np.split(whole.position, _gaps(whole.time, whole.position)), radius)
     known = play.known[whole.rows]
     unit = f" {model.units['position']}" if model.units["position"] else ""
     why = "There is no direction" if recording.direction is None else "The direction is not used"
@@ -232,12 +232,11 @@ def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tu
     ), "1 % of the travel, because neither the recording nor the model has one"
 
 
-def _gaps(time: Float1D | None) -> NDArray[np.intp]:
+def _gaps(time: Float1D | None, position: Float1D) -> NDArray[np.intp]:
     """Returns the indices of rows at which a motion starts after a gap of time."""
     if time is None or len(time) < 2:
         return np.empty(0, dtype=np.intp)
-    steps = np.diff(time)
-    return np.flatnonzero(steps > GAP_RATIO * np.median(steps)) + 1
+    return gaps_of(time, position)
 
 
 def require_same_units(model: Model, units: Mapping[str, str]) -> None:

@@ -34,21 +34,6 @@ deviation of the force [-]."""
 UNFIT_NRMSE = 0.5
 """NRMSE above which a model is unfit: it leaves a quarter of the force's variance unexplained [-]."""
 
-ROWS_PER_PARAMETER = 7
-"""Number of rows for each parameter below which the error between the rows may exceed the error on the rows
-by a fifth."""
-
-ROWS_PER_PARAMETER_IF_FEW = 10
-"""Number of rows for each parameter that is required with fewer than FEW_ROWS rows, which may miss a bend of
-the force."""
-
-FEW_ROWS = 500
-"""Number of rows below which each fitted number of the model needs ROWS_PER_PARAMETER_IF_FEW rows."""
-
-AMPLE_ROWS_PER_PARAMETER = 1000
-"""Number of rows for each fitted number of the model, at and above which the check for too few rows does not
-search for repeated rows."""
-
 
 def error_findings(nrmse: float, rows: str) -> list[Finding]:
     """Returns findings on the size of the NRMSE; `rows` names the rows on which the NRMSE was computed."""
@@ -64,39 +49,11 @@ def error_findings(nrmse: float, rows: str) -> list[Finding]:
     ]
 
 
-def size_findings(network: FittedNetwork, recordings: Sequence[Recording]) -> list[Finding]:
-    """Returns a finding if there are too few rows for the number of parameters.
-
-    Repeated rows are counted once, and rows with correlated noise are counted as fewer independent rows.
-    """
-    rows = network.residuals
-    if not recordings or rows >= AMPLE_ROWS_PER_PARAMETER * network.n_parameters:
-        return []
-    pairs = np.concatenate([part.position + 1j * part.force for part in recordings])
-    distinct = len(np.unique(pairs))
-    each = ROWS_PER_PARAMETER_IF_FEW if distinct < FEW_ROWS else ROWS_PER_PARAMETER
-    needed = each * network.n_parameters
-    if min(distinct, network.independent_rows) >= needed:
-        return []
-    counted = min(distinct, round(network.independent_rows))
-    subject = f"{rows} rows"
-    if counted < rows:
-        subject = f"{rows} rows ({counted} independent, the others repeat them or have correlated noise)"
-    return [
-        usable(
-            f"{subject} determine {network.n_parameters} parameters: {needed} rows are needed for a reliable "
-            "NRMSE. The error between the rows may be larger: record more rows, or verify the model on "
-            "another recording"
-        )
-    ]
-
-
 def verdict_of(
     network: FittedNetwork, recordings: Sequence[Recording], side: Float1D | None = None
 ) -> Verdict:
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
     findings = [*findings_of(recordings, side, relaxes=network.memory is not None), *network.findings]
-    findings += size_findings(network, recordings)
     told = max(network.nrmse, network.left_out_nrmse)
     rows = (
         "rows of the identification that were left out in turn"
@@ -389,8 +346,8 @@ def wait_findings(best: Candidate) -> list[Finding]:
         usable(
             f"in {len(force)} rows in which the tool waits, the force differs from the model by "
             f"{data.force_unit.text(error)} RMS: it changes with time at a constant position (relaxation, "
-            "creep or drift), which a model of position does not show. Cure: record time, so that a memory can be "
-            "identified, or use the model only while the tool moves"
+            "creep or drift), which a model of position does not show. Cure: record time, so that a memory "
+            "can be identified, or use the model only while the tool moves"
         )
     ]
 

@@ -71,8 +71,7 @@ def without_wrong_readings(
 ) -> tuple[list[Recording], list[Finding], list[str]]:
     """Returns the recordings without isolated rows and wrong readings, findings on the isolated rows, and
     notes on the wrong readings."""
-    kept, findings = without_isolated(recordings)
-    notes: list[str] = []
+    kept, notes = list(recordings), list[str]()
     for number, recording in enumerate(kept):
         wrong = wrong_readings(recording)
         if not wrong.any():
@@ -86,6 +85,7 @@ def without_wrong_readings(
             "before and after them. They are taken as wrong readings and were dropped."
         )
         kept[number] = recording.without(wrong)
+    kept, findings = without_isolated(kept)
     return kept, findings, notes
 
 
