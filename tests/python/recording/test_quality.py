@@ -211,19 +211,6 @@ def test_held_columns_are_reported_with_their_period(held: str) -> None:
     assert ("--force-late-s 0.0035" in found) == (held == "the force changes")
 
 
-def test_too_few_rows_for_the_parameters_are_reported_and_repetitions_do_not_count() -> None:
-    rows = rows_of("P1").take(np.arange(0, 5000, 60))
-    model = palpate.identify(rows.recording())
-    fitted = len(rows) - sum(
-        int(note.split()[0]) for note in model.notes["identification"] if "not fitted" in note
-    )
-    assert f"{fitted} rows determine {model.n_parameters} parameters" in str(model.verdict)
-    repeated = rows.take(np.repeat(np.arange(len(rows)), 4))
-    verdict = str(palpate.identify(repeated.recording()).verdict)
-    assert f"{4 * len(rows)} rows ({len(rows)} independent, the others repeat them or have " in verdict
-    assert "correlated noise) determine" in verdict
-
-
 def test_findings_on_several_recordings_name_the_recording() -> None:
     first, second = rows_of("P1", 0), rows_of("P1", 1)
     assert only_sentence(first, replace(second, f=np.minimum(second.f, 8.0))).startswith(

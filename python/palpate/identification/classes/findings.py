@@ -25,7 +25,8 @@ from .class_selection import ClassSelection
 from .repeatability import band_with_check, left_out_nrmse
 
 PULLING_ROWS = 0.002
-"""If more than this share of the rows pulls the tool, the tool cannot leave the object [-]."""
+"""If more than this share of the rows, and more than one row, pulls the tool, the tool cannot leave the object
+[-]."""
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: the RMS error is then a tenth of the standard
@@ -395,7 +396,8 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     if below == "auto":
         force = data.force[data.reported]
         near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(force)))
-        pulls = float(np.quantile(force, PULLING_ROWS)) < -near_zero
+        most = max(1, int(PULLING_ROWS * len(force)))
+        pulls = float(np.partition(force, most)[most]) < -near_zero
         below = "free" if single and data.period is None and not pulls else "linear"
     return replace(
         network,

@@ -33,8 +33,9 @@ def test_position_spikes_are_left_out_and_counted(at: dict[int, float]) -> None:
     assert true_nrmse(model, wall) < 1.5 * true_nrmse(clean, wall) < 0.002
     assert model.fit.nrmse == pytest.approx(clean.fit.nrmse, rel=0.01)
     assert model.domain[1][0] == pytest.approx(TRAVEL, rel=1e-3)
-    assert f"{len(at)} of {N} rows" in str(model.verdict)
-    assert "likely wrong readings and were dropped" in str(model.verdict)
+    (note,) = (each for each in model.notes["identification"] if "wrong readings" in each)
+    assert note.startswith(f"{len(at)} of {N} rows")
+    assert "were dropped" in note
 
 
 def test_force_spikes_are_left_out_and_counted() -> None:
@@ -42,26 +43,27 @@ def test_force_spikes_are_left_out_and_counted() -> None:
     y = wall(x) + noise(N)
     model = palpate.identify(recorded(x, changed(y, {5100: 1.4e7, 100: -1e9, 999: 500.0})))
     assert true_nrmse(model, wall) < 0.001
-    assert f"3 of {N} rows (row 100 at -1e+09" in str(model.verdict)
+    assert any(f"3 of {N} rows (row 100 at -1e+09" in each for each in model.notes["identification"])
 
 
 def test_one_spike_in_few_rows_is_left_out() -> None:
     x = sweep(50)
     model = palpate.identify(recorded(changed(x, {25: 6e5}), wall(x)))
     assert true_nrmse(model, wall) < 0.02
-    assert "1 of 50 rows" in str(model.verdict)
+    assert any("1 of 50 rows" in each for each in model.notes["identification"])
 
 
 def test_rows_that_stretch_the_domain_are_reported() -> None:
+    rows = np.random.default_rng(0).permutation(N)
     x = strokes(N)
-    model = palpate.identify(recorded(changed(x, {5000: 3.0}), wall(x) + noise(N)))
+    model = palpate.identify(recorded(changed(x[rows], {5000: 3.0}), (wall(x) + noise(N))[rows]))
     assert "row 5000 at 3" in str(model.verdict)
     assert "extend the range of position" in str(model.verdict)
 
 
-def test_too_many_spikes_give_no_good_error() -> None:
+def test_more_than_a_tenth_of_wrong_readings_give_no_good_error() -> None:
     x = strokes(N)
-    x[::50] = 6e5
+    x[::8] = 6e5
     model = palpate.identify(recorded(x, wall(strokes(N)) + noise(N)))
     assert model.fit.nrmse > 0.5
     assert model.verdict.level == "no"
