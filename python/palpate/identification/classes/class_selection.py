@@ -29,6 +29,7 @@ from ..network.constraints import (
     domain_bounds,
     impose,
     moved_to_bounds,
+    violated_positions,
 )
 from ..network.separable import SeparableProblem, Solution
 from ..options import IdentifyOptions
@@ -39,6 +40,9 @@ from .dynamics import Dynamics
 REGROWTH_ERROR_RATIO = 1.01
 """Ratio of the RMS error with constraints to the RMS error without constraints, above which a network is
 grown again on forces that keep the constraints [-]."""
+
+FORCE_MARGIN = 0.1
+"""Part of the range of the recorded forces by which a model may exceed them between the rows [-]."""
 
 VELOCITY_INPUTS = ("position", "velocity")
 """Inputs of a network of the model class velocity."""
@@ -180,12 +184,16 @@ class ClassSelection:
     def _cost_of(self, bounds: Sequence[Bound], free: Candidate, rmse: float) -> str:
         """Returns a note on imposed constraints: the change of the RMS error by them, and the largest release
         force minus press force without them."""
-        names, unit = " and ".join(dict.fromkeys(bound.name for bound in bounds)), self.data.force_unit
+        broken = (
+            bound.name for bound in bounds if len(violated_positions(free.problem, free.solution, bound))
+        )
+        names, unit = " and ".join(dict.fromkeys(broken)), self.data.force_unit
         note = (
             f"{in_words(free.model_class)}: {names} imposed over the whole domain, which changes the RMS "
             f"error from {unit.interval(free.rmse, rmse)}."
         )
-        above = crossing(free.problem, free.solution) if self.options.hysteresis_nonnegative else None
+        nonnegative = self.options.hysteresis_nonnegative and free.strokes is not None
+        above = crossing(free.problem, free.solution) if nonnegative else None
         if above is None:
             return note
         lower, reach, position = float(self.data.lower[0]), float(self.data.reach[0]), self.data.position_unit
@@ -207,7 +215,16 @@ class ClassSelection:
             slopes=None if slopes is None else (slopes[0] * reach, slopes[1] * reach),
             fixed=self._fixed_force,
             periodic=self.options.period is not None,
+            forces=self._force_range if slopes is None and self._fixed_force is None else None,
         )
+
+    @cached_property
+    def _force_range(self) -> tuple[float, float]:
+        """Least and largest force of the model in its domain: those of the rows, and a little more, because
+        the force can have an extreme value between two rows."""
+        force = self.data.force[self.data.reported]
+        more = FORCE_MARGIN * float(np.ptp(force))
+        return float(force.min()) - more, float(force.max()) + more
 
     def _judged_on(self, problem: SeparableProblem, solution: Solution) -> float:
         """Returns the criterion of a solution on the rows of another least-squares problem, without a new

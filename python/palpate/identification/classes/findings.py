@@ -25,7 +25,7 @@ from .class_selection import ClassSelection
 from .repeatability import band_with_check, left_out_nrmse
 
 PULLING_ROWS = 0.002
-"""If more than this share of the rows, and more than one row, pulls the tool, the tool cannot leave the object
+"""If more than this share of the rows, and more than one row, pulls the tool, it cannot leave the object
 [-]."""
 
 USABLE_NRMSE = 0.1
@@ -233,18 +233,6 @@ HIDDEN_ERROR_RATIO = 1.2
 """Ratio of the NRMSE without the rows of extreme force to the NRMSE over all rows, above which a finding
 reports both [-]."""
 
-POSITIONS_BETWEEN_ROWS = 4001
-"""Number of positions over the domain, besides the extrema of each wavelet, where the model's force is
-compared with the range of the recorded forces."""
-
-USABLE_EXCESS = 0.25
-"""Share of the range of the recorded forces by which the model may exceed them without a finding [-].
-Models of measured switches, domes and springs exceed it by less than 0.1."""
-
-UNFIT_EXCESS = 1.0
-"""If the model's force exceeds the recorded forces by at least this share of their range, the model is unfit
-[-]."""
-
 
 def extreme_force_findings(error: RowError, force_unit: Unit = UNSTATED_UNIT) -> list[Finding]:
     """Returns a finding if few rows of extreme force hide a large error of all other rows."""
@@ -276,53 +264,6 @@ def _plainly_small(error: RowError, rows: NDArray[np.intp]) -> bool:
     low, high = np.quantile(some, (EXTREME_SHARE, 1.0 - EXTREME_SHARE))
     inner = some[(some >= low) & (some <= high)]
     return bool(error.rmse < 0.5 * USABLE_NRMSE * float(np.std(inner)))
-
-
-def excess_findings(
-    network: FittedNetwork,
-    force: Float1D,
-    *,
-    repeats: bool,
-    position_unit: Unit = UNSTATED_UNIT,
-    force_unit: Unit = UNSTATED_UNIT,
-) -> list[Finding]:
-    """Returns a finding if the force of a model leaves the range of the recorded forces at positions between
-    the rows.
-
-    With play radius r, a stroke reaches its own force only after 2 r from its start; a periodic force has no
-    such part.
-    """
-    reach = float(np.ptp(force))
-    if len(network.lower) > 1 or not reach > 0.0:
-        return []
-    lower, upper = float(network.lower[0]), float(network.upper[0])
-    sides = np.array([0.0, -1.0, 1.0, -np.sqrt(3.0), np.sqrt(3.0)])
-    extrema = (network.beta[:, :1] + sides / network.alpha[:, :1]).ravel()
-    at = np.concatenate([np.linspace(lower, upper, POSITIONS_BETWEEN_ROWS), np.clip(extrema, lower, upper)])
-    directions = ("", "") if network.weight_hysteresis is None else (" while pressing", " while releasing")
-    found = []
-    play = 0.0 if repeats else min(2.0 * (network.play_radius or 0.0), upper - lower)
-    ends = (lower + play, upper), (lower, upper - play)
-    for sign, stroke, (first, last) in zip((1.0, -1.0), directions, ends, strict=True):
-        x = at[(at >= first) & (at <= last)]
-        side = None if network.weight_hysteresis is None else np.full(len(x), sign)
-        values = network.force(x[:, None], side)
-        excess = np.maximum(force.min() - values, values - force.max()) / reach
-        worst = int(np.argmax(excess))
-        found.append((float(excess[worst]), float(x[worst]), float(values[worst]), stroke))
-    share, place, value, stroke = max(found)
-    if share <= USABLE_EXCESS:
-        return []
-    judge = no if share > UNFIT_EXCESS else usable
-    return [
-        judge(
-            f"between the rows the force of the model is {force_unit.text(value)} at position "
-            f"{position_unit.text(place)}{stroke}, but all recorded forces are "
-            f"{force_unit.interval(force.min(), force.max())}. Likely cause: few rows near this position. "
-            "Cure: record more strokes there, remove single rows far from the others, or give a smaller "
-            "--max-wavelets"
-        )
-    ]
 
 
 def wait_findings(best: Candidate) -> list[Finding]:
@@ -382,9 +323,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     findings += report.findings + limit_findings(best, options) + wait_findings(best)
     if data.robust is not None:
         findings += data.robust.findings(best.residual, data.force_unit)
-    units = {"position_unit": data.position_unit, "force_unit": data.force_unit}
     findings += extreme_force_findings(error, data.force_unit)
-    findings += excess_findings(network, data.force[counted > 0.0], repeats=data.period is not None, **units)
     if data.counted is None and single:
         rows = np.flatnonzero(counted)
         side, position = None if best.side is None else best.side[rows], data.domain[rows, 0]

@@ -51,6 +51,10 @@ MOST_ALTERNATIONS = 50
 """Largest number of alternating projections of a force onto the lower and the upper slope bound."""
 
 
+NONNEGATIVE, FORCE_RANGE = "press force >= release force", "range of the recorded forces"
+"""Names of the constraints h >= 0 and of the least and largest force, in the notes."""
+
+
 @dataclass(frozen=True)
 class Bound:
     """Constraint sign * (reading - limit) >= 0; the reading is a combination of mean force and hysteresis, or
@@ -97,9 +101,10 @@ def domain_bounds(
     slopes: tuple[float, float] | None,
     fixed: tuple[float, float] | None = None,
     periodic: bool = False,
+    forces: tuple[float, float] | None = None,
 ) -> list[Bound]:
-    """Returns the required constraints: h >= 0, and (min, max) of the slope [force/box] of press g + h and
-    release g - h.
+    """Returns the required constraints: h >= 0, and (min, max) of force and slope [force/box] of press g + h
+    and release g - h.
 
     `fixed` is (position [box], force): the mean force g goes through this point, by an upper and a lower
     bound. With `periodic`, g (and h) and their slopes are equal at both ends of the domain.
@@ -117,8 +122,10 @@ def domain_bounds(
         g = (1.0, 0.0) if two else (1.0,)
         bounds += [Bound(g, False, "fixed force", sign, fixed[1], 0.0, fixed[0]) for sign in (1.0, -1.0)]
     if hysteresis and two:
-        bounds.append(Bound((0.0, 1.0), False, "press force >= release force", 1.0, 0.0, 1.0))
+        bounds.append(Bound((0.0, 1.0), False, NONNEGATIVE, 1.0, 0.0, 1.0))
     for stroke in [(1.0, 1.0), (1.0, -1.0)] if two else [(1.0,)]:
+        for sign, limit in zip((1.0, -1.0), forces or (), strict=False):
+            bounds.append(Bound(stroke, False, FORCE_RANGE, sign, limit, 1.0))
         for sign, limit in zip((1.0, -1.0), slopes or (), strict=False):
             if np.isfinite(limit):
                 bounds.append(
@@ -142,12 +149,14 @@ def moved_to_bounds(
     grid = np.linspace(0.0, 1.0, PROJECTION_CELLS + 1)
     readings = problem.readout @ solution.coefficients @ _columns(solution.basis, False, grid).T
     before = readings.copy()
-    if any(not bound.of_slope and bound.at is None for bound in bounds):
+    mix = np.array([[1.0, 1.0], [1.0, -1.0]])[: len(readings), : len(readings)]
+    if any(bound.name == NONNEGATIVE for bound in bounds):
         readings[1] = np.maximum(readings[1], 0.0)
+    if limits := sorted({bound.limit for bound in bounds if bound.name == FORCE_RANGE}):
+        readings = np.linalg.solve(mix, np.clip(mix @ readings, limits[0], limits[-1]))
     if any(bound.of_slope for bound in bounds):
         low = max([bound.limit for bound in bounds if bound.of_slope and bound.sign > 0], default=-np.inf)
         high = min([bound.limit for bound in bounds if bound.of_slope and bound.sign < 0], default=np.inf)
-        mix = np.array([[1.0, 1.0], [1.0, -1.0]])[: len(readings), : len(readings)]
         strokes = [slope_limited(grid, stroke, low, high) for stroke in mix @ readings]
         readings = np.linalg.solve(mix, np.array(strokes))
     shift = [np.interp(rows.positions[:, 0], grid, change) for change in readings - before]
@@ -301,10 +310,12 @@ def _mixed_with_safe(problem: SeparableProblem, solution: Solution, bounds: Sequ
     }
     readings = np.zeros((len(problem.readout), solution.coefficients.shape[1]))
     readings[0, 1] = 0.0 if any(bound.seam for bound in bounds) else inside[bool(lows), bool(highs)]
+    limits = [bound.limit for bound in bounds if bound.name == FORCE_RANGE]
+    readings[0, 0] = np.mean(limits) if limits else 0.0
     for bound in bounds:
         if bound.at is not None:
             readings[0, 0] = bound.limit - readings[0, 1] * bound.at
-    readings[1:, 0] = problem.force_range
+    readings[1:, 0] = 0.25 * np.ptp(limits) if limits else problem.force_range
     safe = np.linalg.solve(problem.readout, readings)
     refused, kept = 0.0, 1.0
     for _ in range(30):

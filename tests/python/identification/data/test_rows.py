@@ -227,15 +227,13 @@ def test_hysteresis_of_a_knob_follows_the_motion_and_not_the_wrapped_position() 
     assert model.fit.nrmse < 0.06
 
 
-def test_force_far_beyond_the_recorded_range_between_rows_is_not_good() -> None:
+def test_the_force_stays_near_the_recorded_range_where_a_stroke_has_no_rows() -> None:
     """The motion reverses at the start of the play: the rows contain no pressed force there."""
     recording, model = forth_and_back()
     span = float(np.ptp(recording.force))
     q = np.linspace(0.0, 0.02, 200)
     largest = max(np.abs(model.force(q, direction=np.full(200, side))).max() for side in (1.0, -1.0))
-    reported = any("between the rows the force of the model is" in reason for reason in model.verdict.reasons)
-    assert reported == (largest > 1.25 * span)
-    assert model.verdict.level == "no" or largest < 2.0 * span
+    assert largest < 1.2 * span
 
 
 @pytest.mark.parametrize(("missing", "level"), [(0.02, "good"), (0.2, "usable"), (0.7, "no")])
