@@ -64,7 +64,7 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     contact = contact_at(position[~waiting], recording.force[~waiting])
     deepest = float(position.max()) if deepest is None else deepest
     role[position < contact - AIR_MARGIN * (deepest - contact)] = Role.APPROACH
-    role[waiting] = np.where(position < contact, Role.REST, Role.HOLD)[waiting]
+    role[waiting] = np.where(position <= contact, Role.REST, Role.HOLD)[waiting]
     return role
 
 
