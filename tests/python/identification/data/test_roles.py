@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows that wait, or that move far from the contact, are not fitted, so that only the motion decides the model."""
+"""Rows that wait, or that move far from the contact, are not fitted: only the motion decides the model."""
 
 import numpy as np
 import pytest
