@@ -243,8 +243,7 @@ def test_more_than_a_tenth_of_the_rows_are_not_wrong_readings() -> None:
 
 def test_a_clean_steep_start_a_wall_and_a_click_have_no_wrong_reading() -> None:
     assert wrong_rows(PRESS, FORCE) == []
-    steep = PRESS + 0.02
-    assert wrong_rows(steep, 40.0 * np.tanh(steep / 0.05)) == []
+    assert wrong_rows(PRESS, 40.0 * (1.0 - np.exp(-PRESS / 0.015)) + 12.0 * PRESS) == []
     assert wrong_rows(PRESS[:400], 2.0 * PRESS[:400] + 3e4 * np.maximum(PRESS[:400] - 3.995, 0.0)) == []
     assert wrong_rows(PRESS, FORCE - 20.0 * (PRESS > 2.0)) == []
 
