@@ -86,8 +86,7 @@ def without_wrong_readings(
         more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
         where = f"recording {number + 1}: " if len(kept) > 1 else ""
         notes.append(
-            f"{where}{len(rows)} of {len(recording)} rows ({named}{more}) lie outside the values of the rows "
-            "before and after them. They are taken as wrong readings and were dropped."
+            f"{where}{len(rows)} of {len(recording)} rows are wrong readings and were dropped: {named}{more}."
         )
         kept[number] = recording.without(wrong)
     return kept, findings, notes
