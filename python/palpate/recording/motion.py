@@ -263,7 +263,8 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
     for begin, end in np.flatnonzero(np.diff(slow, prepend=False, append=False)).reshape(-1, 2).tolist():
         # The tool stops between two rows: the last row that moves less than half of a step waits as well.
         stopped = begin > 1 and travelled[begin - 1] - travelled[begin - 2] < 0.5 * speed[begin - 1]
-        first_row = begin - int(stopped)
+        # Speed is taken over some rows: the wait begins behind the row with which the tool arrives.
+        first_row = min(begin - int(stopped), int(np.searchsorted(travelled, travelled[begin])) + 1)
         # One slow row is a turn between two rows.
         found[first_row:end] = (
             end - first_row > 1 and (end - first_row) * speed[begin:end].max() >= LEAST_WAIT
