@@ -132,15 +132,16 @@ def test_few_rows_have_no_wait(rows: int) -> None:
     assert rests(np.sort(np.random.default_rng(rows).uniform(0.0, 1.0, rows))) == []
 
 
-@pytest.mark.parametrize("waiting", [10, 300, 20_000])
+@pytest.mark.parametrize("waiting", [5, 10, 300, 20_000])
 @pytest.mark.parametrize("at", [0, 200, 400], ids=["first", "turn", "last"])
 @pytest.mark.parametrize("scale", [1e-90, 1e-9, 1.0, 1e90])
 def test_a_wait_is_found_from_its_first_to_its_last_row(waiting: int, at: int, scale: float) -> None:
     position = np.insert(IN_AND_OUT, [at] * waiting, IN_AND_OUT[min(at, 399)])
     found = rests(scale * position)
-    assert len(found) == pytest.approx(waiting, abs=2)
-    assert found[0] == pytest.approx(at, abs=2)
-    assert found[-1] == pytest.approx(at + waiting - 1, abs=2)
+    # One row of the motion is at the position of the wait, and two are at that of the turn.
+    assert len(found) in (waiting, waiting + 1, waiting + 2)
+    assert found == list(range(found[0], found[0] + len(found)))
+    assert found[0] in (at, at - 1)
 
 
 @pytest.mark.parametrize("step", [0.001, 0.0025, 0.005, 0.0125, 0.025])

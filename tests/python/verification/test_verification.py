@@ -402,16 +402,13 @@ def test_a_recording_in_which_every_row_waits_is_compared_with_all_rows() -> Non
 
 
 def test_waits_of_a_model_with_memory_are_compared() -> None:
-    time = np.arange(4000) * 2e-3
-    x = np.interp(time, [0.0, 1.0, 4.0, 5.0, 8.0], [0.0, 1.0, 1.0, 0.0, 0.0])
+    time = np.arange(6000) * 2e-3
+    x = np.interp(time, [0.0, 0.5, 4.5, 5.0, 6.0, 8.0, 12.0], [0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0])
     f = np.zeros(len(x))
-    memory = 0.0
     for row in range(1, len(x)):
-        memory = memory * np.exp(-2e-3 / 0.5) + 3.0 * (x[row] - x[row - 1])
-        f[row] = 2.0 * x[row] + memory
-    recording = Recording.from_arrays(
-        x, f + np.random.default_rng(0).normal(0.0, 1e-3, 4000), time, units=RAD
-    )
+        f[row] = f[row - 1] * np.exp(-2e-3 / 0.5) + 3.0 * (x[row] - x[row - 1])
+    f += 2.0 * x + np.random.default_rng(0).normal(0.0, 1e-3, len(x))
+    recording = Recording.from_arrays(x, f, time, units=RAD)
     model = identify(recording)
     assert model.memory is not None
-    assert verify(model, recording).n == 4000
+    assert verify(model, recording).n == len(x)
