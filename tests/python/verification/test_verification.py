@@ -395,10 +395,11 @@ def test_rows_that_wait_are_not_compared(rows: int) -> None:
     assert found.compared.position.tolist() == with_waits(rows).position[found.rows].tolist()
 
 
-def test_a_recording_in_which_every_row_waits_is_compared_with_all_rows() -> None:
-    x = np.random.default_rng(0).normal(0.5, 1e-3, 300)
-    waiting = Recording.from_arrays(x, 2.0 * x + 1.0, direction=np.ones(300), units=RAD)
-    assert verify(identify(with_waits(0)), waiting).n == 300
+def test_rows_that_wait_are_compared_if_no_others_have_a_direction() -> None:
+    recording = with_waits(300)
+    hold = np.zeros(len(recording))
+    hold[720:980] = 1.0
+    assert verify(identify(with_waits(0)), replace(recording, direction=hold.astype(np.int8))).n == 260
 
 
 def test_waits_of_a_model_with_memory_are_compared() -> None:
