@@ -162,7 +162,7 @@ def test_a_wait_of_a_noisy_position_is_found(deviation: float) -> None:
     assert np.count_nonzero(found[330:-330]) == 0
 
 
-def test_a_slow_stroke_beside_a_fast_one_does_not_wait() -> None:
+def test_a_slow_stroke_before_a_fast_one_does_not_wait() -> None:
     slow, fast = np.linspace(0.0, 1.0, 6000), np.linspace(1.0, 0.0, 200)
     assert rests(np.concatenate([slow, fast])) == []
 
@@ -175,7 +175,7 @@ def test_noise_is_found_from_sixth_differences_and_a_motion_has_none() -> None:
 
 
 @pytest.mark.parametrize("rows", [30, 80, 150, 1000])
-def test_the_steps_of_a_quantised_motion_are_no_noise(rows: int) -> None:
+def test_the_steps_of_a_quantised_motion_are_not_noise(rows: int) -> None:
     press = np.linspace(0.0, 1.0, rows)
     position = np.round(np.concatenate([press, press[::-1]]) * 80.0) / 80.0
     assert noise_band(position) == pytest.approx(1.5 * resolution_of(position))

@@ -276,7 +276,7 @@ def held(share: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("share", [0.05, 0.4])
-def test_a_hold_in_which_the_force_relaxes_is_no_stuck_or_clipped_sensor(share: float) -> None:
+def test_a_hold_in_which_the_force_relaxes_is_not_a_stuck_or_clipped_sensor(share: float) -> None:
     x, f = held(share)
     found = sentences(Rows(x, f, None, None, {"position": "m", "force": "N"}))
     assert not [sentence for sentence in found if "stuck" in sentence or "clipped" in sentence]
@@ -327,11 +327,11 @@ def test_a_stroke_with_the_wrong_sign_gets_the_verdict_no() -> None:
     ],
     ids=["clean", "friction", "adhesion", "both", "noisy"],
 )
-def test_friction_and_adhesion_are_no_second_zero(clean: tuple[np.ndarray, np.ndarray]) -> None:
+def test_friction_and_adhesion_are_not_a_second_zero(clean: tuple[np.ndarray, np.ndarray]) -> None:
     assert zero_sentences(*clean) == []
 
 
-def test_a_nearly_constant_friction_is_no_mirrored_stroke() -> None:
+def test_a_nearly_constant_friction_is_not_a_mirrored_stroke() -> None:
     x, _ = contact()
     f = np.repeat([1.0, -1.0], 800) * (0.3 + 5.0 * x) + np.random.default_rng(0).normal(0.0, 1e-3, 1600)
     assert zero_sentences(x, f) == []
