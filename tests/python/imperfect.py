@@ -56,3 +56,21 @@ def true_nrmse(model: palpate.Model, law: Law, travel: float = TRAVEL) -> float:
     """Returns the NRMSE of a model against the force law without noise, over the recorded positions."""
     x = np.linspace(0.0, travel, 2001)
     return float(np.sqrt(np.mean((model.force(x) - law(x)) ** 2)) / np.std(law(x)))
+
+
+def press_and_release(rows: int = 150, depth: float = 4.0) -> Array:
+    """Returns the positions of one press and one release at constant speed."""
+    press = np.linspace(0.0, depth, rows)
+    return np.concatenate([press, press[::-1]])
+
+
+def loop(x: Array) -> Array:
+    """Returns the force of a hardening contact with friction over a press and a release of equal length."""
+    way = np.repeat([1.0, -1.0], len(x) // 2)
+    return 40.0 * np.tanh(x / 0.6) + 12.0 * x + 3.0 * way * np.tanh(x)
+
+
+def knob(degrees: Array, detents: int = 24) -> Array:
+    """Returns the torque [mN m] of a knob without friction at its angles."""
+    angle = np.radians(detents * degrees)
+    return 8.0 * np.sin(angle) + 1.5 * np.sin(2.0 * angle)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
@@ -31,7 +32,7 @@ from ..model import Model
 from ..recording import Recording
 from ..recording.files import CELL_BYTES, TooLargeError, require_memory
 from ..recording.formats import is_read_in_parts
-from ..recording.units import Unit
+from ..recording.units import POSITION_UNITS, UNSTATED_UNIT, Unit, symbols_of, unit_of
 from ..verdict import Verdict
 from ..verification import Verification, verify
 from ..verification.verification import circumstances
@@ -85,13 +86,18 @@ _HELP = summaries() | {
 }
 """Help of each option that is a field of `IdentifyOptions`; its docstring begins with the same sentence."""
 
-_METAVAR = {"slope_bounds": "LEAST LARGEST", "fixed_force": "POSITION FORCE", "inputs": "NAMES"}
+_METAVAR = {
+    "slope_bounds": "LEAST LARGEST",
+    "fixed_force": "POSITION FORCE",
+    "inputs": "NAMES",
+    "period": "15deg|2.5mm",
+}
 """Placeholder that the help shows for the value of an option, by option."""
 
 _MOST_DECISIONS = 7
 """Largest number of decisions of the model selection that the summary prints"""
 
-_GROUP = {"inputs": "Model", "monotone": "Constraints"}
+_GROUP = {"inputs": "Model", "period": "Model", "monotone": "Constraints"}
 """Heading in the help, by option; options that are not listed here are under "Expert"."""
 
 
@@ -103,6 +109,24 @@ def _search(ctx: click.Context, param: click.Parameter, values: tuple[str, ...])
     return SearchOptions.parsed(dict(value.split("=", 1) for value in values))
 
 
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", re.IGNORECASE)
+"""A number and the text behind it."""
+
+
+def _period(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[float, str] | None:
+    """Returns a period in SI and its SI unit, which is empty if the number has no unit."""
+    if value is None:
+        return None
+    found = _QUANTITY.fullmatch(value)
+    unit = unit_of(found[2]) if found and found[2] else UNSTATED_UNIT
+    if not found or unit is None or unit.si not in ("", *POSITION_UNITS):
+        message = (
+            f"{value!r} must be a number in m or rad, or a number and a unit ({symbols_of(POSITION_UNITS)})"
+        )
+        raise click.BadParameter(message, ctx, param)
+    return float(found[1]) * unit.factor, unit.si
+
+
 def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
     flag = "--" + name.replace("_", "-")
     text: dict[str, Any] = {
@@ -110,6 +134,8 @@ def _option(name: str, hint: Any, default: Any) -> Callable[[Any], Any]:
         "help": _HELP.get(name, "").replace(" [-]", ""),
         "group": _GROUP.get(name, "Expert"),
     }
+    if name == "period":
+        return expert_option(flag, name, metavar=_METAVAR[name], callback=_period, **text)
     alternatives = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     kinds = [kind for kind in alternatives if kind is not NoneType]
     if kinds == [bool]:
@@ -260,11 +286,15 @@ def identify(
         left = {name: value for name, value in reading.options.items() if name not in _READ_BY_PARTS}
         left |= {"object": sizes, "plot": plot, "baselines": with_baselines}
         _require_unused(hold_out_every=hold_out_every, **left)
+    period, unit = settings["period"] or (None, "")
+    settings["period"] = period
     others = _fit_baselines(recordings, hold_out_every) if with_baselines else []
     judged_on = recordings
     if hold_out_every is not None:
         parts = [recording.split(hold_out_every) for recording in recordings]
         recordings, judged_on = [train for train, _ in parts], [test for _, test in parts]
+    if recordings:
+        _require_unit_of_period(unit, recordings[0].units["position"])
     talk("identifying ...")
     start = time.perf_counter()
     with progress("identifying") as shown, reporting_to(lambda name, n: shown(f"{name}, {n} wavelets")):
@@ -284,6 +314,7 @@ def identify(
             objects = _objects(sizes, recordings)
             model = identify_model(recordings if objects is None else None, objects=objects, **settings)
     if by_parts:
+        _require_unit_of_period(unit, model.units["position"])
         chosen_columns = ", ".join(f"{role} is {column}" for role, column in model.data.columns.items())
         talk(f"read {model.data.rows} rows; {chosen_columns}")
         for note in model.notes["identification"]:
@@ -339,6 +370,8 @@ def identify(
                     "model": f"{output}: {model.fit.model_class}, {model.n_wavelets} wavelets, "
                     f"{model.n_parameters} parameters",
                     "error": f"{rms}NRMSE {number(nrmse)} on {judged}",
+                    **_left_out_text(model),
+                    **_outside_text(model, recordings),
                     **_band_text(model, recordings),
                     **dict(note.split(": ", 1) for note in model.notes["model_selection"][-_MOST_DECISIONS:]),
                     **_corrected_lag(recordings),
@@ -367,6 +400,46 @@ def _read_at_once(files: Sequence[Path], reading: ReadingOptions, inputs: Sequen
     return recordings
 
 
+def _require_unit_of_period(unit: str, position_unit: str) -> None:
+    """Refuses a period in the unit of another quantity than the position."""
+    if unit and position_unit and unit != position_unit:
+        raise click.UsageError(
+            f"--period is in {unit} and the position in {position_unit}: both must be lengths or both angles"
+        )
+
+
+_LEFT_OUT = ("rows are not fitted", "rows are wrong readings")
+"""Parts of the notes of an identification that name rows that it left out."""
+
+
+def _left_out_text(model: Model) -> dict[str, str]:
+    """Returns the line of the summary on rows that were left out; empty without such rows."""
+    notes = [note for note in model.notes["identification"] if any(part in note for part in _LEFT_OUT)]
+    return {"rows": " ".join(notes).removesuffix(".")} if notes else {}
+
+
+def _outside_text(model: Model, recordings: Sequence[Recording]) -> dict[str, str]:
+    """Returns the line of the summary on the force outside the recorded positions, for one input, or on its
+    period."""
+    unit = _unit_of("position", model, recordings)
+    if model.period is not None:
+        return {"period": f"the force repeats every {unit.text(model.period)}"}
+    if len(model.inputs) > 1:
+        return {}
+    words = {"free": "falls to zero", "linear": "continues straight"}
+    leaves = " (the tool leaves)" if model.below == "free" else ""
+    low, high = (float(end[0]) for end in model.domain)
+    return {
+        "outside": f"below {unit.text(low)}: {words[model.below]}{leaves}; "
+        f"above {unit.text(high)}: {words[model.above]}"
+    }
+
+
+def _unit_of(role: str, model: Model, recordings: Sequence[Recording]) -> Unit:
+    """Returns the unit of the first file if it was read as a whole, else that of the model."""
+    return recordings[0].file_unit(role) if recordings else Unit.of_si(model.units[role])
+
+
 def _band_text(model: Model, recordings: Sequence[Recording]) -> dict[str, str]:
     """Returns the check of the band for the summary; empty without band."""
     band = model.band
@@ -380,10 +453,7 @@ def _band_text(model: Model, recordings: Sequence[Recording]) -> dict[str, str]:
 
 def _print_sketch(model: Model, recordings: Sequence[Recording]) -> None:
     """Prints the force curve as text, in the units of the first file if it was read as a whole."""
-    position, force = (
-        recordings[0].file_unit(role) if recordings else Unit.of_si(model.units[role])
-        for role in ("position", "force")
-    )
+    position, force = (_unit_of(role, model, recordings) for role in ("position", "force"))
     columns = terminal_width() or WIDEST
     if lines := sketch_of(model, position, force, columns=columns, unicode=prints_unicode()):
         print_line()

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..identification.data.roles import role_counts, roles_of
 from ..recording import Recording
 from ..recording.motion import GAP_RATIO, ordered_strokes
 from ..recording.quality import quality_findings
@@ -91,6 +92,7 @@ def _summary(recording: Recording, strokes: dict[str, int] | None) -> dict[str, 
     else:
         source = "the order of the rows" if recording.direction is None else "the direction column"
         rows["strokes"] = f"{strokes['press']} press, {strokes['release']} release, from {source}"
+    rows["roles"] = role_counts(roles_of(recording))
     return {name: value for name, value in rows.items() if value}
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from matplotlib.axes import Axes
 
+from ..identification.data.roles import ROLE_NAMES, Role, roles_of
 from ..recording import Recording
 from .look import dots_of, legend_above, of_stroke, scale_on, strokes, thinned
 
 
 def draw_recording(axes: Axes, recording: Recording) -> None:
-    """Draws force over position, press and release with different dots.
+    """Draws force over position, press and release with different dots, and rows that are not fitted in
+    colour.
 
     Parameters
     ----------
@@ -22,15 +24,21 @@ def draw_recording(axes: Axes, recording: Recording) -> None:
     seen = "simulated" if "simulated" in recording.metadata else "recorded"
     x = scale_on(axes.xaxis, recording.units["position"], recording.position)
     y = scale_on(axes.yaxis, recording.units["force"], recording.force)
-    for name, rows in strokes(recording.direction, len(recording)):
-        shade = "0.3" if name != "release" else "0.6"
-        axes.plot(
-            *thinned(recording.position[rows] * x.factor, recording.force[rows] * y.factor),
-            **dots_of(name),
-            color=shade,
-            markersize=2.2,
-            label=of_stroke(seen, name),
+    role = roles_of(recording)
+    drawn = [
+        (
+            (role == Role.MOVING) & rows,
+            of_stroke(seen, name),
+            "0.6" if name == "release" else "0.3",
+            dots_of(name),
         )
+        for name, rows in strokes(recording.direction, len(recording))
+    ]
+    drawn += [(role == each, ROLE_NAMES[each], f"C{each}", dots_of("")) for each in list(Role)[1:]]
+    for rows, name, colour, dots in drawn:
+        if rows.any():
+            position, force = recording.position[rows] * x.factor, recording.force[rows] * y.factor
+            axes.plot(*thinned(position, force), **dots, color=colour, markersize=2.2, label=name)
     axes.set_xlabel(x.label("position"))
     axes.set_ylabel(y.label("force"))
     legend_above(axes)

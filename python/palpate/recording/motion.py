@@ -136,17 +136,22 @@ def turns_of(direction: Int8Vector) -> int:
     return int(np.count_nonzero(moving[1:] != moving[:-1]))
 
 
-def noise_of(x: Float1D) -> float:
+def noise_of(x: Float1D, step: float = 0.0) -> float:
     """Returns the standard deviation of the noise of positions or forces (n,) from their sixth differences; 0
     for fewer than seven rows.
 
-    A motion leaves almost nothing in them, and reversals are too few to change their median.
+    A motion leaves almost nothing in them, and reversals are too few to change their median. A motion in one
+    direction that is rounded to a `step` has no noise.
     """
     if len(x) < 7:
         return 0.0
-    differences = np.abs(np.diff(x, 6))
-    median = float(np.median(differences[:: max(1, len(x) // MOST_DIFFERENCES)]))
-    return median / (0.6745 * math.sqrt(math.comb(12, 6)))
+    every = max(1, len(x) // MOST_DIFFERENCES)
+    differences = np.abs(np.diff(x, 6))[::every]
+    changes = np.lib.stride_tricks.sliding_window_view(np.diff(x), 6)[::every]
+    one_way = (changes.min(axis=1) >= 0.0) | (changes.max(axis=1) <= 0.0)
+    # Rounding moves each value by at most half a step, and the coefficients of a sixth difference sum to 64.
+    differences[one_way & (differences <= 32.0 * step)] = 0.0
+    return float(np.median(differences)) / (0.6745 * math.sqrt(math.comb(12, 6)))
 
 
 def resolution_of(x: Float1D) -> float:
@@ -220,7 +225,8 @@ shorter one has no weight in a fit."""
 def noise_band(x: Float1D) -> float:
     """Returns the width within which noise and resolution move positions (n,) in recorded order."""
     sections = np.array_split(x, max(1, min(SECTIONS, len(x) // LEAST_SECTION_ROWS)))
-    return max(TURN_NOISE * max(map(noise_of, sections)), TURN_STEPS * resolution_of(x))
+    step = resolution_of(x)
+    return max(TURN_NOISE * max(noise_of(section, step) for section in sections), TURN_STEPS * step)
 
 
 def waits(position: Float1D) -> NDArray[np.bool_]:
@@ -257,7 +263,8 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
     for begin, end in np.flatnonzero(np.diff(slow, prepend=False, append=False)).reshape(-1, 2).tolist():
         # The tool stops between two rows: the last row that moves less than half of a step waits as well.
         stopped = begin > 1 and travelled[begin - 1] - travelled[begin - 2] < 0.5 * speed[begin - 1]
-        first_row = begin - int(stopped)
+        # Speed is taken over some rows: the wait begins behind the row with which the tool arrives.
+        first_row = min(begin - int(stopped), int(np.searchsorted(travelled, travelled[begin])) + 1)
         # One slow row is a turn between two rows.
         found[first_row:end] = (
             end - first_row > 1 and (end - first_row) * speed[begin:end].max() >= LEAST_WAIT

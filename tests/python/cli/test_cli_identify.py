@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from imperfect import knob, loop, press_and_release
 from palpate import IdentifyOptions, Recording, load_model, read_recording
 from palpate.cli.main import main, palpate
 from palpate.recording.sample import sample_recording
@@ -198,6 +199,11 @@ def test_settings_reach_the_identification(folder: Path, capsys: pytest.CaptureF
         (["--search", "play_radius=wide"], "play_radius is 'wide': must be numbers joined by commas"),
         (["--search", "unknown=1"], "search has no setting 'unknown'"),
         (["--search", "patience"], "must be NAME=VALUE"),
+        (["--period", "15parsec"], "'15parsec' must be a number in m or rad, or a number and a unit (m, mm"),
+        (["--period", "deg"], "'deg' must be a number"),
+        (["--period", "15ms"], "'15ms' must be a number"),
+        (["--period", "2.5mm"], "--period is in m and the position in rad"),
+        (["--period", "0deg"], "period is 0.0: must be a finite number > 0"),
         (["--plot", "m.doc"], "is not a figure file"),
         (["--plot", "m.json"], "is not a figure file"),
         (["--plot", "nowhere/m.png"], "there is no folder nowhere"),
@@ -374,3 +380,77 @@ def test_the_lag_of_the_force_is_printed_and_corrected_only_on_request(
     assert "force lag 20 ms corrected" in " ".join(captured.out.split())
     assert main(["identify", "a.csv", *settings, "--force-late-s", "soon"]) == 2
     assert "must be a number of seconds, such as 0.025, or auto" in capsys.readouterr().err
+
+
+def knob_file(path: Path) -> Path:
+    """Writes three turns of a knob with 24 detents, with a pause at the end, in deg and mNm."""
+    angle = press_and_release(3600, 1080.0)
+    angle = np.insert(angle, [3600] * 100, 1080.0)
+    way = np.repeat([1.0, 0.0, -1.0], [3600, 100, 3600])
+    torque = knob(angle) + 2.5 * way + np.random.default_rng(1).normal(0.0, 0.25, len(angle))
+    rows = (f"{x:.4f},{f:.4f}" for x, f in zip(angle, torque, strict=True))
+    path.write_text("\n".join(["angle_deg,torque_mNm", *rows, ""]), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "text", ["15deg", "15 deg", "15\u00b0", "0.2617993877991494", "0.2617993877991494rad"]
+)
+def test_a_period_has_a_unit_or_is_in_si(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    knob_file(folder / "knob.csv")
+    assert main(["identify", "knob.csv", "-o", "m.json", "--period", text]) == 0
+    assert load_model(folder / "m.json").period == pytest.approx(np.radians(15.0), rel=1e-12)
+    assert "period               the force repeats every 15 deg\n" in capsys.readouterr().out
+
+
+def test_a_period_that_is_found_and_rows_that_wait_are_printed(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    knob_file(folder / "knob.csv")
+    assert main(["identify", "knob.csv", "-o", "m.json"]) == 0
+    printed = capsys.readouterr().out
+    assert "rows                 101 of 7300 rows are not fitted: 101 wait in contact\n" in printed
+    assert "period               the force repeats every 15 deg\n" in printed
+    assert "outside" not in printed
+
+
+def press_file(path: Path) -> Path:
+    """Writes a press and a release in mm with two wrong readings and a wait before them."""
+    x = press_and_release()
+    f = loop(x) + np.random.default_rng(0).normal(0.0, 0.05, len(x))
+    f[50], f[60] = 0.0, 200.0
+    x, f = np.concatenate([np.zeros(155), x]), np.concatenate([np.zeros(155), f])
+    rows = (f"{a:.4f},{b:.4f}" for a, b in zip(x, f, strict=True))
+    path.write_text("\n".join(["position_mm,force_N", *rows, ""]), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "below", "above"),
+    [
+        ([], "falls to zero (the tool leaves)", "continues straight"),
+        (["--below", "linear", "--above", "free"], "continues straight", "falls to zero"),
+    ],
+)
+def test_the_summary_names_rows_that_were_left_out_and_the_force_outside(
+    arguments: list[str], below: str, above: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    press_file(folder / "press.csv")
+    assert main(["identify", "press.csv", "-o", "m.json", *arguments]) == 0
+    printed = capsys.readouterr().out
+    assert (
+        "rows                 2 of 455 rows are wrong readings and were dropped: row 205: 0 N at 1.342 mm, "
+        "row 215: 200 N at 1.611 mm. 156 of 453 rows are not fitted: 156 wait in air\n"
+    ) in printed
+    assert f"outside              below 0 mm: {below}; above 4 mm: {above}\n" in printed
+
+
+def test_identify_does_not_estimate_the_lag(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sample_recording(3, 5.0).write(folder / "a.csv")
+
+    def refuse(_: object) -> None:
+        raise AssertionError("the lag was estimated")
+
+    monkeypatch.setattr("palpate.recording.recording.lag_of", refuse)
+    assert main(["identify", "a.csv", "-o", "m.json"]) == 0
+    assert main(["show", "a.csv", "--lag"]) != 0

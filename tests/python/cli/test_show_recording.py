@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from models_by_hand import model_by_hand
-from palpate import Recording
+from palpate import Recording, read_recording
 from palpate.cli.main import main
 from palpate.recording.sample import sample_recording
 
@@ -169,3 +169,33 @@ def test_measured_recordings_of_all_kinds_are_drawn(data: Path, tmp_path: Path) 
         picture = tmp_path / f"{number}.png"
         assert main(["show", str(data / name), "--plot", str(picture)]) == 0
         assert picture.stat().st_size > 50_000
+
+
+def waiting(path: Path) -> Path:
+    """Writes an approach through air, a press, a hold and a release in mm and N."""
+    x = np.concatenate([np.linspace(-40.0, 4.0, 4400), np.full(100, 4.0), np.linspace(4.0, -1.0, 500)])
+    rows = (f"{each:.4f},{50.0 * max(each, 0.0):.4f}" for each in x)
+    path.write_text("\n".join(["depth_mm,load_N", *rows, ""]), encoding="utf-8")
+    return path
+
+
+def test_the_roles_of_the_rows_are_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", str(waiting(tmp_path / "held.csv"))]) == 0
+    roles = printed(capsys)["roles"].split(", ")
+    assert [each.split(" ", 1)[1] for each in roles] == ["move", "approach", "wait in contact"]
+    counts = [int(each.split(" ", 1)[0]) for each in roles]
+    assert counts == pytest.approx([1300, 3600, 100], abs=5)
+    assert sum(counts) == 5000
+
+
+def test_rows_of_each_role_have_a_colour(tmp_path: Path) -> None:
+    axes = read_recording(waiting(tmp_path / "held.csv")).plot()
+    dots = {str(line.get_label()): line for line in axes.get_lines()}
+    assert list(dots) == ["recorded", "approach", "wait in contact"]
+    assert len({line.get_color() for line in dots.values()}) == 3
+    assert sum(len(line.get_xdata()) for line in dots.values()) == 5000  # type: ignore[arg-type]
+
+
+def test_a_recording_without_waits_has_one_role(strokes: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", str(strokes)]) == 0
+    assert printed(capsys)["roles"] == "170 move"

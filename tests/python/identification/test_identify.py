@@ -9,6 +9,7 @@ import pytest
 
 import palpate
 from conftest import sampled
+from imperfect import loop, press_and_release
 from palpate import InputError, Model, Recording, identify
 from palpate._core.model import play
 from palpate.identification.data.roles import Role, roles_of
@@ -177,3 +178,69 @@ def test_nothing_diverges_on_other_measured_files(data: Path, folder: str) -> No
         margin = np.ptp(recording.force)
         assert recording.force.min() - margin < force.min(), path.name
         assert force.max() < recording.force.max() + margin, path.name
+
+
+@pytest.mark.parametrize("rows", [30, 50, 80])
+def test_few_rows_without_direction_and_time_show_the_hysteresis(rows: int) -> None:
+    x = press_and_release(rows)
+    f = loop(x) + np.random.default_rng(0).normal(0.0, 0.2, len(x))
+    model = identify(Recording.from_arrays(x, f))
+    assert model.kind == "hysteresis"
+    at = np.linspace(1.5, 3.5, 100)
+    press, release = (model.force(at, direction=np.full(100, way)) for way in (1.0, -1.0))
+    assert press - release == pytest.approx(6.0 * np.tanh(at), rel=0.15)
+
+
+def push_button() -> Recording:
+    """Returns three presses of a button whose force does not pull the tool [m, N]."""
+    press = np.linspace(0.0, 3.6e-3, 360)
+    x = np.tile(np.concatenate([press, press[::-1]]), 3)
+    way = np.tile(np.repeat([1.0, -1.0], 360), 3)
+    drop = 0.13 / (1.0 + np.exp(-(x - np.where(way > 0, 1.55e-3, 1.15e-3)) / 6e-5))
+    f = 0.18 * (1.0 - np.exp(-x / 8e-5)) + 90.0 * x - drop + 0.03 * way
+    f = np.where(x < 1e-5, 0.0, np.clip(f, 0.0, None))
+    noise = np.random.default_rng(0).normal(0.0, 2e-3, len(x))
+    return Recording.from_arrays(x, f + noise, units={"position": "m", "force": "N"})
+
+
+BELOW = np.array([-1e-2, -1e-3])
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_button_that_never_pulls_does_not_pull_below_the_recording(way: float) -> None:
+    model = identify(push_button())
+    assert model.below == "free"
+    assert model.force(BELOW, direction=np.full(2, way)) == pytest.approx(0.0, abs=0.02)
+
+
+def test_an_object_that_pulls_in_the_recording_continues_below_it() -> None:
+    x = press_and_release(400) - 2.0
+    f = 3.0 * x + np.random.default_rng(0).normal(0.0, 0.01, len(x))
+    model = identify(Recording.from_arrays(x, f))
+    assert model.below == "linear"
+    assert model.force(-3.0) == pytest.approx(-9.0, rel=0.02)
+
+
+@pytest.mark.parametrize("end", ["below", "above"])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_both_ends_continue_as_they_are_given(end: str, way: float) -> None:
+    at = {"below": -1e-2, "above": 2e-2}[end]
+    straight = identify(push_button(), **{end: "linear"}).force(at, direction=way)
+    free = identify(push_button(), **{end: "free"}).force(at, direction=way)
+    assert abs(straight) > 0.5
+    assert free == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize("rows", [80, 2000])
+def test_a_hold_in_which_the_force_relaxes_does_not_change_the_strokes(rows: int) -> None:
+    press, relaxing = np.linspace(0.0, 5.0, 1000), np.linspace(0.0, 5.0, rows)
+    curve = 60.0 * press + 14.0 * press**2
+    held = curve[-1] * (1.0 - 0.4 * (1.0 - np.exp(-relaxing)))
+    x = np.concatenate([press, np.full(rows, 5.0), press[::-1]])
+    f = np.concatenate([curve, held, 0.6 * curve[::-1]])
+    f += np.random.default_rng(0).normal(0.0, 1.0, len(f))
+    model = identify(Recording.from_arrays(x, f))
+    for way, of in ((1.0, curve), (-1.0, 0.6 * curve)):
+        error = model.force(press, direction=np.full(1000, way)) - of
+        assert np.abs(error).max() < 4.0
+    assert model.force(-1.0, direction=-1.0) == pytest.approx(0.0, abs=2.0)

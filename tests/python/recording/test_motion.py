@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from palpate.recording.motion import strokes_from_order, turns_of
+from palpate.recording.motion import noise_band, noise_of, resolution_of, strokes_from_order, turns_of, waits
 
 IN_AND_OUT = np.concatenate([np.linspace(0.0, 1.0, 200), np.linspace(1.0, 0.0, 200)])
 STATED = np.repeat([1, -1], 200)
@@ -105,3 +105,84 @@ def test_a_position_without_a_reversal_has_one_direction(sign: int) -> None:
 )
 def test_unordered_rows_have_no_direction(position: np.ndarray) -> None:
     assert strokes_from_order(position) is None
+
+
+def rests(position: np.ndarray) -> list[int]:
+    return np.flatnonzero(waits(position)).tolist()
+
+
+@pytest.mark.parametrize(
+    "position",
+    [
+        IN_AND_OUT,
+        IN_AND_OUT[:200],
+        np.tile(IN_AND_OUT, 5) + noise(0.001, 2000),
+        2.0 - 2.0 * np.cos(np.linspace(0.0, 14.0 * np.pi, 7000)),
+        noise(0.001, 300),
+    ],
+    ids=["loop", "one_stroke", "noisy", "sine", "nothing_but_wait"],
+)
+def test_a_motion_without_waits_has_none(position: np.ndarray) -> None:
+    assert rests(position) == []
+
+
+@pytest.mark.parametrize("rows", [7, 8, 9, 12])
+def test_few_rows_have_no_wait(rows: int) -> None:
+    assert rests(np.linspace(0.0, 1.0, rows)) == []
+    assert rests(np.sort(np.random.default_rng(rows).uniform(0.0, 1.0, rows))) == []
+
+
+@pytest.mark.parametrize("waiting", [5, 10, 300, 20_000])
+@pytest.mark.parametrize("at", [0, 200, 400], ids=["first", "turn", "last"])
+@pytest.mark.parametrize("scale", [1e-90, 1e-9, 1.0, 1e90])
+def test_a_wait_is_found_from_its_first_to_its_last_row(waiting: int, at: int, scale: float) -> None:
+    position = np.insert(IN_AND_OUT, [at] * waiting, IN_AND_OUT[min(at, 399)])
+    found = rests(scale * position)
+    # One row of the motion is at the position of the wait, and two are at that of the turn.
+    assert len(found) in (waiting, waiting + 1, waiting + 2)
+    assert found == list(range(found[0], found[0] + len(found)))
+    assert found[0] in (at, at - 1)
+
+
+@pytest.mark.parametrize("step", [0.001, 0.0025, 0.005, 0.0125, 0.025])
+@pytest.mark.parametrize("rows", [100, 300, 1000])
+def test_a_wait_of_a_quantised_position_is_found(step: float, rows: int) -> None:
+    press = np.linspace(0.0, 1.0, 150)
+    position = np.concatenate([np.zeros(rows), press, press[::-1], np.zeros(rows)])
+    found = waits(np.round(position / step) * step)
+    assert np.count_nonzero(found[:rows]) + np.count_nonzero(found[-rows:]) >= 2 * rows - 8
+    assert not found[rows + 5 : -rows - 5].any()
+
+
+@pytest.mark.parametrize("deviation", [0.0003, 0.001, 0.003])
+def test_a_wait_of_a_noisy_position_is_found(deviation: float) -> None:
+    position = np.concatenate([np.zeros(300), IN_AND_OUT, np.zeros(300)]) + noise(deviation, 1000)
+    found = waits(position)
+    assert np.count_nonzero(found[:300]) + np.count_nonzero(found[-300:]) >= 570
+    assert np.count_nonzero(found[330:-330]) == 0
+
+
+def test_a_slow_stroke_before_a_fast_one_does_not_wait() -> None:
+    slow, fast = np.linspace(0.0, 1.0, 6000), np.linspace(1.0, 0.0, 200)
+    assert rests(np.concatenate([slow, fast])) == []
+
+
+def test_noise_is_found_from_sixth_differences_and_a_motion_has_none() -> None:
+    assert noise_of(noise(0.01, 4000)) == pytest.approx(0.01, rel=0.05)
+    assert noise_of(IN_AND_OUT + noise(0.01, 400)) == pytest.approx(0.01, rel=0.15)
+    assert noise_of(IN_AND_OUT**3) < 1e-9
+    assert noise_of(np.arange(6.0)) == 0.0
+
+
+@pytest.mark.parametrize("rows", [30, 80, 150, 1000])
+def test_the_steps_of_a_quantised_motion_are_not_noise(rows: int) -> None:
+    press = np.linspace(0.0, 1.0, rows)
+    position = np.round(np.concatenate([press, press[::-1]]) * 80.0) / 80.0
+    assert noise_band(position) == pytest.approx(1.5 * resolution_of(position))
+
+
+@pytest.mark.parametrize("repeat", [1, 20])
+@pytest.mark.parametrize("steps", [20, 40, 80, 160, 320])
+def test_a_quantised_motion_waits_only_in_its_first_step(steps: int, repeat: int) -> None:
+    position = np.round(np.repeat(IN_AND_OUT, repeat) * steps) / steps
+    assert all(position[row] == position[0] for row in rests(position))

@@ -250,3 +250,82 @@ def test_a_friction_of_the_wrong_sign_is_not_advised_to_be_late() -> None:
     driven = sign_sentence(lambda time, x: 0.2 * x - 0.5 * np.sign(np.sin(2.0 * np.pi * 0.5 * time)))
     assert "--negate force" in driven
     assert "--force-late-s" not in driven
+
+
+def held(share: float) -> tuple[np.ndarray, np.ndarray]:
+    """Returns a press, a hold in which the force relaxes by a share, and a fast release [m, N]."""
+    press, relaxing = np.linspace(0.0, 5e-3, 500), np.linspace(0.0, 5.0, 2000)
+    x = np.concatenate([press, np.full(2000, 5e-3), press[::-10]])
+    force = 60.0 * press + 1.4e4 * press**2
+    last = force[-1] * (1.0 - share * (1.0 - np.exp(-relaxing)))
+    f = np.concatenate([force, last, force[::-10] * (1.0 - share)])
+    return x, f + np.random.default_rng(0).normal(0.0, 1e-4, len(x))
+
+
+@pytest.mark.parametrize("share", [0.05, 0.4])
+def test_a_hold_in_which_the_force_relaxes_is_not_a_stuck_or_clipped_sensor(share: float) -> None:
+    x, f = held(share)
+    found = sentences(Rows(x, f, None, None, {"position": "m", "force": "N"}))
+    assert not [sentence for sentence in found if "stuck" in sentence or "clipped" in sentence]
+
+
+def contact(friction: float = 0.0, pull: float = 0.0, noise: float = 2e-3) -> tuple[np.ndarray, np.ndarray]:
+    """Returns positions [m] and forces [N] of a press and a release, with friction and adhesion."""
+    press = np.linspace(0.0, 4e-3, 800)
+    x = np.concatenate([press, press[::-1]])
+    way = np.repeat([1.0, -1.0], 800)
+    f = 500.0 * x + way * friction - np.where(way < 0, pull * np.exp(-(((x - 5e-4) / 3e-4) ** 2)), 0.0)
+    return x, f + np.random.default_rng(0).normal(0.0, noise, len(x))
+
+
+def zero_sentences(x: np.ndarray, f: np.ndarray) -> list[str]:
+    found = sentences(Rows(x, f, None, None, {"position": "m", "force": "N"}))
+    return [each for each in found if "zero of the force" in each or "opposite sign" in each]
+
+
+@pytest.mark.parametrize("shift", [-0.05, -0.12, -0.3])
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e6])
+def test_a_release_with_another_zero_is_reported(shift: float, scale: float) -> None:
+    x, f = contact()
+    f[800:] += shift * 2.0
+    (sentence,) = zero_sentences(x, scale * f)
+    assert sentence.startswith("the release ends at -")
+    assert sentence.endswith("record again without a tare in between")
+
+
+def test_a_stroke_with_the_wrong_sign_gets_the_verdict_no() -> None:
+    x, f = contact(friction=0.02)
+    f[800:] *= -1.0
+    (sentence,) = zero_sentences(x, f)
+    assert sentence.endswith("Change the sign of the force of one stroke")
+    recording = palpate.Recording.from_arrays(x, f)
+    assert recording.verdict.level == "no"
+    assert palpate.identify(recording).verdict.level == "no"
+
+
+@pytest.mark.parametrize(
+    "clean",
+    [
+        contact(),
+        contact(friction=0.3),
+        contact(pull=0.4),
+        contact(friction=0.05, pull=0.2),
+        contact(noise=0.05),
+    ],
+    ids=["clean", "friction", "adhesion", "both", "noisy"],
+)
+def test_friction_and_adhesion_are_not_a_second_zero(clean: tuple[np.ndarray, np.ndarray]) -> None:
+    assert zero_sentences(*clean) == []
+
+
+def test_a_nearly_constant_friction_is_not_a_mirrored_stroke() -> None:
+    x, _ = contact()
+    f = np.repeat([1.0, -1.0], 800) * (0.3 + 5.0 * x) + np.random.default_rng(0).normal(0.0, 1e-3, 1600)
+    assert zero_sentences(x, f) == []
+
+
+def test_rows_that_wait_do_not_hide_a_second_zero() -> None:
+    x, f = contact()
+    f[800:] -= 0.24
+    wait = np.random.default_rng(1).normal(0.0, 2e-3, 3000)
+    assert len(zero_sentences(np.concatenate([np.zeros(3000), x]), np.concatenate([wait, f]))) == 1

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
+from imperfect import press_and_release
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate.model import Fit
 from palpate.recording import Source, sample_recording
@@ -371,3 +372,44 @@ def test_plot_of_a_verification_draws_forces_or_residuals() -> None:
     assert (forces.get_ylabel(), residuals.get_ylabel()) == ("force [N·m]", "residual [mN·m]")
     drawn = 1e-3 * np.asarray(residuals.lines[0].get_ydata())
     np.testing.assert_allclose(drawn, -found.residual, rtol=1e-12)
+
+
+def with_waits(rows: int) -> Recording:
+    """Returns a press and a release with waits before them and at the turn, in which the force relaxes."""
+    x, y = press_and_release(400, 1.0), np.repeat([1.0, -1.0], 400)
+    f = 2.0 * x + 1.0 + 0.25 * y + np.random.default_rng(2).normal(0.0, NOISE, 800)
+    relaxing = 3.25 - 0.5 * (1.0 - np.exp(-np.linspace(0.0, 5.0, rows)))
+    x = np.concatenate([np.zeros(rows), x[:400], np.ones(rows), x[400:]])
+    f = np.concatenate([np.ones(rows), f[:400], relaxing, f[400:]])
+    return Recording.from_arrays(x, f, units=RAD)
+
+
+@pytest.mark.parametrize("rows", [30, 300, 5000])
+def test_rows_that_wait_are_not_compared(rows: int) -> None:
+    model = identify(with_waits(0))
+    without, found = verify(model, with_waits(0)), verify(model, with_waits(rows))
+    assert found.n == pytest.approx(without.n, abs=4)
+    assert found.nrmse == pytest.approx(without.nrmse, rel=0.05)
+    assert any(f"of {800 + 2 * rows} rows are not compared: " in note for note in found.notes)
+    assert len(found.force) == len(found.residual) == np.count_nonzero(found.rows) == found.n
+    assert found.compared.position.tolist() == with_waits(rows).position[found.rows].tolist()
+
+
+def test_rows_that_wait_are_compared_if_no_others_have_a_direction() -> None:
+    recording = with_waits(300)
+    hold = np.zeros(len(recording))
+    hold[720:980] = 1.0
+    assert verify(identify(with_waits(0)), replace(recording, direction=hold.astype(np.int8))).n == 260
+
+
+def test_waits_of_a_model_with_memory_are_compared() -> None:
+    time = np.arange(6000) * 2e-3
+    x = np.interp(time, [0.0, 0.5, 4.5, 5.0, 6.0, 8.0, 12.0], [0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0])
+    f = np.zeros(len(x))
+    for row in range(1, len(x)):
+        f[row] = f[row - 1] * np.exp(-2e-3 / 0.5) + 3.0 * (x[row] - x[row - 1])
+    f += 2.0 * x + np.random.default_rng(0).normal(0.0, 1e-3, len(x))
+    recording = Recording.from_arrays(x, f, time, units=RAD)
+    model = identify(recording)
+    assert model.memory is not None
+    assert verify(model, recording).n == len(x)

@@ -55,13 +55,13 @@ def verdict_of(
 ) -> Verdict:
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
     findings = [*findings_of(recordings, side, relaxes=network.memory is not None), *network.findings]
-    told = max(network.nrmse, network.left_out_nrmse)
+    largest = max(network.nrmse, network.left_out_nrmse)
     rows = (
-        "rows of the identification that were left out in turn"
-        if told > network.nrmse
+        "rows that were left out of the fit, block after block"
+        if largest > network.nrmse
         else "the rows of the identification"
     )
-    findings += error_findings(told, rows)
+    findings += error_findings(largest, rows)
     return Verdict(tuple(dict.fromkeys(findings)))
 
 

@@ -76,13 +76,16 @@ def without_wrong_readings(
         wrong = wrong_readings(recording)
         if not wrong.any():
             continue
-        rows, unit = np.flatnonzero(wrong), recording.file_unit("force")
-        named = ", ".join(f"row {row} at {unit.text(recording.force[row])}" for row in rows[:MOST_NAMED_ROWS])
+        rows = np.flatnonzero(wrong)
+        position, force = recording.file_unit("position"), recording.file_unit("force")
+        named = ", ".join(
+            f"row {row}: {force.text(recording.force[row])} at {position.text(recording.position[row])}"
+            for row in rows[:MOST_NAMED_ROWS]
+        )
         more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
         where = f"recording {number + 1}: " if len(kept) > 1 else ""
         notes.append(
-            f"{where}{len(rows)} of {len(recording)} rows ({named}{more}) lie outside the values of the rows "
-            "before and after them. They are taken as wrong readings and were dropped."
+            f"{where}{len(rows)} of {len(recording)} rows are wrong readings and were dropped: {named}{more}."
         )
         kept[number] = recording.without(wrong)
     kept, findings = without_isolated(kept)
@@ -290,14 +293,17 @@ def _deviating(
         around = np.pad(v, NEIGHBOUR_ROWS, mode="edge")
         windows = np.lib.stride_tricks.sliding_window_view(around, NEIGHBOUR_ROWS)
         before, after = (np.median(each, axis=1) for each in (windows[: len(v)], windows[-len(v) :]))
+        # The first and the last row have no rows on one side: the change of the nearest rows continues there.
+        before[0] = after[0] + WRONG_RATIO * (after[0] - after[NEIGHBOUR_ROWS])
+        after[-1] = before[-1] + WRONG_RATIO * (before[-1] - before[-1 - NEIGHBOUR_ROWS])
         apart = np.maximum(v - np.maximum(before, after), np.minimum(before, after) - v)
-        changes = np.pad(np.abs(np.diff(v)), LOCAL_ROWS, mode="edge")
+        changes = np.pad(np.abs(np.diff(v)), LOCAL_ROWS, mode="reflect")
         nearby = np.median(np.lib.stride_tricks.sliding_window_view(changes, LOCAL_ROWS), axis=1)
         usual = np.maximum(np.maximum(nearby[: len(v)], nearby[-len(v) :]), float(np.median(changes)))
         wrong = apart > np.maximum(WRONG_RATIO * usual, floor)
         if not at_ends and wrong.any():
             ordinary = x[~wrong]
-            wrong &= (x > ordinary.min()) & (x < ordinary.max())
+            wrong &= (x >= ordinary.min()) & (x < ordinary.max())
         if not wrong.any():
             break
         found[rows[wrong]] = True

@@ -46,12 +46,15 @@ def period_of(recordings: Sequence[Recording]) -> float | None:
 
 
 def _curve(box: Float1D, force: Float1D, cells: int) -> Float1D:
-    """Returns the mean force in each cell; a cell without rows gets the force between its neighbours."""
+    """Returns the force at the centre of each cell, between the mean positions and forces of the rows in
+    cells."""
     cell = np.minimum((box * cells).astype(np.intp), cells - 1)
     count = np.bincount(cell, minlength=cells)
     known = np.flatnonzero(count)
-    mean = np.bincount(cell, force, minlength=cells)[known] / count[known]
-    return np.asarray(np.interp(np.arange(cells), known, mean))
+    at, mean = (
+        np.bincount(cell, each, minlength=cells)[known] / count[known] for each in (box * cells, force)
+    )
+    return np.asarray(np.interp(np.arange(cells) + 0.5, at, mean))
 
 
 def _autocorrelation(curve: Float1D) -> Float1D:

@@ -64,23 +64,29 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     contact = contact_at(position[~waiting], recording.force[~waiting])
     deepest = float(position.max()) if deepest is None else deepest
     role[position < contact - AIR_MARGIN * (deepest - contact)] = Role.APPROACH
-    role[waiting] = np.where(position < contact, Role.REST, Role.HOLD)[waiting]
+    role[waiting] = np.where(position <= contact, Role.REST, Role.HOLD)[waiting]
     return role
+
+
+ROLE_NAMES = {
+    Role.MOVING: "move",
+    Role.APPROACH: "approach",
+    Role.REST: "wait in air",
+    Role.HOLD: "wait in contact",
+}
+"""What the rows of each role do, for texts."""
+
+
+def role_counts(role: Int8Vector) -> str:
+    """Returns how many rows have each role (n,): "2186 move, 155 wait in contact"."""
+    counts = np.bincount(role, minlength=len(Role)).tolist()
+    return ", ".join(f"{counts[each]} {name}" for each, name in ROLE_NAMES.items() if counts[each])
 
 
 def unused_rows(role: Int8Vector, used: str = "fitted") -> str:
     """Returns a sentence on the rows of each role (n,) that are not fitted or compared."""
-    reasons = {
-        Role.APPROACH: "move far from the contact",
-        Role.REST: "wait without contact",
-        Role.HOLD: "wait in contact",
-    }
-    counts = {reason: int(np.count_nonzero(role == each)) for each, reason in reasons.items()}
-    listed = ", ".join(f"{count} {reason}" for reason, count in counts.items() if count)
-    return (
-        f"{sum(counts.values())} of {len(role)} rows are not {used}, because they show no force over "
-        f"position: {listed}."
-    )
+    unused = role[role != Role.MOVING]
+    return f"{len(unused)} of {len(role)} rows are not {used}: {role_counts(unused)}."
 
 
 def contact_at(position: Float1D, force: Float1D) -> float:

@@ -7,8 +7,24 @@ import pytest
 
 import palpate
 from conftest import sampled
-from imperfect import TRAVEL, Array, noise, recorded, strokes, sweep, true_nrmse, wall
-from palpate.identification.data.outliers import suspects, without_isolated
+from imperfect import (
+    TRAVEL,
+    Array,
+    loop,
+    noise,
+    press_and_release,
+    recorded,
+    strokes,
+    sweep,
+    true_nrmse,
+    wall,
+)
+from palpate.identification.data.outliers import (
+    suspects,
+    without_isolated,
+    without_wrong_readings,
+    wrong_readings,
+)
 from palpate.identification.identify_files import identify_files
 
 N = 10_000
@@ -63,7 +79,7 @@ def test_rows_that_stretch_the_domain_are_reported() -> None:
 
 def test_more_than_a_tenth_of_wrong_readings_give_no_good_error() -> None:
     x = strokes(N)
-    x[::8] = 6e5
+    x[::9] = 6e5
     model = palpate.identify(recorded(x, wall(strokes(N)) + noise(N)))
     assert model.fit.nrmse > 0.5
     assert model.verdict.level == "no"
@@ -166,3 +182,85 @@ def test_no_row_is_dropped_without_outliers() -> None:
     model = palpate.identify(recorded(x, y), loss="huber")
     assert model.verdict.level == "good"
     assert true_nrmse(model, wall) < 0.001
+
+
+PRESS = press_and_release(400)
+FORCE = loop(PRESS) + np.random.default_rng(0).normal(0.0, 0.05, len(PRESS))
+
+
+def wrong_rows(x: Array, y: Array) -> list[int]:
+    return np.flatnonzero(wrong_readings(recorded(x, y))).tolist()
+
+
+@pytest.mark.parametrize(
+    "at",
+    [
+        {100: 0.0},
+        {300: 60.0},
+        {100: 500.0, 101: 500.0},
+        {200: 20.0, 500: -60.0, 600: 30.0},
+        {0: 30.0},
+        {799: -200.0},
+    ],
+    ids=["zero", "moderate", "pair", "several", "first", "last"],
+)
+def test_wrong_forces_are_dropped_and_named_by_default(at: dict[int, float]) -> None:
+    y = changed(FORCE, at)
+    assert wrong_rows(PRESS, y) == list(at)
+    model, clean = palpate.identify(recorded(PRESS, y)), palpate.identify(recorded(PRESS, FORCE))
+    x, press = np.linspace(0.0, 4.0, 500), np.ones(500)
+    assert float(np.abs(model.force(x, direction=press) - clean.force(x, direction=press)).max()) < 0.1
+    (note,) = [note for note in model.notes["identification"] if "wrong readings" in note]
+    row, force = next(iter(at.items()))
+    assert note.startswith(f"{len(at)} of 800 rows are wrong readings and were dropped")
+    assert f": row {row}: {force:g} at " in note
+
+
+@pytest.mark.parametrize(
+    "at",
+    [{0: -3.0}, {799: 3.0}, {399: 0.0}, {399: 8.0}, {100: 8.0}],
+    ids=["first", "last", "turn", "far", "inner"],
+)
+def test_wrong_positions_are_found_in_every_row(at: dict[int, float]) -> None:
+    assert wrong_rows(changed(PRESS, at), FORCE) == list(at)
+
+
+@pytest.mark.parametrize("length", [1e-90, 1e-9, 1e90])
+@pytest.mark.parametrize("force", [1e-90, 1e-9, 1e90])
+def test_wrong_readings_do_not_depend_on_the_units(length: float, force: float) -> None:
+    assert wrong_rows(length * PRESS, force * changed(FORCE, {100: 0.0, 300: 500.0})) == [100, 300]
+
+
+def test_four_equal_readings_in_sequence_belong_to_the_object() -> None:
+    assert wrong_rows(PRESS, changed(FORCE, dict.fromkeys(range(100, 104), 500.0))) == []
+
+
+def test_more_than_a_tenth_of_the_rows_are_not_wrong_readings() -> None:
+    at = np.arange(5, 795, 9)[:80]
+    assert wrong_rows(PRESS, changed(FORCE, dict.fromkeys(at.tolist(), 900.0))) == at.tolist()
+    y = changed(FORCE, dict.fromkeys([*at.tolist(), 797], 900.0))
+    assert wrong_rows(PRESS, y) == []
+    assert palpate.identify(recorded(PRESS, y)).verdict.level == "no"
+
+
+def test_a_clean_steep_start_a_wall_and_a_click_have_no_wrong_reading() -> None:
+    assert wrong_rows(PRESS, FORCE) == []
+    assert wrong_rows(PRESS, 40.0 * (1.0 - np.exp(-PRESS / 0.015)) + 12.0 * PRESS) == []
+    assert wrong_rows(PRESS[:400], 2.0 * PRESS[:400] + 3e4 * np.maximum(PRESS[:400] - 3.995, 0.0)) == []
+    assert wrong_rows(PRESS, FORCE - 20.0 * (PRESS > 2.0)) == []
+
+
+@pytest.mark.parametrize("rows", [10, 16])
+def test_few_rows_have_no_wrong_reading(rows: int) -> None:
+    x = np.linspace(0.0, 4.0, rows)
+    assert wrong_rows(x, changed(2.0 * x, {rows // 2: 500.0})) == []
+
+
+def test_each_part_of_a_recording_names_its_wrong_readings() -> None:
+    recording = recorded(PRESS, changed(FORCE, {100: 0.0, 104: 500.0}))
+    train, test = recording.split(5)
+    assert np.flatnonzero(wrong_readings(train)).tolist() == [80]
+    assert np.flatnonzero(wrong_readings(test)).tolist() == [20]
+    kept, _, notes = without_wrong_readings([train, test])
+    assert [len(part) for part in kept] == [639, 159]
+    assert [note.split(" of ")[0] for note in notes] == ["recording 1: 1", "recording 2: 1"]

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The period of a force that repeats over position is found, and a force that does not repeat has none."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import palpate
+from imperfect import Array, knob, press_and_release
+from palpate import Recording
+from palpate.identification.data.period import period_of
+
+TURNS = press_and_release(3600, 1080.0)
+
+
+def turned(angle: Array, torque: Array, unit: float = 1.0) -> Recording:
+    """Returns a recording of a knob with friction; `unit` is the unit of the angle."""
+    way = np.sign(np.gradient(angle))
+    torque = torque + 2.5 * way + np.random.default_rng(1).normal(0.0, 0.25, len(angle))
+    return Recording.from_arrays(unit * angle, torque)
+
+
+def test_the_period_of_a_knob_is_found_over_three_turns() -> None:
+    assert period_of([turned(TURNS, knob(TURNS))]) == pytest.approx(15.0, rel=3e-5)
+
+
+@pytest.mark.parametrize("detents", [5, 12, 36])
+def test_the_period_is_that_of_the_detents(detents: int) -> None:
+    assert period_of([turned(TURNS, knob(TURNS, detents))]) == pytest.approx(360.0 / detents, rel=3e-4)
+
+
+def test_a_coarse_encoder_and_several_recordings_give_the_same_period() -> None:
+    step = 360.0 / 1024
+    coarse = np.round(TURNS / step) * step
+    assert period_of([turned(coarse, knob(TURNS))]) == pytest.approx(15.0, rel=3e-4)
+    halves = [turned(TURNS[rows], knob(TURNS[rows])) for rows in (slice(None, 3600), slice(3600, None))]
+    assert period_of(halves) == pytest.approx(15.0, rel=3e-4)
+
+
+@pytest.mark.parametrize("unit", [1e-90, 1e-9, 1e90])
+def test_the_period_does_not_depend_on_the_unit(unit: float) -> None:
+    assert period_of([turned(TURNS, knob(TURNS), unit)]) == pytest.approx(15.0 * unit, rel=3e-5)
+
+
+def test_rows_that_are_held_out_do_not_change_the_period() -> None:
+    train, _ = turned(TURNS, knob(TURNS)).split(5)
+    assert period_of([train]) == pytest.approx(15.0, rel=3e-5)
+
+
+def spring(x: Array) -> Array:
+    return 2.0 * x
+
+
+def dome(x: Array) -> Array:
+    return 1.5 * np.tanh(4.0 * x) - 0.9 / (1.0 + np.exp(-(x - 2.0) / 0.1)) + 8.0 * np.maximum(x - 3.4, 0.0)
+
+
+def one_cycle(x: Array) -> Array:
+    return np.asarray(np.sin(2.0 * np.pi * x / 4.0))
+
+
+@pytest.mark.parametrize("law", [spring, dome, one_cycle, np.zeros_like])
+def test_a_force_that_does_not_repeat_has_no_period(law: Callable[[Array], Array]) -> None:
+    x = press_and_release(1000)
+    noise = np.random.default_rng(0).normal(0.0, 0.01, len(x))
+    recording = Recording.from_arrays(x, law(x) + noise)
+    assert period_of([recording]) is None
+    assert palpate.identify(recording).period is None
+
+
+@pytest.mark.parametrize("rows", [10, 20, 60])
+def test_few_rows_have_no_period(rows: int) -> None:
+    x = np.linspace(0.0, 1080.0, rows)
+    assert period_of([Recording.from_arrays(x, knob(x))]) is None
+
+
+def test_shuffled_rows_and_further_inputs_have_no_period() -> None:
+    order = np.random.default_rng(0).permutation(len(TURNS))
+    shuffled = Recording.from_arrays(TURNS[order], knob(TURNS)[order])
+    assert period_of([shuffled]) is None
+    further = Recording.from_arrays(TURNS, knob(TURNS), inputs={"depth": TURNS})
+    assert period_of([further]) is None
+
+
+def test_the_model_of_a_knob_has_the_period_and_names_it() -> None:
+    recording = turned(TURNS, knob(TURNS))
+    model = palpate.identify(recording)
+    assert model.period == pytest.approx(15.0, rel=3e-5)
+    assert model.verdict.level == "good"
+    assert "The force repeats every 15" in str(model.notes["identification"])
+    at = np.linspace(0.0, 360.0, 4001)
+    error = model.force(at, direction=np.ones(len(at))) - (knob(at) + 2.5)
+    assert float(np.sqrt(np.mean(error**2))) < 0.1
+
+
+def test_a_periodic_force_on_a_slope_is_not_taken_as_periodic() -> None:
+    x = press_and_release(3000, 60.0)
+    force = knob(x) + 2.0 * x + np.random.default_rng(0).normal(0.0, 0.1, len(x))
+    model = palpate.identify(Recording.from_arrays(x, force))
+    at = np.linspace(0.0, 60.0, 2001)
+    assert model.period is None
+    assert float(np.sqrt(np.mean((model.force(at) - knob(at) - 2.0 * at) ** 2))) < 0.5
+
+
+def test_a_given_period_is_not_searched() -> None:
+    model = palpate.identify(turned(TURNS, knob(TURNS)), period=30.0)
+    assert model.period == 30.0
+    assert "The force repeats every" not in str(model.notes["identification"])
