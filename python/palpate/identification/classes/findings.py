@@ -388,9 +388,9 @@ def wait_findings(best: Candidate) -> list[Finding]:
     return [
         usable(
             f"in {len(force)} rows in which the tool waits, the force differs from the model by "
-            f"{data.force_unit.text(error)} RMS: it changes with time at a constant position (relaxation, creep "
-            "or drift), which a model of position does not show. Cure: record time, so that a memory can be "
-            "identified, or use the model only while the tool moves"
+            f"{data.force_unit.text(error)} RMS: it changes with time at a constant position (relaxation, "
+            "creep or drift), which a model of position does not show. Cure: record time, so that a memory "
+            "can be identified, or use the model only while the tool moves"
         )
     ]
 
