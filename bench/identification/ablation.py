@@ -4,8 +4,9 @@
 python bench/identification/ablation.py [--draws 24] [--files 4] [--jobs 2] [--each] [--json FILE]
 
 A rule is a function or a constant of the identification that is replaced, so that the rule has no effect. The
-fits are draws of the bench of ordinary recordings, judged on the exact force, and measured objects, judged on
-rows or recordings that are left out. PALPATE_DATA names the folder of measured recordings.
+fits are draws of the bench of ordinary recordings and noise on a straight line, judged on the exact force,
+and measured objects, judged on rows or recordings that are left out. PALPATE_DATA names the folder of
+measured recordings.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from joblib import Parallel, delayed
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from bench.identification.noise import CASES, line
 from bench.identification.ordinary import ALLOWED_RATIO, Truth
 from bench.identification.ordinary_recordings import drawn
 from bench.identification.real_data import EVERY, SETS
@@ -198,6 +200,18 @@ def of_draw(draw: int) -> Fit:
     return Fit([rows.recording()], Truth.of(rows).error, {})
 
 
+def of_noise(case: str, draw: int) -> Fit:
+    """Returns a straight line with noise."""
+    recording = CASES[case](draw)
+    x = np.linspace(recording.position.min(), recording.position.max(), 1000)
+
+    def error(model: Model) -> float:
+        at_rest = model.predict(np.column_stack([x, 0.0 * x])) if model.of_velocity else model.force(x)
+        return float(normalised(root_mean_square(at_rest - line(x)), line(x)))
+
+    return Fit([recording], error, {})
+
+
 def of_file(path: Path, name: str) -> Fit:
     """Returns a recording of a set of measured objects; every fifth row is left out."""
     options = dict(SETS[name].options)
@@ -254,8 +268,9 @@ def _without(fit: Fit, rule: Rule) -> dict[str, Any]:
 
 
 def tasks(draws: int, files: int) -> list[tuple[Any, ...]]:
-    """Returns the arguments of `measure` for all fits."""
+    """Returns the arguments of `measure` for all fits; `files` is also the number of draws of each noise."""
     found: list[tuple[Any, ...]] = [(f"draw {draw}", of_draw, draw) for draw in range(draws)]
+    found += [(f"{case}, draw {draw}", of_noise, case, draw) for case in CASES for draw in range(files)]
     if (folder := measured_data()) is None:
         return found
     for name, most in MEASURED.items():
@@ -339,7 +354,9 @@ def _line(each: dict[str, Any]) -> tuple[str, ...]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draws", type=int, default=count(DRAWS))
-    parser.add_argument("--files", type=int, default=count(FILES), help="largest number of each set")
+    parser.add_argument(
+        "--files", type=int, default=count(FILES), help="largest number of each set and noise"
+    )
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--each", action="store_true", help="print a line for each fit")
     parser.add_argument("--json", type=Path, default=None)
