@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bench.identification import ablation
-from bench.identification.ablation import RULES, Fit, Rule, changed, main, measure, result_of
+from bench.identification.ablation import CASES, RULES, Fit, Rule, changed, main, measure, result_of
 
 import palpate
 
@@ -83,12 +83,14 @@ def test_the_study_prints_each_rule_and_writes_its_results(
 ) -> None:
     monkeypatch.delenv("PALPATE_DATA", raising=False)
     file = tmp_path / "ablation.json"
-    monkeypatch.setattr(sys, "argv", ["ablation.py", "--draws", "1", "--jobs", "1", "--json", str(file)])
+    given = ["--draws", "1", "--files", "1", "--jobs", "1", "--json", str(file)]
+    monkeypatch.setattr(sys, "argv", ["ablation.py", *given])
+    monkeypatch.setattr(ablation, "CASES", {"each row 5 times": CASES["each row 5 times"]})
     main()
     rules = json.loads(file.read_text())["results"]["rules"]
     assert [each["rule"] for each in rules] == [rule.name for rule in RULES]
     changes = {each["rule"]: each["changed"] for each in rules}
-    assert changes["pruning"] == 1
+    assert changes["pruning"] == changes["repeated rows count once"] == 1
     table = capsys.readouterr().out
     assert "| pruning | 1 |" in table
     assert "| no finer than repeats | no change |" in table
