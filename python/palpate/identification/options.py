@@ -129,7 +129,8 @@ class IdentifyOptions:
     held-out rows: fresh (error as force) or perceptual (error in just noticeable differences)"""
     loss: str = "squares"
     """squares: least squares; huber: outliers weigh less. An outlier is a row with a force far from the
-    model's force."""
+    model's force. Wrong readings, outside the values of the rows before and after them, are dropped with
+    both."""
     hysteresis_nonnegative: bool = True
     """Impose that every loop loses energy. The hysteresis is h >= 0 over the domain."""
     slope_bounds: tuple[float, float] | None = None
@@ -143,8 +144,9 @@ class IdentifyOptions:
     """Impose a slope below 0.9 of this stiffness [N/m or N*m/rad]. It is the stiffness K_c of the virtual
     coupling, and 0.9 is `compensated_share`."""
     period: float | None = None
-    """Period of a repeating force [m or rad]. It is the change of position after which the force repeats,
-    such as one revolution of a knob."""
+    """Period of a repeating force [m or rad]; searched if not given. It is the change of position after which
+    the force repeats, such as one revolution of a knob. The search needs inputs="auto" and two periods in
+    one direction."""
     below: str = "auto"
     """Force below the recorded positions: free, linear or auto. free falls to zero, because the tool leaves;
     linear continues straight. auto is free, unless the recording shows that the object pulls the tool."""

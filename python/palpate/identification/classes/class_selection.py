@@ -3,8 +3,7 @@
 
 A model class is compared with the next simpler accepted class on the same samples by the same criterion, with
 constraints imposed. It is accepted only if the criterion decreases by at least `evidence` (of
-:class:`SearchOptions`) and the error on held-out rows, if it is tested, decreases too. The notes hold the
-decrease for every class, accepted or not.
+:class:`SearchOptions`). The notes hold the decrease for every class, accepted or not.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model selection of one recording: all model classes, repeated if outliers, wide cells or correlated noise
-require it."""
+"""Model selection of one recording: all model classes, repeated if outliers or correlated noise require
+it."""
 
 from __future__ import annotations
 

@@ -4,10 +4,10 @@
 An encoder repeats its positions. For w samples y_k at one position x the least squares of the paper's eq. 4
 needs only w, the mean force and `within`, the sum of squared differences from the mean force: sum_k (y_k -
 f(x))^2 = w (mean y - f(x))^2 + within. Positions that do not repeat are gathered in cells; a cell is replaced
-by its mean position and mean force. The error of this is of second order in the cell width
-(:func:`binning_error` estimates it). The part of `within` that the slope of the force across the cell
-explains is removed, so that the remainder measures noise. With many inputs a grid of narrow cells has too
-many cells; then a part of the rows, evenly spread over the recording, represents all rows.
+by its mean position and mean force. The error of this is of second order in the cell width. The part of
+`within` that the slope of the force across the cell explains is removed, so that the remainder measures
+noise. With many inputs a grid of narrow cells has too many cells; then a part of the rows, evenly spread over
+the recording, represents all rows.
 """
 
 from __future__ import annotations
@@ -52,8 +52,6 @@ class Compressed:
     """(m,) number of samples that each row represents"""
     side: Float1D | None
     """(m,) direction state s in [-1, 1]; None without hysteresis"""
-    spread: Float2D
-    """(m, d) variance of the positions of the samples of each row; 0 for equal positions"""
     within: float
     """Sum of squared differences of the samples from the mean force of their row: no model of these inputs
     can reduce it"""
@@ -143,14 +141,13 @@ class Compressor:
         x = np.column_stack([_mean(group, count, weight * column) for column in self._positions.T])
         y = _mean(group, count, weight * self._force)
         dy = self._force - y[group]
-        spread, merged_side = np.zeros_like(x), None
+        merged_side = None
         ds = np.zeros_like(dy)
         if side is not None:
             merged_side = _mean(group, count, weight * side)
             ds = side - merged_side[group]
         if self._per_axis:
             dx = self._positions - x[group]
-            spread = np.column_stack([_mean(group, count, weight * column * column) for column in dx.T])
             # The rows of a cell and its neighbours share one slope for all direction states, so that the
             # slopes need the same degrees of freedom in all model classes.
             block = self._pooled()
@@ -161,7 +158,7 @@ class Compressor:
             dy = _without_slopes(dy, ds[:, None], part, weight)
         within = self._within + float(dy @ (weight * dy))
         samples = float(weight.sum())
-        return Compressed(x, y, count, merged_side, spread, within, samples, self._limits, self._cells)
+        return Compressed(x, y, count, merged_side, within, samples, self._limits, self._cells)
 
     def _part(self, rows: NDArray[np.bool_]) -> Compressor:
         """Returns a compressor of the rows that `rows` marks with True, with the position cells of this
@@ -245,7 +242,6 @@ def around_seam(rows: Compressed) -> Compressed:
         force=rows.force[index],
         weight=np.where(shared, 0.5, 1.0)[index] * rows.weight[index],
         side=None if rows.side is None else rows.side[index],
-        spread=rows.spread[index],
     )
 
 

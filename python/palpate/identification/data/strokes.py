@@ -21,10 +21,6 @@ from ..decision import Decision
 TRAVEL_CELLS = 32
 """Number of cells of the travel in which press force and release force are compared."""
 
-SIGNIFICANT_STANDARD_ERRORS = 4.0
-"""Hysteresis is tested only if press and release force differ by at least this number of standard errors of
-the difference."""
-
 LEAST_CONSISTENT_SHARE = 0.9
 """If the force of one recording is above that of another in at least this share of the position cells, the
 recording with the higher force is taken as press, the other one as release [-]."""
@@ -102,7 +98,7 @@ def strokes_of(recordings: Sequence[Recording]) -> Strokes:
             return _untested(position, force, unit, None)
         side = np.concatenate([np.full(len(part), up) for part, up in zip(recordings, press, strict=True)])
         press_files, release_files = _names(recordings, press > 0), _names(recordings, press < 0)
-        difference = float(np.nanmean(_Cells.of(position, force, side).difference))
+        difference = float(np.nanmean(_difference(position, force, side)))
         note = f"{press_files} is taken as press and {release_files} as release: the press force is higher"
         findings = (
             usable(
@@ -114,44 +110,31 @@ def strokes_of(recordings: Sequence[Recording]) -> Strokes:
     return Strokes(side, (f"{note}.",), findings)
 
 
-@dataclass(frozen=True)
-class _Cells:
-    """Press force minus release force in cells of the travel with rows of both strokes."""
-
-    difference: Float1D
-    """(m,) mean press force minus mean release force of a cell, at equal position [force]"""
-    error: Float1D
-    """(m,) standard error of the difference of the mean press and release force of a cell [force]"""
-
-    @classmethod
-    def of(cls, position: Float1D, force: Float1D, side: Float1D) -> _Cells:
-        press, release = side > 0, side < 0
-        lower = max(position[press].min(), position[release].min())
-        upper = min(position[press].max(), position[release].max())
-        rows = (side != 0) & (position >= lower) & (position <= upper)
-        if not upper > lower:
-            return cls(np.empty(0), np.empty(0))
-        x, f = (position[rows] - lower) / (upper - lower), force[rows] - force[rows].mean()
-        cell = np.minimum((x * TRAVEL_CELLS).astype(np.int64), TRAVEL_CELLS - 1)
-        group = 2 * cell + press[rows]
-        count, f_sum, x_sum, xx, xf, ff = (
-            np.bincount(group, values, 2 * TRAVEL_CELLS).reshape(TRAVEL_CELLS, 2)
-            for values in (None, f, x, x * x, x * f, f * f)
-        )
-        mean_x, mean_f = (total / np.maximum(count, 1) for total in (x_sum, f_sum))
-        # One slope of force over position is fitted to both strokes of a cell.
-        xx, xf, ff = (
-            np.sum(square - count * one * other, axis=1)
-            for square, one, other in ((xx, mean_x, mean_x), (xf, mean_x, mean_f), (ff, mean_f, mean_f))
-        )
-        slope = np.divide(xf, xx, out=np.zeros(TRAVEL_CELLS), where=xx > 0)
-        difference = mean_f[:, 1] - mean_f[:, 0] - slope * (mean_x[:, 1] - mean_x[:, 0])
-        n_out, n_in = count.T
-        used = (n_in >= 2) & (n_out >= 2) & (n_in + n_out > 4)
-        # The noise of a force is taken to be at least its rounding error.
-        floor = (1e-7 * float(np.ptp(f))) ** 2
-        variance = np.maximum(ff - slope * xf, 0.0)[used] / (n_in + n_out - 3.0)[used] + floor
-        return cls(difference[used], np.sqrt(variance * (1.0 / n_in[used] + 1.0 / n_out[used])))
+def _difference(position: Float1D, force: Float1D, side: Float1D) -> Float1D:
+    """Returns the mean press force minus the mean release force at equal position (m,) [force], in the cells
+    of the travel that have rows of both strokes."""
+    press, release = side > 0, side < 0
+    lower = max(position[press].min(), position[release].min())
+    upper = min(position[press].max(), position[release].max())
+    rows = (side != 0) & (position >= lower) & (position <= upper)
+    if not upper > lower:
+        return np.empty(0)
+    x, f = (position[rows] - lower) / (upper - lower), force[rows] - force[rows].mean()
+    cell = np.minimum((x * TRAVEL_CELLS).astype(np.int64), TRAVEL_CELLS - 1)
+    group = 2 * cell + press[rows]
+    count, f_sum, x_sum, xx, xf = (
+        np.bincount(group, values, 2 * TRAVEL_CELLS).reshape(TRAVEL_CELLS, 2)
+        for values in (None, f, x, x * x, x * f)
+    )
+    mean_x, mean_f = (total / np.maximum(count, 1) for total in (x_sum, f_sum))
+    # One slope of force over position is fitted to both strokes of a cell.
+    xx, xf = (
+        np.sum(square - count * mean_x * other, axis=1) for square, other in ((xx, mean_x), (xf, mean_f))
+    )
+    slope = np.divide(xf, xx, out=np.zeros(TRAVEL_CELLS), where=xx > 0)
+    difference = mean_f[:, 1] - mean_f[:, 0] - slope * (mean_x[:, 1] - mean_x[:, 0])
+    n_out, n_in = count.T
+    return np.asarray(difference[(n_in >= 2) & (n_out >= 2) & (n_in + n_out > 4)])
 
 
 def _press(recordings: Sequence[Recording]) -> Float1D | None:
@@ -166,7 +149,7 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
         position = np.concatenate([one.position, other.position])
         force = np.concatenate([one.force, other.force])
         side = np.repeat([1.0, -1.0], [len(one), len(other)])
-        return _Cells.of(position, force, side).difference, float(force.std())
+        return _difference(position, force, side), float(force.std())
 
     def above(one: Recording, other: Recording) -> int:
         """Returns +1 if the force of `one` is above that of `other` in most cells, -1 if below, else 0."""

@@ -25,7 +25,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...errors import InputError
 from ...verdict import Finding
@@ -237,14 +236,6 @@ class Candidate:
     @property
     def rmse(self) -> float:
         return self.problem.rmse(self.solution)
-
-    @property
-    def at_lower(self) -> float:
-        """Mean force g of both strokes at the smallest position of the domain [force]."""
-        table, d = self.problem.readout @ self.solution.coefficients, self.problem.dimension
-        basis = self.solution.basis
-        corner = wavelet_columns(np.zeros((1, d)), basis.alpha, basis.beta)[0]
-        return float(table[0, 0] + table[0, 1 + d :] @ corner)
 
     def criterion(self, name: str) -> float:
         """Returns the value of a criterion for this candidate; a smaller value is better."""

@@ -60,7 +60,7 @@ def test_weights_from_merged_rows_are_those_from_all_rows() -> None:
     random = np.random.default_rng(3)
     x = np.repeat(np.linspace(0.0, 1.0, 60), random.integers(1, 9, 60))[:, None]
     y = wall(0.6 * x[:, 0]) + random.normal(0.0, 0.02, len(x))
-    every_row = Compressed(x, y, np.ones(len(x)), None, np.zeros((len(x), 1)), 0.0, len(x))
+    every_row = Compressed(x, y, np.ones(len(x)), None, 0.0, len(x))
     basis = Basis(np.array([[5.0], [20.0]]), np.array([[0.4], [0.7]]))
     merged, every = (
         problem_of(rows, resolved_by=5) for rows in (Compressor(x, y, max_positions=100).rows(), every_row)

@@ -1,0 +1,376 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Repeats identifications with one rule switched off at a time, and prints what each rule changes.
+
+python bench/identification/ablation.py [--draws 24] [--files 4] [--jobs 2] [--each] [--json FILE]
+
+A rule is a function or a constant of the identification that is replaced, so that the rule has no effect. The
+fits are draws of the bench of ordinary recordings and noise on a straight line, judged on the exact force,
+and measured objects, judged on rows or recordings that are left out. PALPATE_DATA names the folder of
+measured recordings.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from functools import reduce
+from importlib import import_module
+from pathlib import Path
+from statistics import median
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+from joblib import Parallel, delayed
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from bench.identification.noise import CASES, line
+from bench.identification.ordinary import ALLOWED_RATIO, Truth
+from bench.identification.ordinary_recordings import drawn
+from bench.identification.real_data import EVERY, SETS
+from bench.studies import count, markdown_table, measured_data, write_results
+
+import palpate
+from palpate import InputError, Model, Recording
+from palpate.baselines import comparable
+from palpate.recording.motion import velocity
+from palpate.verification.metrics import normalised, root_mean_square
+
+DRAWS = 24
+
+FILES = 4
+"""Largest number of files of each set, evenly spread"""
+
+CHANGED_RATIO = 1.02
+"""Ratio of two errors, of the same class and size, above which a fit has changed"""
+
+MEASURED = {
+    "keyswitches": FILES,
+    "switch_springs": FILES,
+    "rubber_domes": 2,
+    "davinci_grip": 2,
+    "motor_cogging": 2,
+}
+"""Sets of measured objects and the number of files of each"""
+
+SILICONES = ("EF10_0T_A", "EF30_37_5T_A")
+"""Silicones with five recordings each: the last one is left out"""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Function or constant of the package that can be switched off."""
+
+    name: str
+    module: str
+    """Module that uses it, without the name of the package"""
+    attribute: str
+    without: Any
+    """Replacement, with which the rule has no effect"""
+
+    @property
+    def place(self) -> tuple[Any, str]:
+        """Module or class that has the function or constant, and its name there."""
+        *owners, name = self.attribute.split(".")
+        return reduce(getattr, owners, import_module(f"palpate.{self.module}")), name
+
+    @contextmanager
+    def off(self) -> Iterator[None]:
+        """Switches the rule off.
+
+        Raises
+        ------
+        AttributeError
+            The package has no such function or constant.
+        """
+        with patch.object(*self.place, self.without):
+            yield
+
+    @contextmanager
+    def watched(self, effective: set[str]) -> Iterator[None]:
+        """Adds the name of the rule to a set if its replacement returns another value in any call, or if it
+        is a constant."""
+        function = getattr(*self.place)
+        if not callable(function):
+            effective.add(self.name)
+            yield
+            return
+
+        def both(*given: Any, **named: Any) -> Any:
+            value = function(*given, **named)
+            if self.name not in effective and not _same(value, self.without(*given, **named)):
+                effective.add(self.name)
+            return value
+
+        with patch.object(*self.place, both):
+            yield
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, (tuple, list)) and isinstance(other, (tuple, list)):
+        return len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, (np.ndarray, float, str)) and isinstance(other, (np.ndarray, float, str)):
+        return bool(np.array_equal(one, other))
+    return one is other
+
+
+def _none(values: Any, *_: Any) -> Any:
+    return np.zeros(len(values), dtype=bool)
+
+
+def _first(value: Any, *_: Any, **__: Any) -> Any:
+    return value
+
+
+def _second(_: Any, value: Any, *__: Any) -> Any:
+    return value
+
+
+def _nothing(*_: Any, **__: Any) -> Any:
+    return None
+
+
+def _zero(*_: Any, **__: Any) -> float:
+    return 0.0
+
+
+def _one(*_: Any, **__: Any) -> float:
+    return 1.0
+
+
+def _no_findings(*_: Any, **__: Any) -> Any:
+    return []
+
+
+DATA, CLASSES, SEARCH = (f"identification.{folder}" for folder in ("data", "classes", "search"))
+
+RULES = (
+    Rule("rows that wait are not fitted", f"{DATA}.roles", "waits", _none),
+    Rule("approach is not fitted", f"{DATA}.roles", "contact_at", lambda x, f: float(x.min())),
+    Rule("wrong readings are dropped", f"{DATA}.outliers", "wrong_readings", _none),
+    Rule("isolated rows are dropped", f"{DATA}.outliers", "without_isolated", lambda each: (list(each), [])),
+    Rule("period is found", "identification.identify", "period_of", _nothing),
+    Rule("repeated rows count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
+    Rule("force step hides errors", f"{DATA}.rows", "force_step", _zero),
+    Rule("position noise limits wavelets", f"{DATA}.rows", "position_noise", _zero),
+    Rule("correlated noise", f"{CLASSES}.model_selection", "correlated_noise", _first),
+    Rule("noise where candidates differ", f"{SEARCH}.evidence", "local_noise_ratio", _one),
+    Rule("no finer than repeats", f"{CLASSES}.model_selection", "no_finer_than_repeats", _first),
+    Rule("finer wavelets", f"{SEARCH}.growth", "LEAST_CORE_POSITIONS", np.inf),
+    Rule("pruning", f"{SEARCH}.growth", "MOST_PRUNE_TRIALS", 0),
+    Rule("weight penalty", "identification.network.separable", "SeparableProblem.with_prior", _first),
+    Rule("regrowth with constraints", f"{CLASSES}.class_selection", "REGROWTH_ERROR_RATIO", np.inf),
+    Rule("single-valued rival", f"{CLASSES}.hysteresis", "Hysteresis._single_valued", _second),
+    Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
+    Rule("direction state at the start", f"{CLASSES}.hysteresis", "PlaySearch.with_first_states", _second),
+    Rule("growth with the play radius", f"{CLASSES}.hysteresis", "FIRST_MAX_WAVELETS", 64),
+    Rule("rows around the seam", f"{SEARCH}.evidence", "around_seam", _first),
+    Rule("gain by velocity", f"{CLASSES}.model_selection", "LEAST_GAIN", 1e-9),
+    Rule("gain by memory", f"{CLASSES}.memory", "LEAST_GAIN", 0.0),
+    Rule("damping is fitted again", f"{CLASSES}.model_selection", "MOST_DYNAMIC_SELECTIONS", 1),
+    Rule("spread of the speeds", f"{CLASSES}.dynamics", "LEAST_SPEED_SPREAD", 0.0),
+    Rule("error on rows left out", f"{CLASSES}.findings", "left_out_nrmse", _zero),
+    Rule("checks of the recording", f"{CLASSES}.findings", "findings_of", _no_findings),
+    Rule("check of waits", f"{CLASSES}.findings", "wait_findings", _no_findings),
+    Rule("check of the size", f"{CLASSES}.findings", "size_findings", _no_findings),
+    Rule("check of the extreme forces", f"{CLASSES}.findings", "extreme_force_findings", _no_findings),
+    Rule("check of forces between rows", f"{CLASSES}.findings", "excess_findings", _no_findings),
+    Rule("check of other inputs", f"{CLASSES}.findings", "explained_findings", _no_findings),
+)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Recordings of an identification, its options, and the error of its model."""
+
+    recordings: Sequence[Recording]
+    error: Callable[[Model], float]
+    """True error, or error on what was left out, divided by the standard deviation of the force [-]"""
+    options: dict[str, Any]
+
+
+def of_draw(draw: int) -> Fit:
+    """Returns a draw of the bench of ordinary recordings."""
+    _, rows = drawn(draw)
+    return Fit([rows.recording()], Truth.of(rows).error, {})
+
+
+def of_noise(case: str, draw: int) -> Fit:
+    """Returns a straight line with noise."""
+    recording = CASES[case](draw)
+    x = np.linspace(recording.position.min(), recording.position.max(), 1000)
+
+    def error(model: Model) -> float:
+        at_rest = model.predict(np.column_stack([x, 0.0 * x])) if model.of_velocity else model.force(x)
+        return float(normalised(root_mean_square(at_rest - line(x)), line(x)))
+
+    return Fit([recording], error, {})
+
+
+def of_file(path: Path, name: str) -> Fit:
+    """Returns a recording of a set of measured objects; every fifth row is left out."""
+    options = dict(SETS[name].options)
+    recording = palpate.read_recording(path, **SETS[name].reading)
+    if "velocity" in options.get("inputs", ""):
+        recording = replace(recording, inputs=velocity(recording)[0][:, None], input_names=("velocity",))
+    return Fit([recording.split(EVERY)[0]], lambda model: _left_out(model, recording, EVERY), options)
+
+
+def of_silicone(folder: Path, name: str) -> Fit:
+    """Returns the recordings of a silicone; the last one is left out."""
+    *given, left = map(palpate.read_recording, sorted((folder / "silicone_compression").glob(f"{name}*.csv")))
+    return Fit(given, lambda model: _left_out(model, left, 1), {})
+
+
+def _left_out(model: Model, recording: Recording, every: int) -> float:
+    """Returns the NRMSE on every n-th row of a recording."""
+    check = palpate.verify(model, recording)
+    rows = comparable(recording) & check.rows & (np.arange(len(recording)) % every == every - 1)
+    return float(normalised(root_mean_square(check.residual[rows[check.rows]]), recording.force[rows]))
+
+
+def result_of(fit: Fit, *changes: AbstractContextManager[None]) -> dict[str, Any]:
+    """Identifies with changes of the package, and judges the model without them."""
+    try:
+        with ExitStack() as stack:
+            for change in changes:
+                stack.enter_context(change)
+            model = palpate.identify(list(fit.recordings), **fit.options)
+    except InputError as error:
+        return {"verdict": "refused", "refused": str(error)}
+    return {
+        "verdict": model.verdict.level,
+        "model_class": model.fit.model_class,
+        "parameters": model.n_parameters,
+        "error": fit.error(model),
+        "reported": model.fit.nrmse,
+    }
+
+
+def measure(name: str, fit_of: Callable[..., Fit], *given: Any) -> dict[str, Any]:
+    """Identifies one set of recordings with all rules, and without each rule that has an effect on it."""
+    fit, effective = fit_of(*given), set[str]()
+    every = result_of(fit, *(rule.watched(effective) for rule in RULES))
+    without = {rule.name: _without(fit, rule) if rule.name in effective else every for rule in RULES}
+    return {"fit": name, "all": every, "without": without}
+
+
+def _without(fit: Fit, rule: Rule) -> dict[str, Any]:
+    try:
+        return result_of(fit, rule.off())
+    except Exception as error:  # a rule can prevent any error
+        return {"verdict": "fails", "failure": repr(error)}
+
+
+def tasks(draws: int, files: int) -> list[tuple[Any, ...]]:
+    """Returns the arguments of `measure` for all fits; `files` is also the number of draws of each noise."""
+    found: list[tuple[Any, ...]] = [(f"draw {draw}", of_draw, draw) for draw in range(draws)]
+    found += [(f"{case}, draw {draw}", of_noise, case, draw) for case in CASES for draw in range(files)]
+    if (folder := measured_data()) is None:
+        return found
+    for name, most in MEASURED.items():
+        paths = sorted((folder / name).glob(SETS[name].pattern))
+        paths = paths[:: max(1, -(-len(paths) // min(most, files)))]
+        found += [(f"{name}, {path.stem}", of_file, path, name) for path in paths]
+    return found + [(name, of_silicone, folder, name) for name in SILICONES[: min(len(SILICONES), files)]]
+
+
+def changed(every: Mapping[str, Any], without: Mapping[str, Any]) -> bool:
+    """Returns True if the class, the number of parameters or, by more than 2 %, the error differ."""
+    if "error" not in every or "error" not in without:
+        return every["verdict"] != without["verdict"]
+    if any(every[key] != without[key] for key in ("model_class", "parameters")):
+        return True
+    smaller, larger = sorted((float(every["error"]), float(without["error"])))
+    return larger > CHANGED_RATIO * smaller
+
+
+def _understated(result: dict[str, Any]) -> bool:
+    return bool(result["verdict"] == "good" and result["error"] > ALLOWED_RATIO * result["reported"])
+
+
+def report(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Prints and returns what each rule changes: fits, errors, sizes and verdicts."""
+    summary: list[dict[str, Any]] = []
+    for rule in RULES:
+        pairs = [(row["all"], row["without"][rule.name]) for row in rows]
+        fitted = [pair for pair in pairs if "error" in pair[0] and "error" in pair[1]]
+        ratios = [without["error"] / every["error"] for every, without in fitted if every["error"] > 0.0]
+        verdicts = Counter(
+            f"{every['verdict']} to {without['verdict']}"
+            for every, without in pairs
+            if every["verdict"] != without["verdict"]
+        )
+        summary.append(
+            {
+                "rule": rule.name,
+                "fits": len(pairs),
+                "changed": sum(changed(*pair) for pair in pairs),
+                "median": median(ratios) if ratios else None,
+                "least": min(ratios, default=None),
+                "worst": max(ratios, default=None),
+                "parameters": sum(without["parameters"] for _, without in fitted)
+                / max(1, sum(every["parameters"] for every, _ in fitted)),
+                "verdicts": dict(sorted(verdicts.items())),
+                "understated": [sum(map(_understated, side)) for side in zip(*fitted, strict=True)],
+            }
+        )
+    print(f"{len(rows)} fits; error: true, or on what was left out")
+    header = (
+        "without the rule",
+        "changed",
+        "median",
+        "least",
+        "worst",
+        "parameters",
+        "understated",
+        "verdict",
+    )
+    print(markdown_table(header, list(map(_line, summary)), (0, 7)))
+    unused = [each["rule"] for each in summary if not each["changed"] and not each["verdicts"]]
+    print(f"no change: {', '.join(unused) or 'none'}")
+    return summary
+
+
+def _line(each: dict[str, Any]) -> tuple[str, ...]:
+    if not each["changed"] and not each["verdicts"]:
+        return each["rule"], "no change", *[""] * 6
+    before, after = each["understated"] or (0, 0)
+    return (
+        each["rule"],
+        str(each["changed"]),
+        *("" if each[key] is None else f"{each[key]:.2f}" for key in ("median", "least", "worst")),
+        f"{each['parameters']:.2f}",
+        f"{before} to {after}" if before != after else "",
+        ", ".join(f"{change} {number}" for change, number in each["verdicts"].items()),
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draws", type=int, default=count(DRAWS))
+    parser.add_argument(
+        "--files", type=int, default=count(FILES), help="largest number of each set and noise"
+    )
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--each", action="store_true", help="print a line for each fit")
+    parser.add_argument("--json", type=Path, default=None)
+    options = parser.parse_args()
+    rows = []
+    for row in Parallel(n_jobs=options.jobs, return_as="generator")(
+        delayed(measure)(*task) for task in tasks(options.draws, options.files)
+    ):
+        rows.append(row)
+        if options.each:
+            different = [name for name, each in row["without"].items() if changed(row["all"], each)]
+            print(f"{row['fit']}: {', '.join(different) or 'no change'}", flush=True)
+    write_results(options.json, {"rules": report(rows), "fits": rows})
+
+
+if __name__ == "__main__":
+    main()
