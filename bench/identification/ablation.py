@@ -167,7 +167,6 @@ RULES = (
     Rule("regrowth with constraints", f"{CLASSES}.class_selection", "REGROWTH_ERROR_RATIO", np.inf),
     Rule("single-valued rival", f"{CLASSES}.hysteresis", "Hysteresis._single_valued", _second),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
-    Rule("direction state at the start", f"{CLASSES}.hysteresis", "PlaySearch.with_first_states", _second),
     Rule("growth with the play radius", f"{CLASSES}.hysteresis", "FIRST_MAX_WAVELETS", 64),
     Rule("rows around the seam", f"{SEARCH}.evidence", "around_seam", _first),
     Rule("gain by velocity", f"{CLASSES}.model_selection", "LEAST_GAIN", 1e-9),

@@ -14,7 +14,7 @@ from ...recording import Recording
 from ...recording.motion import noise_band
 from ...recording.quality import findings_of
 from ...recording.units import UNSTATED_UNIT, Unit
-from ...verdict import Finding, Verdict, no, usable
+from ...verdict import FORCE_FLOOR, FORCE_JND, Finding, Verdict, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import period_notes
 from ..decision import latest
@@ -294,6 +294,50 @@ def wait_findings(best: Candidate) -> list[Finding]:
     ]
 
 
+PLACES = 100
+"""Number of places of the travel; in each of them the mean residual of each stroke is compared with a just
+noticeable difference."""
+
+PLACE_ERRORS = 2.0
+"""Part of a mean residual that can be random [standard errors]."""
+
+MOST_JND = 2.0
+"""Mean residual of a place above which a hand feels a wrong force there [just noticeable differences]."""
+
+
+def place_findings(best: Candidate) -> list[Finding]:
+    """Returns a finding on the place at which the mean force of the rows differs most from the model, if a hand
+    feels the difference."""
+    rows = np.flatnonzero(best.error.weight > 0.0)
+    if len(best.data.names) > 1 or not len(rows):
+        return []
+    data, residual = best.data, best.residual[rows]
+    place = np.minimum((data.box[rows, 0] * PLACES).astype(np.intp), PLACES - 1)
+    release = (
+        np.zeros(len(rows), dtype=np.intp) if best.side is None else (best.side[rows] < 0.0).astype(np.intp)
+    )
+    group = place + PLACES * release
+    count = np.maximum(np.bincount(group, minlength=2 * PLACES), 1)
+    mean, force, square = (
+        np.bincount(group, values, 2 * PLACES) / count for values in (residual, data.force[rows], residual**2)
+    )
+    error = np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count - 1, 1))
+    jnd = np.maximum(FORCE_JND * np.abs(force), FORCE_FLOOR * float(np.abs(data.force[rows]).max()) or 1.0)
+    felt = np.where(count > 2, (np.abs(mean) - PLACE_ERRORS * error) / jnd, 0.0)
+    worst = int(np.argmax(felt))
+    if felt[worst] <= MOST_JND:
+        return []
+    stroke = "" if best.side is None else (" of the release" if worst >= PLACES else " of the press")
+    at = float(data.lower[0] + data.reach[0] * (worst % PLACES + 0.5) / PLACES)
+    return [
+        usable(
+            f"at {data.position_unit.text(at)}{stroke} the rows differ from the model by "
+            f"{data.force_unit.text(abs(float(mean[worst])))} on average, {felt[worst]:.2g} just noticeable "
+            "differences: the force there depends on more than position and direction, or on the motion before"
+        )
+    ]
+
+
 def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     """Returns a finding if growth ended at max_wavelets although neighbouring residuals are still
     correlated."""
@@ -320,7 +364,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         positions = data.lower[0] + data.reach[0] * data.path[:, 0]
         note, of_period = period_notes(positions, data.period, data.position_unit.si)
         notes, findings = [*notes, note], findings + of_period
-    findings += report.findings + limit_findings(best, options) + wait_findings(best)
+    findings += report.findings + limit_findings(best, options) + wait_findings(best) + place_findings(best)
     if data.robust is not None:
         findings += data.robust.findings(best.residual, data.force_unit)
     findings += extreme_force_findings(error, data.force_unit)
@@ -344,7 +388,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         rmse=error.rmse,
         nrmse=error.nrmse,
         rmse_of_all=best.error_on(None).rmse,
-        left_out_nrmse=left_out_nrmse(best),
+        left_out_nrmse=left_out_nrmse(best, selection.growth),
         residuals=int(np.count_nonzero(counted)),
         residual_correlation=neighbour_correlation(best.residual[best.error_on(None).weight > 0.0]),
         path=tuple(report.path),

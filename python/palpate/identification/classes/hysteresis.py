@@ -5,7 +5,6 @@ a play operator."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -94,7 +93,7 @@ class Hysteresis(ModelClass):
             of_order = self._of(below, HysteresisInput(order, order != 0.0))
             self._play, basis = play, of_order.solution.basis
         before, strokes = list(report.decisions), play.best_of_options(basis)
-        of_play = None if strokes is None else play.with_first_states(self._of(below, strokes))
+        of_play = None if strokes is None else self._of(below, strokes)
         if of_order is not None and (of_play is None or self._fits_better(of_order, of_play)):
             report.decisions[:] = before
             return of_order
@@ -289,19 +288,8 @@ class PlaySearch:
         falls = math.log(self._residual_squares(strokes, basis, known) / found.fun) * np.count_nonzero(known)
         return self._of(math.exp(found.x)) if falls > self._evidence else strokes
 
-    def with_first_states(self, found: Candidate) -> Candidate:
-        """Returns the candidate for which the direction state at the start of each motion is computed from
-        the first recorded force of that motion."""
-        if found.play_radius is None:
-            return found
-        g, h = found.parts_at(self._samples.data.box[self._starts])
-        force = self._samples.data.force[self._starts]
-        first = np.clip((force - g) / np.where(h == 0.0, np.inf, h), -1.0, 1.0)
-        return replace(found, strokes=self._of(found.play_radius, first.tolist()))
-
-    def _of(self, radius: float, first: Sequence[float] | None = None) -> HysteresisInput:
-        motions = np.split(self._path, self._starts[1:])
-        return HysteresisInput.of_play(motions, radius, first)
+    def _of(self, radius: float) -> HysteresisInput:
+        return HysteresisInput.of_play(np.split(self._path, self._starts[1:]), radius)
 
     @cached_property
     def _usable(self) -> list[HysteresisInput]:

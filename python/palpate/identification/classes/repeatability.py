@@ -15,6 +15,7 @@ from ..data.compression import HELD_OUT_EVERY, Compressor, HeldOutRows, inside
 from ..data.repeats import Repeats, band_of, pure_error
 from ..network.separable import problem_of
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
+from ..search.growth import Growth
 from .class_selection import ClassSelection
 
 MOST_EXCESS = 1.02
@@ -116,10 +117,10 @@ def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
     return band, (f"One {band.left_out} left out of the fit at a time: RMS error {error} on it{share}.",)
 
 
-def left_out_nrmse(best: Candidate) -> float:
+def left_out_nrmse(best: Candidate, growth: Growth) -> float:
     """Returns the NRMSE on rows that are left out of the fit, a fifth of them at a time.
 
-    Weights, slopes and bias are fitted to the other rows with the wavelets of the model. Rows with correlated
+    All numbers of the model are fitted again to the other rows by a few steps of `growth`. Rows with correlated
     noise are left out together.
     """
     data, used = best.data, best.error.weight > 0.0
@@ -136,7 +137,7 @@ def left_out_nrmse(best: Candidate) -> float:
     for number in range(HELD_OUT_EVERY):
         others = used & (fold != number)
         if others.any():
-            again, left = _left_out(best, compressor, force, others, used & (fold == number))
+            again, left = _left_out(best, compressor, force, others, used & (fold == number), growth)
             residual[left] = again[left]
     return replace(error, residual=residual).nrmse
 
@@ -161,6 +162,7 @@ def _left_out(
     force: Float1D,
     fitted: NDArray[np.bool_],
     left: NDArray[np.bool_],
+    growth: Growth | None = None,
 ) -> tuple[Float1D, NDArray[np.bool_]]:
     """Returns the residual (n,) of the model fitted to some of the rows, and the left out rows (n,) within
     the positions and directions of these rows.
@@ -180,4 +182,6 @@ def _left_out(
     rows = compressor.rows(best.side, fitted)
     problem = replace(problem_of(rows, resolved_by=best.problem.resolved_by), prior=best.problem.prior)
     solution = problem.solve(best.solution.basis)
+    if growth is not None:
+        solution = growth.refined(problem, solution)
     return problem.errors(solution, HeldOutRows(np.ascontiguousarray(data.box), force, best.side)), left

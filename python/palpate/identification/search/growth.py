@@ -395,6 +395,13 @@ class Growth:
                     current, value = trial, self._criterion_of(problem, trial)
         return current
 
+    def refined(self, problem: SeparableProblem, solution: Solution) -> Solution:
+        """Returns a solution after as many refinement steps as follow each added wavelet."""
+        if not self._search.refine or not len(solution.basis):
+            return solution
+        steps = self._search.refine_steps
+        return self._refine(problem, solution, steps=steps, tolerance=GROWING_TOLERANCE)
+
     def _improved(
         self, problem: SeparableProblem, solution: Solution, steps: int, tolerance: float = GROWING_TOLERANCE
     ) -> tuple[SeparableProblem, Solution]:
