@@ -90,7 +90,7 @@ _METAVAR = {
     "slope_bounds": "LEAST LARGEST",
     "fixed_force": "POSITION FORCE",
     "inputs": "NAMES",
-    "period": "15deg|2.5mm",
+    "period": "15deg",
 }
 """Placeholder that the help shows for the value of an option, by option."""
 
