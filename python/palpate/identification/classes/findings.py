@@ -306,17 +306,14 @@ MOST_JND = 2.0
 
 
 def place_findings(best: Candidate) -> list[Finding]:
-    """Returns a finding on the place at which the mean force of the rows differs most from the model, if a hand
-    feels the difference."""
+    """Returns a finding on the place at which the mean force of the rows differs most from the model, if a
+    hand feels the difference."""
     rows = np.flatnonzero(best.error.weight > 0.0)
     if len(best.data.names) > 1 or not len(rows):
         return []
     data, residual = best.data, best.residual[rows]
     place = np.minimum((data.box[rows, 0] * PLACES).astype(np.intp), PLACES - 1)
-    release = (
-        np.zeros(len(rows), dtype=np.intp) if best.side is None else (best.side[rows] < 0.0).astype(np.intp)
-    )
-    group = place + PLACES * release
+    group = place if best.side is None else place + PLACES * (best.side[rows] < 0.0)
     count = np.maximum(np.bincount(group, minlength=2 * PLACES), 1)
     mean, force, square = (
         np.bincount(group, values, 2 * PLACES) / count for values in (residual, data.force[rows], residual**2)
@@ -333,7 +330,7 @@ def place_findings(best: Candidate) -> list[Finding]:
         usable(
             f"at {data.position_unit.text(at)}{stroke} the rows differ from the model by "
             f"{data.force_unit.text(abs(float(mean[worst])))} on average, {felt[worst]:.2g} just noticeable "
-            "differences: the force there depends on more than position and direction, or on the motion before"
+            "differences: the force there depends on more than position and direction, or on earlier motion"
         )
     ]
 

@@ -120,8 +120,8 @@ def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
 def left_out_nrmse(best: Candidate, growth: Growth) -> float:
     """Returns the NRMSE on rows that are left out of the fit, a fifth of them at a time.
 
-    All numbers of the model are fitted again to the other rows by a few steps of `growth`. Rows with correlated
-    noise are left out together.
+    All numbers of the model are fitted again to the other rows by a few steps of `growth`. Rows with
+    correlated noise are left out together.
     """
     data, used = best.data, best.error.weight > 0.0
     force = data.force if best.moving is None else data.force - best.moving.force
