@@ -176,9 +176,8 @@ RULES = (
     Rule("error on rows left out", f"{CLASSES}.findings", "left_out_nrmse", _zero),
     Rule("checks of the recording", f"{CLASSES}.findings", "findings_of", _no_findings),
     Rule("check of waits", f"{CLASSES}.findings", "wait_findings", _no_findings),
-    Rule("check of the size", f"{CLASSES}.findings", "size_findings", _no_findings),
+    Rule("check of places", f"{CLASSES}.findings", "place_findings", _no_findings),
     Rule("check of the extreme forces", f"{CLASSES}.findings", "extreme_force_findings", _no_findings),
-    Rule("check of forces between rows", f"{CLASSES}.findings", "excess_findings", _no_findings),
     Rule("check of other inputs", f"{CLASSES}.findings", "explained_findings", _no_findings),
 )
 
