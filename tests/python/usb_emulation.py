@@ -30,7 +30,7 @@ needs_emulation = pytest.mark.skipif(bool(MISSING), reason=MISSING or "emulation
 
 
 def emulated(
-    *command: Any, device: Sequence[str] = (), timeout: float = 120.0
+    *command: Any, device: Sequence[str] = (), timeout: float = 600.0
 ) -> subprocess.CompletedProcess[str]:
     """Runs a command with the emulated USB device; `device` are options of tests/usb/run_emulated.py.
 

@@ -320,17 +320,17 @@ def place_findings(best: Candidate) -> list[Finding]:
     )
     error = np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count - 1, 1))
     jnd = np.maximum(FORCE_JND * np.abs(force), FORCE_FLOOR * float(np.abs(data.force[rows]).max()) or 1.0)
-    felt = np.where(count > 2, (np.abs(mean) - PLACE_ERRORS * error) / jnd, 0.0)
-    worst = int(np.argmax(felt))
-    if felt[worst] <= MOST_JND:
+    noticed = np.where(count > 2, (np.abs(mean) - PLACE_ERRORS * error) / jnd, 0.0)
+    worst = int(np.argmax(noticed))
+    if noticed[worst] <= MOST_JND:
         return []
     stroke = "" if best.side is None else (" of the release" if worst >= PLACES else " of the press")
     at = float(data.lower[0] + data.reach[0] * (worst % PLACES + 0.5) / PLACES)
     return [
         usable(
             f"at {data.position_unit.text(at)}{stroke} the rows differ from the model by "
-            f"{data.force_unit.text(abs(float(mean[worst])))} on average, {felt[worst]:.2g} just noticeable "
-            "differences: the force there depends on more than position and direction, or on earlier motion"
+            f"{data.force_unit.text(abs(float(mean[worst])))} on average, {noticed[worst]:.2g} just "
+            "noticeable differences: the force there depends on more than position and direction, or on earlier motion"
         )
     ]
 

@@ -237,7 +237,7 @@ def test_shuffled_rows_lose_nothing() -> None:
 
 @pytest.mark.parametrize("rows", [20, 45])
 def test_the_error_on_left_out_rows_is_that_between_few_rows(rows: int) -> None:
-    """Many parameters on few rows are no defect if the rows determine them."""
+    """A model of few rows can have many parameters, if the rows determine them."""
     between = np.linspace(0.0, sweep(rows).max(), 2001)
     ratios = []
     for seed in range(6):
