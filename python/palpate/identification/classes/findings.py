@@ -330,7 +330,8 @@ def place_findings(best: Candidate) -> list[Finding]:
         usable(
             f"at {data.position_unit.text(at)}{stroke} the rows differ from the model by "
             f"{data.force_unit.text(abs(float(mean[worst])))} on average, {noticed[worst]:.2g} just "
-            "noticeable differences: the force there depends on more than position and direction, or on earlier motion"
+            "noticeable differences: the force there depends on more than position and direction, or on "
+            "earlier motion"
         )
     ]
 
