@@ -353,6 +353,11 @@ def identify(
         judged = f"{fitted} of {rows} rows" if fitted < rows else "the rows of the identification"
     if hold_out_every is None and settings["loss"] == "huber":
         judged += ", where rows far from the model have less weight"
+    left_out_nrmse = model.notes.get("left_out_nrmse", 0.0)
+    left_out = ""
+    if hold_out_every is None and left_out_nrmse > nrmse:
+        left_out = f", {number(left_out_nrmse)} on rows left out of the fit"
+        result["left_out_nrmse"] = left_out_nrmse
     # The NRMSE of the fit leaves out wrong readings, which `verify` compares.
     rms = "" if hold_out_every is None else _rms_text(verified)
     with drawing() as write_figures:
@@ -369,7 +374,7 @@ def identify(
                 {
                     "model": f"{output}: {model.fit.model_class}, {model.n_wavelets} wavelets, "
                     f"{model.n_parameters} parameters",
-                    "error": f"{rms}NRMSE {number(nrmse)} on {judged}",
+                    "error": f"{rms}NRMSE {number(nrmse)} on {judged}{left_out}",
                     **_left_out_text(model),
                     **_outside_text(model, recordings),
                     **_band_text(model, recordings),

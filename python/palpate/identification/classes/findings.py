@@ -57,9 +57,7 @@ def verdict_of(
     findings = [*findings_of(recordings, side, relaxes=network.memory is not None), *network.findings]
     largest = max(network.nrmse, network.left_out_nrmse)
     rows = (
-        "rows that were left out of the fit, block after block"
-        if largest > network.nrmse
-        else "the rows of the identification"
+        "rows that were left out of the fit" if largest > network.nrmse else "the rows of the identification"
     )
     findings += error_findings(largest, rows)
     return Verdict(tuple(dict.fromkeys(findings)))
@@ -386,7 +384,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         rmse=error.rmse,
         nrmse=error.nrmse,
         rmse_of_all=best.error_on(None).rmse,
-        left_out_nrmse=left_out_nrmse(best, selection.growth),
+        left_out_nrmse=left_out_nrmse(selection),
         residuals=int(np.count_nonzero(counted)),
         residual_correlation=neighbour_correlation(best.residual[best.error_on(None).weight > 0.0]),
         path=tuple(report.path),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...model.band import BAND_LEVEL, Band
+from ...recording.conversion import MIN_ROWS
 from ..data.compression import HELD_OUT_EVERY, Compressor, HeldOutRows, inside
 from ..data.repeats import Repeats, band_of, pure_error
 from ..network.separable import problem_of
@@ -117,12 +118,18 @@ def band_with_check(best: Candidate) -> tuple[Band | None, tuple[str, ...]]:
     return band, (f"One {band.left_out} left out of the fit at a time: RMS error {error} on it{share}.",)
 
 
-def left_out_nrmse(best: Candidate, growth: Growth) -> float:
+FEW_ROWS = 500
+"""Number of rows up to which the model is selected again for the error on left out rows; more rows change its
+wavelets little, and only its numbers are fitted again."""
+
+
+def left_out_nrmse(selection: ClassSelection) -> float:
     """Returns the NRMSE on rows that are left out of the fit, a fifth of them at a time.
 
-    All numbers of the model are fitted again to the other rows by a few steps of `growth`. Rows with
-    correlated noise are left out together.
+    A model of few rows is selected again from the other rows. The numbers of another model are fitted again
+    to them by a few steps. Rows with correlated noise are left out together.
     """
+    best, growth = selection.best, selection.growth
     data, used = best.data, best.error.weight > 0.0
     force = data.force if best.moving is None else data.force - best.moving.force
     compressor = Compressor(
@@ -134,9 +141,15 @@ def left_out_nrmse(best: Candidate, growth: Growth) -> float:
     fold[rows] = np.arange(len(rows)) // together % HELD_OUT_EVERY
     error = best.error
     residual = error.residual.copy()
+    again_selected = len(rows) <= FEW_ROWS and data is selection.data and best.moving is None
     for number in range(HELD_OUT_EVERY):
         others = used & (fold != number)
-        if others.any():
+        if again_selected and np.count_nonzero(others) > MIN_ROWS:
+            given = np.ones(len(used)) if data.weight is None else data.weight
+            other = selection.repeated(replace(data, weight=np.where(others, given, 0.0))).best
+            left = used & (fold == number) & (other.error_on(None).weight > 0.0)
+            residual[left] = other.residual[left]
+        elif others.any():
             again, left = _left_out(best, compressor, force, others, used & (fold == number), growth)
             residual[left] = again[left]
     return replace(error, residual=residual).nrmse
