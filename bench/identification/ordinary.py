@@ -170,7 +170,7 @@ def judged(model: Model, best: Model, rows: Rows) -> dict[str, Any]:
     truth = Truth.of(rows)
     error, place, best_error = truth.error(model), truth.worst_place(model), truth.error(best)
     found, known = classes_of(model), resolvable(rows)
-    reported = max(model.fit.nrmse, model.notes["left_out_nrmse"])
+    reported = max(model.fit.nrmse, model.notes.get("left_out_nrmse", 0.0))
     return {
         "true_error": error,
         "reported_error": reported,

@@ -357,7 +357,6 @@ def identify(
     left_out = ""
     if hold_out_every is None and left_out_nrmse > nrmse:
         left_out = f", {number(left_out_nrmse)} on rows left out of the fit"
-        result["left_out_nrmse"] = left_out_nrmse
     # The NRMSE of the fit leaves out wrong readings, which `verify` compares.
     rms = "" if hold_out_every is None else _rms_text(verified)
     with drawing() as write_figures:

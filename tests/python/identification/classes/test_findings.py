@@ -236,7 +236,7 @@ def test_shuffled_rows_lose_nothing() -> None:
 
 
 @pytest.mark.parametrize("rows", [20, 45])
-def test_the_error_on_left_out_rows_is_that_between_few_rows(rows: int) -> None:
+def test_the_error_on_left_out_rows_is_not_below_that_between_few_rows(rows: int) -> None:
     """A model of few rows can have many parameters, if the rows determine them."""
     between = np.linspace(0.0, sweep(rows).max(), 2001)
     ratios = []
@@ -245,5 +245,5 @@ def test_the_error_on_left_out_rows_is_that_between_few_rows(rows: int) -> None:
         model = palpate.identify(recorded(sweep(rows), wall(sweep(rows)) + random.normal(0.0, 0.02, rows)))
         true = np.sqrt(np.mean((model.force(between) - wall(between)) ** 2)) / np.std(wall(between))
         ratios.append(true / model.notes["left_out_nrmse"])
-    assert 0.5 < np.median(ratios) < 1.3
-    assert max(ratios) < 1.6
+    assert max(ratios) < 1.3
+    assert np.median(ratios) > 0.2
