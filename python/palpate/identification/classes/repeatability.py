@@ -141,7 +141,8 @@ def left_out_nrmse(selection: ClassSelection) -> float:
     fold[rows] = np.arange(len(rows)) // together % HELD_OUT_EVERY
     error = best.error
     residual = error.residual.copy()
-    again_selected = len(rows) <= FEW_ROWS and data is selection.data and best.moving is None
+    single = len(data.names) == 1
+    again_selected = single and len(rows) <= FEW_ROWS and data is selection.data and best.moving is None
     for number in range(HELD_OUT_EVERY):
         others = used & (fold != number)
         if again_selected and np.count_nonzero(others) > MIN_ROWS:
@@ -150,7 +151,9 @@ def left_out_nrmse(selection: ClassSelection) -> float:
             left = used & (fold == number) & (other.error_on(None).weight > 0.0)
             residual[left] = other.residual[left]
         elif others.any():
-            again, left = _left_out(best, compressor, force, others, used & (fold == number), growth)
+            again, left = _left_out(
+                best, compressor, force, others, used & (fold == number), growth if single else None
+            )
             residual[left] = again[left]
     return replace(error, residual=residual).nrmse
 
