@@ -170,7 +170,7 @@ def _fitted_with_period(
     """
     found = period_of(recordings) if options.period is None and options.inputs == "auto" else None
     tried = []
-    for period in (found, options.period)[found is None :]:
+    for period in [options.period] if found is None else [found, None]:
         chosen = replace(options, period=period)
         rows = rows_of(recordings, chosen, objects)
         tried.append((fit_rows(rows, chosen), chosen, rows))

@@ -234,9 +234,7 @@ def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tu
 
 def _gaps(time: Float1D | None, position: Float1D) -> NDArray[np.intp]:
     """Returns the indices of rows at which a motion starts after a gap of time."""
-    if time is None or len(time) < 2:
-        return np.empty(0, dtype=np.intp)
-    return gaps_of(time, position)
+    return np.empty(0, dtype=np.intp) if time is None else gaps_of(time, position)
 
 
 def require_same_units(model: Model, units: Mapping[str, str]) -> None:

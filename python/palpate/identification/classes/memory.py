@@ -21,7 +21,7 @@ from ..data.limits import FORCE_RESOLUTION
 from ..decision import Decision, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
-from ..search.evidence import ON_HELD_OUT_ROWS, deviance
+from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, deviance
 from .memory_fit import STEPS, MemoryFit, Motion, Resting, Shape
 
 MOST_ROWS = 12_000
@@ -60,9 +60,6 @@ LEAST_CORRELATION = 0.1
 errors included. A branch decays by at most 40 % in a sample interval, because two intervals must resolve it.
 Branches that explain the share LEAST_GAIN of the squared error therefore give a correlation of at least
 0.15."""
-
-LEAST_GAIN = 0.25
-"""Least relative decrease of the squared error by a memory [-]: it is harder to render and to certify."""
 
 CONTACT_SHARE = 0.02
 """Share of the force range below which a tool that can leave the object has left it, after it was in contact

@@ -20,7 +20,7 @@ from ..data.outliers import robust_weights, suspects
 from ..data.rows import Rows
 from ..decision import decided, in_words, lowered
 from ..options import IdentifyOptions
-from ..search.evidence import ON_HELD_OUT_ROWS, Candidate
+from ..search.evidence import LEAST_GAIN, ON_HELD_OUT_ROWS, Candidate
 from .class_selection import VELOCITY_INPUTS, ClassSelection, Linear, ModelClass, Network
 from .findings import USABLE_NRMSE
 from .hysteresis import Hysteresis
@@ -28,10 +28,6 @@ from .repeatability import no_finer_than_repeats
 
 MOST_DYNAMIC_SELECTIONS = 2
 """Number of times that the model is selected again, each time with better values of damping and mass."""
-
-LEAST_GAIN = 0.25
-"""Least share of the squared error that velocity as an input must explain [-]: a force of two inputs is
-harder to render and to certify."""
 
 MOST_CORRELATION_ESTIMATES = 5
 """Largest number of times that the correlation of the noise of successive rows is estimated."""
