@@ -58,11 +58,10 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
     """Returns the model's force along a recording.
 
     For a hysteresis model s = +-1 is the direction of the recording, and rows without direction are left out.
-    Without direction, time and play radius, the strokes follow from the order of rows. Without a direction,
-    or with a play radius, the play operator follows the positions in their order. A memory follows the
-    positions over the time of the recording, from rest. The play radius is the
-    first one available of: `play_radius`, the radius of the flight record, of the model, of its plan, or 1 %
-    of the travel. A flight record behind a virtual coupling is compared at the position of the virtual
+    Without direction and play radius, the strokes follow from the order of rows, as in the identification.
+    Otherwise, the play operator follows the positions in their order. A memory follows the positions over the
+    time of the recording, from rest. The play radius is the first one available of: `play_radius`, the radius
+    of the flight record, of the model, of its plan, or 1 % of the travel. A flight record behind a virtual coupling is compared at the position of the virtual
     object, except a compensated one. A flight record with prediction is compared at the predicted position.
 
     Raises
@@ -217,19 +216,23 @@ def _state(model: Model, recording: Recording, flight: FlightRecord, play_radius
     return _State(side, known, notes)
 
 
-def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tuple[float, str]:
+def _known_radius(model: Model, flight: FlightRecord) -> tuple[float, str] | None:
     """Returns the play radius and, in words, where its value comes from."""
     for radius, origin in (
-        (play_radius, "as given"),
         (flight.play_radius, "that of the flight record"),
         (model.play_radius, "that of the model"),
         ((model.plan or {}).get("play_radius"), "that of the plan"),
     ):
         if radius:
             return float(radius), origin
-    return default_play_radius(
-        model, 0.0
-    ), "1 % of the travel, because neither the recording nor the model has one"
+    return None
+
+
+def _radius(model: Model, flight: FlightRecord, play_radius: float | None) -> tuple[float, str]:
+    if play_radius is not None:
+        return play_radius, "as given"
+    without = "1 % of the travel, because neither the recording nor the model has one"
+    return _known_radius(model, flight) or (default_play_radius(model, 0.0), without)
 
 
 def _gaps(time: Float1D | None, position: Float1D) -> NDArray[np.intp]:
@@ -280,18 +283,18 @@ def flight_of(recording: Recording) -> FlightRecord:
 def with_strokes(model: Model, recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     """Returns the recording with strokes from its order of rows and a note; otherwise unchanged.
 
-    Strokes are added if the model differs between press and release, and no direction, time or play radius of
-    the model is known. A recording without reversal may be sorted by position; all rows then get the stroke
-    whose model force is nearer.
+    Strokes are added if the model differs between press and release, and neither a direction nor a play
+    radius is known. A recording without time and reversal may be sorted by position; all rows then get the
+    stroke whose model force is nearer.
     """
-    known = recording.direction is not None or recording.time is not None or model.play_radius is not None
+    known = recording.direction is not None or _known_radius(model, flight_of(recording))
     if known or not model.hysteretic:
         return recording, ()
     direction = ordered_strokes(recording)
     if direction is None:
         return recording, ()
     turns = turns_of(direction)
-    if turns:
+    if turns or recording.time is not None:
         note = f"The direction is taken from the order of rows: {turns} turn{'s' * (turns != 1)}."
         return replace(recording, direction=direction), (note,)
 

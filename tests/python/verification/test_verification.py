@@ -132,19 +132,22 @@ def test_without_a_direction_the_play_operator_follows_the_motion() -> None:
     assert "the play operator follows the positions" in result.notes[0]
 
 
-def test_a_motion_without_direction_and_play_radius_takes_one_percent_of_the_travel_and_names_it() -> None:
+@pytest.mark.parametrize("timed", [False, True])
+def test_without_direction_and_play_radius_the_strokes_follow_from_the_order_of_rows(timed: bool) -> None:
     table = stroke(direction=False)
-    time = 1e-3 * np.arange(len(table))
+    time = 1e-3 * np.arange(len(table)) if timed else None
     motion = Recording.from_arrays(table.position, table.force, time, units=RAD)
     result = verify(model_of(curve().source, hysteresis=True), motion)
-    assert np.mean(np.abs(result.residual) < 4 * NOISE) > 0.98
-    assert "radius is 0.01 rad, 1 % of the travel" in result.notes[0]
-
-
-def test_a_table_without_direction_and_time_takes_its_strokes_from_the_order_of_rows() -> None:
-    result = verify(model_of(curve().source, hysteresis=True), stroke(direction=False))
     assert np.mean(np.abs(result.residual) < 4 * NOISE) > 0.99
     assert result.notes[0] == "The direction is taken from the order of rows: 1 turn."
+
+
+def test_rows_without_order_direction_and_play_radius_take_one_percent_of_the_travel_and_name_it() -> None:
+    table = stroke(direction=False)
+    mixed = np.random.default_rng(1).permutation(len(table))
+    motion = Recording.from_arrays(table.position[mixed], table.force[mixed], units=RAD)
+    result = verify(model_of(curve().source, hysteresis=True), motion)
+    assert "radius is 0.01 rad, 1 % of the travel" in result.notes[0]
 
 
 def test_a_play_radius_that_is_given_is_used_even_with_a_direction() -> None:
