@@ -59,10 +59,11 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
 
     For a hysteresis model s = +-1 is the direction of the recording, and rows without direction are left out.
     Without direction and play radius, the strokes follow from the order of rows, as in the identification.
-    Otherwise, the play operator follows the positions in their order. A memory follows the positions over the
-    time of the recording, from rest. The play radius is the first one available of: `play_radius`, the radius
-    of the flight record, of the model, of its plan, or 1 % of the travel. A flight record behind a virtual coupling is compared at the position of the virtual
-    object, except a compensated one. A flight record with prediction is compared at the predicted position.
+    Otherwise, the play operator follows the positions in their order. A memory follows the positions over
+    the time of the recording, from rest. The play radius is the first one available of: `play_radius`, the
+    radius of the flight record, of the model, of its plan, or 1 % of the travel. A flight record behind a
+    virtual coupling is compared at the position of the virtual object, except a compensated one. A flight
+    record with prediction is compared at the predicted position.
 
     Raises
     ------
