@@ -5,8 +5,10 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
 add_library(palpate_options INTERFACE)
 
+# Files that are compiled as one share a scope, in which a local name of one file may be a global name of another.
 target_compile_options(
-  palpate_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
+  palpate_options INTERFACE -Wall -Wextra -Wpedantic -Wnon-virtual-dtor -Woverloaded-virtual
+                            $<$<NOT:$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wshadow>)
 if(PALPATE_WARNINGS_AS_ERRORS)
   target_compile_options(palpate_options INTERFACE -Werror)
 endif()

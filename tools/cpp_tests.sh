@@ -8,33 +8,34 @@ set -euo pipefail
 
 preset=$1
 scale=${PALPATE_TEST_SCALE:-1}
-sample=()
-always=()
+targets=()
+tests=.
 with=()
+sample() {
+    if [ "$scale" -lt 10 ]; then
+        targets=("$@")
+        tests="^($(IFS='|' && echo "$*"))$"
+    fi
+}
 
 case $preset in
 asan | tsan)
-    sample=(test_flight_recorder test_ring_buffer test_usb_device test_palpate_device)
+    sample test_realtime test_usb_device test_palpate_device
     export PALPATE_TEST_SCALE=$(((scale + 9) / 10))
     ;;
-release) sample=(test_compiled_network) ;;
-# Only these tests run a tick without a forbidden action. A compiler without this sanitizer is refused by CMake.
-rtsan) always=(test_controller test_tick test_campaign) ;;
+release) sample test_model ;;
+rtsan) targets=(test_run) ;;
 esac
 # The thread sanitizer of older compilers fails with the address randomization of newer kernels.
 if [ "$preset" = tsan ] && setarch "$(uname -m)" --addr-no-randomize true 2>/dev/null; then
     with=(setarch "$(uname -m)" --addr-no-randomize)
 fi
 
-built=()
-chosen=()
-if [ "$scale" -lt 10 ]; then
-    always+=("${sample[@]}")
-fi
-if [ "${#always[@]}" -gt 0 ]; then
-    built=(--target "${always[@]}")
-    chosen=(--label-regex "^($(IFS='|' && echo "${always[*]}"))$")
-fi
 cmake --preset "$preset" >/dev/null
-cmake --build --preset "$preset" "${built[@]}"
+cmake --build --preset "$preset" ${targets[@]+--target "${targets[@]}"}
+chosen=(--label-regex "$tests")
+# Only these tests run a tick without a forbidden action. A compiler without this sanitizer is refused by CMake.
+if [ "$preset" = rtsan ]; then
+    chosen=(--tests-regex '^(Controller|Tick|Campaign)\.')
+fi
 "${with[@]}" ctest --preset "$preset" "${chosen[@]}" --parallel "${CMAKE_BUILD_PARALLEL_LEVEL:-1}" --progress

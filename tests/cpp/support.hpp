@@ -91,7 +91,7 @@ struct Spring {
     using State = Stateless;
     double stiffness;
 
-    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+    [[nodiscard]] EnvironmentSample at(double x, State /*stateless*/) const noexcept {
         return {stiffness * x, stiffness, 0.5 * stiffness * x * x, false};
     }
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}
@@ -103,7 +103,7 @@ struct Spring {
 struct ClickAndWall {
     using State = Stateless;
 
-    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+    [[nodiscard]] EnvironmentSample at(double x, State /*stateless*/) const noexcept {
         const double u = (x - 0.15) / 0.03;
         const double click = 0.6 * std::exp(-u * u);
         const double z = (x - 0.4) / 0.004;
@@ -120,7 +120,7 @@ struct ClickAndWall {
 struct BrokenBeyond {
     using State = Stateless;
 
-    [[nodiscard]] EnvironmentSample at(double x, const State& /*stateless*/) const noexcept {
+    [[nodiscard]] EnvironmentSample at(double x, State /*stateless*/) const noexcept {
         return {x > 0.5 ? std::numeric_limits<double>::quiet_NaN() : 0.0, 0.0, 0.0, false};
     }
     void advance(double /*x*/, State& /*stateless*/) const noexcept {}

@@ -271,8 +271,9 @@ def compile_errors(copy: Path) -> str:
 
 def test_names() -> list[str]:
     """Returns the names of the C++ tests that do not wait for a clock."""
-    sources = sorted((ROOT / "tests" / "cpp").rglob("test_*.cpp"))
-    return [source.stem for source in sources if source.parent.name not in WITH_CLOCK]
+    tests = ROOT / "tests" / "cpp"
+    folders = {source.relative_to(tests).parts[0] for source in tests.rglob("test_*.cpp")}
+    return [f"test_{folder}" for folder in sorted(folders - WITH_CLOCK)]
 
 
 def build_errors(copy: Path, build: Path, tests: list[str]) -> str:
@@ -359,7 +360,7 @@ def main() -> int:
                 executed[number].append(program)
 
     def survives(number: int) -> bool:
-        own = "test_" + Path(mutants[number].header).stem
+        own = "test_" + Path(mutants[number].header).parent.name
         for program in sorted(executed[number], key=lambda each: (each.path.name != own, each.duration)):
             limit = 10 * program.duration + FEW_SECONDS
             if not program.run({"PALPATE_MUTANT": str(number)}, limit):

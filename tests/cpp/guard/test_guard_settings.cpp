@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests of the settings of the guards, and of the guards that they make for a model.
 #include "palpate/guard/guard_settings.hpp"
+#include "special_values.hpp"
 
 #include <cmath>
 #include <cstdint>
@@ -17,7 +18,7 @@
 namespace palpate {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using test::infinity;
 
 /// Returns the message with which `validate` refuses the settings, or nothing.
 std::string refusal(const GuardSettings& settings) {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests of each guard alone, at the exact values at which it begins to act.
 #include "palpate/guard/limits.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
-#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -22,8 +22,8 @@
 namespace palpate {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::infinity;
+using test::nan;
 
 /// Returns the next larger number.
 double just_above(double value) {

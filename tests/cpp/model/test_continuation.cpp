@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/continuation.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <gtest/gtest.h>
 
 namespace palpate {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using test::infinity;
 
 /// Returns the integral of a polynomial of degree at most 3 by Simpson's rule, which is exact for it.
 template <class F>

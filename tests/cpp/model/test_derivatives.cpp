@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/derivatives.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
+using test::epsilon;
 
 /// Returns derivative n of the Mexican hat, (-1)^n He_{n+2}(u) e^{-u^2/2}, from the recursion of the Hermite
 /// polynomials He in extended precision.
@@ -33,7 +33,7 @@ long double hat_derivative(std::size_t n, long double u) {
 }
 
 /// Returns derivative n of the network's force in extended precision.
-long double exact(const NetworkParameters& network, long double x, std::size_t n) {
+long double exact_derivative(const NetworkParameters& network, long double x, std::size_t n) {
     const long double c = network.linear[0];
     long double sum = n == 0 ? c * x + network.bias : n == 1 ? c : 0.0L;
     for (std::size_t i = 0; i < network.weight.size(); ++i) {
@@ -53,7 +53,8 @@ TEST(Derivatives, AgreeWithHermiteFunctionsWithinTheirRoundingBounds) {
             const double x = uniform(random, -2.0, 2.0);
             const Derivatives here = derivatives(network, x);
             for (std::size_t n = 0; n < here.size(); ++n) {
-                ASSERT_LE(std::abs(static_cast<double>(here[n] - exact(network, x, n))), rounding[n])
+                ASSERT_LE(std::abs(static_cast<double>(here[n] - exact_derivative(network, x, n))),
+                          rounding[n])
                     << n << " " << x;
             }
             const Jet four = jet(network, x);
@@ -168,7 +169,7 @@ TEST(DerivativeBounds, HoldForTheNinthDerivative) {
         const double bound = derivative_bounds(network, from, to)[9];
         for (int j = 0; j < 20; ++j) {
             const double x = uniform(random, from, to);
-            ASSERT_LE(std::abs(static_cast<double>(exact(network, x, 9))), bound) << x;
+            ASSERT_LE(std::abs(static_cast<double>(exact_derivative(network, x, 9))), bound) << x;
         }
     }
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/energy.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
@@ -23,7 +23,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using test::infinity;
 
 /// A force whose evaluations are counted: the straight line f(x) = slope (x - zero) with an antiderivative that is not
 /// zero at any edge.

@@ -15,13 +15,13 @@
 namespace palpate {
 namespace {
 
-const Domain two_long{{1.0}, {3.0}, {}, {}, std::nullopt};
-const Domain box{{1.0, -1.0}, {3.0, 1.0}, {}, {}, std::nullopt};
+const Domain one_input{{1.0}, {3.0}, {}, {}, std::nullopt};
+const Domain two_inputs{{1.0, -1.0}, {3.0, 1.0}, {}, {}, std::nullopt};
 const NetworkParameters spring{1, {}, {}, {}, {2.0}, 0.1};
 const NetworkParameters plane{2, {}, {}, {}, {2.0, 0.5}, 0.1};
 
 ForceModel with_hysteresis(std::optional<double> play_radius) {
-    return {spring, {{}, 0.3, 0.4}, two_long, play_radius};
+    return {spring, {{}, 0.3, 0.4}, one_input, play_radius};
 }
 
 MemoryParameters memory_of(const NetworkParameters& ratio) {
@@ -29,10 +29,10 @@ MemoryParameters memory_of(const NetworkParameters& ratio) {
 }
 
 TEST(ForceModel, HasExactlyOneKind) {
-    const ForceModel position{spring, two_long};
+    const ForceModel position{spring, one_input};
     const ForceModel pair = with_hysteresis(0.1);
-    const ForceModel positions{plane, box};
-    const ForceModel moving = ForceModel::of_velocity(plane, box);
+    const ForceModel positions{plane, two_inputs};
+    const ForceModel moving = ForceModel::of_velocity(plane, two_inputs);
     EXPECT_NE(position.network(), nullptr);
     EXPECT_NE(pair.hysteresis(), nullptr);
     EXPECT_NE(moving.velocity(), nullptr);
@@ -50,12 +50,12 @@ TEST(ForceModel, HasExactlyOneKind) {
     for (const auto* model : {&position, &pair}) {
         EXPECT_EQ(model->radial(), nullptr);
         EXPECT_EQ(model->parameters().linear, spring.linear);
-        EXPECT_EQ(model->domain().upper, two_long.upper);
+        EXPECT_EQ(model->domain().upper, one_input.upper);
         EXPECT_NO_THROW(require_renderable(*model));
     }
     for (const auto* model : {&positions, &moving}) {
         EXPECT_EQ(model->parameters().linear, plane.linear);
-        EXPECT_EQ(model->domain().lower, box.lower);
+        EXPECT_EQ(model->domain().lower, two_inputs.lower);
     }
     EXPECT_NO_THROW(require_renderable(moving));
     EXPECT_EQ(test::refusal([&] { require_renderable(positions); }), "the network has 2 inputs, must have 1");
@@ -69,9 +69,9 @@ TEST(ForceModel, SlopeBoundsIncludePressReleaseAndSticking) {
         EXPECT_NEAR(bounds.lower, lower, 1e-12);
         EXPECT_NEAR(bounds.upper, upper, 1e-12);
     };
-    expect(ForceModel{spring, two_long}.slope_bounds(), 2.0, 2.0);
-    expect(ForceModel{spring, two_long}.slope_bounds(0.1), 2.0, 2.0);
-    expect(ForceModel::of_velocity(plane, box).slope_bounds(), 2.0, 2.0);
+    expect(ForceModel{spring, one_input}.slope_bounds(), 2.0, 2.0);
+    expect(ForceModel{spring, one_input}.slope_bounds(0.1), 2.0, 2.0);
+    expect(ForceModel::of_velocity(plane, two_inputs).slope_bounds(), 2.0, 2.0);
     expect(with_hysteresis(0.2).slope_bounds(), 1.7, 2.3);
     expect(with_hysteresis(std::nullopt).slope_bounds(0.1), 1.7, 2.3 + 13.0);
 }
@@ -124,20 +124,21 @@ TEST(ForceModel, StoredSlopeBoundsMayDifferByOnePercentOfTheSteepestSlope) {
     const double fewest = own.upper - 1.001 * slack;
     EXPECT_EQ(message(own.lower, fewest), refused_max(fewest, own.upper));
     // The bounds of a constant force are exactly 0, so that only 0 is accepted.
-    const ForceModel constant{{1, {}, {}, {}, {0.0}, 0.5}, two_long};
+    const ForceModel constant{{1, {}, {}, {}, {0.0}, 0.5}, one_input};
     EXPECT_EQ(test::refusal([&] { constant.require_slopes_within({0.0, 0.0}); }), "");
     EXPECT_EQ(test::refusal([&] { constant.require_slopes_within({1e-300, 0.0}); }),
               refused_min(1e-300, 0.0));
     EXPECT_EQ(test::refusal([&] { constant.require_slopes_within({0.0, -1e-300}); }),
               refused_max(-1e-300, 0.0));
-    EXPECT_EQ(test::refusal([] { ForceModel{plane, box}.require_slopes_within({5.0, 4.0}); }), "");
-    EXPECT_EQ(test::refusal([] { ForceModel::of_velocity(plane, box).require_slopes_within({5.0, 4.0}); }),
-              "");
+    EXPECT_EQ(test::refusal([] { ForceModel{plane, two_inputs}.require_slopes_within({5.0, 4.0}); }), "");
+    EXPECT_EQ(
+        test::refusal([] { ForceModel::of_velocity(plane, two_inputs).require_slopes_within({5.0, 4.0}); }),
+        "");
 }
 
 TEST(ForceModel, FinestWidthIncludesTheRatioOfTheMemory) {
-    EXPECT_EQ((ForceModel{spring, two_long}.finest_width()), 2.0);
-    const ForceModel model{{1, {4.0}, {2.0}, {0.5}, {2.0}, 0.0}, two_long};
+    EXPECT_EQ((ForceModel{spring, one_input}.finest_width()), 2.0);
+    const ForceModel model{{1, {4.0}, {2.0}, {0.5}, {2.0}, 0.0}, one_input};
     EXPECT_EQ(model.finest_width(), 0.25);
     EXPECT_EQ(model.with_memory(memory_of({1, {}, {}, {}, {0.0}, 1.0})).finest_width(), 0.25);
     EXPECT_EQ(model.with_memory(memory_of({1, {8.0}, {2.0}, {0.5}, {0.0}, 1.0})).finest_width(), 0.125);
@@ -145,14 +146,14 @@ TEST(ForceModel, FinestWidthIncludesTheRatioOfTheMemory) {
 
 TEST(ForceModel, OnlyAForceOfPositionCanHaveAMemory) {
     const MemoryParameters memory = memory_of({1, {}, {}, {}, {0.0}, 1.0});
-    const ForceModel position{spring, two_long};
+    const ForceModel position{spring, one_input};
     EXPECT_EQ(position.memory(), nullptr);
     const ForceModel relaxing = position.with_memory(memory);
     ASSERT_NE(relaxing.memory(), nullptr);
     EXPECT_EQ(relaxing.memory()->parameters().stiffness, memory.stiffness);
     EXPECT_EQ(relaxing.parameters().linear, spring.linear);
     EXPECT_EQ(position.memory(), nullptr) << "the first model is not changed";
-    for (const ForceModel& model : {with_hysteresis(0.1), ForceModel{plane, box}}) {
+    for (const ForceModel& model : {with_hysteresis(0.1), ForceModel{plane, two_inputs}}) {
         EXPECT_EQ(test::refusal([&] { (void)model.with_memory(memory); }),
                   "only a force of position without hysteresis can have a memory");
     }
@@ -168,7 +169,7 @@ TEST(ForceModel, PlayRadiusIsUsualUnlessItIsGiven) {
     for (const double x : {0.5, 1.0, 2.2, 3.5}) {
         EXPECT_EQ(set.hysteresis()->sliding(x, 0.7).force, unset.hysteresis()->sliding(x, 0.7).force);
     }
-    const ForceModel position{spring, two_long};
+    const ForceModel position{spring, one_input};
     EXPECT_EQ(position.with_play_radius(0.3).play_radius(), std::nullopt);
     EXPECT_NE(position.with_play_radius(0.3).network(), nullptr);
 }
@@ -177,9 +178,9 @@ TEST(ForceModel, HysteresisNeedsADomainOfOneInput) {
     const auto message = [](const Domain& domain) {
         return test::refusal([&] { (void)ForceModel{spring, {{}, 0.3, 0.4}, domain, 0.1}; });
     };
-    EXPECT_EQ(message(two_long), "");
+    EXPECT_EQ(message(one_input), "");
     const std::string refused = "a hysteresis network has one input";
-    EXPECT_EQ(message(box), refused);
+    EXPECT_EQ(message(two_inputs), refused);
     EXPECT_EQ(message({{1.0, 2.0}, {3.0}, {}, {}, std::nullopt}), refused);
     EXPECT_EQ(message({{1.0}, {3.0, 4.0}, {}, {}, std::nullopt}), refused);
 }

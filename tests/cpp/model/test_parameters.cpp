@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/parameters.hpp"
+#include "special_values.hpp"
 
 #include <limits>
 #include <stdexcept>
@@ -13,8 +14,8 @@
 namespace palpate {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using test::infinity;
+using test::nan;
 
 /// Returns a vector with memory for one more value, which contains `hidden`.
 std::vector<double> before(double hidden, std::vector<double> values) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/model/radial_bounds.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
+using test::epsilon;
 
 /// Margin by which bounds of fourth derivatives are rounded up.
 constexpr double margin = 1.0 + 1e-9;

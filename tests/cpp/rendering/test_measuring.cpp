@@ -2,11 +2,11 @@
 // Tests of the structures that measure objects and devices, tick by tick. All numbers are sums of powers of two, so
 // that results are exact.
 #include "palpate/rendering/measuring.hpp"
+#include "special_values.hpp"
 
 #include <cmath>
 #include <cstddef>
 #include <initializer_list>
-#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -17,9 +17,9 @@
 namespace palpate {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double period = 0.125;
+using test::infinity;
+using test::nan;
+constexpr double probe_period = 0.125;
 
 constexpr ProbeSettings settings{
     .lower = 0.0, .upper = 1.0, .speed = 1.0, .stiffness = 64.0, .damping = 0.5, .force_limit = 16.0};
@@ -42,14 +42,14 @@ void expect_plain(const Rendered& rendered, double force, double environment_pos
 }
 
 TEST(Probe, FollowsATriangleWithSpringAndDamper) {
-    Probe probe{settings, period};
+    Probe probe{settings, probe_period};
     probe.reset(0.0);
     double last = 0.0;
     for (int k = 1; k <= 40; ++k) {
-        const double target = 1.0 - std::abs(std::fmod(k * period, 2.0) - 1.0);
+        const double target = 1.0 - std::abs(std::fmod(k * probe_period, 2.0) - 1.0);
         const double speed = (k - 1) / 8 % 2 == 0 ? 1.0 : -1.0;
         const double position = target + (k % 3 - 1) / 64.0;
-        const double force = 64.0 * (position - target) + 0.5 * ((position - last) / period - speed);
+        const double force = 64.0 * (position - target) + 0.5 * ((position - last) / probe_period - speed);
         const Rendered rendered = probe.step(position);
         expect_plain(rendered, force, target);
         EXPECT_FALSE(rendered.extrapolated);
@@ -64,7 +64,7 @@ TEST(Probe, FollowsATriangleWithSpringAndDamper) {
 TEST(Probe, MovesAtItsSpeedAndUpwardsAfterEachReset) {
     ProbeSettings fast = settings;
     fast.speed = 2.0;
-    Probe probe{fast, period};
+    Probe probe{fast, probe_period};
     for (int run = 0; run < 2; ++run) {
         probe.reset(0.5);
         expect_plain(probe.step(0.75), 0.5 * (2.0 - 2.0), 0.75);
@@ -76,7 +76,7 @@ TEST(Probe, MovesAtItsSpeedAndUpwardsAfterEachReset) {
 
 TEST(Probe, MovesIntoItsRange) {
     for (const double start : {-2.0, 3.0}) {
-        Probe probe{settings, period};
+        Probe probe{settings, probe_period};
         probe.reset(start);
         const double way = start < 0.0 ? 0.125 : -0.125;
         for (int k = 1; k < 8; ++k) {
@@ -90,7 +90,7 @@ TEST(Probe, ReversesBeyondItsForceLimit) {
     ProbeSettings wide = settings;
     wide.lower = -8.0;
     wide.upper = 8.0;
-    Probe probe{wide, period};
+    Probe probe{wide, probe_period};
     probe.reset(0.0);
     expect_plain(probe.step(0.0), -8.0 - 0.5, 0.125);
     expect_plain(probe.step(0.0), -16.0, 0.25);
@@ -105,7 +105,7 @@ TEST(Probe, ReversesBeyondItsForceLimit) {
 
 TEST(Probe, RefusalNamesTheFieldItsValueAndTheRule) {
     const auto refusal = [](const ProbeSettings& given) {
-        return test::refusal([&] { const Probe probe{given, period}; });
+        return test::refusal([&] { const Probe probe{given, probe_period}; });
     };
     EXPECT_EQ(refusal(settings), "");
     EXPECT_EQ(refusal({.lower = infinity}), "probe: lower is inf, must be a finite number");
@@ -121,7 +121,8 @@ TEST(Probe, RefusalNamesTheFieldItsValueAndTheRule) {
 
 // Three ticks without force, then two with force; three pushes of full size, three of half size.
 TEST(Pulses, FollowTheirSchedule) {
-    Pulses pulses{{.force = 0.5, .smaller = 0.25, .push_s = 0.25, .rest_s = 0.375, .farthest = 2.0}, period};
+    Pulses pulses{{.force = 0.5, .smaller = 0.25, .push_s = 0.25, .rest_s = 0.375, .farthest = 2.0},
+                  probe_period};
     pulses.reset(10.0);
     for (const int start : {0, 37}) {
         for (int k = 0; k < 100; ++k) {
@@ -142,10 +143,10 @@ TEST(Pulses, FollowTheirSchedule) {
 
 TEST(Pulses, RefuseAForceThatIsNotPositiveAndFinite) {
     for (const double bad : {0.0, -0.5, nan, infinity}) {
-        EXPECT_THROW((Pulses{{.force = bad}, period}), std::invalid_argument) << bad;
+        EXPECT_THROW((Pulses{{.force = bad}, probe_period}), std::invalid_argument) << bad;
     }
     try {
-        const Pulses pulses{{.force = -0.5}, period};
+        const Pulses pulses{{.force = -0.5}, probe_period};
         FAIL();
     } catch (const std::invalid_argument& error) {
         EXPECT_STREQ(error.what(), "push is -0.500000, must be > 0");

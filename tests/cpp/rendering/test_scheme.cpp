@@ -2,11 +2,11 @@
 #include "palpate/rendering/compensated.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -20,10 +20,10 @@
 namespace palpate {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double period = 1e-3;
+using test::infinity;
+constexpr double scheme_period = 1e-3;
 
-ForceModel spring(double stiffness) {
+ForceModel linear_model(double stiffness) {
     return {NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0}, test::unit_domain()};
 }
 
@@ -43,7 +43,7 @@ ForceModel with_memory() {
     MemoryParameters memory;
     memory.stiffness = {2.0};
     memory.time_constant_s = {0.1};
-    return spring(5.0).with_memory(memory);
+    return linear_model(5.0).with_memory(memory);
 }
 
 Scheme scheme_of(StructureKind kind) {
@@ -79,7 +79,7 @@ TEST(Scheme, RefusalOfAModelNamesTheStructure) {
                                   ", must be direct: only the direct structure can render a force ";
         EXPECT_EQ(refused(scheme_of(kind), of_velocity()), start + "of position and velocity");
         EXPECT_EQ(refused(scheme_of(kind), with_memory()), start + "with memory");
-        EXPECT_EQ(refused(scheme_of(kind), spring(5.0)), "");
+        EXPECT_EQ(refused(scheme_of(kind), linear_model(5.0)), "");
     }
     EXPECT_EQ(refused(scheme_of(StructureKind::Direct), of_velocity()), "");
     EXPECT_EQ(refused(scheme_of(StructureKind::Direct), with_memory()), "");
@@ -94,7 +94,7 @@ TEST(Scheme, RefusalOfANumberNamesItsFieldValueAndRule) {
         const auto with = [&](auto change) {
             Scheme scheme = scheme_of(kind);
             change(scheme);
-            return refused(scheme, spring(5.0));
+            return refused(scheme, linear_model(5.0));
         };
         const auto only_if = [](bool used, const std::string& message) { return used ? message : ""; };
         EXPECT_EQ(with([](Scheme& s) { s.coupling.stiffness = 0.0; }),
@@ -118,11 +118,11 @@ TEST(Scheme, RefusesPredictionsThatItsStructureOrModelCannotUse) {
         return refused(scheme, model);
     };
     for (const int predict : {0, 1, 16}) {
-        EXPECT_EQ(with(StructureKind::Direct, spring(5.0), predict), "");
+        EXPECT_EQ(with(StructureKind::Direct, linear_model(5.0), predict), "");
     }
-    EXPECT_EQ(with(StructureKind::Direct, spring(5.0), 17), "predict is 17, must be 0 to 16");
-    EXPECT_EQ(with(StructureKind::Direct, spring(5.0), -1), "predict is -1, must be 0 to 16");
-    EXPECT_EQ(with(StructureKind::Massless, spring(5.0), 1),
+    EXPECT_EQ(with(StructureKind::Direct, linear_model(5.0), 17), "predict is 17, must be 0 to 16");
+    EXPECT_EQ(with(StructureKind::Direct, linear_model(5.0), -1), "predict is -1, must be 0 to 16");
+    EXPECT_EQ(with(StructureKind::Massless, linear_model(5.0), 1),
               "predict is 1, must be 0 for the structure massless");
     EXPECT_EQ(with(StructureKind::Direct, of_velocity(), 1),
               "predict is 1, must be 0 for a force of position and velocity");
@@ -142,19 +142,19 @@ TEST(Scheme, NeedsAPlayRadiusForHysteresis) {
 TEST(Scheme, RefusesACompensationThatIsNotPossible) {
     Scheme scheme;
     scheme.compensated = true;
-    EXPECT_EQ(refused(scheme, spring(89.9)), "");
+    EXPECT_EQ(refused(scheme, linear_model(89.9)), "");
     EXPECT_EQ(
-        refused(scheme, spring(92.0)),
+        refused(scheme, linear_model(92.0)),
         "coupling_stiffness is 100, must be at least 102.2 to compensate a model whose steepest slope is "
         "92");
     EXPECT_EQ(refused(scheme, lossy(5.0, 0.1, 0.01)),
               "compensated is set for a hysteresis model, whose slope has no bound while it sticks");
-    EXPECT_EQ(refused(scheme, spring(-89.9)), "");
-    EXPECT_NE(refused(scheme, spring(-92.0)), "") << "outside the domain its force rises by as much";
+    EXPECT_EQ(refused(scheme, linear_model(-89.9)), "");
+    EXPECT_NE(refused(scheme, linear_model(-92.0)), "") << "outside the domain its force rises by as much";
     scheme.coupling.stiffness = 0.5;
-    EXPECT_EQ(refused(scheme, spring(0.4)), "");
+    EXPECT_EQ(refused(scheme, linear_model(0.4)), "");
     scheme.structure = StructureKind::Direct;
-    EXPECT_EQ(refused(scheme, spring(0.1)),
+    EXPECT_EQ(refused(scheme, linear_model(0.1)),
               "compensated is set for the direct structure, which has no coupling");
 }
 
@@ -180,21 +180,21 @@ TEST(Scheme, CompensationIsRefusedExactlyBeyondTheCertifiedSlope) {
 
 TEST(Scheme, SteepestSlopeIsThatOfTheRenderedForce) {
     Scheme scheme;
-    EXPECT_NEAR(steepest_slope(scheme, spring(45.0)), 45.0, 1e-9);
-    EXPECT_NEAR(steepest_slope(scheme, spring(-45.0)), 45.0, 1e-9) << "of its continuation";
+    EXPECT_NEAR(steepest_slope(scheme, linear_model(45.0)), 45.0, 1e-9);
+    EXPECT_NEAR(steepest_slope(scheme, linear_model(-45.0)), 45.0, 1e-9) << "of its continuation";
     EXPECT_NEAR(steepest_slope(scheme, lossy(5.0, 0.1, 0.02)), 5.0 + 5.0, 1e-6);
     scheme.play_radius = 0.05;
     EXPECT_NEAR(steepest_slope(scheme, lossy(5.0, 0.1, 0.02)), 5.0 + 2.0, 1e-6) << "of the scheme";
     EXPECT_NEAR(steepest_slope(scheme, lossy(5.0, 0.1, {})), 5.0 + 2.0, 1e-6);
     scheme = {};
     scheme.compensated = true;
-    EXPECT_NEAR(steepest_slope(scheme, spring(80.0)), 400.0, 1e-6) << "1/80 - 1/100 = 1/400";
+    EXPECT_NEAR(steepest_slope(scheme, linear_model(80.0)), 400.0, 1e-6) << "1/80 - 1/100 = 1/400";
 }
 
 TEST(Scheme, RefusalOfADivergingSchemeNamesItsLimit) {
     Scheme scheme = scheme_of(StructureKind::Explicit);
     const auto at = [&](double stiffness) {
-        return refusal([&] { validate(scheme, spring(stiffness), period); });
+        return refusal([&] { validate(scheme, linear_model(stiffness), scheme_period); });
     };
     // (4 m - 2 (B_o + B_c) T) / T^2 - K_c = (0.004 - 0.00104) / 1e-6 - 100
     EXPECT_EQ(at(2859.0), "");
@@ -202,7 +202,8 @@ TEST(Scheme, RefusalOfADivergingSchemeNamesItsLimit) {
         at(2861.0),
         "structure is explicit, which diverges: the model's steepest slope is 2861, must be below 2860; "
         "the implicit structure has no such limit");
-    EXPECT_NE(refusal([&] { validate(scheme, lossy(5.0, 0.1, {}), period); }), "") << "also the other rules";
+    EXPECT_NE(refusal([&] { validate(scheme, lossy(5.0, 0.1, {}), scheme_period); }), "")
+        << "also the other rules";
 }
 
 /// Calls `visit` with the structure of a scheme for an exact environment, without tables.
@@ -213,15 +214,16 @@ auto exact(const E& environment, const Scheme& scheme, double force_limit, doubl
             return scheme.predict > 0 ? visit(PredictedDirect{environment, scheme.predict})
                                       : visit(Direct{environment});
         case StructureKind::Massless:
-            return visit(Massless{LimitedEnvironment{environment, force_limit}, scheme.coupling, period,
-                                  LimitedResolvent{LoadLineSolver{}}});
+            return visit(Massless{LimitedEnvironment{environment, force_limit}, scheme.coupling,
+                                  scheme_period, LimitedResolvent{LoadLineSolver{}}});
         case StructureKind::Implicit:
-            return visit(Implicit<E>{environment, scheme.inertia, scheme.coupling, period, {}, force_limit});
+            return visit(
+                Implicit<E>{environment, scheme.inertia, scheme.coupling, scheme_period, {}, force_limit});
         case StructureKind::Explicit:
-            return visit(Explicit{environment, scheme.inertia, scheme.coupling, period});
+            return visit(Explicit{environment, scheme.inertia, scheme.coupling, scheme_period});
         case StructureKind::EnergyConsistent:
-            return visit(EnergyConsistent{environment, scheme.inertia, scheme.coupling, period, 1e-2 * width,
-                                          true, force_limit});
+            return visit(EnergyConsistent{environment, scheme.inertia, scheme.coupling, scheme_period,
+                                          1e-2 * width, true, force_limit});
     }
 }
 
@@ -265,7 +267,7 @@ TEST(Scheme, PreparedStructureGivesTheForcesOfTheExactModel) {
                                      const std::string& name) {
                 exact(environment, chosen, limit, model.finest_width(), [&](auto reference) {
                     limited +=
-                        expect_equal_forces(make_structure(model, chosen, period, limit),
+                        expect_equal_forces(make_structure(model, chosen, scheme_period, limit),
                                             std::move(reference), std::string(structure_names[k]) + name);
                 });
             };
@@ -298,7 +300,7 @@ TEST(Scheme, PreparedStructureGivesTheForcesOfTheExactModel) {
 
 TEST(Scheme, StructureOfARefusedSchemeIsNotBuilt) {
     Scheme scheme = scheme_of(StructureKind::Direct);
-    const auto build = [&] { (void)make_structure(spring(5.0), scheme, period, infinity); };
+    const auto build = [&] { (void)make_structure(linear_model(5.0), scheme, scheme_period, infinity); };
     EXPECT_EQ(refusal(build), "");
     scheme.predict = 17;
     EXPECT_EQ(refusal(build), "predict is 17, must be 0 to 16");
@@ -307,14 +309,15 @@ TEST(Scheme, StructureOfARefusedSchemeIsNotBuilt) {
 TEST(Scheme, NamesTheSolverOfItsLoadLine) {
     test::Random random{2};
     const ForceModel model{{1, {4.0, 9.0}, {0.5, 0.2}, {0.2, 0.05}, {8.0}, 0.1}, test::unit_domain()};
-    EXPECT_EQ(solver_name(model, scheme_of(StructureKind::Direct), period), std::nullopt);
-    EXPECT_EQ(solver_name(model, scheme_of(StructureKind::Explicit), period), std::nullopt);
+    EXPECT_EQ(solver_name(model, scheme_of(StructureKind::Direct), scheme_period), std::nullopt);
+    EXPECT_EQ(solver_name(model, scheme_of(StructureKind::Explicit), scheme_period), std::nullopt);
     for (const StructureKind kind :
          {StructureKind::Massless, StructureKind::Implicit, StructureKind::EnergyConsistent}) {
-        EXPECT_EQ(solver_name(model, scheme_of(kind), period), "table") << name_of(kind);
+        EXPECT_EQ(solver_name(model, scheme_of(kind), scheme_period), "table") << name_of(kind);
     }
     // The force falls with slope -8000 at each position, so no load line of this scheme has exactly one solution
-    EXPECT_EQ(solver_name(spring(-8000.0), scheme_of(StructureKind::Massless), period), "newton");
+    EXPECT_EQ(solver_name(linear_model(-8000.0), scheme_of(StructureKind::Massless), scheme_period),
+              "newton");
 }
 
 }  // namespace

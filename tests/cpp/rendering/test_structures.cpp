@@ -31,8 +31,8 @@ namespace {
 using test::ClickAndWall;
 using test::Spring;
 
-constexpr double period = 1e-3;
-constexpr VirtualCoupling coupling{100.0, 0.02};
+constexpr double step_period = 1e-3;
+constexpr VirtualCoupling stiff_coupling{100.0, 0.02};
 
 struct ForceError {
     /// RMS of rendered force minus model force at the handle position at the end of the tick
@@ -76,35 +76,39 @@ TEST(Scene, Direct) {
 // RMS force error of massless, compensated rendering: 0.00362 N*m at the end of the tick, 0.00037 N*m
 // at the sample
 TEST(Scene, MasslessCompensated) {
-    const VirtualCoupling softer_damper{coupling.stiffness, 0.005};
-    const Compensated<ClickAndWall> object{ClickAndWall{}, coupling.stiffness};
-    expect_within_5_percent(force_error(Massless{object, softer_damper, period}), 0.00362, 0.00037);
+    const VirtualCoupling softer_damper{stiff_coupling.stiffness, 0.005};
+    const Compensated<ClickAndWall> object{ClickAndWall{}, stiff_coupling.stiffness};
+    expect_within_5_percent(force_error(Massless{object, softer_damper, step_period}), 0.00362, 0.00037);
 }
 
 // RMS force error of massless rendering: 0.1202 N*m at the end of the tick, 0.1202 N*m at the sample
 TEST(Scene, Massless) {
-    expect_within_5_percent(force_error(Massless{ClickAndWall{}, coupling, period}), 0.1202, 0.1202);
+    expect_within_5_percent(force_error(Massless{ClickAndWall{}, stiff_coupling, step_period}), 0.1202,
+                            0.1202);
 }
 
 // RMS force error of the implicit structure with m = 0.001, B_o = 0: 0.1231 N*m at the end of the
 // tick, 0.1227 N*m at the sample
 TEST(Scene, ImplicitUndamped) {
-    expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.0}, coupling, period}),
-                            0.1231, 0.1227);
+    expect_within_5_percent(
+        force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.0}, stiff_coupling, step_period}), 0.1231,
+        0.1227);
 }
 
 // RMS force error of the implicit structure with m = 0.001, B_o = 0.5: 0.2530 N*m at the end of the
 // tick, 0.2532 N*m at the sample
 TEST(Scene, ImplicitDamped) {
-    expect_within_5_percent(force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}),
-                            0.2530, 0.2532);
+    expect_within_5_percent(
+        force_error(Implicit{ClickAndWall{}, Inertia{0.001, 0.5}, stiff_coupling, step_period}), 0.2530,
+        0.2532);
 }
 
 // RMS force error of the explicit structure with m = 0.001, B_o = 0.5: 0.2530 N*m at the end of the
 // tick, 0.2532 N*m at the sample
 TEST(Scene, ExplicitDamped) {
-    expect_within_5_percent(force_error(Explicit{ClickAndWall{}, Inertia{0.001, 0.5}, coupling, period}),
-                            0.2530, 0.2532);
+    expect_within_5_percent(
+        force_error(Explicit{ClickAndWall{}, Inertia{0.001, 0.5}, stiff_coupling, step_period}), 0.2530,
+        0.2532);
 }
 
 /// Returns the largest object position |y| in the last tenth of a free motion, divided by the largest |y| in the first
@@ -130,7 +134,7 @@ double growth(S structure, int ticks) {
 // m = 0.001, B_o = 0.5"
 TEST(ExplicitLimit, IsThreeThousandForThePapersMassAndDamping) {
     const auto free_motion = [](double stiffness) {
-        return growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.5}, coupling, period}, 4000);
+        return growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.5}, stiff_coupling, step_period}, 4000);
     };
     EXPECT_LT(free_motion(2990.0), 0.1);
     EXPECT_GT(free_motion(3010.0), 10.0);
@@ -141,24 +145,24 @@ TEST(ExplicitLimit, IsThreeThousandForThePapersMassAndDamping) {
 TEST(ExplicitLimit, UndampedOscillationKeepsItsAmplitude) {
     for (const double stiffness : {10.0, 400.0, 2000.0, 3900.0}) {
         const double ratio =
-            growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.0}, coupling, period}, 20'000);
+            growth(Explicit{Spring{stiffness}, Inertia{0.001, 0.0}, stiff_coupling, step_period}, 20'000);
         EXPECT_NEAR(ratio, 1.0, 0.01) << stiffness;
     }
-    EXPECT_GT(growth(Explicit{Spring{4010.0}, Inertia{0.001, 0.0}, coupling, period}, 4000), 10.0);
+    EXPECT_GT(growth(Explicit{Spring{4010.0}, Inertia{0.001, 0.0}, stiff_coupling, step_period}, 4000), 10.0);
 }
 
 // With a virtual coupling and a handle that does not move, the explicit structure is stable for the object stiffness K
 // if K + K_c < (4m - 2(B_o + B_c)T)/T^2.
 TEST(ExplicitLimit, IncludesTheCoupling) {
     const auto held = [](double stiffness) {
-        Explicit structure{Spring{stiffness}, Inertia{0.001, 0.5}, coupling, period};
+        Explicit structure{Spring{stiffness}, Inertia{0.001, 0.5}, stiff_coupling, step_period};
         double last = 0.0;
         for (int k = 0; k < 6000; ++k) {
             last = std::abs(structure.step(k < 5 ? 0.01 : 0.0).environment_position);
         }
         return last;
     };
-    const double limit = explicit_slope_limit({0.001, 0.5}, coupling, period);
+    const double limit = explicit_slope_limit({0.001, 0.5}, stiff_coupling, step_period);
     EXPECT_NEAR(limit, 2860.0, 1e-9);
     EXPECT_LT(held(0.99 * limit), 1e-3);
     EXPECT_GT(held(1.01 * limit), 1.0);
@@ -168,8 +172,8 @@ TEST(ExplicitLimit, IncludesTheCoupling) {
 TEST(Implicit, IsStableAtAMillion) {
     for (const double stiffness : {0.1, 3000.0, 1e6}) {
         for (const double damping : {0.0, 0.5}) {
-            const double ratio =
-                growth(Implicit{Spring{stiffness}, Inertia{0.001, damping}, coupling, period}, 20'000);
+            const double ratio = growth(
+                Implicit{Spring{stiffness}, Inertia{0.001, damping}, stiff_coupling, step_period}, 20'000);
             EXPECT_LE(ratio, 1.0) << stiffness << " " << damping;
         }
     }
@@ -179,10 +183,10 @@ TEST(Implicit, IsStableAtAMillion) {
 // x_{k-1} - x_{k-2} + (T^2/m) F_k
 TEST(Implicit, SolvesThePapersEquation) {
     const ClickAndWall object;
-    Implicit structure{object, Inertia{0.001, 0.0}, coupling, period};
+    Implicit structure{object, Inertia{0.001, 0.0}, stiff_coupling, step_period};
     double before = 0.0;
     double last = 0.0;
-    const double scale = period * period / 0.001;
+    const double scale = step_period * step_period / 0.001;
     for (int k = 0; k < 500; ++k) {
         const double force = 1.0 + std::sin(0.02 * k);
         const double x = structure.drive(force).environment_position;
@@ -194,15 +198,15 @@ TEST(Implicit, SolvesThePapersEquation) {
 
 TEST(Massless, BalancesTheCouplingAtEveryTick) {
     const ClickAndWall object;
-    Massless structure{object, coupling, period};
+    Massless structure{object, stiff_coupling, step_period};
     double device = 0.0;
     double position = 0.0;
     for (int k = 0; k < 500; ++k) {
         const double x = 0.2 * (1.0 - std::cos(0.01 * k));
         const Rendered rendered = structure.step(x);
         const double y = rendered.environment_position;
-        const double velocity_error = ((x - device) - (y - position)) / period;
-        EXPECT_NEAR(rendered.force, coupling.force(x - y, velocity_error), 1e-9);
+        const double velocity_error = ((x - device) - (y - position)) / step_period;
+        EXPECT_NEAR(rendered.force, stiff_coupling.force(x - y, velocity_error), 1e-9);
         EXPECT_NEAR(rendered.force, object.at(y, {}).force, 1e-12);
         device = x;
         position = y;
@@ -285,10 +289,10 @@ TEST(ForceLimit, InsideTheStepPreventsEnergyFromAThrownMass) {
     const VirtualCoupling spring{90.0, 0.0};
     constexpr double none = std::numeric_limits<double>::infinity();
     const auto implicit = [&](double limit) {
-        return Implicit<Spring>{Spring{0.0}, mass, spring, period, {}, limit, {}};
+        return Implicit<Spring>{Spring{0.0}, mass, spring, step_period, {}, limit, {}};
     };
     const auto consistent = [&](double limit) {
-        return EnergyConsistent{Spring{0.0}, mass, spring, period, 1e-4, true, limit};
+        return EnergyConsistent{Spring{0.0}, mass, spring, step_period, 1e-4, true, limit};
     };
     EXPECT_LT(work_of_a_throw(implicit(none), 5.0), -1.9) << "clipped outside the step";
     EXPECT_LT(work_of_a_throw(consistent(none), 5.0), -1.9) << "clipped outside the step";
@@ -346,7 +350,8 @@ int limited_steps(S structure, double limit, VirtualCoupling spring, test::Rando
         const Rendered now = structure.step(x + moved);
         const double spread = x + moved - now.environment_position;
         const double coupling_force =
-            spring.stiffness * spread + spring.damping / period * (u - (now.environment_position - 2.0 * y));
+            spring.stiffness * spread +
+            spring.damping / step_period * (u - (now.environment_position - 2.0 * y));
         EXPECT_NEAR(now.force, std::clamp(coupling_force, -limit, limit), 1e-8);
         EXPECT_NEAR(residual(now.environment_position, now.force), 0.0, 1e-8);
         EXPECT_EQ(now.status, std::abs(coupling_force) > limit ? Status::Limited : Status::Ok);
@@ -362,32 +367,33 @@ TEST(ForceLimit, GivesObjectAndDeviceTheSameForce) {
     const ClickAndWall object;
     const VirtualCoupling spring{100.0, 0.02};
     const Inertia mass{0.01, 0.05};
-    const double inertial = mass.mass / period / period;
+    const double inertial = mass.mass / step_period / step_period;
     constexpr double limit = 8.0;
     double last = 0.2;
     double before = 0.2;
-    const int limited = limited_steps(Implicit<ClickAndWall>{object, mass, spring, period, {}, limit, {}},
-                                      limit, spring, random, [&](double y, double force) {
-                                          const double own = inertial * (y - 2.0 * last + before) +
-                                                             mass.damping / period * (y - last) +
-                                                             object.at(y, {}).force;
-                                          before = std::exchange(last, y);
-                                          return own - force;
-                                      });
+    const int limited =
+        limited_steps(Implicit<ClickAndWall>{object, mass, spring, step_period, {}, limit, {}}, limit, spring,
+                      random, [&](double y, double force) {
+                          const double own = inertial * (y - 2.0 * last + before) +
+                                             mass.damping / step_period * (y - last) + object.at(y, {}).force;
+                          before = std::exchange(last, y);
+                          return own - force;
+                      });
     EXPECT_GT(limited, 100);
     EXPECT_LT(limited, 380);
     double velocity = 0.0;
     last = 0.2;
     const Spring linear{40.0};
-    EXPECT_GT(limited_steps(
-                  EnergyConsistent{linear, mass, spring, period, 1e-4, false, limit}, limit, spring, random,
-                  [&](double y, double force) {
-                      const double own = 2.0 * mass.mass / period * ((y - last) / period - velocity) +
-                                         mass.damping / period * (y - last) + 20.0 * (y + last);
-                      velocity = 2.0 * (y - last) / period - velocity;
-                      last = y;
-                      return own - force;
-                  }),
+    EXPECT_GT(limited_steps(EnergyConsistent{linear, mass, spring, step_period, 1e-4, false, limit}, limit,
+                            spring, random,
+                            [&](double y, double force) {
+                                const double own =
+                                    2.0 * mass.mass / step_period * ((y - last) / step_period - velocity) +
+                                    mass.damping / step_period * (y - last) + 20.0 * (y + last);
+                                velocity = 2.0 * (y - last) / step_period - velocity;
+                                last = y;
+                                return own - force;
+                            }),
               100);
 }
 
@@ -395,15 +401,16 @@ TEST(ForceLimit, OfAMasslessObjectLimitsItsForce) {
     const ClickAndWall object;
     constexpr double limit = 1.0;
     using Limited = LimitedEnvironment<ClickAndWall>;
-    Massless structure{Limited{object, limit}, coupling, period, LimitedResolvent{LoadLineSolver{}}};
+    Massless structure{Limited{object, limit}, stiff_coupling, step_period,
+                       LimitedResolvent{LoadLineSolver{}}};
     double device = 0.0;
     double position = 0.0;
     for (int k = 0; k < 500; ++k) {
         const double x = 0.3 * (1.0 - std::cos(0.01 * k));
         const Rendered rendered = structure.step(x);
         const double y = rendered.environment_position;
-        const double velocity_error = ((x - device) - (y - position)) / period;
-        EXPECT_NEAR(rendered.force, coupling.force(x - y, velocity_error), 1e-9);
+        const double velocity_error = ((x - device) - (y - position)) / step_period;
+        EXPECT_NEAR(rendered.force, stiff_coupling.force(x - y, velocity_error), 1e-9);
         EXPECT_NEAR(rendered.force, std::min(limit, object.at(y, {}).force), 1e-12);
         EXPECT_EQ(rendered.status, object.at(y, {}).force > limit ? Status::Limited : Status::Ok) << k;
         device = x;
@@ -455,9 +462,9 @@ void expect_zero_force_without_a_trace(S structure, const std::string& name) {
 TEST(Structure, NanGivesZeroForceAndTheNextStepContinues) {
     const ClickAndWall object;
     expect_zero_force_without_a_trace(Direct{object}, "direct");
-    expect_zero_force_without_a_trace(Massless{object, coupling, period}, "massless");
-    expect_zero_force_without_a_trace(Implicit{object, Inertia{}, coupling, period}, "implicit");
-    expect_zero_force_without_a_trace(Explicit{object, Inertia{}, coupling, period}, "explicit");
+    expect_zero_force_without_a_trace(Massless{object, stiff_coupling, step_period}, "massless");
+    expect_zero_force_without_a_trace(Implicit{object, Inertia{}, stiff_coupling, step_period}, "implicit");
+    expect_zero_force_without_a_trace(Explicit{object, Inertia{}, stiff_coupling, step_period}, "explicit");
 }
 
 ForceModel spring_model(double stiffness) {
@@ -523,7 +530,7 @@ TEST(Structure, ExtremePositionsGiveAFiniteForceOrAreRefused) {
     const ForceModel both{gentle, {{0.1}, 0.0, 0.4}, test::unit_domain(), 0.01};
     const auto check = [](const ForceModel& model, const Scheme& scheme, const std::string& name) {
         for (const double limit : {5.0, std::numeric_limits<double>::infinity()}) {
-            AnyStructure structure = make_structure(model, scheme, period, limit);
+            AnyStructure structure = make_structure(model, scheme, step_period, limit);
             structure.reset(0.2);
             (void)structure.step(0.2);
             (void)structure.step(0.205);
@@ -559,13 +566,13 @@ TEST(Structure, StartsAtRestAtTheDevicePosition) {
         EXPECT_LE(std::abs(first.force), std::abs(object.at(0.3, {}).force) + 1e-9) << name;
     };
     expect_at_rest(Direct{object}, "direct");
-    expect_at_rest(Massless{object, coupling, period}, "massless");
-    expect_at_rest(Implicit{object, Inertia{}, coupling, period}, "implicit");
-    expect_at_rest(Explicit{object, Inertia{}, coupling, period}, "explicit");
+    expect_at_rest(Massless{object, stiff_coupling, step_period}, "massless");
+    expect_at_rest(Implicit{object, Inertia{}, stiff_coupling, step_period}, "implicit");
+    expect_at_rest(Explicit{object, Inertia{}, stiff_coupling, step_period}, "explicit");
 }
 
 TEST(DirectVelocity, ComputesTheVelocityFromTheLastTwoPositions) {
-    DirectVelocity structure{*dashpot_model().velocity(), period};
+    DirectVelocity structure{*dashpot_model().velocity(), step_period};
     structure.reset(0.3);
     EXPECT_NEAR(structure.step(0.3).force, 1.5, 1e-12) << "the object rests under the device";
     EXPECT_NEAR(structure.step(0.3005).force, 1.5025 + 0.2 * 0.5, 1e-9);
@@ -615,7 +622,7 @@ TEST(Scheme, RefusesSchemesThatCannotBeRendered) {
     scheme.coupling.stiffness = 0.0;
     EXPECT_THROW((void)simulate(spring_model(5.0), scheme, {}, {}, 10), std::invalid_argument);
     scheme = {};
-    EXPECT_THROW((void)force_driven(spring_model(5.0), scheme, {}, period, 0.0), std::invalid_argument);
+    EXPECT_THROW((void)force_driven(spring_model(5.0), scheme, {}, step_period, 0.0), std::invalid_argument);
     EXPECT_THROW((void)named<StructureKind>("implied", "structure"), std::invalid_argument);
     const ForceModel loose{
         NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
@@ -626,32 +633,32 @@ TEST(Scheme, IsRefusedAtAPeriodAtWhichItDiverges) {
     Scheme scheme;
     scheme.structure = StructureKind::Explicit;
     scheme.inertia = {0.001, 0.5};
-    EXPECT_NO_THROW(validate(scheme, spring_model(2859.0), period));
-    EXPECT_THROW(validate(scheme, spring_model(2861.0), period), std::invalid_argument);
-    EXPECT_NO_THROW(validate(scheme, spring_model(2861.0), 0.5 * period));
+    EXPECT_NO_THROW(validate(scheme, spring_model(2859.0), step_period));
+    EXPECT_THROW(validate(scheme, spring_model(2861.0), step_period), std::invalid_argument);
+    EXPECT_NO_THROW(validate(scheme, spring_model(2861.0), 0.5 * step_period));
     EXPECT_NO_THROW(validate(scheme, spring_model(2861.0)));
     scheme.structure = StructureKind::Implicit;
-    EXPECT_NO_THROW(validate(scheme, spring_model(1e6), period));
+    EXPECT_NO_THROW(validate(scheme, spring_model(1e6), step_period));
 
     // Every function that renders a scheme must check that the scheme is valid, not only the function that reads the
     // name of the structure.
     scheme.structure = StructureKind::Explicit;
     EXPECT_THROW((void)simulate(spring_model(2861.0), scheme, {}, {}, 10), std::invalid_argument);
-    EXPECT_THROW((void)motion_driven(spring_model(2861.0), scheme, {}, period), std::invalid_argument);
+    EXPECT_THROW((void)motion_driven(spring_model(2861.0), scheme, {}, step_period), std::invalid_argument);
 
     // While the play operator does not move, hysteresis over play radius, h / r, is part of the slope.
     const ForceModel both{
         NetworkParameters{1, {}, {}, {}, {5.0}, 0.0}, {{}, 0.0, 0.1}, test::unit_domain(), {}};
     scheme.play_radius = 1e-4;
-    EXPECT_NO_THROW(validate(scheme, both, period));
+    EXPECT_NO_THROW(validate(scheme, both, step_period));
     scheme.play_radius = 3e-5;
-    EXPECT_THROW(validate(scheme, both, period), std::invalid_argument);
+    EXPECT_THROW(validate(scheme, both, step_period), std::invalid_argument);
 
     // A compensated model with the slope 45 N*m/rad behind a coupling of 50 N*m/rad is ten times steeper: 450 N*m/rad.
     scheme = {StructureKind::Explicit, {50.0, 0.0}, {2e-4, 0.15}, true, 0.0};
     EXPECT_NEAR(steepest_slope(scheme, spring_model(45.0)), 450.0, 1e-9);
-    EXPECT_NO_THROW(validate(scheme, spring_model(40.0), period));
-    EXPECT_THROW(validate(scheme, spring_model(45.0), period), std::invalid_argument);
+    EXPECT_NO_THROW(validate(scheme, spring_model(40.0), step_period));
+    EXPECT_THROW(validate(scheme, spring_model(45.0), step_period), std::invalid_argument);
 }
 
 TEST(Scheme, SlopeBoundsOfAHysteresisModelIncludeSticking) {
@@ -669,7 +676,7 @@ TEST(Scheme, RendersHysteresisWithItsPlayRadius) {
     scheme.structure = StructureKind::Direct;
     scheme.play_radius = 0.005;
     const std::array<double, 4> motion{0.1, 0.5, 0.499, 0.1};
-    const auto rendered = motion_driven(both, scheme, motion, period);
+    const auto rendered = motion_driven(both, scheme, motion, step_period);
     EXPECT_NEAR(rendered[0].force, 0.5, 1e-12);
     EXPECT_NEAR(rendered[1].force, 2.5 + 0.2, 1e-12);
     EXPECT_NEAR(rendered[2].force, 2.495 + 0.2 * (1.0 - 0.001 / 0.005), 1e-12);
@@ -775,11 +782,12 @@ TEST(Structure, MarksPositionsOfTheObjectOutsideTheDomain) {
     };
     expect_marked(Direct{HalfSpring{}}, "direct");
     expect_marked(PredictedDirect{HalfSpring{}, 2}, "predicted");
-    expect_marked(Massless{HalfSpring{}, coupling, period}, "massless");
-    expect_marked(Implicit{HalfSpring{}, Inertia{}, coupling, period}, "implicit");
-    expect_marked(Explicit{HalfSpring{}, Inertia{}, coupling, period}, "explicit");
-    expect_marked(EnergyConsistent{HalfSpring{}, Inertia{}, coupling, period}, "energy-consistent");
-    expect_marked(Massless{Compensated{HalfSpring{}, 100.0}, coupling, period}, "compensated");
+    expect_marked(Massless{HalfSpring{}, stiff_coupling, step_period}, "massless");
+    expect_marked(Implicit{HalfSpring{}, Inertia{}, stiff_coupling, step_period}, "implicit");
+    expect_marked(Explicit{HalfSpring{}, Inertia{}, stiff_coupling, step_period}, "explicit");
+    expect_marked(EnergyConsistent{HalfSpring{}, Inertia{}, stiff_coupling, step_period},
+                  "energy-consistent");
+    expect_marked(Massless{Compensated{HalfSpring{}, 100.0}, stiff_coupling, step_period}, "compensated");
 }
 
 TEST(Structure, DirectNeedsOneEvaluationAndStatesItsPosition) {
@@ -788,7 +796,7 @@ TEST(Structure, DirectNeedsOneEvaluationAndStatesItsPosition) {
     DirectVelocity velocity{
         *ForceModel::of_velocity({2, {}, {}, {}, {5.0, 0.2}, 0.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}})
              .velocity(),
-        period};
+        step_period};
     const auto expect_one = [](auto& structure) {
         structure.reset(0.5);
         const Rendered rendered = structure.step(0.5);
@@ -828,10 +836,10 @@ TEST(Structure, PositionThatIsNotFiniteIsRefusedAlsoIfTheForceIsFinite) {
     };
     expect_refused(Direct{ConstantForce{}});
     expect_refused(PredictedDirect{ConstantForce{}, 3});
-    expect_refused(Massless{ConstantForce{}, coupling, period});
-    expect_refused(Implicit{ConstantForce{}, Inertia{}, coupling, period});
-    expect_refused(Explicit{ConstantForce{}, Inertia{}, coupling, period});
-    expect_refused(EnergyConsistent{ConstantForce{}, Inertia{}, coupling, period});
+    expect_refused(Massless{ConstantForce{}, stiff_coupling, step_period});
+    expect_refused(Implicit{ConstantForce{}, Inertia{}, stiff_coupling, step_period});
+    expect_refused(Explicit{ConstantForce{}, Inertia{}, stiff_coupling, step_period});
+    expect_refused(EnergyConsistent{ConstantForce{}, Inertia{}, stiff_coupling, step_period});
 }
 
 // An infinite force on the object is refused, and the step after it is that of an object that was never pushed.
@@ -850,9 +858,9 @@ TEST(Structure, DriveWithAForceThatIsNotFiniteIsRefused) {
             EXPECT_EQ(now.evaluations, expected.evaluations) << "the search starts at the same position";
         }
     };
-    expect_refused(Implicit{test::Hardening{}, test::inertia, test::coupling, period});
-    expect_refused(Explicit{test::Hardening{}, test::inertia, test::coupling, period});
-    expect_refused(EnergyConsistent{test::Hardening{}, test::inertia, test::coupling, period});
+    expect_refused(Implicit{test::Hardening{}, test::inertia, test::coupling, step_period});
+    expect_refused(Explicit{test::Hardening{}, test::inertia, test::coupling, step_period});
+    expect_refused(EnergyConsistent{test::Hardening{}, test::inertia, test::coupling, step_period});
 }
 
 TEST(Structure, ResetForgetsTheMotionBefore) {
@@ -880,10 +888,10 @@ TEST(Structure, ResetForgetsTheMotionBefore) {
         }
     };
     expect_forgotten(Direct{object});
-    expect_forgotten(Massless{object, coupling, period});
-    expect_forgotten(Implicit{object, Inertia{}, coupling, period});
-    expect_forgotten(Explicit{object, Inertia{}, coupling, period});
-    expect_forgotten(EnergyConsistent{object, Inertia{}, coupling, period});
+    expect_forgotten(Massless{object, stiff_coupling, step_period});
+    expect_forgotten(Implicit{object, Inertia{}, stiff_coupling, step_period});
+    expect_forgotten(Explicit{object, Inertia{}, stiff_coupling, step_period});
+    expect_forgotten(EnergyConsistent{object, Inertia{}, stiff_coupling, step_period});
 }
 
 /// Object whose force depends on its last position, f = 20 x + 4 (x - last).
@@ -915,7 +923,7 @@ TEST(Structure, StateOfTheObjectFollowsItsPosition) {
             x = x1 + test::uniform(random, -0.05, 0.05);
             const Rendered now = structure.step(x);
             EXPECT_NEAR(residual(now.environment_position, now.force), 0.0, 1e-9) << name << " " << k;
-            speed1 = 2.0 * (now.environment_position - y1) / period - speed1;
+            speed1 = 2.0 * (now.environment_position - y1) / step_period - speed1;
             y2 = std::exchange(y1, now.environment_position);
             x1 = x;
             force1 = now.force;
@@ -927,28 +935,28 @@ TEST(Structure, StateOfTheObjectFollowsItsPosition) {
         PredictedDirect{Dragging{}, 1},
         [&](double, double force) { return force - f(x + 0.5 * (x - x1), x); }, "predicted");
     check(
-        Massless{Dragging{}, coupling, period}, [&](double y, double force) { return force - f(y, y1); },
-        "massless");
+        Massless{Dragging{}, stiff_coupling, step_period},
+        [&](double y, double force) { return force - f(y, y1); }, "massless");
     check(
-        Implicit{Dragging{}, mass, coupling, period},
+        Implicit{Dragging{}, mass, stiff_coupling, step_period},
         [&](double y, double force) {
-            return mass.mass * (y - 2.0 * y1 + y2) / (period * period) + mass.damping * (y - y1) / period +
-                   f(y, y1) - force;
+            return mass.mass * (y - 2.0 * y1 + y2) / (step_period * step_period) +
+                   mass.damping * (y - y1) / step_period + f(y, y1) - force;
         },
         "implicit");
     check(
-        Explicit{Dragging{}, mass, coupling, period},
+        Explicit{Dragging{}, mass, stiff_coupling, step_period},
         [&](double y, double force) {
-            EXPECT_NEAR(force, coupling.force(x - y, (x - x1 - (y - y1)) / period), 1e-9);
-            return mass.mass * (y - 2.0 * y1 + y2) / (period * period) + mass.damping * (y1 - y2) / period +
-                   f(y1, y1) - force1;
+            EXPECT_NEAR(force, stiff_coupling.force(x - y, (x - x1 - (y - y1)) / step_period), 1e-9);
+            return mass.mass * (y - 2.0 * y1 + y2) / (step_period * step_period) +
+                   mass.damping * (y1 - y2) / step_period + f(y1, y1) - force1;
         },
         "explicit");
     check(
-        EnergyConsistent{Dragging{}, mass, coupling, period, 0.0, false},
+        EnergyConsistent{Dragging{}, mass, stiff_coupling, step_period, 0.0, false},
         [&](double y, double force) {
-            return 2.0 * mass.mass / period * ((y - y1) / period - speed1) +
-                   mass.damping * (y - y1) / period + 12.0 * (y + y1) - 4.0 * y1 - force;
+            return 2.0 * mass.mass / step_period * ((y - y1) / step_period - speed1) +
+                   mass.damping * (y - y1) / step_period + 12.0 * (y + y1) - 4.0 * y1 - force;
         },
         "energy-consistent");
 }
@@ -965,15 +973,15 @@ TEST(Structure, ForceThatIsNotFiniteIsRefused) {
     };
     expect_refused(Direct{test::BrokenBeyond{}});
     expect_refused(PredictedDirect{test::BrokenBeyond{}, 3});
-    expect_refused(Massless{test::BrokenBeyond{}, coupling, period});
-    expect_refused(Implicit{test::BrokenBeyond{}, Inertia{}, coupling, period});
-    expect_refused(Explicit{test::BrokenBeyond{}, Inertia{}, coupling, period});
-    expect_refused(EnergyConsistent{test::BrokenBeyond{}, Inertia{}, coupling, period});
+    expect_refused(Massless{test::BrokenBeyond{}, stiff_coupling, step_period});
+    expect_refused(Implicit{test::BrokenBeyond{}, Inertia{}, stiff_coupling, step_period});
+    expect_refused(Explicit{test::BrokenBeyond{}, Inertia{}, stiff_coupling, step_period});
+    expect_refused(EnergyConsistent{test::BrokenBeyond{}, Inertia{}, stiff_coupling, step_period});
 }
 
 // The load line f(y) + 0.2 y = 0 has the solutions -5, 0 and 5.
 TEST(Massless, SearchStartsAtTheResetPosition) {
-    Massless structure{PushingOut{1.0, 0.31, 100.0}, VirtualCoupling{0.2, 0.0}, period};
+    Massless structure{PushingOut{1.0, 0.31, 100.0}, VirtualCoupling{0.2, 0.0}, step_period};
     for (const double start : {6.0, -6.0}) {
         structure.reset(start);
         EXPECT_NEAR(structure.step(0.0).environment_position, std::copysign(5.0, start), 1e-9);
@@ -1018,7 +1026,7 @@ TEST(Implicit, SearchAfterAFailedLimitedStepStartsAtTheObject) {
 
 TEST(Massless, StatesThatItsSearchEndedAlsoAtTheForceLimit) {
     const auto status = [](int max_evaluations) {
-        Massless structure{LimitedEnvironment{Spring{50.0}, 1.0}, coupling, period,
+        Massless structure{LimitedEnvironment{Spring{50.0}, 1.0}, stiff_coupling, step_period,
                            LimitedResolvent{LoadLineSolver{.max_evaluations = max_evaluations}}};
         structure.reset(1.0);
         return structure.step(2.0).status;
@@ -1039,7 +1047,7 @@ TEST(DirectVelocity, PositionThatIsNotFiniteIsRefusedAlsoWithoutForce) {
         ForceModel::of_velocity({2, {}, {}, {}, {0.0, 0.0}, 1.0}, {{0.0, -1.0}, {1.0, 1.0}, {}, {}, {}});
     for (const double bad :
          {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-        DirectVelocity structure{*model.velocity(), period};
+        DirectVelocity structure{*model.velocity(), step_period};
         EXPECT_EQ(structure.step(bad).status, Status::NonFinite);
         EXPECT_EQ(structure.step(0.5).force, 1.0);
     }

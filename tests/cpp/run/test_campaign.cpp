@@ -2,13 +2,14 @@
 // Renders random models on random devices with random hands and faults, in virtual time through the real controller and
 // loop, and checks every tick (campaign.hpp, invariants.hpp):
 //
-//     build/release/tests/cpp/test_campaign --ticks=1e9 [--seed=N]
+//     PALPATE_TEST_SCALE=3400 build/release/tests/cpp/test_run --gtest_filter=Campaign.*
 //
-// A failure prints the seed of its scene; --ticks=1 --seed=N repeats this scene alone.
+// renders 1e9 ticks. A failure prints the seed of its scene; PALPATE_CAMPAIGN_SEED=N repeats this scene alone.
 #include "campaign.hpp"
 
 #include <chrono>
 #include <cstdint>
+#include <cstdlib>
 #include <iostream>
 #include <string>
 
@@ -17,10 +18,10 @@
 namespace palpate {
 namespace {
 
-double wanted_ticks = 300e3 * test::cases(1);
-std::uint64_t first_seed = 1;
-
 TEST(Campaign, EveryTickOfRandomScenesKeepsItsPromises) {
+    const char* alone = std::getenv("PALPATE_CAMPAIGN_SEED");
+    const std::uint64_t first_seed = alone == nullptr ? 1 : std::stoull(alone);
+    const double wanted_ticks = alone == nullptr ? 300e3 * test::cases(1) : 1.0;
     test::Totals totals;
     int failures = 0;
     const auto start = std::chrono::steady_clock::now();
@@ -30,7 +31,7 @@ TEST(Campaign, EveryTickOfRandomScenesKeepsItsPromises) {
         const std::string broken = test::run_scene(seed, totals);
         if (!broken.empty()) {
             ++failures;
-            ADD_FAILURE() << broken << "\nrepeat: test_campaign --ticks=1 --seed=" << seed;
+            ADD_FAILURE() << broken << "\nrepeat: PALPATE_CAMPAIGN_SEED=" << seed;
         }
         if (static_cast<double>(totals.ticks) >= next_report) {
             next_report += 1e8;
@@ -43,19 +44,3 @@ TEST(Campaign, EveryTickOfRandomScenesKeepsItsPromises) {
 
 }  // namespace
 }  // namespace palpate
-
-int main(int count, char** words) {
-    testing::InitGoogleTest(&count, words);
-    for (int k = 1; k < count; ++k) {
-        const std::string word = words[k];
-        if (word.rfind("--ticks=", 0) == 0) {
-            palpate::wanted_ticks = std::stod(word.substr(8));
-        } else if (word.rfind("--seed=", 0) == 0) {
-            palpate::first_seed = std::stoull(word.substr(7));
-        } else {
-            std::cerr << "unknown option " << word << ", must be --ticks=N or --seed=N\n";
-            return 2;
-        }
-    }
-    return RUN_ALL_TESTS();
-}

@@ -2,6 +2,7 @@
 #include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/run/controller.hpp"
+#include "special_values.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -23,8 +24,8 @@ namespace {
 
 using test::ClockFault;
 
-constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::infinity;
+using test::nan;
 
 /// A device that returns prescribed readings, some of them invalid, to test the controller.
 class ScriptedDevice {
@@ -187,7 +188,7 @@ TEST(Controller, ReportsTheFirstOfItsStatusesInTheirOrder) {
     EXPECT_NEAR(tick().command.force, 0.5, 1e-12);
     next.status = Status::Ok;
     EXPECT_EQ(tick().status, Status::Ramp);
-    guards.slew.largest_step = inf;
+    guards.slew.largest_step = infinity;
     EXPECT_NEAR(tick().command.force, 10.0 * 0.7 * 0.5 * 0.5, 1e-12);
     guards.ramp = {};
     EXPECT_EQ(tick().status, Status::EnergyLimited);
@@ -251,7 +252,7 @@ TEST(Controller, LimitsTheForceOfATickToTheGivenLimit) {
 }
 
 /// A device whose clock sets the rate, if a test chooses so.
-struct PacingDevice : ScriptedDevice {
+struct PaceByChoice : ScriptedDevice {
     bool paces = false;
     [[nodiscard]] bool sets_pace() const noexcept { return paces; }
 };
@@ -271,7 +272,7 @@ TEST(Controller, KnowsWhetherTheClockOfTheDeviceSetsTheRate) {
     EXPECT_FALSE(paced(plain));
     AlwaysPacingDevice always;
     EXPECT_TRUE(paced(always));
-    PacingDevice chosen;
+    PaceByChoice chosen;
     EXPECT_FALSE(paced(chosen));
     chosen.paces = true;
     EXPECT_TRUE(paced(chosen));
@@ -279,7 +280,7 @@ TEST(Controller, KnowsWhetherTheClockOfTheDeviceSetsTheRate) {
 
 // ------------------------------------------------------------- every state, every event, every structure
 
-constexpr double period_s = 1e-3;
+constexpr double tick_s = 1e-3;
 constexpr std::uint64_t tolerated = 3;
 
 GuardSettings guard_settings(bool certified) {
@@ -296,7 +297,7 @@ GuardSettings guard_settings(bool certified) {
 }
 
 /// Largest change of position that is not a jump.
-const double largest_step = guard_settings(false).largest_speed * period_s;
+const double largest_step = guard_settings(false).largest_speed * tick_s;
 
 /// A reading that follows the last valid one, or a disturbance of the clock, with the answer in a healthy state.
 struct Event {
@@ -322,8 +323,8 @@ const std::vector<Event> events{
     {"far", Status::Jump, 0.0, 1e3},
     {"largest number", Status::Jump, 0.0, std::numeric_limits<double>::max()},
     {"NaN", Status::NonFinite, 0.0, nan},
-    {"infinity", Status::NonFinite, 0.0, inf},
-    {"minus infinity", Status::NonFinite, 0.0, -inf},
+    {"infinity", Status::NonFinite, 0.0, infinity},
+    {"minus infinity", Status::NonFinite, 0.0, -infinity},
     {"timeout", Status::Timeout, 0.0, 0.0, Status::Timeout, 0},
     {"timeout with NaN", Status::Timeout, 0.0, nan, Status::Timeout, 0},
     {"command lost", Status::Lost, 0.0, 0.0, Status::Lost},
@@ -338,7 +339,7 @@ const std::vector<Event> events{
     {"device reports NaN", Status::NonFinite, 0.0, 0.0, Status::NonFinite},
     {"device limits", Status::Ok, 0.0, 0.0, Status::Limited},
     {"motor force NaN", Status::Ok, 1e-4, 0.0, Status::Ok, 1, nan},
-    {"motor force infinite", Status::Ok, 1e-4, 0.0, Status::Ok, 1, inf},
+    {"motor force infinite", Status::Ok, 1e-4, 0.0, Status::Ok, 1, infinity},
     {"motor gives energy", Status::Ok, -0.9 * largest_step, 0.0, Status::Ok, 1, 2.0},
     {"late tick", Status::Ok, 0.0, 0.0, Status::Ok, 1, 0.0, {0, 400'000, 0}},
     {"much too late tick", Status::Ok, 0.0, 0.0, Status::Ok, 1, 0.0, {0, 3'000'000, 0}},
@@ -429,12 +430,12 @@ struct Played {
 Played play(const AnyStructure& structure, const Guards& guards, const GuardSettings& settings,
             const std::vector<std::size_t>& played) {
     LoopSettings loop;
-    loop.rate_hz = 1.0 / period_s;
+    loop.rate_hz = 1.0 / tick_s;
     loop.tolerated = tolerated;
     loop.lowest_rate_share = 0.0;
-    loop.longest_period_s = settings.certified ? 1.5 * period_s : inf;
+    loop.longest_period_s = settings.certified ? 1.5 * tick_s : infinity;
     // The clock stretches the run when it jumps, so the number of ticks is not that of the events
-    loop.duration_s = static_cast<double>(played.size() + 8) * period_s;
+    loop.duration_s = static_cast<double>(played.size() + 8) * tick_s;
     std::vector<ClockFault> clock;
     for (std::size_t k = 0; k < played.size(); ++k) {
         ClockFault fault = events[played[k]].clock;
@@ -450,7 +451,7 @@ Played play(const AnyStructure& structure, const Guards& guards, const GuardSett
     invariants.motor_does_not_obey();
     Played result;
     result.report =
-        test::run_checked(structure, EventDevice{played, 0.05}, guards, loop, period_s, clock, invariants,
+        test::run_checked(structure, EventDevice{played, 0.05}, guards, loop, tick_s, clock, invariants,
                           [&](const TickRecord& record) { result.statuses.push_back(record.status); });
     result.broken = invariants.broken();
     return result;
@@ -491,10 +492,10 @@ TEST(Controller, EveryEventInEveryStateOfEveryStructureKeepsThePromises) {
     const std::size_t stride = test::cases(1) > 1 ? 1 : 8;
     std::size_t runs = 0;
     for (const test::Variant& variant : test::all_variants()) {
-        const AnyStructure structure = make_structure(variant.model, variant.scheme, period_s, 2.0);
+        const AnyStructure structure = make_structure(variant.model, variant.scheme, tick_s, 2.0);
         for (const bool certified : {false, true}) {
             const GuardSettings settings = guard_settings(certified);
-            const Guards guards = guards_of(settings, variant.model, variant.scheme, period_s);
+            const Guards guards = guards_of(settings, variant.model, variant.scheme, tick_s);
             for (const State& state : all_states) {
                 for (std::size_t first = 0; first < events.size(); ++first) {
                     for (std::size_t second = 0; second < events.size(); ++second) {
@@ -528,9 +529,9 @@ TEST(Controller, EveryEventInEveryStateOfEveryStructureKeepsThePromises) {
 // Each sequence of events leads to the state of its name.
 TEST(Controller, EventsReachEveryState) {
     const test::Variant variant = test::all_variants().front();
-    const AnyStructure structure = make_structure(variant.model, variant.scheme, period_s, 2.0);
+    const AnyStructure structure = make_structure(variant.model, variant.scheme, tick_s, 2.0);
     const GuardSettings settings = guard_settings(false);
-    const Guards guards = guards_of(settings, variant.model, variant.scheme, period_s);
+    const Guards guards = guards_of(settings, variant.model, variant.scheme, tick_s);
     for (const State& state : states()) {
         const Played run = play(structure, guards, settings, state.before);
         const std::string name = state.name;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/run/loop.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -37,58 +38,60 @@ TEST(LoopSettings, AcceptACertificateThatHoldsForExactlyOnePeriod) {
 
 // ---------------------------------------------------------------------------------------------- settings
 
-constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::infinity;
+using test::nan;
 
 /// Returns the message with which settings are refused; empty if they are accepted.
-std::string refusal(const std::function<void(LoopSettings&)>& change) {
+std::string loop_refusal(const std::function<void(LoopSettings&)>& change) {
     LoopSettings settings;
     change(settings);
     return test::refusal([&] { validate(settings); });
 }
 
-std::string refusal(double LoopSettings::* field, double value) {
-    return refusal([&](LoopSettings& settings) { settings.*field = value; });
+std::string loop_refusal(double LoopSettings::* field, double value) {
+    return loop_refusal([&](LoopSettings& settings) { settings.*field = value; });
 }
 
 TEST(LoopSettings, AreRefusedJustOutsideOfTheirRange) {
-    EXPECT_EQ(refusal([](LoopSettings&) {}), "");
+    EXPECT_EQ(loop_refusal([](LoopSettings&) {}), "");
     for (const double rate : {100.0, 10'000.0}) {
-        EXPECT_EQ(refusal(&LoopSettings::rate_hz, rate), "");
+        EXPECT_EQ(loop_refusal(&LoopSettings::rate_hz, rate), "");
     }
-    EXPECT_EQ(refusal(&LoopSettings::rate_hz, 99.0), "rate_hz is 99, must be 100 to 10000");
-    EXPECT_EQ(refusal(&LoopSettings::rate_hz, 10'001.0), "rate_hz is 10001, must be 100 to 10000");
-    for (const double rate : {std::nextafter(100.0, 0.0), std::nextafter(10'000.0, inf), nan}) {
-        EXPECT_NE(refusal(&LoopSettings::rate_hz, rate), "");
+    EXPECT_EQ(loop_refusal(&LoopSettings::rate_hz, 99.0), "rate_hz is 99, must be 100 to 10000");
+    EXPECT_EQ(loop_refusal(&LoopSettings::rate_hz, 10'001.0), "rate_hz is 10001, must be 100 to 10000");
+    for (const double rate : {std::nextafter(100.0, 0.0), std::nextafter(10'000.0, infinity), nan}) {
+        EXPECT_NE(loop_refusal(&LoopSettings::rate_hz, rate), "");
     }
 
-    for (const double duration : {std::numeric_limits<double>::denorm_min(), 0.5, inf}) {
-        EXPECT_EQ(refusal(&LoopSettings::duration_s, duration), "");
+    for (const double duration : {std::numeric_limits<double>::denorm_min(), 0.5, infinity}) {
+        EXPECT_EQ(loop_refusal(&LoopSettings::duration_s, duration), "");
     }
-    EXPECT_EQ(refusal(&LoopSettings::duration_s, 0.0), "duration_s is 0, must be > 0");
-    EXPECT_EQ(refusal(&LoopSettings::duration_s, -2.0), "duration_s is -2, must be > 0");
-    EXPECT_EQ(refusal(&LoopSettings::duration_s, nan), "duration_s is nan, must be > 0");
+    EXPECT_EQ(loop_refusal(&LoopSettings::duration_s, 0.0), "duration_s is 0, must be > 0");
+    EXPECT_EQ(loop_refusal(&LoopSettings::duration_s, -2.0), "duration_s is -2, must be > 0");
+    EXPECT_EQ(loop_refusal(&LoopSettings::duration_s, nan), "duration_s is nan, must be > 0");
 
     for (const double share : {0.0, 0.5, 1.0}) {
-        EXPECT_EQ(refusal(&LoopSettings::lowest_rate_share, share), "");
+        EXPECT_EQ(loop_refusal(&LoopSettings::lowest_rate_share, share), "");
     }
-    EXPECT_EQ(refusal(&LoopSettings::lowest_rate_share, -0.5), "lowest_rate_share is -0.5, must be 0 to 1");
-    EXPECT_EQ(refusal(&LoopSettings::lowest_rate_share, 1.5), "lowest_rate_share is 1.5, must be 0 to 1");
+    EXPECT_EQ(loop_refusal(&LoopSettings::lowest_rate_share, -0.5),
+              "lowest_rate_share is -0.5, must be 0 to 1");
+    EXPECT_EQ(loop_refusal(&LoopSettings::lowest_rate_share, 1.5),
+              "lowest_rate_share is 1.5, must be 0 to 1");
     for (const double share : {-std::numeric_limits<double>::denorm_min(), std::nextafter(1.0, 2.0), nan}) {
-        EXPECT_NE(refusal(&LoopSettings::lowest_rate_share, share), "");
+        EXPECT_NE(loop_refusal(&LoopSettings::lowest_rate_share, share), "");
     }
 }
 
 // With a rate of a power of two, the product of rate and period is exact.
 TEST(LoopSettings, AcceptALongestPeriodThatIsShorterOnlyByRounding) {
     const auto with_period = [](double periods) {
-        return refusal([&](LoopSettings& settings) {
+        return loop_refusal([&](LoopSettings& settings) {
             settings.rate_hz = 1024.0;
             settings.longest_period_s = periods / 1024.0;
         });
     };
     const double shortest = 1.0 - 1e-9;
-    EXPECT_EQ(with_period(inf), "");
+    EXPECT_EQ(with_period(infinity), "");
     EXPECT_EQ(with_period(shortest), "");
     EXPECT_NE(with_period(std::nextafter(shortest, 0.0)), "");
     EXPECT_EQ(with_period(0.512), "longest_period_s is 0.0005, must be at least one period");
@@ -305,7 +308,7 @@ TEST(RunLoop, CountsSkippedTicksForTheDuration) {
 
 TEST(RunLoop, RunsUntilAStopIfItsDurationIsInfinite) {
     LoopRun run;
-    run.settings.duration_s = inf;
+    run.settings.duration_s = infinity;
     run.clock = regular(700);
     run.stop_after = 700;
     run.go(ExitReason::Guard);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/run/record_sinks.hpp"
+#include "special_values.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -12,7 +13,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -21,7 +21,7 @@
 namespace palpate {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 TEST(Range, ContainsAllValuesThatAreNumbers) {
     Range range;

@@ -16,6 +16,7 @@
 #include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/run/controller.hpp"
+#include "special_values.hpp"
 #include "support.hpp"
 #include "tick.hpp"
 #include "variants.hpp"
@@ -24,8 +25,8 @@ namespace palpate {
 namespace {
 
 constexpr double period_s = 1e-3;
-constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::infinity;
+using test::nan;
 
 GuardSettings guard_settings() {
     GuardSettings settings;
@@ -49,8 +50,8 @@ const std::vector<double> positions{0.05,
                                     std::numeric_limits<double>::denorm_min(),
                                     -1e-300,
                                     nan,
-                                    inf,
-                                    -inf,
+                                    infinity,
+                                    -infinity,
                                     10.0,
                                     -1e3,
                                     1e9,

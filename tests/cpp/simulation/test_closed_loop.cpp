@@ -8,6 +8,7 @@
 #include "limits/hands.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/simulation/closed_loop.hpp"
+#include "scenes.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -16,8 +17,7 @@ namespace {
 using test::ClickAndWall;
 using test::Spring;
 
-constexpr auto to_the_end = [](const Tick& /*tick*/, const Motion& /*handle*/,
-                               const EnergyAccount& /*account*/) { return true; };
+using test::to_the_end;
 
 DeviceProfile random_device(test::Random& random) {
     DeviceProfile device;

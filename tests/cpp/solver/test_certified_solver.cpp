@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/solver/certified_solver.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -22,8 +22,8 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
+using test::epsilon;
+using test::infinity;
 
 WaveletNetwork random_scene(Random& random, int k) {
     const auto continuation = k % 2 == 0 ? Continuation::Free : Continuation::Linear;
@@ -382,7 +382,7 @@ TEST(Sheet, CountsEachTermOfTaylorsFormula) {
 }
 
 /// An object that records the positions at which its force is evaluated.
-struct Recorded {
+struct RecordedPoints {
     using State = Stateless;
     const WaveletNetwork& network;
     std::vector<double>& visited;
@@ -404,7 +404,7 @@ TEST(CertifiedSolver, EvaluatesOnlyTheCellsOfTheLastAndTheNewSolution) {
     const CertifiedSolver solver{piecewise(network.curve()), p};
     ASSERT_TRUE(solver.unique(p));
     std::vector<double> visited;
-    const Recorded object{network, visited};
+    const RecordedPoints object{network, visited};
     const auto solve = [&](double y, CertifiedSolver::Memory& memory) {
         visited.clear();
         return solver.solve(object, {}, {p, network.at(y, {}).force + p * y}, memory).position;

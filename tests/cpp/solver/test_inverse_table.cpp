@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/solver/inverse_table.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -21,8 +21,8 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
+using test::epsilon;
+using test::infinity;
 
 /// Returns F(y) = f(y) + p y in extended precision.
 long double exact(const NetworkParameters& network, long double p, long double y) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/solver/limited_resolvent.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using test::infinity;
 
 /// Finds the only position y with c(f(y)) + p y = q by bisection; c is the force limit, p y the load line.
 template <class E>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/solver/newton.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +20,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using test::infinity;
 
 TEST(LoadLineSolver, SolvesAnyUniqueLoadLineOfRandomNetworks) {
     Random random{21};

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/solver/piecewise_force.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using test::infinity;
 
 /// Returns the force at x: the network inside the domain, and outside it the straight lines added up from the edge.
 double added_up(const PiecewiseForce& force, double x) {

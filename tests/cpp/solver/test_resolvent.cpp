@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/solver/resolvent.hpp"
+#include "special_values.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -24,7 +25,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
+using test::epsilon;
 
 WaveletNetwork random_scene(Random& random, std::size_t wavelets,
                             Continuation continuation = Continuation::Linear) {
@@ -543,7 +544,7 @@ TEST(CertifiedSolver, EndsWithinFourEvaluationsNearAFold) {
     EXPECT_LE(cells.back(), 1000U);
 }
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using test::infinity;
 
 TEST(Branch, ComputesALineFromItsFiniteEnd) {
     Branch line;

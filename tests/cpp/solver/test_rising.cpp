@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/solver/rising.hpp"
+#include "special_values.hpp"
 
 #include <cmath>
 #include <limits>
@@ -16,7 +17,7 @@ using test::cases;
 using test::Random;
 using test::uniform;
 
-constexpr double epsilon = std::numeric_limits<double>::epsilon();
+using test::epsilon;
 
 TEST(RisingIntervals, BeginAndEndAtTheLastDigitOfEachFold) {
     Random random{311};

@@ -24,8 +24,8 @@ using test::Random;
 using test::uniform;
 
 /// Returns a random mean force and hysteresis over [0, 1]; the hysteresis is one or two bumps above a constant.
-HysteresisNetwork random_pair(Random& random, std::size_t wavelets, double play_radius,
-                              Continuation continuation = Continuation::Free) {
+HysteresisNetwork random_sliding_pair(Random& random, std::size_t wavelets, double play_radius,
+                                      Continuation continuation = Continuation::Free) {
     const NetworkParameters network = test::random_network(random, wavelets);
     HysteresisParameters hysteresis{std::vector<double>(wavelets, 0.0), 0.0, uniform(random, 0.3, 1.0)};
     for (double& weight : hysteresis.weight) {
@@ -51,8 +51,9 @@ TEST(SlidingResolvent, AgreesWithNewton) {
     int steps = 0;
     int by_table = 0;
     for (int k = 0; k < cases(30); ++k) {
-        const HysteresisNetwork pair = random_pair(random, static_cast<std::size_t>(1 + k % 12), 0.01,
-                                                   k % 2 == 0 ? Continuation::Free : Continuation::Linear);
+        const HysteresisNetwork pair =
+            random_sliding_pair(random, static_cast<std::size_t>(1 + k % 12), 0.01,
+                                k % 2 == 0 ? Continuation::Free : Continuation::Linear);
         const double p = unique_slope(random, pair);
         const SlidingResolvent resolvent{pair, p};
         ASSERT_TRUE(resolvent.tabulated()) << k;
@@ -84,7 +85,7 @@ TEST(SlidingResolvent, AgreesWithNewton) {
 
 TEST(SlidingResolvent, NeedsAtMostTwoEvaluationsWhileSticking) {
     Random random{72};
-    const HysteresisNetwork pair = random_pair(random, 8, 0.02);
+    const HysteresisNetwork pair = random_sliding_pair(random, 8, 0.02);
     const double p = unique_slope(random, pair);
     const SlidingResolvent resolvent{pair, p};
     ASSERT_TRUE(resolvent.tabulated());
@@ -193,7 +194,7 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
 
 TEST(SlidingResolvent, UsesNewtonIfTheLoadLineIsNotUnique) {
     Random random{73};
-    const HysteresisNetwork pair = random_pair(random, 8, 0.01);
+    const HysteresisNetwork pair = random_sliding_pair(random, 8, 0.01);
     const double p = -0.5 * pair.force().slope_bounds().lower;
     ASSERT_GT(p, 0.0);
     const SlidingResolvent resolvent{pair, p};

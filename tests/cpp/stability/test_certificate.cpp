@@ -16,18 +16,13 @@
 
 #include "palpate/stability/certificate.hpp"
 #include "palpate/stability/renderable_slopes.hpp"
+#include "slopes.hpp"
 #include "support.hpp"
 
 namespace palpate {
 namespace {
 
-/// Returns the bounds of a static force whose slope lies between two numbers.
-ForceBounds slopes(double lower, double upper) {
-    ForceBounds bounds;
-    bounds.slope = {lower, upper};
-    bounds.steepest = bounds.sliding = bounds.slope.largest();
-    return bounds;
-}
+using test::slopes;
 
 /// Returns a device without encoder steps and command steps.
 DeviceProfile smooth(double viscous_damping, int delay_samples = 0) {

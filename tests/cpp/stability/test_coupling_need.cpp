@@ -12,18 +12,14 @@
 #include <gtest/gtest.h>
 
 #include "palpate/stability/coupling_need.hpp"
+#include "slopes.hpp"
+#include "special_values.hpp"
 
 namespace palpate {
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
-
-ForceBounds slopes(double lower, double upper) {
-    ForceBounds bounds;
-    bounds.slope = {lower, upper};
-    bounds.steepest = bounds.sliding = bounds.slope.largest();
-    return bounds;
-}
+using test::infinity;
+using test::slopes;
 
 // The maximum of this polynomial lies between two samples, as far from both as possible.
 TEST(CouplingNeed, LargestOverFrequenciesIsAboveTheTrueMaximumByAtMostAShare) {
@@ -94,9 +90,9 @@ TEST(CouplingNeed, IsTheLargestOfAllShorterDelaysAndFrequencies) {
 
 TEST(CouplingNeed, ExistsUpToTheSlopeOfTheCoupling) {
     EXPECT_EQ(coupling_need({100.0, 0.03125}, 1.0 / 1024.0, 0, 0.0, 132.0), 82.0);
-    EXPECT_EQ(coupling_need({100.0, 0.03125}, 1.0 / 1024.0, 0, 0.0, std::nextafter(132.0, 200.0)), infinite);
-    EXPECT_EQ(coupling_need({100.0, 0.03125}, 1.0 / 1024.0, 2, 0.0, 140.0), infinite);
-    EXPECT_EQ(coupling_need({100.0, 0.0}, 1e-3, 0, 0.0, std::numeric_limits<double>::quiet_NaN()), infinite);
+    EXPECT_EQ(coupling_need({100.0, 0.03125}, 1.0 / 1024.0, 0, 0.0, std::nextafter(132.0, 200.0)), infinity);
+    EXPECT_EQ(coupling_need({100.0, 0.03125}, 1.0 / 1024.0, 2, 0.0, 140.0), infinity);
+    EXPECT_EQ(coupling_need({100.0, 0.0}, 1e-3, 0, 0.0, std::numeric_limits<double>::quiet_NaN()), infinity);
     EXPECT_EQ(coupling_need({0.0, 0.0}, 1e-3, 3, 0.5, 0.0), 0.0);
     EXPECT_EQ(coupling_need({100.0, 0.02}, 1e-3, 2), coupling_need({100.0, 0.02}, 1e-3, 2, 0.0, 0.0));
 }
@@ -130,9 +126,9 @@ TEST(CouplingNeed, GainOfAMasslessObjectBoundsEveryErrorOfTheForce) {
             EXPECT_LE(largest, gain * (1.0 + 1e-12));
         }
     }
-    EXPECT_EQ(massless_gain(slopes(-100.0, 1.0), {K, 0.02}, 1e-3), infinite);
-    EXPECT_EQ(massless_gain(slopes(-100.0, 1.0), {K, 0.0}, 1e-3), infinite);
-    EXPECT_LT(massless_gain(slopes(std::nextafter(-100.0, 0.0), 1.0), {K, 0.02}, 1e-3), infinite);
+    EXPECT_EQ(massless_gain(slopes(-100.0, 1.0), {K, 0.02}, 1e-3), infinity);
+    EXPECT_EQ(massless_gain(slopes(-100.0, 1.0), {K, 0.0}, 1e-3), infinity);
+    EXPECT_LT(massless_gain(slopes(std::nextafter(-100.0, 0.0), 1.0), {K, 0.02}, 1e-3), infinity);
     EXPECT_EQ(massless_gain(slopes(0.0, 0.0), {K, 0.02}, 1e-3), 0.0);
 }
 
@@ -210,13 +206,13 @@ TEST(CouplingNeed, NeedAndGainAreProportionalToTheUnitOfForce) {
 TEST(CouplingNeed, GainOfAnUnstableSpringIsInfinite) {
     constexpr double T = 1e-3;
     // The object falls away if -K is larger than the coupling stiffness; at exactly K + K_c = 0 a pole is at 1.
-    EXPECT_EQ(implicit_gain(-101.0, {1e-3, 0.1}, {100.0, 0.02}, T), infinite);
-    EXPECT_EQ(implicit_gain(-128.0, {0.0, 0.0}, {128.0, 0.0}, 1.0), infinite);
-    EXPECT_LT(implicit_gain(-90.0, {1e-3, 0.1}, {100.0, 0.02}, T), infinite);
+    EXPECT_EQ(implicit_gain(-101.0, {1e-3, 0.1}, {100.0, 0.02}, T), infinity);
+    EXPECT_EQ(implicit_gain(-128.0, {0.0, 0.0}, {128.0, 0.0}, 1.0), infinity);
+    EXPECT_LT(implicit_gain(-90.0, {1e-3, 0.1}, {100.0, 0.02}, T), infinity);
     // Negative leading coefficient with poles inside the unit circle
-    EXPECT_EQ(implicit_gain(-1000.0, {0.0, 0.0}, {100.0, 0.02}, T), infinite);
+    EXPECT_EQ(implicit_gain(-1000.0, {0.0, 0.0}, {100.0, 0.02}, T), infinity);
     // Ten million terms are not enough for a pole this close to the unit circle.
-    EXPECT_EQ(implicit_gain(0.0, {1.0, 1e-7}, {1e-6, 0.0}, 1e-3), infinite);
+    EXPECT_EQ(implicit_gain(0.0, {1.0, 1e-7}, {1e-6, 0.0}, 1e-3), infinity);
 }
 
 }  // namespace

@@ -15,10 +15,13 @@
 
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/stability/explicit_inequalities.hpp"
+#include "slopes.hpp"
 #include "support.hpp"
 
 namespace palpate {
 namespace {
+
+using test::slopes;
 
 constexpr double T = 1e-3;
 
@@ -189,13 +192,6 @@ TEST(ExplicitNeed, FindsANarrowMaximumThatMovesWithTheSlope) {
     const VirtualCoupling coupling{158.675, 0.00793102};
     const double need = explicit_need({-15.2061, 851.194}, inertia, coupling, T, 1);
     EXPECT_GE(need, (1.0 - 1e-3) * largest_need({-15.2061, 851.194}, inertia, coupling, 1));
-}
-
-ForceBounds slopes(double lower, double upper) {
-    ForceBounds bounds;
-    bounds.slope = {lower, upper};
-    bounds.steepest = bounds.sliding = bounds.slope.largest();
-    return bounds;
 }
 
 std::vector<Inequality> lines_of(const ForceBounds& bounds, Inertia inertia, VirtualCoupling coupling,

@@ -3,7 +3,6 @@
 // wider than the accuracy that the header states.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -12,13 +11,14 @@
 #include <gtest/gtest.h>
 
 #include "palpate/stability/force_bounds.hpp"
+#include "special_values.hpp"
 #include "support.hpp"
 
 namespace palpate {
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::infinity;
+using test::nan;
 
 TEST(ForceBounds, RisingAndFallingAreTheSlopesOfEachSign) {
     ForceBounds bounds;
@@ -38,7 +38,7 @@ TEST(ForceBounds, RisingAndFallingAreTheSlopesOfEachSign) {
 
 TEST(ForceBounds, PlayRadiusIsTheHysteresisByItsSlope) {
     ForceBounds bounds;
-    EXPECT_EQ(bounds.play_radius(), infinite);
+    EXPECT_EQ(bounds.play_radius(), infinity);
     bounds.hysteresis_force = {0.1, 0.5};
     bounds.hysteresis_per_play = 20.0;
     EXPECT_DOUBLE_EQ(bounds.play_radius(), 0.025);
@@ -48,7 +48,7 @@ TEST(ForceBounds, PlayRadiusIsTheHysteresisByItsSlope) {
 
 TEST(ForceBounds, AreFiniteOnlyIfEachBoundIs) {
     EXPECT_TRUE(finite(ForceBounds{}));
-    for (const double wrong : {infinite, -infinite, nan}) {
+    for (const double wrong : {infinity, -infinity, nan}) {
         for (double ForceBounds::* field :
              {&ForceBounds::steepest, &ForceBounds::sliding, &ForceBounds::hysteresis_per_play,
               &ForceBounds::mean_force, &ForceBounds::drag}) {
@@ -87,9 +87,9 @@ TEST(ForceBounds, CompensationInvertsTheCouplingInSeries) {
     }
     ForceBounds steep;
     steep.slope = {-1.0, 100.0};
-    EXPECT_EQ(compensated(steep, 100.0).slope.upper, infinite);
+    EXPECT_EQ(compensated(steep, 100.0).slope.upper, infinity);
     steep.slope.upper = std::nextafter(100.0, 0.0);
-    EXPECT_LT(compensated(steep, 100.0).slope.upper, infinite);
+    EXPECT_LT(compensated(steep, 100.0).slope.upper, infinity);
     EXPECT_GT(compensated(steep, 100.0).slope.upper, 1e17);
 }
 
@@ -128,7 +128,7 @@ TEST(ForceBounds, BoundsOfACombinedSlopeAreTight) {
         const Interval bounds = detail::reading_bounds(force, h, reading, 0.1, 0.9);
         const NetworkCurve g_curve{force, test::unit_domain()};
         const NetworkCurve h_curve{h, test::unit_domain()};
-        Interval sampled{infinite, -infinite};
+        Interval sampled{infinity, -infinity};
         for (int k = 0; k <= 8000; ++k) {
             const Curve g = g_curve.inside(0.1 + 0.8 * k / 8000);
             const Curve both = h_curve.inside(0.1 + 0.8 * k / 8000);
@@ -146,7 +146,7 @@ TEST(ForceBounds, BoundsOfACombinedSlopeAreTight) {
 /// Returns the interval of the slopes of a function at `count` positions, by differences.
 template <class Function>
 Interval sampled_slopes(double from, double to, int count, Function force) {
-    Interval slopes{infinite, -infinite};
+    Interval slopes{infinity, -infinity};
     constexpr double step = 1e-6;
     for (int k = 0; k < count; ++k) {
         const double x = from + step + (to - from - 2.0 * step) * k / (count - 1);
@@ -190,12 +190,12 @@ TEST(ForceBounds, AreComputedToATenThousandthOfTheSteepestSlope) {
     network.beta = {0.5};
     network.weight = {1.0};
     const NetworkCurve curve{network, test::unit_domain()};
-    Interval sampled{infinite, -infinite};
+    Interval sampled{infinity, -infinity};
     for (int k = 0; k <= 200'000; ++k) {
         const double slope = curve.inside(k / 200'000.0).slope;
         sampled = sampled.with({slope, slope});
     }
-    const Interval slopes = detail::static_bounds(curve, infinite).slope;
+    const Interval slopes = detail::static_bounds(curve, infinity).slope;
     EXPECT_LE(slopes.lower, sampled.lower);
     EXPECT_GE(slopes.lower, sampled.lower - 1e-4 * sampled.largest());
     EXPECT_GE(slopes.upper, sampled.upper);
@@ -219,7 +219,7 @@ TEST(ForceBounds, OfHysteresisAreTheSlopesOfSlidingAndSticking) {
         const ForceModel model{force, hysteresis, domain, radius};
         const NetworkCurve& g = model.hysteresis()->force();
         const NetworkCurve& h = model.hysteresis()->hysteresis_force();
-        Interval slide{infinite, -infinite};
+        Interval slide{infinity, -infinity};
         Interval slope = slide;
         Interval loss = slide;
         double steepest = 0.0;
@@ -320,8 +320,8 @@ TEST(ForceBounds, SmallestHysteresisIsResolvedToAMillionthIfItIsNearZero) {
     network.weight = {-1.0, 0.3};
     network.bias = 0.0;
     const NetworkCurve curve{network, test::unit_domain()};
-    double least = infinite;
-    double most = -infinite;
+    double least = infinity;
+    double most = -infinity;
     for (int k = 0; k <= 200'000; ++k) {
         const double value = curve.inside(k / 200'000.0).value;
         least = std::min(least, value);

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "palpate/stability/inequality.hpp"
+#include "special_values.hpp"
 
 namespace palpate {
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::infinity;
+using test::nan;
 
 Inequality line(double left, double right, bool strict = false) {
     Inequality made{"id", "friction", "f_c >= x", left, right, Basis::Proved, "a proof"};
@@ -32,8 +32,8 @@ TEST(Inequality, HoldsAtEqualityUnlessItIsStrict) {
 
 TEST(Inequality, WithASideThatIsNotFiniteDoesNotHold) {
     for (const bool strict : {false, true}) {
-        EXPECT_FALSE(line(infinite, 1.0, strict).holds());
-        EXPECT_FALSE(line(1.0, -infinite, strict).holds());
+        EXPECT_FALSE(line(infinity, 1.0, strict).holds());
+        EXPECT_FALSE(line(1.0, -infinity, strict).holds());
         EXPECT_FALSE(line(nan, 1.0, strict).holds());
         EXPECT_FALSE(line(1.0, nan, strict).holds());
     }

@@ -17,7 +17,7 @@ namespace {
 constexpr double period = 0.5;
 
 /// Returns a device whose delay and jitter are given in periods.
-DeviceProfile device(double delay, double jitter = 0.0) {
+DeviceProfile late_device(double delay, double jitter = 0.0) {
     DeviceProfile profile;
     profile.period_s = period;
     profile.delay_s = delay * period;
@@ -72,8 +72,8 @@ TEST(PredictedForce, NeedOfAnyForceIsThatOfTheUnpredictedForcePlusHalfASlope) {
     for (const SlopeRange slopes : {SlopeRange{1.0, 0.0}, {0.5, 3.0}, {2.0, 2.0}}) {
         for (const double delay : {0.0, 0.5, 1.0}) {
             EXPECT_DOUBLE_EQ(
-                predicted_path_need(device(delay), slopes),
-                device_need(device(delay), slopes) + std::max(slopes.rising, slopes.falling) / 2.0);
+                predicted_path_need(late_device(delay), slopes),
+                device_need(late_device(delay), slopes) + std::max(slopes.rising, slopes.falling) / 2.0);
         }
     }
 }
@@ -83,21 +83,23 @@ TEST(PredictedForce, WholeDelayNeedsThatOfTheFilterOrOfThePath) {
         for (int whole = 0; whole <= 2; ++whole) {
             for (const int m : {1, 4}) {
                 const double expected = std::min(filtered_need(prediction_taps(whole, m), slopes),
-                                                 predicted_path_need(device(whole), slopes));
-                EXPECT_EQ(predicted_need(device(whole), m, slopes), expected) << whole << " " << m;
+                                                 predicted_path_need(late_device(whole), slopes));
+                EXPECT_EQ(predicted_need(late_device(whole), m, slopes), expected) << whole << " " << m;
             }
         }
         // Without delay, jitter does not change the ratio of damping and longest period.
-        EXPECT_EQ(predicted_need(device(0.0, 0.3), 2, slopes), predicted_need(device(0.0), 2, slopes));
-        EXPECT_EQ(predicted_need(device(0.0, 1.5), 2, slopes), predicted_need(device(0.0), 2, slopes));
+        EXPECT_EQ(predicted_need(late_device(0.0, 0.3), 2, slopes),
+                  predicted_need(late_device(0.0), 2, slopes));
+        EXPECT_EQ(predicted_need(late_device(0.0, 1.5), 2, slopes),
+                  predicted_need(late_device(0.0), 2, slopes));
     }
 }
 
 TEST(PredictedForce, WithoutASlopeOrABoundTheSimpleNeedRemains) {
     const double infinite = std::numeric_limits<double>::infinity();
-    EXPECT_EQ(predicted_need(device(0.5), 2, {0.0, 0.0}), 0.0);
-    EXPECT_EQ(predicted_need(device(0.5), 2, {infinite, 0.0}), infinite);
-    EXPECT_EQ(predicted_need(device(0.0), 2, {infinite, 0.0}), infinite);
+    EXPECT_EQ(predicted_need(late_device(0.5), 2, {0.0, 0.0}), 0.0);
+    EXPECT_EQ(predicted_need(late_device(0.5), 2, {infinite, 0.0}), infinite);
+    EXPECT_EQ(predicted_need(late_device(0.0), 2, {infinite, 0.0}), infinite);
 }
 
 /// Returns the need of a force that changes within a sample: the parts of a sample before and after the change last at
@@ -112,8 +114,8 @@ TEST(PredictedForce, FractionOfASampleSplitsTheSample) {
         for (const double delay : {0.25, 1.25}) {
             const int whole = static_cast<int>(delay);
             const double expected = std::min(split_need(whole, 2, slopes, 0.25, 0.75),
-                                             predicted_path_need(device(delay), slopes));
-            EXPECT_DOUBLE_EQ(predicted_need(device(delay), 2, slopes), expected) << delay;
+                                             predicted_path_need(late_device(delay), slopes));
+            EXPECT_DOUBLE_EQ(predicted_need(late_device(delay), 2, slopes), expected) << delay;
         }
     }
 }
@@ -122,20 +124,20 @@ TEST(PredictedForce, JitterMakesBothPartsOfASampleLonger) {
     for (const SlopeRange slopes : {SlopeRange{1.0, 0.2}, {0.2, 1.0}}) {
         const auto expected = [&](double delay, double jitter, double first, double rest) {
             return std::min(split_need(static_cast<int>(delay), 2, slopes, first, rest),
-                            predicted_path_need(device(delay, jitter), slopes));
+                            predicted_path_need(late_device(delay, jitter), slopes));
         };
         // The force of a late sample acts before the next sample. The first part lasts as long as the delay, the
         // second part at most from the end of the delay to the latest next sample.
-        EXPECT_DOUBLE_EQ(predicted_need(device(0.5, 0.25), 2, slopes),
+        EXPECT_DOUBLE_EQ(predicted_need(late_device(0.5, 0.25), 2, slopes),
                          expected(0.5, 0.25, 0.5 / 1.25, 0.75 / 1.25));
-        EXPECT_DOUBLE_EQ(predicted_need(device(0.75, 0.25), 2, slopes),
+        EXPECT_DOUBLE_EQ(predicted_need(late_device(0.75, 0.25), 2, slopes),
                          expected(0.75, 0.25, 0.75 / 1.25, 0.5 / 1.25));
         // With a whole sample of delay both instants, of the sample and of the force, can be late.
-        EXPECT_DOUBLE_EQ(predicted_need(device(1.5, 0.125), 2, slopes),
+        EXPECT_DOUBLE_EQ(predicted_need(late_device(1.5, 0.125), 2, slopes),
                          expected(1.5, 0.125, 0.625 / 1.125, 0.625 / 1.125));
-        EXPECT_DOUBLE_EQ(predicted_need(device(1.25, 0.25), 2, slopes),
+        EXPECT_DOUBLE_EQ(predicted_need(late_device(1.25, 0.25), 2, slopes),
                          expected(1.25, 0.25, 0.5 / 1.25, 1.0 / 1.25));
-        EXPECT_DOUBLE_EQ(predicted_need(device(1.75, 0.25), 2, slopes),
+        EXPECT_DOUBLE_EQ(predicted_need(late_device(1.75, 0.25), 2, slopes),
                          expected(1.75, 0.25, 1.0 / 1.25, 0.5 / 1.25));
     }
 }
@@ -146,17 +148,17 @@ TEST(PredictedForce, JitterBeyondASampleRoundsTheDelay) {
             return std::min(
                 detail::roughly_filtered_need(prediction_taps(nearest, 2), 5.0 / 3.0,
                                               detail::uncertain_time(delay, 1.0, jitter, nearest), slopes),
-                predicted_path_need(device(delay, jitter), slopes));
+                predicted_path_need(late_device(delay, jitter), slopes));
         };
-        EXPECT_DOUBLE_EQ(predicted_need(device(0.875, 0.0625 * 3), 2, slopes),
+        EXPECT_DOUBLE_EQ(predicted_need(late_device(0.875, 0.0625 * 3), 2, slopes),
                          expected(0.875, 0.0625 * 3, 1));
-        EXPECT_DOUBLE_EQ(predicted_need(device(1.0, 0.001), 2, slopes), expected(1.0, 0.001, 1));
-        EXPECT_DOUBLE_EQ(predicted_need(device(1.0625, 0.125), 2, slopes), expected(1.0625, 0.125, 1));
-        EXPECT_DOUBLE_EQ(predicted_need(device(1.9375, 0.125), 2, slopes), expected(1.9375, 0.125, 2));
-        EXPECT_LT(expected(1.0, 0.001, 1), predicted_path_need(device(1.0, 0.001), slopes));
+        EXPECT_DOUBLE_EQ(predicted_need(late_device(1.0, 0.001), 2, slopes), expected(1.0, 0.001, 1));
+        EXPECT_DOUBLE_EQ(predicted_need(late_device(1.0625, 0.125), 2, slopes), expected(1.0625, 0.125, 1));
+        EXPECT_DOUBLE_EQ(predicted_need(late_device(1.9375, 0.125), 2, slopes), expected(1.9375, 0.125, 2));
+        EXPECT_LT(expected(1.0, 0.001, 1), predicted_path_need(late_device(1.0, 0.001), slopes));
         for (const double jitter : {1.0, 1.5}) {
-            EXPECT_EQ(predicted_need(device(1.0, jitter), 2, slopes),
-                      predicted_path_need(device(1.0, jitter), slopes));
+            EXPECT_EQ(predicted_need(late_device(1.0, jitter), 2, slopes),
+                      predicted_path_need(late_device(1.0, jitter), slopes));
         }
     }
 }

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,15 +9,18 @@
 #include <gtest/gtest.h>
 
 #include "palpate/stability/renderable_slopes.hpp"
+#include "slopes.hpp"
+#include "special_values.hpp"
 #include "support.hpp"
 
 namespace palpate {
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
+using test::infinity;
+using test::slopes;
 
 /// Returns a device with the damping 0.06 and the friction 0.01; the delay is given in periods.
-DeviceProfile device(double delay, double encoder_step = 0.0) {
+DeviceProfile fast_device(double delay, double encoder_step = 0.0) {
     DeviceProfile profile;
     profile.viscous_damping = 0.06;
     profile.coulomb_friction = 0.01;
@@ -48,15 +50,15 @@ TEST(RenderableSlopes, LargestValueThatHoldsIsFoundAtEverySize) {
 }
 
 TEST(RenderableSlopes, SearchEndsFarAboveTheSlopesOfTheDevice) {
-    EXPECT_DOUBLE_EQ(detail::slope_search_limit(device(0.0)), 1e9 * 121.0);
+    EXPECT_DOUBLE_EQ(detail::slope_search_limit(fast_device(0.0)), 1e9 * 121.0);
 }
 
 TEST(RenderableSlopes, DirectRenderingHoldsForTheSlopesOfSlidingAndSticking) {
-    const DeviceProfile exact = device(0.0, 1e-4);  // b / T = 120, 2 f_c / Delta = 200
+    const DeviceProfile exact = fast_device(0.0, 1e-4);  // b / T = 120, 2 f_c / Delta = 200
     EXPECT_TRUE(detail::holds_directly(exact, {200.0, 199.0}, 0.0));
     EXPECT_FALSE(detail::holds_directly(exact, {200.1, 1.0}, 0.0));
     EXPECT_FALSE(detail::holds_directly(exact, {1.0, 200.1}, 0.0));
-    const DeviceProfile smooth = device(0.0);
+    const DeviceProfile smooth = fast_device(0.0);
     EXPECT_TRUE(detail::holds_directly(smooth, {239.9, 1e6}, 0.0));
     EXPECT_FALSE(detail::holds_directly(smooth, {240.1, 0.0}, 0.0));
     EXPECT_TRUE(detail::holds_directly(smooth, {139.9, 1e6}, 100.0));
@@ -68,23 +70,23 @@ TEST(RenderableSlopes, DirectRenderingHoldsForTheSlopesOfSlidingAndSticking) {
 }
 
 TEST(RenderableSlopes, WithoutDelayAreThoseOfDampingAndFriction) {
-    const Interval smooth = renderable_slopes(device(0.0));
-    EXPECT_EQ(smooth.lower, -infinite);
+    const Interval smooth = renderable_slopes(fast_device(0.0));
+    EXPECT_EQ(smooth.lower, -infinity);
     EXPECT_NEAR(smooth.upper, 240.0, 1e-9);
-    const Interval stepped = renderable_slopes(device(0.0, 1e-4));
+    const Interval stepped = renderable_slopes(fast_device(0.0, 1e-4));
     EXPECT_NEAR(stepped.lower, -200.0, 200.0 * 1.1e-5);
     EXPECT_NEAR(stepped.upper, 200.0, 1e-9);
-    const Interval fine = renderable_slopes(device(0.0, 5e-5));  // friction 400
+    const Interval fine = renderable_slopes(fast_device(0.0, 5e-5));  // friction 400
     EXPECT_NEAR(fine.lower, -400.0, 400.0 * 1.1e-5);
     EXPECT_NEAR(fine.upper, 240.0, 1e-9);
-    const Interval sticking = renderable_slopes(device(0.0), 100.0);
+    const Interval sticking = renderable_slopes(fast_device(0.0), 100.0);
     EXPECT_NEAR(sticking.upper, 140.0, 1e-9);
-    EXPECT_EQ(sticking.lower, -infinite);
-    EXPECT_NEAR(renderable_slopes(device(0.0, 1e-4), 50.0).upper, 100.0, 1e-9);
-    const Interval wanted = renderable_slopes(device(0.0, 5e-5), 0.0, {10.0, 20.0});
+    EXPECT_EQ(sticking.lower, -infinity);
+    EXPECT_NEAR(renderable_slopes(fast_device(0.0, 1e-4), 50.0).upper, 100.0, 1e-9);
+    const Interval wanted = renderable_slopes(fast_device(0.0, 5e-5), 0.0, {10.0, 20.0});
     EXPECT_NEAR(wanted.lower, -400.0, 400.0 * 1.1e-5);
     EXPECT_NEAR(wanted.upper, 240.0, 1e-9);
-    DeviceProfile none = device(0.0);
+    DeviceProfile none = fast_device(0.0);
     none.viscous_damping = 0.0;
     EXPECT_EQ(renderable_slopes(none).upper, 0.0);
     none.encoder_step = none.force_step = 0.0;
@@ -96,11 +98,11 @@ TEST(RenderableSlopes, WithoutDelayAreThoseOfDampingAndFriction) {
 // slope; then the rising slope is found at that falling slope.
 TEST(RenderableSlopes, WithDelayTheFallingSlopeIsFoundFirst) {
     for (const double delay : {0.5, 1.0}) {
-        const DeviceProfile profile = device(delay);
+        const DeviceProfile profile = fast_device(delay);
         const auto need = [&](double rising, double falling) {
             return device_need(profile, {rising, falling}) * profile.period_s;
         };
-        for (const SlopeRange wanted : {SlopeRange{infinite, infinite}, {infinite, 10.0}, {5.0, infinite}}) {
+        for (const SlopeRange wanted : {SlopeRange{infinity, infinity}, {infinity, 10.0}, {5.0, infinity}}) {
             // Equal slopes first: the need is proportional to the slopes.
             double low = 0.0;
             double high = 1e4;
@@ -124,10 +126,10 @@ TEST(RenderableSlopes, WithDelayTheFallingSlopeIsFoundFirst) {
 
 TEST(RenderableSlopes, SteepestStickIsAddedToASlopeOfItsSize) {
     // Rising slope k + h / r = 2 k: T 2 k / 2 = b
-    EXPECT_NEAR(steepest_stick(device(0.0)), 120.0, 1e-9);
+    EXPECT_NEAR(steepest_stick(fast_device(0.0)), 120.0, 1e-9);
     // Friction: (k + 2 k) Delta / 2 = f_c
-    EXPECT_NEAR(steepest_stick(device(0.0, 1e-4)), 200.0 / 3.0, 1e-9);
-    const DeviceProfile late = device(1.0);
+    EXPECT_NEAR(steepest_stick(fast_device(0.0, 1e-4)), 200.0 / 3.0, 1e-9);
+    const DeviceProfile late = fast_device(1.0);
     const double stick = steepest_stick(late);
     EXPECT_NEAR(device_need(late, {2.0 * stick, stick}) * late.period_s, 0.06, 1e-9);
 }
@@ -144,30 +146,22 @@ ForceBounds sliding_bounds(double rising, double loss) {
 
 TEST(RenderableSlopes, NarrowestPlayAddsTheSlopeThatRemains) {
     // 10 + h / r = 2 b / T = 240
-    EXPECT_NEAR(narrowest_play(sliding_bounds(10.0, 0.1), device(0.0), 0.0, 1.0), 0.1 / 230.0, 1e-15);
-    EXPECT_NEAR(narrowest_play(sliding_bounds(10.0, 0.1), device(0.0), 1e-9, 1.0), 0.1 / 230.0, 1e-12);
-    EXPECT_EQ(narrowest_play(sliding_bounds(10.0, 0.1), device(0.0), 0.01, 1.0), 0.01);
-    EXPECT_EQ(narrowest_play(sliding_bounds(10.0, 0.1), device(0.0), 1e-5, 4e-4), infinite);
-    EXPECT_NEAR(narrowest_play(sliding_bounds(10.0, 0.1), device(0.0), 1e-5, 5e-4), 0.1 / 230.0, 1e-15);
+    EXPECT_NEAR(narrowest_play(sliding_bounds(10.0, 0.1), fast_device(0.0), 0.0, 1.0), 0.1 / 230.0, 1e-15);
+    EXPECT_NEAR(narrowest_play(sliding_bounds(10.0, 0.1), fast_device(0.0), 1e-9, 1.0), 0.1 / 230.0, 1e-12);
+    EXPECT_EQ(narrowest_play(sliding_bounds(10.0, 0.1), fast_device(0.0), 0.01, 1.0), 0.01);
+    EXPECT_EQ(narrowest_play(sliding_bounds(10.0, 0.1), fast_device(0.0), 1e-5, 4e-4), infinity);
+    EXPECT_NEAR(narrowest_play(sliding_bounds(10.0, 0.1), fast_device(0.0), 1e-5, 5e-4), 0.1 / 230.0, 1e-15);
     // Friction: h / r counts once with the addition e to the slope, as soon as r >= Delta / 2, or twice.
-    const DeviceProfile stepped = device(0.0, 1e-4);
+    const DeviceProfile stepped = fast_device(0.0, 1e-4);
     const double radius = narrowest_play(sliding_bounds(10.0, 0.1), stepped, 1e-5, 1.0);
     const double once = 10.0 * (1.0 + 1e-4 / (2.0 * radius)) + 0.1 / radius;
     EXPECT_NEAR(once, 200.0, 1e-6);
     // Negative hysteresis is never certified; hysteresis of 0 adds nothing.
     ForceBounds negative = sliding_bounds(10.0, -0.1);
     negative.hysteresis_force = {-0.2, -0.1};
-    EXPECT_EQ(narrowest_play(negative, device(0.0), 1e-3, 1.0), infinite);
-    EXPECT_EQ(narrowest_play(sliding_bounds(10.0, 0.0), device(0.0), 1e-6, 1.0), 1e-6);
-    EXPECT_EQ(narrowest_play(sliding_bounds(10.0, -0.1), device(0.0), 1e-6, 1.0), 1e-6);
-}
-
-/// Returns bounds of a static force.
-ForceBounds slopes(double lower, double upper) {
-    ForceBounds bounds;
-    bounds.slope = {lower, upper};
-    bounds.steepest = bounds.sliding = bounds.slope.largest();
-    return bounds;
+    EXPECT_EQ(narrowest_play(negative, fast_device(0.0), 1e-3, 1.0), infinity);
+    EXPECT_EQ(narrowest_play(sliding_bounds(10.0, 0.0), fast_device(0.0), 1e-6, 1.0), 1e-6);
+    EXPECT_EQ(narrowest_play(sliding_bounds(10.0, -0.1), fast_device(0.0), 1e-6, 1.0), 1e-6);
 }
 
 /// A virtual object and its coupling that the explicit structure may use.
@@ -215,7 +209,7 @@ TEST(ExplicitScheme, IsTheFirstStableCombinationOfTheSearch) {
     int none = 0;
     int later = 0;
     for (int draw = 0; draw < 6; ++draw) {
-        const DeviceProfile profile = device(draw % 3 == 2 ? 1.0 : 0.0);
+        const DeviceProfile profile = fast_device(draw % 3 == 2 ? 1.0 : 0.0);
         const double rising = draw == 5 ? -1.0 : std::exp(test::uniform(random, 0.0, 6.0));
         const ForceBounds bounds =
             slopes(draw == 5 ? -2.0 : -std::exp(test::uniform(random, -2.0, 4.5)), rising);
@@ -240,7 +234,7 @@ TEST(ExplicitScheme, IsTheFirstStableCombinationOfTheSearch) {
 }
 
 TEST(ExplicitScheme, KeepsTheNumbersThatTheUserSets) {
-    const DeviceProfile profile = device(0.0);
+    const DeviceProfile profile = fast_device(0.0);
     const ForceBounds bounds = slopes(-1.0, 20.0);
     SchemeChoices chosen;
     chosen.coupling_stiffness = 33.0;
@@ -262,7 +256,7 @@ TEST(ExplicitScheme, KeepsTheNumbersThatTheUserSets) {
     heavy.mass = 0.002;
     EXPECT_DOUBLE_EQ(explicit_scheme(bounds, profile, heavy).inertia.damping, 0.1 * 0.002 / profile.period_s);
     // A force without finite bounds, or a device without damping, has no stable scheme; the last one is returned.
-    const Scheme wall = explicit_scheme(slopes(0.0, infinite), profile, heavy);
+    const Scheme wall = explicit_scheme(slopes(0.0, infinity), profile, heavy);
     EXPECT_NEAR(wall.coupling.stiffness, 0.15 * 228.0, 1e-6);
     EXPECT_DOUBLE_EQ(wall.inertia.damping, 1.0 * 0.002 / profile.period_s);
     DeviceProfile loose = profile;

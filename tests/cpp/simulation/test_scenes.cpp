@@ -17,12 +17,10 @@ namespace palpate {
 namespace {
 
 using test::Scene;
+using test::to_the_end;
 
 constexpr std::size_t ticks = 400;
 constexpr int substeps = 8;
-
-constexpr auto to_the_end = [](const Tick& /*tick*/, const Motion& /*handle*/,
-                               const EnergyAccount& /*account*/) { return true; };
 
 /// Returns the energy that the hand took out in excess of the stored energy, divided by the rounding error of the
 /// account. A value above 1 violates the certificate.
