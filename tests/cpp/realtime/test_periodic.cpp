@@ -26,11 +26,11 @@ TEST(Periodic, SkipsAndCountsDeadlinesThatPassed) {
     constexpr Nanoseconds period = 1'000'000;
     Periodic clock{period};
     clock.start();
-    const Wake first = clock.wait();
+    (void)clock.wait();  // the next deadline is at most one period later
     std::this_thread::sleep_for(std::chrono::milliseconds{10});
     const Wake late = clock.wait();
     const Wake next = clock.wait();
-    EXPECT_GE(late.skipped, 8U - first.skipped);
+    EXPECT_GE(late.skipped, 9U);
     EXPECT_GT(next.deadline, late.now);
 }
 
