@@ -24,7 +24,7 @@
 #include "palpate/run/controller.hpp"
 #include "palpate/simulation/closed_loop.hpp"
 #include "palpate/stability/certificate.hpp"
-#include "scenes.hpp"
+#include "simulation/scenes.hpp"
 #include "support.hpp"
 
 namespace palpate {

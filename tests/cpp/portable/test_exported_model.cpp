@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/portable/export_check.hpp"
-#include "scenes.hpp"
+#include "simulation/scenes.hpp"
 #include "support.hpp"
 
 namespace palpate {

@@ -22,7 +22,7 @@
 #include "palpate/run/render.hpp"
 #include "palpate/simulation/faulty_device.hpp"
 #include "palpate/simulation/simulated_device.hpp"
-#include "scenes.hpp"
+#include "simulation/scenes.hpp"
 
 namespace palpate::test {
 

@@ -8,7 +8,7 @@
 #include "limits/hands.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/simulation/closed_loop.hpp"
-#include "scenes.hpp"
+#include "simulation/scenes.hpp"
 #include "support.hpp"
 
 namespace palpate {

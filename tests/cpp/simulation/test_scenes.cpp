@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "limits/hands.hpp"
-#include "scenes.hpp"
+#include "simulation/scenes.hpp"
 
 namespace palpate {
 namespace {
