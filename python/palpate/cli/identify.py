@@ -351,8 +351,6 @@ def identify(
     if hold_out_every is None:
         fitted = model.data.rows
         judged = f"{fitted} of {rows} rows" if fitted < rows else "the rows of the identification"
-    if hold_out_every is None and settings["loss"] == "huber":
-        judged += ", where rows far from the model have less weight"
     left_out_nrmse = model.notes.get("left_out_nrmse", 0.0)
     left_out = ""
     if hold_out_every is None and left_out_nrmse > nrmse:

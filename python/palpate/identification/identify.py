@@ -26,10 +26,10 @@ from .classes.findings import USABLE_NRMSE, identified, verdict_of
 from .classes.memory import IdentifyRest, better_with_memory
 from .classes.model_selection import select
 from .data.limits import ForceScale
-from .data.outliers import without_wrong_readings
 from .data.period import period_of
 from .data.rows import Rows, require_in_range, require_usable, rows_of
 from .data.sections import in_sections
+from .data.wrong_readings import without_wrong_readings
 from .decision import latest
 from .network.fitted import FittedNetwork
 from .network.separable import TINY
@@ -136,7 +136,7 @@ def identify(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify each one "
                 "separately"
             )
-    recordings, isolated, wrong = without_wrong_readings(recordings)
+    recordings, wrong = without_wrong_readings(recordings)
     for each in recordings:
         require_in_range("position", each.position)
         require_in_range("force", each.force)
@@ -147,11 +147,7 @@ def identify(
     # result.
     with threadpool_limits(limits=1, user_api="blas"):
         network, settings, rows = _fitted_with_period(fitted, settings, object_of)
-        network = replace(
-            network,
-            findings=(*isolated, *network.findings),
-            notes=(*wrong, *sections, *network.notes),
-        )
+        network = replace(network, notes=(*wrong, *sections, *network.notes))
         rest = _resting(rows, settings)
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)
     source = Source.merged(part.source for part in fitted)

@@ -44,8 +44,8 @@ from ..recording.units import Unit
 from ..verdict import Finding, usable
 from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
-from .data.outliers import refuse_isolated
 from .data.rows import modulo, require_in_range
+from .data.wrong_readings import wrong_readings
 from .decision import Decision, in_words
 from .identify import fit_environment, model_of
 from .network.fitted import FittedNetwork
@@ -210,12 +210,17 @@ def read_part(work: tuple[LongRecording, tuple[int, int]]) -> PartRead:
     for block in recording.blocks(part):
         summary = None
         if len(block.position):
-            require_in_range("position", block.position)
-            require_in_range("force", block.force)
-            stated = block.direction is not None
-            side = block.direction if stated else strokes_from_order(block.position)
-            summary = summarise(block.position, block.force, side)
-        found.add(summary, block.rows)
+            wrong = wrong_readings(block.position, block.position, block.force)
+            position, force = block.position[~wrong], block.force[~wrong]
+            require_in_range("position", position)
+            require_in_range("force", force)
+            direction = block.direction
+            side = strokes_from_order(position) if direction is None else direction[~wrong]
+            summary = summarise(position, force, side)
+            if wrong.any():
+                first = int(np.flatnonzero(block.kept)[wrong][0])
+                found.left_out.drop("with a wrong reading", int(wrong.sum()), found.rows + first)
+        found.add(summary, len(block.kept))
         found.left_out.add(block.left_out, 0)
     return found
 
@@ -255,8 +260,6 @@ def _error_on_rows(
 def _identified(
     summary: Summary, recordings: Sequence[LongRecording], settings: IdentifyOptions, notes: list[str]
 ) -> Model:
-    width = 0.0 if summary.level is None else 2.0**summary.level
-    refuse_isolated(summary.position, summary.count, width)
     notes += mirror_notes(summary.correlation)
     side: Float1D | None = summary.side.astype(np.float64)
     notes.append(f"Defects of the recording and a lag of the force were not searched: {IN_PARTS}.")
@@ -332,8 +335,6 @@ def _require_summable(settings: IdentifyOptions) -> None:
             f"inputs names {', '.join(sorted(further))}: must be position and hysteresis only, for files "
             "that are read part by part"
         )
-    if settings.loss != "squares":
-        raise InputError(f"loss is {settings.loss!r}: must be 'squares' for files that are read part by part")
 
 
 @dataclass(frozen=True)

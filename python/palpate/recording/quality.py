@@ -477,8 +477,7 @@ def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
     found: list[Finding] = []
     reported: set[tuple[float, float]] = set()
     for of, name in [(0, "recording"), *strokes]:
-        rows = travel.inside if of == 0 else travel.inside & (side == of)
-        at = np.unique(recording.position[rows])
+        at = np.unique(recording.position if of == 0 else recording.position[travel.inside & (side == of)])
         if len(at) < 10:
             continue
         distances = np.diff(at)
@@ -498,13 +497,13 @@ def _position_gaps(recording: Recording, travel: Travel) -> list[Finding]:
 def _gaps(recording: Recording, travel: Travel, name: str, gaps: list[tuple[float, float]]) -> Finding:
     """Returns a finding on all position intervals without rows, with the limits of the longest ones."""
     unit = recording.file_unit("position")
-    share = sum(stop - start for start, stop in gaps) / travel.length
+    share = sum(stop - start for start, stop in gaps) / float(np.ptp(recording.position))
     longest = sorted(gaps, key=lambda gap: gap[0] - gap[1])[:MOST_NAMED_GAPS]
     named = " and ".join(unit.interval(*gap) for gap in sorted(longest))
     more = f" ({len(gaps) - len(longest)} shorter gaps are not listed)" if len(gaps) > len(longest) else ""
     return usable(
         f"the {name} has no rows from {named}{more}, {share:.0%} of the travel: the model is interpolated "
-        "or extrapolated there; record these positions too"
+        "or extrapolated there; record these positions too, or remove single rows beyond a gap"
     )
 
 

@@ -250,7 +250,7 @@ def extreme_force_findings(error: RowError, force_unit: Unit = UNSTATED_UNIT) ->
             f"{EXTREME_SHARE:.0%} with the most extreme forces. These reach "
             f"{force_unit.text(float(np.abs(error.force).max()))}, the others have a range of "
             f"{force_unit.text(float(np.ptp(error.force[kept])))}, so that few rows hide the error of the "
-            "others. If they are wrong readings, remove these rows or give --loss huber"
+            "others. If they are wrong readings, remove these rows"
         )
     ]
 
@@ -361,8 +361,6 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         note, of_period = period_notes(positions, data.period, data.position_unit.si)
         notes, findings = [*notes, note], findings + of_period
     findings += report.findings + limit_findings(best, options) + wait_findings(best) + place_findings(best)
-    if data.robust is not None:
-        findings += data.robust.findings(best.residual, data.force_unit)
     findings += extreme_force_findings(error, data.force_unit)
     if data.counted is None and single:
         rows = np.flatnonzero(counted)

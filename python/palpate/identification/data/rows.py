@@ -24,7 +24,6 @@ from ..decision import Decision
 from ..options import IdentifyOptions
 from .compression import HELD_OUT_EVERY, held_out_rows
 from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, position_noise, repeated
-from .outliers import Robust
 from .repeats import Repeats
 from .roles import Role, roles_of, unused_rows
 from .strokes import strokes_of
@@ -83,8 +82,6 @@ class Rows:
     """Findings that can lower the verdict"""
     counted: Float1D | None = None
     """(n,) number of recorded rows that each row represents in the reported error; None: 1 each"""
-    robust: Robust | None = None
-    """Weights and outliers of Huber's loss; None for least squares"""
     limits: RowLimits = NO_LIMITS
     """Limits of the information in the rows: share of independent rows, RMS error hidden by the resolution of
     the force, and noise of the position"""
@@ -133,8 +130,7 @@ class Rows:
     def reported(self) -> NDArray[np.bool_]:
         """(n,) True for rows that are used for the reported error."""
         rows = np.ones(len(self.force), dtype=bool) if self.counted is None else self.counted > 0.0
-        rows = rows if self.fitted is None else rows & self.fitted
-        return rows if self.robust is None else rows & ~self.robust.outliers
+        return rows if self.fitted is None else rows & self.fitted
 
     def held_out(self) -> NDArray[np.bool_]:
         """Returns True (n,) for held-out rows."""
