@@ -19,7 +19,7 @@ from ..verdict import Finding, no, usable
 from .comparison import CellRows, Travel, cell_rows, merged_findings, scale_findings, sides
 from .conversion import MIN_ROWS, mirror_notes
 from .lag import LONGEST_LAG_S
-from .motion import TURN_STEPS, gaps_of, strokes_from_order, waits
+from .motion import TURN_STEPS, gaps_of, waits
 
 if TYPE_CHECKING:
     from .recording import Recording
@@ -174,9 +174,9 @@ def quality_findings(recording: Recording, *, relaxes: bool = False) -> list[Fin
 
 def _moving_cells(recording: Recording) -> CellRows | None:
     """Returns the rows of a recording by position cell, without the rows at which the tool waits."""
-    if strokes_from_order(recording.position) is None:
-        return cell_rows(recording, Travel.of(recording.position))
     waiting = waits(recording.position)
+    if waiting is None:
+        return cell_rows(recording, Travel.of(recording.position))
     moving, kept = np.flatnonzero(~waiting), recording.without(waiting)
     if not len(moving):
         return None

@@ -270,7 +270,7 @@ def wait_findings(best: Candidate) -> list[Finding]:
     Between press and release any force is possible, and a position within its noise.
     """
     data = best.data
-    if data.fitted is None or data.fitted.all() or best.error.spread == 0.0:
+    if data.fitted.all() or best.error.spread == 0.0:
         return []
     box, force, band = data.box[~data.fitted], data.force[~data.fitted], noise_band(data.path[:, 0])
     low, high = np.full(len(force), np.inf), np.full(len(force), -np.inf)

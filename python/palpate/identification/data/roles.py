@@ -9,13 +9,14 @@ nearby.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import IntEnum
 
 import numpy as np
 
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
-from ...recording.motion import LEAST_STROKE_ROWS, noise_of, resolution_of, strokes_from_order, waits
+from ...recording.motion import LEAST_STROKE_ROWS, noise_of, resolution_of, waits
 from .limits import FORCE_RESOLUTION
 
 
@@ -54,11 +55,8 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     recording with further inputs, or whose rows are not in the order of a motion, has only moving rows.
     """
     role = np.full(len(recording), Role.MOVING, dtype=np.int8)
-    motion = recording.motion
-    if recording.input_names or strokes_from_order(motion.position) is None:
-        return role
-    waiting = waits(motion.position)[motion.rows]
-    if waiting.all():
+    of_motion = None if recording.input_names else waits(recording.motion.position)
+    if of_motion is None or (waiting := of_motion[recording.motion.rows]).all():
         return role
     position = recording.position
     contact = contact_at(position[~waiting], recording.force[~waiting])
@@ -77,16 +75,21 @@ ROLE_NAMES = {
 """What the rows of each role do, for texts."""
 
 
-def role_counts(role: Int8Vector) -> str:
-    """Returns how many rows have each role (n,): "2186 move, 155 wait in contact"."""
+def role_counts(role: Int8Vector) -> dict[str, int]:
+    """Returns the number of rows of each role (n,) that occurs, by its name."""
     counts = np.bincount(role, minlength=len(Role)).tolist()
-    return ", ".join(f"{counts[each]} {name}" for each, name in ROLE_NAMES.items() if counts[each])
+    return {name: counts[each] for each, name in ROLE_NAMES.items() if counts[each]}
+
+
+def counts_text(counts: Mapping[str, int]) -> str:
+    """Returns numbers of rows as text: "2186 move, 155 wait in contact"."""
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
 
 
 def unused_rows(role: Int8Vector, used: str = "fitted") -> str:
     """Returns a sentence on the rows of each role (n,) that are not fitted or compared."""
     unused = role[role != Role.MOVING]
-    return f"{len(unused)} of {len(role)} rows are not {used}: {role_counts(unused)}."
+    return f"{len(unused)} of {len(role)} rows are not {used}: {counts_text(role_counts(unused))}."
 
 
 def contact_at(position: Float1D, force: Float1D) -> float:

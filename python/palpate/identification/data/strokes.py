@@ -272,18 +272,15 @@ class HysteresisInput:
         return cls(side, np.ones(len(side), dtype=bool))
 
     @classmethod
-    def of_play(
-        cls, motions: Sequence[Float1D], radius: float, first: Sequence[float] | None = None
-    ) -> HysteresisInput:
-        """Returns the direction states of the play operator along motions that each start at s = 0, or at
-        `first`.
+    def of_play(cls, motions: Sequence[Float1D], radius: float) -> HysteresisInput:
+        """Returns the direction states of the play operator along motions that each start at s = 0.
 
         After a motion has covered twice the play radius, the direction state no longer depends on its start
         value, and counts as known. If no motion is this long, all rows count as known.
         """
         side, known = [], []
-        for motion, s in zip(motions, first if first is not None else [0.0] * len(motions), strict=True):
-            play = _core.model.play(motion, radius, start=motion[0] - s * radius)
+        for motion in motions:
+            play = _core.model.play(motion, radius, start=motion[0])
             side.append(np.clip((motion - play) / radius, -1.0, 1.0))
             covered = np.maximum.accumulate(motion) - np.minimum.accumulate(motion)
             known.append(covered >= 2.0 * radius)
