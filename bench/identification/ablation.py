@@ -156,7 +156,6 @@ RULES = (
     Rule("period is found", "identification.identify", "period_of", _nothing),
     Rule("repeated rows count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
     Rule("force step hides errors", f"{DATA}.rows", "force_step", _zero),
-    Rule("position noise limits wavelets", f"{DATA}.rows", "position_noise", _zero),
     Rule("correlated noise", f"{CLASSES}.model_selection", "correlated_noise", _first),
     Rule("noise where candidates differ", f"{SEARCH}.evidence", "local_noise_ratio", _one),
     Rule("no finer than repeats", f"{CLASSES}.model_selection", "no_finer_than_repeats", _first),
@@ -164,7 +163,6 @@ RULES = (
     Rule("pruning", f"{SEARCH}.growth", "MOST_PRUNE_TRIALS", 0),
     Rule("weight penalty", "identification.network.separable", "SeparableProblem.with_prior", _first),
     Rule("regrowth with constraints", f"{CLASSES}.class_selection", "REGROWTH_ERROR_RATIO", np.inf),
-    Rule("single-valued rival", f"{CLASSES}.hysteresis", "Hysteresis._single_valued", _second),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("growth with the play radius", f"{CLASSES}.hysteresis", "FIRST_MAX_WAVELETS", 64),
     Rule("rows around the seam", f"{SEARCH}.evidence", "around_seam", _first),
@@ -176,8 +174,6 @@ RULES = (
     Rule("checks of the recording", f"{CLASSES}.findings", "findings_of", _no_findings),
     Rule("check of waits", f"{CLASSES}.findings", "wait_findings", _no_findings),
     Rule("check of places", f"{CLASSES}.findings", "place_findings", _no_findings),
-    Rule("check of the extreme forces", f"{CLASSES}.findings", "extreme_force_findings", _no_findings),
-    Rule("check of other inputs", f"{CLASSES}.findings", "explained_findings", _no_findings),
 )
 
 

@@ -23,7 +23,7 @@ from ...verdict import Finding, no, usable
 from ..decision import Decision
 from ..options import IdentifyOptions
 from .compression import HELD_OUT_EVERY, held_out_rows
-from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, position_noise, repeated
+from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, repeated
 from .repeats import Repeats
 from .roles import Role, roles_of, unused_rows
 from .strokes import strokes_of
@@ -83,8 +83,8 @@ class Rows:
     counted: Float1D | None = None
     """(n,) number of recorded rows that each row represents in the reported error; None: 1 each"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the rows: share of independent rows, RMS error hidden by the resolution of
-    the force, and noise of the position"""
+    """Limits of the information in the rows: share of independent rows, and RMS error hidden by the
+    resolution of the force"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) smallest and largest position of the unit box; None: those of the rows"""
     role: Int8Vector | None = None
@@ -183,15 +183,14 @@ class Rows:
         )
 
     def limited(self) -> Rows:
-        """Returns the rows with their dependence, force resolution and noise; rows that repeat others get
+        """Returns the rows with their dependence and force resolution; rows that repeat others get
         weight 0.
 
         Rows with a given weight use it in the fit and in the error, and get no such limits.
         """
         if self.weight is not None:
             return replace(self, counted=self.weight)
-        noise = position_noise(self.positions[:, 0] / self.reach[0]) if len(self.names) == 1 else 0.0
-        limits = RowLimits(force_error=STEP_ERROR * force_step(self.force), position_noise=noise)
+        limits = RowLimits(force_error=STEP_ERROR * force_step(self.force))
         again, repeats = repeated(self.positions, self.force, self.side)
         notes = (*self.notes, repeats) if repeats else self.notes
         unused = again | ~self.fitted
