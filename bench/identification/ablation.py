@@ -152,7 +152,7 @@ DATA, CLASSES, SEARCH = (f"identification.{folder}" for folder in ("data", "clas
 RULES = (
     Rule("rows that wait are not fitted", f"{DATA}.roles", "waits", _none),
     Rule("approach is not fitted", f"{DATA}.roles", "contact_at", lambda x, f: float(x.min())),
-    Rule("wrong readings are dropped", f"{DATA}.wrong_readings", "wrong_readings", _none),
+    Rule("wrong readings are dropped", "recording.checks.wrong_readings", "wrong_readings", _none),
     Rule("period is found", "identification.identify", "period_of", _nothing),
     Rule("repeated rows count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
     Rule("force step hides errors", f"{DATA}.rows", "force_step", _zero),

@@ -10,8 +10,9 @@ import numpy as np
 
 from ..identification.data.roles import counts_text, role_counts, roles_of
 from ..recording import Recording
+from ..recording.checks import quality_findings
+from ..recording.checks.wrong_readings import without_wrong_readings
 from ..recording.motion import GAP_RATIO, ordered_strokes
-from ..recording.quality import quality_findings
 from ..verdict import Verdict
 from .exit_status import end_with, finishing
 from .figures import FrameFigure, drawing, picture_frame, picture_recording
@@ -44,8 +45,11 @@ def show_recording(
 ) -> None:
     """Prints a recording, its verdict first, and draws its views."""
     recording = reading.read(file)
-    verdict = Verdict(tuple(quality_findings(recording)))
-    strokes, roles = _strokes(recording), role_counts(roles_of(recording))
+    (kept,), _ = without_wrong_readings([recording])
+    verdict = Verdict(tuple(quality_findings(kept)))
+    strokes, roles = _strokes(recording), role_counts(roles_of(kept))
+    if lost := len(recording) - len(kept):
+        roles["wrong reading"] = lost
     with drawing() as write_figures:
         notes = () if plot is None else picture_recording(plot, recording)
         if frame is not None:

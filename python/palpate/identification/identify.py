@@ -18,6 +18,7 @@ from ..arguments import parameter_texts, shown
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording, Source, read_recording
+from ..recording.checks.wrong_readings import without_wrong_readings
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
@@ -30,7 +31,6 @@ from .data.period import period_of
 from .data.roles import role_counts
 from .data.rows import Rows, require_in_range, require_usable, rows_of
 from .data.sections import in_sections
-from .data.wrong_readings import without_wrong_readings
 from .decision import latest
 from .network.fitted import FittedNetwork
 from .network.separable import TINY

@@ -35,6 +35,7 @@ from ..arguments import path_of
 from ..errors import InputError
 from ..model import Model
 from ..recording import Source
+from ..recording.checks.wrong_readings import wrong_readings
 from ..recording.conversion import mirror_notes
 from ..recording.files import unchanged
 from ..recording.motion import strokes_from_order
@@ -45,7 +46,6 @@ from ..verdict import Finding, usable
 from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
 from .data.rows import modulo, require_in_range
-from .data.wrong_readings import wrong_readings
 from .decision import Decision, in_words
 from .identify import fit_environment, model_of
 from .network.fitted import FittedNetwork

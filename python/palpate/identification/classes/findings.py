@@ -10,8 +10,8 @@ import numpy as np
 
 from ..._typing import Float1D
 from ...recording import Recording
+from ...recording.checks import findings_of
 from ...recording.motion import noise_band
-from ...recording.quality import findings_of
 from ...verdict import FORCE_FLOOR, FORCE_JND, Finding, Verdict, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import period_notes
@@ -21,10 +21,6 @@ from ..options import IdentifyOptions
 from ..search.evidence import Candidate
 from .class_selection import ClassSelection
 from .repeatability import band_with_check, left_out_nrmse
-
-PULLING_ROWS = 0.002
-"""If more than this share of the rows, and more than one row, pulls the tool, it cannot leave the object
-[-]."""
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: the RMS error is then a tenth of the standard
@@ -171,8 +167,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     if below == "auto":
         force = data.force[data.reported]
         near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(force)))
-        most = max(1, int(PULLING_ROWS * len(force)))
-        pulls = float(np.partition(force, most)[most]) < -near_zero
+        pulls = float(np.partition(force, 1)[1]) < -near_zero  # in more than one row
         below = "free" if single and data.period is None and not pulls else "linear"
     return replace(
         network,

@@ -13,7 +13,7 @@ from conftest import sampled
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate.cli.main import main
 from palpate.identification.data.strokes import strokes_of
-from palpate.recording.comparison import scale_findings
+from palpate.recording.checks.recordings import scale_findings
 from palpate.recording.motion import strokes_from_order
 
 MEASURED = ("keyswitches", "rubber_domes", "switch_springs")

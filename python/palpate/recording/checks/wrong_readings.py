@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..._typing import Float1D
-from ...recording import Recording
-from ...recording.motion import strokes_from_order
+from ..motion import strokes_from_order
+
+if TYPE_CHECKING:
+    from ..recording import Recording
 
 MOST_NAMED_ROWS = 3
 """Largest number of wrong readings that a note lists."""
@@ -21,9 +24,6 @@ successive rows nearby]."""
 
 LEAST_WRONG = 0.01
 """Smallest deviation of a wrong reading [share of the range of the column]: a hand does not feel less."""
-
-MOST_ROUNDS = 4
-"""Largest number of times that wrong readings are searched, each time without those found before."""
 
 MOST_WRONG_SHARE = 0.1
 """Share of the rows above which deviating values are not wrong readings [-]: so many belong to the object."""
@@ -85,8 +85,7 @@ def _deviating(
     """Returns True (n,) for the given rows whose value deviates from those before and after them."""
     found = np.zeros(len(values), dtype=bool)
     floor = LEAST_WRONG * float(np.subtract(*np.quantile(values[given], (0.99, 0.01))))
-    for _ in range(MOST_ROUNDS):
-        rows = np.flatnonzero(given & ~found)
+    while len(rows := np.flatnonzero(given & ~found)) > 2 * LOCAL_ROWS:
         v, x = values[rows], position[rows]
         around = np.pad(v, NEIGHBOUR_ROWS, mode="edge")
         windows = np.lib.stride_tricks.sliding_window_view(around, NEIGHBOUR_ROWS)

@@ -20,8 +20,8 @@ from imperfect import (
     true_nrmse,
     wall,
 )
-from palpate.identification.data.wrong_readings import without_wrong_readings, wrong_readings
 from palpate.identification.identify_files import identify_files
+from palpate.recording.checks.wrong_readings import without_wrong_readings, wrong_readings
 
 N = 10_000
 
