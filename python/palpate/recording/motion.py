@@ -217,9 +217,9 @@ STEPS_AROUND = 8
 """Number of distances before a row, and after it, whose median speeds are the speed of the motion around
 it."""
 
-LEAST_WAIT = 0.01
-"""Distance that the tool would travel during the shortest wait that is left out [share of the travel]: a
-shorter one has no weight in a fit."""
+SHORT_WAY = 0.01
+"""Distance without weight in a fit [share of the travel]: the tool would travel further during a wait that is
+left out, and can move further in a gap of time."""
 
 
 def noise_band(x: Float1D) -> float:
@@ -269,9 +269,7 @@ def waits(position: Float1D) -> NDArray[np.bool_] | None:
         # Speed is taken over some rows: the wait begins behind the row with which the tool arrives.
         first_row = min(begin - int(stopped), int(np.searchsorted(travelled, travelled[begin])) + 1)
         # One slow row is a turn between two rows.
-        found[first_row:end] = (
-            end - first_row > 1 and (end - first_row) * speed[begin:end].max() >= LEAST_WAIT
-        )
+        found[first_row:end] = end - first_row > 1 and (end - first_row) * speed[begin:end].max() >= SHORT_WAY
     return found
 
 
@@ -281,19 +279,19 @@ GAP_RATIO = 2.5
 Derivatives and filters are not computed across a gap.
 """
 
-GAP_SHARE = 0.02
-"""A long time step is a gap if the tool can move further in it, at the speed around it [share of the travel]:
-a recorder that stores a row for each change of position or force leaves no gap."""
-
 
 def gaps_of(time: Float1D, position: Float1D) -> NDArray[np.intp]:
-    """Returns the indices of the rows after which a motion (n,) continues beyond a gap of time."""
+    """Returns the indices of the rows after which a motion (n,) continues beyond a gap of time.
+
+    The tool can move far in a gap, at the speed around it: a recorder that stores a row for each change of
+    position or force leaves no gap.
+    """
     steps = np.diff(time)
     if not len(steps):
         return np.empty(0, dtype=np.intp)
     speed = np.abs(np.diff(position)) / steps
     around = np.maximum(speed, np.maximum(np.append(speed[1:], 0.0), np.insert(speed[:-1], 0, 0.0)))
-    moved = around * steps > GAP_SHARE * float(np.ptp(position))
+    moved = around * steps > SHORT_WAY * float(np.ptp(position))
     return np.flatnonzero((steps > GAP_RATIO * np.median(steps)) & moved) + 1
 
 

@@ -3,7 +3,6 @@
 
 import json
 import os
-import re
 import resource
 import subprocess
 import sys
@@ -560,7 +559,6 @@ def test_rows_in_no_order_give_a_finding_that_hysteresis_was_not_tested(tmp_path
     model = palpate.identify_files(written(frame, tmp_path / "press.csv"))
     assert model.verdict.level == "usable"
     assert "hysteresis was not tested" in str(model.verdict)
-    assert re.search(r"standard deviation of 0\.0[45]\d* N\*m \(\d\.\d% of its range\)", str(model.verdict))
     assert "add a column direction" in str(model.verdict)
 
 

@@ -11,9 +11,6 @@ from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.motion import ordered_strokes
 
-CELLS = 8192
-"""Largest number of position cells whose mean forces are correlated."""
-
 LEAST_CORRELATION = 0.5
 """Correlation of the force with itself, one period apart, from which a periodic model is tried [-]."""
 
@@ -35,7 +32,7 @@ def period_of(recordings: Sequence[Recording]) -> float | None:
         return None
     position = np.concatenate([each.position for each in recordings])[press]
     force = np.concatenate([each.force for each in recordings])[press]
-    travel, cells = float(np.ptp(position)), min(CELLS, len(force) // 2)
+    travel, cells = float(np.ptp(position)), len(force) // 2
     if not travel > 0.0:
         return None
     peak = _first_peak(_autocorrelation(_curve((position - position.min()) / travel, force, cells)))

@@ -9,6 +9,7 @@ nearby.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from enum import IntEnum
 
@@ -36,12 +37,6 @@ class Role(IntEnum):
 AIR_MARGIN = 1.0
 """Distance before the contact that is fitted, as a share of the travel in contact [-]: the force is the same
 further away, however long the approach is."""
-
-AIR_SHARE = 0.05
-"""Share of the rows, those at the smallest positions, whose median force is that of the air [-]."""
-
-AIR_BLOCKS = 500
-"""Largest number of groups of neighbouring rows whose mean forces are compared with the force of the air."""
 
 AIR_ERRORS = 4.0
 """Deviation of a mean force from that of the air at which there is contact [standard errors of both]."""
@@ -93,21 +88,22 @@ def unused_rows(role: Int8Vector, used: str = "fitted") -> str:
 
 
 def contact_at(position: Float1D, force: Float1D) -> float:
-    """Returns the smallest position at which the force of moving rows (n,) differs from that at the smallest
+    """Returns the smallest position at which the force of moving rows (n,) differs from that at all smaller
     positions by more than its noise: there the tool meets the object. Without a difference it is the smallest
-    position."""
+    position.
+
+    Rows that are neighbours in position are compared in blocks, as many as each has rows.
+    """
     order = np.argsort(position, kind="stable")
     reach = float(np.ptp(force))
     if not reach > 0.0 or len(force) < LEAST_STROKE_ROWS:
         return float(position.min())
     force = (force - force.min()) / reach
-    x, f = position[order], force[order]
-    air = f[: max(2, int(AIR_SHARE * len(f)))]
-    level = float(np.median(air))
     noise = max(noise_of(force), 0.5 * resolution_of(force), FORCE_RESOLUTION)
-    starts = np.linspace(0, len(f), min(AIR_BLOCKS, len(f)), endpoint=False).astype(np.intp)
-    rows = np.diff(starts, append=len(f))
-    mean = np.add.reduceat(f, starts) / rows
-    error = noise * np.sqrt(1.0 / rows + 1.0 / len(air))
-    apart = np.flatnonzero(np.abs(mean - level) > AIR_ERRORS * error)
-    return float(x[starts[apart[0]]] if len(apart) else x[0])
+    starts = np.linspace(0, len(force), math.isqrt(len(force)), endpoint=False).astype(np.intp)
+    total, rows = np.add.reduceat(force[order], starts), np.diff(starts, append=len(force))
+    air = np.cumsum(total)[:-1] / np.cumsum(rows)[:-1]
+    error = noise * np.sqrt(1.0 / rows[1:] + 1.0 / np.cumsum(rows)[:-1])
+    apart = np.flatnonzero(np.abs(total[1:] / rows[1:] - air) > AIR_ERRORS * error)
+    # If the second block already differs from the first one, there is no air.
+    return float(position[order][starts[1 + apart[0]] if len(apart) and apart[0] else 0])

@@ -128,7 +128,7 @@ def moved_zero(checked: Checked, *, shift_share: float, range_share: float, rows
         _lowest_force(recording, cells.row[(cells.cell >= cells.cells) == way], rows) for way in (False, True)
     )
     # The friction of an object that holds the tool is above zero in the press and below it in the release.
-    # A mirrored press ends as far below zero as it began above it.
+    # A mirrored press begins and ends at opposite forces.
     if end > -shift or cells.press.min() < -shift or abs(start) > 0.5 * abs(end):
         return []
     return [
