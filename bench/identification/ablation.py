@@ -47,7 +47,7 @@ DRAWS = 24
 FILES = 4
 """Largest number of files of each set, evenly spread"""
 
-LOST = (0.15, 0.4)
+LOST = (0.3, 0.6)
 """Positions without rows in a draw with a gap [share of the travel]"""
 
 CHANGED_RATIO = 1.02
@@ -219,8 +219,6 @@ RULES = (
     Rule("force may exceed the recorded forces", f"{CLASSES}.class_selection", "FORCE_MARGIN", 0.0),
     constant(f"{CHECKS}.wrong_readings.wrong_readings", "WRONG_RATIO", 16.0),
     constant(f"{CHECKS}.wrong_readings.wrong_readings", "LEAST_WRONG", 0.0),
-    constant(f"{DATA}.roles.contact_at", "AIR_ERRORS", 8.0),
-    constant(f"{DATA}.roles.contact_at", "AIR_ERRORS", 2.0),
     constant(f"{DATA}.rows.roles_of", "AIR_MARGIN", 0.5, f"{DATA}.roles"),
     constant("identification.identify.period_of", "LEAST_CORRELATION", 0.25, f"{DATA}.period"),
     constant("identification.identify.period_of", "SAME_PEAK", 1.0, f"{DATA}.period"),
@@ -261,7 +259,7 @@ def of_noise(case: str, draw: int) -> Fit:
 
 
 def of_gap(draw: int) -> Fit:
-    """Returns a draw of the bench of ordinary recordings that has no rows over a quarter of the travel."""
+    """Returns a draw of the bench of ordinary recordings that has no rows in a part of the travel."""
     _, rows = drawn(draw)
     share = (rows.motion.x - rows.motion.x.min()) / np.ptp(rows.motion.x)
     kept = rows.take(np.flatnonzero((share < LOST[0]) | (share > LOST[1])))
@@ -325,10 +323,10 @@ def _without(fit: Fit, rule: Rule) -> dict[str, Any]:
 
 def tasks(draws: int, files: int, seed: int = 0) -> list[tuple[Any, ...]]:
     """Returns the arguments of `measure` for all fits: `draws` draws of the bench of ordinary recordings from
-    number `seed` on, and a third of them with a gap; `files` is also the number of draws of each noise."""
+    number `seed` on, and a fifth of them with a gap; `files` is also the number of draws of each noise."""
     found: list[tuple[Any, ...]] = [(f"draw {draw}", of_draw, draw) for draw in range(seed, seed + draws)]
     found += [(f"{case}, draw {draw}", of_noise, case, draw) for case in CASES for draw in range(files)]
-    found += [(f"draw {draw} with a gap", of_gap, draw) for draw in range(seed, seed + draws // 3)]
+    found += [(f"draw {draw} with a gap", of_gap, draw) for draw in range(seed + 2, seed + draws, 5)]
     if (folder := measured_data()) is None:
         return found
     for name, most in MEASURED.items():

@@ -50,8 +50,8 @@ LEAST_CORRELATION = 0.15
 """Correlation of neighbouring residuals below which the residuals are taken as independent [-]."""
 
 SIGNIFICANT_STANDARD_ERRORS = 5.0
-"""A correlation of neighbouring residuals is not random if it exceeds this number of standard errors of a
-correlation of zero."""
+"""A correlation of neighbouring residuals, or a difference of mean forces, is not random if it exceeds this
+number of standard errors."""
 
 LEAST_NOISE_EVENNESS = 0.8
 """Least ratio of the median to the RMS of correlated residuals, 1 for normal noise, at which they are taken

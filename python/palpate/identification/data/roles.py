@@ -18,7 +18,7 @@ import numpy as np
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
 from ...recording.motion import LEAST_STROKE_ROWS, noise_of, resolution_of, waits
-from .limits import FORCE_RESOLUTION
+from .limits import FORCE_RESOLUTION, SIGNIFICANT_STANDARD_ERRORS
 
 
 class Role(IntEnum):
@@ -37,9 +37,6 @@ class Role(IntEnum):
 AIR_MARGIN = 1.0
 """Distance before the contact that is fitted, as a share of the travel in contact [-]: the force is the same
 further away, however long the approach is."""
-
-AIR_ERRORS = 4.0
-"""Deviation of a mean force from that of the air at which there is contact [standard errors of both]."""
 
 
 def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
@@ -104,6 +101,6 @@ def contact_at(position: Float1D, force: Float1D) -> float:
     total, rows = np.add.reduceat(force[order], starts), np.diff(starts, append=len(force))
     air = np.cumsum(total)[:-1] / np.cumsum(rows)[:-1]
     error = noise * np.sqrt(1.0 / rows[1:] + 1.0 / np.cumsum(rows)[:-1])
-    apart = np.flatnonzero(np.abs(total[1:] / rows[1:] - air) > AIR_ERRORS * error)
+    apart = np.flatnonzero(np.abs(total[1:] / rows[1:] - air) > SIGNIFICANT_STANDARD_ERRORS * error)
     # If the second block already differs from the first one, there is no air.
     return float(position[order][starts[1 + apart[0]] if len(apart) and apart[0] else 0])
