@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Repeats identifications with one rule switched off at a time, and prints what each rule changes.
 
-python bench/identification/ablation.py [--draws 24] [--files 4] [--jobs 2] [--each] [--json FILE]
+python bench/identification/ablation.py [--draws 24] [--seed 0] [--files 4] [--jobs 2] [--each] [--json FILE]
 
 A rule is a function or a constant of the identification that is replaced, so that the rule has no effect. The
 fits are draws of the bench of ordinary recordings and noise on a straight line, judged on the exact force,
@@ -38,13 +38,17 @@ from bench.studies import count, markdown_table, measured_data, write_results
 import palpate
 from palpate import InputError, Model, Recording
 from palpate.baselines import comparable
-from palpate.recording.motion import velocity
+from palpate.recording.motion import strokes_from_order, velocity
+from palpate.verdict import Finding
 from palpate.verification.metrics import normalised, root_mean_square
 
 DRAWS = 24
 
 FILES = 4
 """Largest number of files of each set, evenly spread"""
+
+LOST = (0.3, 0.6)
+"""Positions without rows in a draw with a gap [share of the travel]"""
 
 CHANGED_RATIO = 1.02
 """Ratio of two errors, of the same class and size, above which a fit has changed"""
@@ -116,7 +120,7 @@ def _same(one: Any, other: Any) -> bool:
         return len(one) == len(other) and all(map(_same, one, other))
     if isinstance(one, (np.ndarray, float, str)) and isinstance(other, (np.ndarray, float, str)):
         return bool(np.array_equal(one, other))
-    return one is other
+    return one is other or (isinstance(one, Finding) and one == other)
 
 
 def _none(values: Any, *_: Any) -> Any:
@@ -147,17 +151,52 @@ def _no_findings(*_: Any, **__: Any) -> Any:
     return []
 
 
+def _no_wrong_readings(motion: Any, position: Any, *_: Any) -> Any:
+    return _none(position)
+
+
+def _no_waits(position: Any) -> Any:
+    return None if strokes_from_order(position) is None else _none(position)
+
+
+def constant(function: str, name: str, value: float, place: str = "") -> Rule:
+    """Returns the rule that a constant has its value, not another one, in the calls of a function.
+
+    Parameters
+    ----------
+    function : str
+        Function that uses the constant, and the module that calls it: "identification.data.roles.contact_at".
+    name : str
+        Name of the constant.
+    value : float
+        Other value.
+    place : str
+        Module of the constant; by default that of the call.
+    """
+    module, attribute = function.rsplit(".", 1)
+    home = import_module(f"palpate.{place or module}")
+    original = getattr(import_module(f"palpate.{module}"), attribute)
+
+    def without(*given: Any, **named: Any) -> Any:
+        with patch.object(home, name, value):
+            return original(*given, **named)
+
+    return Rule(f"{name} {getattr(home, name):g}, not {value:g}", module, attribute, without)
+
+
+CHECKS = "recording.checks"
+
 DATA, CLASSES, SEARCH = (f"identification.{folder}" for folder in ("data", "classes", "search"))
 
 RULES = (
-    Rule("rows that wait are not fitted", f"{DATA}.roles", "waits", _none),
+    Rule("rows that wait are not fitted", f"{DATA}.roles", "waits", _no_waits),
     Rule("approach is not fitted", f"{DATA}.roles", "contact_at", lambda x, f: float(x.min())),
-    Rule("wrong readings are dropped", f"{DATA}.outliers", "wrong_readings", _none),
-    Rule("isolated rows are dropped", f"{DATA}.outliers", "without_isolated", lambda each: (list(each), [])),
+    Rule(
+        "wrong readings are dropped", f"{CHECKS}.wrong_readings", "wrong_readings", lambda _, x, *__: _none(x)
+    ),
     Rule("period is found", "identification.identify", "period_of", _nothing),
     Rule("repeated rows count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
     Rule("force step hides errors", f"{DATA}.rows", "force_step", _zero),
-    Rule("position noise limits wavelets", f"{DATA}.rows", "position_noise", _zero),
     Rule("correlated noise", f"{CLASSES}.model_selection", "correlated_noise", _first),
     Rule("noise where candidates differ", f"{SEARCH}.evidence", "local_noise_ratio", _one),
     Rule("no finer than repeats", f"{CLASSES}.model_selection", "no_finer_than_repeats", _first),
@@ -165,7 +204,6 @@ RULES = (
     Rule("pruning", f"{SEARCH}.growth", "MOST_PRUNE_TRIALS", 0),
     Rule("weight penalty", "identification.network.separable", "SeparableProblem.with_prior", _first),
     Rule("regrowth with constraints", f"{CLASSES}.class_selection", "REGROWTH_ERROR_RATIO", np.inf),
-    Rule("single-valued rival", f"{CLASSES}.hysteresis", "Hysteresis._single_valued", _second),
     Rule("search of the play radius", f"{CLASSES}.hysteresis", "PlaySearch.with_best_radius", _second),
     Rule("growth with the play radius", f"{CLASSES}.hysteresis", "FIRST_MAX_WAVELETS", 64),
     Rule("rows around the seam", f"{SEARCH}.evidence", "around_seam", _first),
@@ -177,8 +215,18 @@ RULES = (
     Rule("checks of the recording", f"{CLASSES}.findings", "findings_of", _no_findings),
     Rule("check of waits", f"{CLASSES}.findings", "wait_findings", _no_findings),
     Rule("check of places", f"{CLASSES}.findings", "place_findings", _no_findings),
-    Rule("check of the extreme forces", f"{CLASSES}.findings", "extreme_force_findings", _no_findings),
-    Rule("check of other inputs", f"{CLASSES}.findings", "explained_findings", _no_findings),
+    Rule("force near the recorded forces", f"{CLASSES}.class_selection", "FORCE_MARGIN", 1e9),
+    Rule("force may exceed the recorded forces", f"{CLASSES}.class_selection", "FORCE_MARGIN", 0.0),
+    constant(f"{CHECKS}.wrong_readings.wrong_readings", "WRONG_RATIO", 16.0),
+    constant(f"{CHECKS}.wrong_readings.wrong_readings", "LEAST_WRONG", 0.0),
+    constant(f"{DATA}.rows.roles_of", "AIR_MARGIN", 0.5, f"{DATA}.roles"),
+    constant("identification.identify.period_of", "LEAST_CORRELATION", 0.25, f"{DATA}.period"),
+    constant("identification.identify.period_of", "SAME_PEAK", 1.0, f"{DATA}.period"),
+    constant("recording.motion.gaps_of", "SHORT_WAY", 0.0),
+    constant(f"{CLASSES}.findings.left_out_nrmse", "FEW_ROWS", 0, f"{CLASSES}.repeatability"),
+    constant(f"{CLASSES}.findings.place_findings", "PLACES", 200),
+    constant(f"{CLASSES}.findings.place_findings", "PLACE_ERRORS", 0.0),
+    constant(f"{CLASSES}.findings.place_findings", "MOST_JND", 1.0),
 )
 
 
@@ -208,6 +256,14 @@ def of_noise(case: str, draw: int) -> Fit:
         return float(normalised(root_mean_square(at_rest - line(x)), line(x)))
 
     return Fit([recording], error, {})
+
+
+def of_gap(draw: int) -> Fit:
+    """Returns a draw of the bench of ordinary recordings that has no rows in a part of the travel."""
+    _, rows = drawn(draw)
+    share = (rows.motion.x - rows.motion.x.min()) / np.ptp(rows.motion.x)
+    kept = rows.take(np.flatnonzero((share < LOST[0]) | (share > LOST[1])))
+    return Fit([kept.recording()], Truth.of(rows).error, {})
 
 
 def of_file(path: Path, name: str) -> Fit:
@@ -265,10 +321,12 @@ def _without(fit: Fit, rule: Rule) -> dict[str, Any]:
         return {"verdict": "fails", "failure": repr(error)}
 
 
-def tasks(draws: int, files: int) -> list[tuple[Any, ...]]:
-    """Returns the arguments of `measure` for all fits; `files` is also the number of draws of each noise."""
-    found: list[tuple[Any, ...]] = [(f"draw {draw}", of_draw, draw) for draw in range(draws)]
+def tasks(draws: int, files: int, seed: int = 0) -> list[tuple[Any, ...]]:
+    """Returns the arguments of `measure` for all fits: `draws` draws of the bench of ordinary recordings from
+    number `seed` on, and a fifth of them with a gap; `files` is also the number of draws of each noise."""
+    found: list[tuple[Any, ...]] = [(f"draw {draw}", of_draw, draw) for draw in range(seed, seed + draws)]
     found += [(f"{case}, draw {draw}", of_noise, case, draw) for case in CASES for draw in range(files)]
+    found += [(f"draw {draw} with a gap", of_gap, draw) for draw in range(seed + 2, seed + draws, 5)]
     if (folder := measured_data()) is None:
         return found
     for name, most in MEASURED.items():
@@ -352,6 +410,7 @@ def _line(each: dict[str, Any]) -> tuple[str, ...]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draws", type=int, default=count(DRAWS))
+    parser.add_argument("--seed", type=int, default=0, help="first draw")
     parser.add_argument(
         "--files", type=int, default=count(FILES), help="largest number of each set and noise"
     )
@@ -361,7 +420,7 @@ def main() -> None:
     options = parser.parse_args()
     rows = []
     for row in Parallel(n_jobs=options.jobs, return_as="generator")(
-        delayed(measure)(*task) for task in tasks(options.draws, options.files)
+        delayed(measure)(*task) for task in tasks(options.draws, options.files, options.seed)
     ):
         rows.append(row)
         if options.each:

@@ -24,6 +24,11 @@ def bend(u: Array, at: float, width: float) -> Array:
     return np.asarray(width * np.logaddexp(0.0, (u - at) / width))
 
 
+def bowed(bow: float) -> Callable[[Array, Array], Array]:
+    """Returns the shape of a spring without hysteresis that stiffens by `bow`."""
+    return lambda u, s: u + bow * u**2
+
+
 @dataclass(frozen=True, kw_only=True)
 class Object:
     """Object with a known force: shape(u, s) times `scale`, plus relaxing and viscous forces.
@@ -164,11 +169,7 @@ def latching_switch(random: Generator) -> Object:
 
 
 def spring(random: Generator) -> Object:
-    travel, bow = random.uniform(5e-3, 3e-2), random.uniform(-0.2, 0.4)
-
-    def shape(u: Array, s: Array) -> Array:
-        return u + bow * u**2
-
+    travel, shape = random.uniform(5e-3, 3e-2), bowed(random.uniform(-0.2, 0.4))
     return Object(
         name="spring", shape=shape, travel=travel, scale=10.0 ** random.uniform(0.0, 1.5), hysteretic=False
     )
@@ -190,14 +191,9 @@ def spring_with_wall(random: Generator) -> Object:
 
 
 def tissue(random: Generator) -> Object:
-    bow = random.uniform(0.5, 2.0)
-
-    def shape(u: Array, s: Array) -> Array:
-        return u + bow * u**2
-
     return Object(
         name="tissue",
-        shape=shape,
+        shape=bowed(random.uniform(0.5, 2.0)),
         travel=random.uniform(3e-3, 1e-2),
         scale=10.0 ** random.uniform(-1.0, 0.5),
         hysteretic=False,

@@ -342,7 +342,7 @@ KINDS: dict[str, Corruption] = {
 }
 
 CAUSES = {
-    "spikes": r"spike|outlier|outside|single row|stretch|loss huber|far from|few rows",
+    "spikes": r"spike|outlier|outside|single row|stretch|far from|few rows",
     "repeats": r"repeat|identical|held|same row",
     "held samples": r"held|hold|repeat|resolution|steps|delay|late|hysteresis",
     "thinning": r"rows|positions|parameters|gap",

@@ -343,16 +343,16 @@ def identify(
         result["held_out_rows"] = compared
     if model.band is not None:
         result["unseen_error"], result["band_coverage"] = model.band.unseen_error, model.band.coverage
+    if "roles" in model.notes:
+        result["roles"] = model.notes["roles"]
     if with_baselines:
         result["baselines"] = [asdict(each) for each in others]
     rows = sum(len(recording) for recording in judged_on)
     of_rows = str(rows) if compared == rows else f"{compared} of {rows}"
     judged = f"{of_rows} rows held out"
     if hold_out_every is None:
-        fitted = model.data.rows
+        fitted = model.notes["error_rows"]
         judged = f"{fitted} of {rows} rows" if fitted < rows else "the rows of the identification"
-    if hold_out_every is None and settings["loss"] == "huber":
-        judged += ", where rows far from the model have less weight"
     left_out_nrmse = model.notes.get("left_out_nrmse", 0.0)
     left_out = ""
     if hold_out_every is None and left_out_nrmse > nrmse:

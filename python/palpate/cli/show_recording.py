@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..identification.data.roles import role_counts, roles_of
+from ..identification.data.roles import counts_text, role_counts, roles_of
 from ..recording import Recording
+from ..recording.checks import quality_findings
+from ..recording.checks.wrong_readings import without_wrong_readings
 from ..recording.motion import GAP_RATIO, ordered_strokes
-from ..recording.quality import quality_findings
 from ..verdict import Verdict
 from .exit_status import end_with, finishing
 from .figures import FrameFigure, drawing, picture_frame, picture_recording
@@ -44,8 +45,11 @@ def show_recording(
 ) -> None:
     """Prints a recording, its verdict first, and draws its views."""
     recording = reading.read(file)
-    verdict = Verdict(tuple(quality_findings(recording)))
-    strokes = _strokes(recording)
+    (kept,), _ = without_wrong_readings([recording])
+    verdict = Verdict(tuple(quality_findings(kept)))
+    strokes, roles = _strokes(recording), role_counts(roles_of(kept))
+    if lost := len(recording) - len(kept):
+        roles["wrong reading"] = lost
     with drawing() as write_figures:
         notes = () if plot is None else picture_recording(plot, recording)
         if frame is not None:
@@ -55,11 +59,12 @@ def show_recording(
         write_figures()
         if as_json:
             found = {"force_lag": recording.force_lag.record()} if lag else {}
-            print_json(_record(file, recording, strokes) | found | {"verdict": str(verdict)})
+            record = _record(file, recording, strokes) | {"roles": roles}
+            print_json(record | found | {"verdict": str(verdict)})
         else:
             print_verdict(verdict)
             estimated = {"force lag": str(recording.force_lag)} if lag else {}
-            print_numbers(_summary(recording, strokes) | estimated)
+            print_numbers(_summary(recording, strokes, roles) | estimated)
             for note in notes:
                 print_paragraph(note, indent="  ")
         end_with(verdict)
@@ -75,7 +80,7 @@ def _strokes(recording: Recording) -> dict[str, int] | None:
     return {"press": int(np.sum(first > 0)), "release": int(np.sum(first < 0))}
 
 
-def _summary(recording: Recording, strokes: dict[str, int] | None) -> dict[str, str]:
+def _summary(recording: Recording, strokes: dict[str, int] | None, roles: dict[str, int]) -> dict[str, str]:
     """Returns the properties of a recording for display, by name, in the units of the file."""
     position, force = recording.file_unit("position"), recording.file_unit("force")
     others = [*recording.input_names, *recording.columns]
@@ -92,7 +97,7 @@ def _summary(recording: Recording, strokes: dict[str, int] | None) -> dict[str, 
     else:
         source = "the order of the rows" if recording.direction is None else "the direction column"
         rows["strokes"] = f"{strokes['press']} press, {strokes['release']} release, from {source}"
-    rows["roles"] = role_counts(roles_of(recording))
+    rows["roles"] = counts_text(roles)
     return {name: value for name, value in rows.items() if value}
 
 

@@ -18,6 +18,7 @@ from ..arguments import parameter_texts, shown
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording, Source, read_recording
+from ..recording.checks.wrong_readings import without_wrong_readings
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
@@ -26,8 +27,8 @@ from .classes.findings import USABLE_NRMSE, identified, verdict_of
 from .classes.memory import IdentifyRest, better_with_memory
 from .classes.model_selection import select
 from .data.limits import ForceScale
-from .data.outliers import without_wrong_readings
 from .data.period import period_of
+from .data.roles import role_counts
 from .data.rows import Rows, require_in_range, require_usable, rows_of
 from .data.sections import in_sections
 from .decision import latest
@@ -75,7 +76,8 @@ def identify(
         ``model.verdict`` judges it. ``model.fit`` holds its class and why growth stopped, ``model.path``
         every network that was considered. ``model.notes["model_selection"]`` holds one line for each model
         class, accepted or not; ``model.notes["identification"]`` sentences on unused rows, constraints and
-        the check of the band. ``model.band`` is the range of force of a further recording.
+        the check of the band; ``model.notes["roles"]`` the number of rows of each role. ``model.band`` is the
+        range of force of a further recording.
 
     Raises
     ------
@@ -136,7 +138,8 @@ def identify(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify each one "
                 "separately"
             )
-    recordings, isolated, wrong = without_wrong_readings(recordings)
+    given_rows = sum(map(len, recordings))
+    recordings, wrong = without_wrong_readings(recordings)
     for each in recordings:
         require_in_range("position", each.position)
         require_in_range("force", each.force)
@@ -147,17 +150,17 @@ def identify(
     # result.
     with threadpool_limits(limits=1, user_api="blas"):
         network, settings, rows = _fitted_with_period(fitted, settings, object_of)
-        network = replace(
-            network,
-            findings=(*isolated, *network.findings),
-            notes=(*wrong, *sections, *network.notes),
-        )
+        network = replace(network, notes=(*wrong, *sections, *network.notes))
         rest = _resting(rows, settings)
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
-    return model_of(network, recordings[0].units, source, settings, verdict)
+    model = model_of(network, recordings[0].units, source, settings, verdict)
+    used = sum(map(len, recordings))
+    unused = {"wrong reading": given_rows - used, "left out": used - len(rows.force)}
+    model.notes["roles"] = role_counts(rows.roles) | {name: count for name, count in unused.items() if count}
+    return model
 
 
 def _fitted_with_period(
@@ -376,6 +379,7 @@ def model_of(
             "model_selection": [str(decision) for decision in network.decisions],
             "identification": [*network.notes, *network.band_check],
             "left_out_nrmse": network.left_out_nrmse,
+            "error_rows": network.residuals,
             "verdict": verdict.record(),
         },
     )

@@ -35,17 +35,17 @@ from ..arguments import path_of
 from ..errors import InputError
 from ..model import Model
 from ..recording import Source
+from ..recording.checks.wrong_readings import wrong_readings
 from ..recording.conversion import mirror_notes
 from ..recording.files import unchanged
 from ..recording.motion import strokes_from_order
 from ..recording.reading import PART_ROWS, LongRecording, open_long_recording
 from ..recording.rows import LeftOut
-from ..recording.units import Unit
 from ..verdict import Finding, usable
 from .classes.findings import verdict_of
 from .data.compression import POOLED_CELLS
-from .data.outliers import refuse_isolated
 from .data.rows import modulo, require_in_range
+from .data.strokes import DIRECTION_CURE
 from .decision import Decision, in_words
 from .identify import fit_environment, model_of
 from .network.fitted import FittedNetwork
@@ -67,10 +67,6 @@ IN_PARTS = "the files were read part by part"
 
 UNTESTED = ("damping", "mass", "velocity", "memory")
 """Model classes of recordings with time that need all rows at once."""
-
-SCATTER_CELLS = 16
-"""Number of neighbouring position cells in which the force of single rows is compared with one straight
-line."""
 
 Progress = Callable[[int, int], None]
 """Function that receives the number of file parts that were read so far, and the number of all file parts."""
@@ -210,12 +206,17 @@ def read_part(work: tuple[LongRecording, tuple[int, int]]) -> PartRead:
     for block in recording.blocks(part):
         summary = None
         if len(block.position):
-            require_in_range("position", block.position)
-            require_in_range("force", block.force)
-            stated = block.direction is not None
-            side = block.direction if stated else strokes_from_order(block.position)
-            summary = summarise(block.position, block.force, side)
-        found.add(summary, block.rows)
+            wrong = wrong_readings(block.position, block.position, block.force)
+            position, force = block.position[~wrong], block.force[~wrong]
+            require_in_range("position", position)
+            require_in_range("force", force)
+            direction = block.direction
+            side = strokes_from_order(position) if direction is None else direction[~wrong]
+            summary = summarise(position, force, side)
+            if wrong.any():
+                first = int(np.flatnonzero(block.kept)[wrong][0])
+                found.left_out.drop("with a wrong reading", int(wrong.sum()), found.rows + first)
+        found.add(summary, len(block.kept))
         found.left_out.add(block.left_out, 0)
     return found
 
@@ -255,8 +256,6 @@ def _error_on_rows(
 def _identified(
     summary: Summary, recordings: Sequence[LongRecording], settings: IdentifyOptions, notes: list[str]
 ) -> Model:
-    width = 0.0 if summary.level is None else 2.0**summary.level
-    refuse_isolated(summary.position, summary.count, width)
     notes += mirror_notes(summary.correlation)
     side: Float1D | None = summary.side.astype(np.float64)
     notes.append(f"Defects of the recording and a lag of the force were not searched: {IN_PARTS}.")
@@ -272,7 +271,7 @@ def _identified(
         else:
             side = None
             decisions.insert(0, Decision("hysteresis", "not tested", UNKNOWN_STROKES))
-            findings.append(_untested(summary, recordings[0].file_unit("force")))
+            findings.append(usable(f"hysteresis was not tested: {UNKNOWN_STROKES}. Cure: {DIRECTION_CURE}"))
     with threadpool_limits(limits=1, user_api="blas"):
         network = fit_environment(
             summary.position[:, None],
@@ -312,19 +311,6 @@ def _known_strokes(summary: Summary) -> bool:
     return min(press, release) > 0.0 and press + release >= LEAST_KNOWN_SHARE * summary.rows
 
 
-def _untested(summary: Summary, force_unit: Unit) -> Finding:
-    """Returns a finding that hysteresis could not be tested, with the standard deviation of the force at
-    equal positions."""
-    scatter = summary.scatter
-    reach = float(np.ptp(summary.force)) or 1.0
-    return usable(
-        f"hysteresis was not tested: {UNKNOWN_STROKES}. At the same position the force has a standard "
-        f"deviation of {force_unit.text(scatter)} ({scatter / reach:.1%} of its range), from "
-        "noise or from a difference between press and release. Cure: add a column direction with the words "
-        "press and release"
-    )
-
-
 def _require_summable(settings: IdentifyOptions) -> None:
     further = set(() if settings.inputs == "auto" else settings.inputs) - {"position", "hysteresis"}
     if further:
@@ -332,8 +318,6 @@ def _require_summable(settings: IdentifyOptions) -> None:
             f"inputs names {', '.join(sorted(further))}: must be position and hysteresis only, for files "
             "that are read part by part"
         )
-    if settings.loss != "squares":
-        raise InputError(f"loss is {settings.loss!r}: must be 'squares' for files that are read part by part")
 
 
 @dataclass(frozen=True)
@@ -390,22 +374,6 @@ class Summary:
         xx, xy = np.bincount(group, self.xx), np.bincount(group, self.xy)
         explained = np.divide(xy * xy, xx, out=np.zeros_like(xx), where=xx > 0)
         return max(float(self.yy.sum() - explained.sum()), 0.0)
-
-    @property
-    def scatter(self) -> float:
-        """Standard deviation of the force from a straight line in each interval of SCATTER_CELLS cells
-        [force]."""
-        group = np.argsort(np.argsort(self.position, kind="stable")) // SCATTER_CELLS
-        total = np.bincount(group, self.count)
-        dx, dy = (
-            values - (np.bincount(group, self.count * values) / total)[group]
-            for values in (self.position, self.force)
-        )
-        xx = np.bincount(group, self.xx + self.count * dx * dx)
-        xy = np.bincount(group, self.xy + self.count * dx * dy)
-        yy = np.bincount(group, self.yy + self.count * dy * dy)
-        explained = np.divide(xy * xy, xx, out=np.zeros_like(xx), where=xx > 0)
-        return float(np.sqrt(max(float(yy.sum() - explained.sum()), 0.0) / self.rows))
 
 
 def summarise(

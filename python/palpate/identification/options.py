@@ -23,7 +23,6 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "criterion": ("bic", "aicc", "gcv", "fpe", "fresh", "perceptual"),
     "selection": ("orthogonal", "residual", "backward"),
     "refinement": ("projection", "quasi-newton"),
-    "loss": ("squares", "huber"),
     "filters": ("matched", "paper-implicit", "paper-explicit"),
     "below": ("auto", "free", "linear"),
     "above": ("linear", "free"),
@@ -127,10 +126,6 @@ class IdentifyOptions:
     """Criterion to stop adding wavelets. It also compares models. From the fitted rows: bic, aicc, gcv, fpe
     (Bayesian, corrected Akaike, generalised cross-validation, final prediction error). From the error on
     held-out rows: fresh (error as force) or perceptual (error in just noticeable differences)"""
-    loss: str = "squares"
-    """squares: least squares; huber: outliers weigh less. An outlier is a row with a force far from the
-    model's force. Wrong readings, outside the values of the rows before and after them, are dropped with
-    both."""
     hysteresis_nonnegative: bool = True
     """Impose that every loop loses energy. The hysteresis is h >= 0 over the domain."""
     slope_bounds: tuple[float, float] | None = None

@@ -38,7 +38,7 @@ except ImportError as missing:
 SETTINGS = {
     each.name: None if each.name == "search" else each.default
     for each in fields(IdentifyOptions)
-    if each.name in ("max_wavelets", "criterion", "loss", "search")
+    if each.name in ("max_wavelets", "criterion", "search")
 }
 """Settings of :class:`IdentifyOptions` that the estimator has, with their defaults. The value None of search
 means the default search settings."""
@@ -59,7 +59,7 @@ most the third digit of the error."""
 class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """A wavelet network fitted to any X (n, d), y (n,).
 
-    With the loss "squares", minimises sum_k v_k (y_k - f(x_k))^2 plus a small penalty on large w over w,
+    Minimises sum_k v_k (y_k - f(x_k))^2 plus a small penalty on large w over w,
     alpha, beta, c and b, with sample weights v and
 
         f(x) = sum_i w_i psi(alpha_i o (x - beta_i)) + c'x + b,  psi(u) = (|u|^2 - d) exp(-|u|^2 / 2).
@@ -71,7 +71,7 @@ class WaveletNetworkRegressor(RegressorMixin, BaseEstimator):  # type: ignore[mi
     Parameters
     ----------
     **settings
-        max_wavelets, criterion, loss and search of :class:`palpate.IdentifyOptions`, with the same defaults.
+        max_wavelets, criterion and search of :class:`palpate.IdentifyOptions`, with the same defaults.
         The settings of search that describe motion and contact are ignored.
 
     Attributes

@@ -136,12 +136,12 @@ def turns_of(direction: Int8Vector) -> int:
     return int(np.count_nonzero(moving[1:] != moving[:-1]))
 
 
-def noise_of(x: Float1D, step: float = 0.0) -> float:
+def noise_of(x: Float1D) -> float:
     """Returns the standard deviation of the noise of positions or forces (n,) from their sixth differences; 0
     for fewer than seven rows.
 
     A motion leaves almost nothing in them, and reversals are too few to change their median. A motion in one
-    direction that is rounded to a `step` has no noise.
+    direction that is rounded to steps has no noise.
     """
     if len(x) < 7:
         return 0.0
@@ -150,14 +150,14 @@ def noise_of(x: Float1D, step: float = 0.0) -> float:
     changes = np.lib.stride_tricks.sliding_window_view(np.diff(x), 6)[::every]
     one_way = (changes.min(axis=1) >= 0.0) | (changes.max(axis=1) <= 0.0)
     # Rounding moves each value by at most half a step, and the coefficients of a sixth difference sum to 64.
-    differences[one_way & (differences <= 32.0 * step)] = 0.0
+    differences[one_way & (differences <= 32.0 * resolution_of(x))] = 0.0
     return float(np.median(differences)) / (0.6745 * math.sqrt(math.comb(12, 6)))
 
 
 def resolution_of(x: Float1D) -> float:
     """Returns the smallest change of position between adjacent rows that is not a rounding error."""
     steps = np.abs(np.diff(x))
-    return float(np.min(steps[steps > 1e-9]))
+    return float(np.min(steps[steps > 1e-9], initial=np.inf))
 
 
 def _stroke_ends(x: Float1D, turn: float) -> list[tuple[int, int]]:
@@ -217,25 +217,28 @@ STEPS_AROUND = 8
 """Number of distances before a row, and after it, whose median speeds are the speed of the motion around
 it."""
 
-LEAST_WAIT = 0.01
-"""Distance that the tool would travel during the shortest wait that is left out [share of the travel]: a
-shorter one has no weight in a fit."""
+SHORT_WAY = 0.01
+"""Distance without weight in a fit [share of the travel]: the tool would travel further during a wait that is
+left out, and can move further in a gap of time."""
 
 
 def noise_band(x: Float1D) -> float:
     """Returns the width within which noise and resolution move positions (n,) in recorded order."""
     sections = np.array_split(x, max(1, min(SECTIONS, len(x) // LEAST_SECTION_ROWS)))
     step = resolution_of(x)
-    return max(TURN_NOISE * max(noise_of(section, step) for section in sections), TURN_STEPS * step)
+    return max(TURN_NOISE * max(noise_of(section) for section in sections), TURN_STEPS * step)
 
 
-def waits(position: Float1D) -> NDArray[np.bool_]:
-    """Returns True (n,) for rows at which the tool waits; positions (n,) are in recorded order.
+def waits(position: Float1D) -> NDArray[np.bool_] | None:
+    """Returns True (n,) for rows at which the tool waits; positions (n,) are in recorded order. Returns None
+    if the rows are not in the order of a motion.
 
     The distance that the tool has travelled is that of a play operator as wide as the noise, which noise does
     not move. The speed around a row is the smaller one of the median speeds of `STEPS_AROUND` distances
     before it and after it, which a wait among them does not change.
     """
+    if strokes_from_order(position) is None:
+        return None
     x = (position - position.min()) / float(np.ptp(position))
     band = noise_band(x)
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(play(x, 0.5 * band, start=x[0]))))])
@@ -266,9 +269,7 @@ def waits(position: Float1D) -> NDArray[np.bool_]:
         # Speed is taken over some rows: the wait begins behind the row with which the tool arrives.
         first_row = min(begin - int(stopped), int(np.searchsorted(travelled, travelled[begin])) + 1)
         # One slow row is a turn between two rows.
-        found[first_row:end] = (
-            end - first_row > 1 and (end - first_row) * speed[begin:end].max() >= LEAST_WAIT
-        )
+        found[first_row:end] = end - first_row > 1 and (end - first_row) * speed[begin:end].max() >= SHORT_WAY
     return found
 
 
@@ -278,19 +279,19 @@ GAP_RATIO = 2.5
 Derivatives and filters are not computed across a gap.
 """
 
-GAP_SHARE = 0.02
-"""A long time step is a gap if the tool can move further in it, at the speed around it [share of the travel]:
-a recorder that stores a row for each change of position or force leaves no gap."""
-
 
 def gaps_of(time: Float1D, position: Float1D) -> NDArray[np.intp]:
-    """Returns the indices of the rows after which a motion (n,) continues beyond a gap of time."""
+    """Returns the indices of the rows after which a motion (n,) continues beyond a gap of time.
+
+    The tool can move far in a gap, at the speed around it: a recorder that stores a row for each change of
+    position or force leaves no gap.
+    """
     steps = np.diff(time)
     if not len(steps):
         return np.empty(0, dtype=np.intp)
     speed = np.abs(np.diff(position)) / steps
     around = np.maximum(speed, np.maximum(np.append(speed[1:], 0.0), np.insert(speed[:-1], 0, 0.0)))
-    moved = around * steps > GAP_SHARE * float(np.ptp(position))
+    moved = around * steps > SHORT_WAY * float(np.ptp(position))
     return np.flatnonzero((steps > GAP_RATIO * np.median(steps)) & moved) + 1
 
 

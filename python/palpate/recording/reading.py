@@ -226,8 +226,8 @@ class Block:
     force: Float1D
     """[SI]"""
     direction: Int8Vector | None
-    rows: int
-    """Number of rows that were read from the file, including ignored rows"""
+    kept: npt.NDArray[np.bool_]
+    """True for the rows of the file that are used, False for ignored rows"""
     left_out: LeftOut
 
 
@@ -279,7 +279,7 @@ class LongRecording:
                 for column in (conversion.choice.position, conversion.choice.force)
             )
             direction = None if directions is None else directions[check.kept]
-            yield Block(position, force, direction, len(check.kept), check.left_out)
+            yield Block(position, force, direction, check.kept, check.left_out)
 
     def places(self) -> Places:
         """Returns the line numbers and cell texts of the rows of the file, for messages."""

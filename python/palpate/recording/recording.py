@@ -17,12 +17,13 @@ from .._typing import Float1D, Float2D, Int8Vector
 from ..arguments import number_of, path_of, real_of, shown, vector_of
 from ..errors import InputError
 from ..verdict import Verdict
+from .checks import quality_findings
+from .checks.wrong_readings import without_wrong_readings
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
 from .display import columns_of, html_of
 from .files import write_csv
 from .lag import LAG_DIGITS, UNKNOWN_CURE, ForceLag, lag_of
 from .mcap_file import write_mcap
-from .quality import quality_findings
 from .table import FRAME, Cells, FrameTable, python_arguments
 from .units import FORCE_UNITS, POSITION_UNITS, Unit
 
@@ -234,7 +235,8 @@ class Recording:
     @property
     def verdict(self) -> Verdict:
         """Verdict on the quality of the recording: clipped or stuck sensors, gaps, wrong signs or units."""
-        return Verdict(tuple(quality_findings(self)))
+        (kept,), _ = without_wrong_readings([self])
+        return Verdict(tuple(quality_findings(kept)))
 
     @property
     def motion(self) -> Motion:

@@ -57,7 +57,7 @@ CASES = [
     (["re"], ["render", "record", "report"]),
     (["--c"], ["--completion"]),
     (["identify", "--hold"], ["--hold-out-every"]),
-    (["identify", "a.csv", "--loss", ""], ["squares", "huber"]),
+    (["identify", "a.csv", "--below", ""], ["auto", "free", "linear"]),
     (["identify", ""], ["a.csv", "a.parquet"]),
     (["identify", "a.csv", "-o", ""], ["m.json"]),
     (["identify", "a.csv", "--plot", ""], ["p.png"]),

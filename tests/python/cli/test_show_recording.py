@@ -7,6 +7,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+import pandas as pd
 import pytest
 
 from models_by_hand import model_by_hand
@@ -66,6 +67,22 @@ def test_json_has_the_same_properties(strokes: Path, capsys: pytest.CaptureFixtu
     assert found["position"] == pytest.approx([0.0, 4e-3])
     assert found["strokes"] == {"press": 2, "release": 1}
     assert found["rate_hz"] is None
+    assert found["roles"] == {"move": 170}
+
+
+def test_json_counts_the_rows_of_each_role(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    depth = np.concatenate([np.linspace(0.0, 4.0, 200), np.full(60, 4.0), np.linspace(4.0, 0.0, 200)])
+    load = 50.0 * depth
+    load[100] = 5000.0
+    path = tmp_path / "hold.csv"
+    pd.DataFrame({"depth_mm": depth, "load_gf": load}).to_csv(path, index=False)
+    assert main(["show", str(path), "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)["roles"]
+    assert shown == {"move": 397, "wait in contact": 62, "wrong reading": 1}
+    assert main(["identify", str(path), "-o", str(tmp_path / "m.json"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["roles"] == shown
+    assert main(["identify", str(path), "-o", str(tmp_path / "m.json")]) == 0
+    assert "on 397 of 460 rows" in printed(capsys)["error"]
 
 
 @pytest.mark.parametrize("name", ["timed", "strokes"])

@@ -44,7 +44,7 @@ def saddle(n: int = 400, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 def test_settings_and_defaults_are_those_of_identification() -> None:
     known = {each.name: each.default for each in fields(IdentifyOptions)}
     taken = WaveletNetworkRegressor().get_params()
-    assert taken == {name: known[name] for name in ("max_wavelets", "criterion", "loss")} | {"search": None}
+    assert taken == {name: known[name] for name in ("max_wavelets", "criterion")} | {"search": None}
     assert set(inspect.signature(WaveletNetworkRegressor).parameters) == set(taken)
 
 

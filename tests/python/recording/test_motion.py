@@ -80,6 +80,20 @@ def test_a_position_without_a_reversal_has_one_direction(sign: int) -> None:
     assert (found == sign).all()
 
 
+@pytest.mark.parametrize("steps", [8, 10, 12, 15])
+@pytest.mark.parametrize("strokes", [2, 6])
+def test_strokes_of_30_rows_and_few_steps_have_an_order(steps: int, strokes: int) -> None:
+    press = np.linspace(0.0, 1.0, 30)
+    position = np.concatenate([press, press[::-1]] * (strokes // 2))
+    found = strokes_from_order(np.round(position * steps) / steps)
+    assert found is not None
+    assert turns_of(found) == strokes - 1
+
+
+def test_rows_without_an_order_have_no_waits() -> None:
+    assert waits(np.random.default_rng(0).permutation(np.linspace(0.0, 1.0, 200))) is None
+
+
 @pytest.mark.parametrize(
     "position",
     [
@@ -108,7 +122,8 @@ def test_unordered_rows_have_no_direction(position: np.ndarray) -> None:
 
 
 def rests(position: np.ndarray) -> list[int]:
-    return np.flatnonzero(waits(position)).tolist()
+    found = waits(position)
+    return [] if found is None else np.flatnonzero(found).tolist()
 
 
 @pytest.mark.parametrize(

@@ -7,26 +7,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..._typing import Float1D
 from ...recording import Recording
+from ...recording.checks import findings_of
 from ...recording.motion import noise_band
-from ...recording.quality import findings_of
-from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import FORCE_FLOOR, FORCE_JND, Finding, Verdict, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import period_notes
 from ..decision import latest
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
-from ..search.evidence import Candidate, RowError
+from ..search.evidence import Candidate
 from .class_selection import ClassSelection
 from .repeatability import band_with_check, left_out_nrmse
-
-PULLING_ROWS = 0.002
-"""If more than this share of the rows, and more than one row, pulls the tool, it cannot leave the object
-[-]."""
 
 USABLE_NRMSE = 0.1
 """NRMSE above which a model is usable with a reservation: the RMS error is then a tenth of the standard
@@ -36,8 +30,16 @@ UNFIT_NRMSE = 0.5
 """NRMSE above which a model is unfit: it leaves a quarter of the force's variance unexplained [-]."""
 
 
-def error_findings(nrmse: float, rows: str) -> list[Finding]:
-    """Returns findings on the size of the NRMSE; `rows` names the rows on which the NRMSE was computed."""
+MORE_INPUTS = (
+    ". The force has noise or depends on more than the inputs: record time, direction or further inputs as "
+    "columns, and identify different objects or places separately"
+)
+"""Cure for a large error on the rows of the identification."""
+
+
+def error_findings(nrmse: float, rows: str, cure: str = "") -> list[Finding]:
+    """Returns findings on the size of the NRMSE; `rows` names the rows on which the NRMSE was computed, and
+    `cure` is a sentence."""
     if nrmse <= USABLE_NRMSE:
         return []
     judge = no if nrmse > UNFIT_NRMSE else usable
@@ -45,7 +47,7 @@ def error_findings(nrmse: float, rows: str) -> list[Finding]:
     return [
         judge(
             f"the NRMSE on {rows} is {nrmse:.3g}, a good model has at most {USABLE_NRMSE:g}: the model "
-            f"explains {explained:.0%} of the variance of the force"
+            f"explains {explained:.0%} of the variance of the force{cure}"
         )
     ]
 
@@ -59,209 +61,8 @@ def verdict_of(
     rows = (
         "rows that were left out of the fit" if largest > network.nrmse else "the rows of the identification"
     )
-    findings += error_findings(largest, rows)
+    findings += error_findings(largest, rows, MORE_INPUTS)
     return Verdict(tuple(dict.fromkeys(findings)))
-
-
-REPORTED_UNEXPLAINED_SHARE = 0.25
-"""If at least this share of the mean squared error cannot be explained by position, a finding reports the
-share [-]."""
-
-LEAST_CAUSE_SHARE = 0.4
-"""A finding names a likely cause of the residual only if the cause explains at least this share of the
-variance of the residual [-]."""
-
-TIME_BLOCKS = 40
-"""Number of successive sections of the recording; differences of their mean residuals show that the residual
-depends on time."""
-
-TRAVEL_PARTS = 8
-"""Number of parts of the travel; in each part it is computed separately how the residual depends on the
-direction."""
-
-MOST_ROWS = 50_000
-"""Largest number of rows from which the share of variance that a cause explains is estimated; of more rows an
-evenly spread part is used."""
-
-
-FULL_STROKE_STATE = 0.999
-"""Size of the direction state s above which a row belongs to a complete stroke [-]; 1 except for rounding."""
-
-
-def unexplained_variance(position: Float1D, force: Float1D, side: Float1D | None = None) -> float:
-    """Returns the variance of the force (n,) around the straight line between its two neighbours in position
-    (n,).
-
-    Rows are in recorded order; neighbours are on the same stroke if `side` is given. A row whose neighbours
-    in position are also its neighbours in time has no variance.
-    """
-    shuffled = np.random.default_rng(0).permutation(len(position))  # random order of rows at equal position
-    position, force = position[shuffled], force[shuffled]
-    keys = (position,) if side is None else (position, side[shuffled])
-    order = np.lexsort(keys)
-    x, y = position[order], force[order]
-    whole = x[2:] - x[:-2]
-    right = np.divide(x[1:-1] - x[:-2], whole, out=np.full(len(whole), 0.5), where=whole > 0.0)
-    inner = np.ones(len(whole), dtype=bool)
-    if side is not None:
-        strokes = side[shuffled][order]
-        inner = (strokes[2:] == strokes[1:-1]) & (strokes[1:-1] == strokes[:-2])
-    right = np.clip(right, 0.0, 1.0)[inner]
-    between = (1.0 - right) * y[:-2][inner] + right * y[2:][inner]
-    apart = y[1:-1][inner] - between
-    # forces of successive rows of one stroke differ because the position changes, not only because of noise
-    steps = np.abs(np.diff(shuffled[order]))
-    swept = ((steps[1:] == 1) & (steps[:-1] == 1))[inner]
-    variance = np.where(swept, 0.0, apart**2 / (1.0 + right**2 + (1.0 - right) ** 2))
-    return float(np.mean(variance)) if len(apart) else 0.0
-
-
-def unexplained_share(position: Float1D, force: Float1D, side: Float1D | None) -> float:
-    """Returns the share of the variance of the force that position and direction state cannot explain [-].
-
-    Rows inside the play (|s| < 1) are not compared: between a reversal and the next complete stroke the force
-    at one position may have any value between press and release.
-    """
-    rows, spread = _thinned(force), float(np.var(force))
-    if spread == 0.0:
-        return 0.0
-    position, force = position[rows], force[rows]
-    if side is None:
-        return unexplained_variance(position, force) / spread
-    full = np.abs(side[rows]) > FULL_STROKE_STATE
-    variance = unexplained_variance(position[full], force[full], np.sign(side[rows][full]))
-    return float(np.mean(full)) * variance / spread
-
-
-def _thinned(values: Float1D) -> slice:
-    """Returns a slice of at most about MOST_ROWS rows, evenly spread."""
-    return slice(None, None, max(1, len(values) // MOST_ROWS))
-
-
-def likely_cause(position: Float1D, residual: Float1D) -> tuple[str, str]:
-    """Returns the likely cause of a residual (n,) at positions (n,) in recorded order, and the cure."""
-    part = np.argsort(np.argsort(position, kind="stable"), kind="stable") * TRAVEL_PARTS // len(position)
-    ahead = np.sign(np.gradient(position))
-    by_direction = _explained(residual, 3 * part + ahead.astype(np.intp) + 1) - _explained(residual, part)
-    in_time = _explained(residual, np.arange(len(residual)) * TIME_BLOCKS // len(residual))
-    if max(by_direction, in_time) < LEAST_CAUSE_SHARE:
-        return (
-            "the force depends on another input (a second position, the place on the object, velocity) or "
-            "has noise",
-            "record the other inputs as columns and name them with --inputs, or identify each place "
-            "separately",
-        )
-    if by_direction >= in_time:
-        return (
-            "press and release differ",
-            "record a direction or a time column, so that hysteresis can be identified",
-        )
-    return (
-        "the force changes with time at a constant position (relaxation, creep or drift)",
-        "record continuous strokes without pauses, or remove the pauses",
-    )
-
-
-def _explained(values: Float1D, group: NDArray[np.intp]) -> float:
-    """Returns the share of the variance of values (n,) that lies between the means of the groups `group`
-    (n,), minus the share expected for random groups."""
-    _, index, count = np.unique(group, return_inverse=True, return_counts=True)
-    mean = np.bincount(index, values) / count
-    total = float(np.sum((values - values.mean()) ** 2))
-    if total == 0.0:
-        return 0.0
-    between = float(count @ (mean - values.mean()) ** 2) / total
-    return between - (len(count) - 1) / len(values)
-
-
-def explained_findings(
-    position: Float1D,
-    force: Float1D,
-    residual: Float1D,
-    side: Float1D | None,
-    nrmse: float,
-    force_unit: Unit = UNSTATED_UNIT,
-) -> list[Finding]:
-    """Returns a finding if position cannot explain most of a model's error.
-
-    Parameters
-    ----------
-    position, force, residual : (n,)
-        Rows in recorded order, and the residual of the model.
-    side : (n,) or None
-        Direction of each row, for a model with hysteresis.
-    nrmse : float
-        Of the model.
-    force_unit : Unit
-        For the message.
-    """
-    rows = _thinned(force)
-    spread = float(np.var(force))
-    if nrmse <= USABLE_NRMSE or spread == 0.0:
-        return []
-    least = unexplained_share(position, force, side)
-    if least < REPORTED_UNEXPLAINED_SHARE * nrmse**2:
-        return []
-    judge = no if nrmse > UNFIT_NRMSE else usable
-    share = max(0.0, 1.0 - least)
-    inputs = "position" if side is None else "position and direction state"
-    cause, cure = likely_cause(position[rows], residual[rows])
-    apart = float(np.sqrt(2.0 * least * spread))
-    return [
-        judge(
-            f"{inputs} can explain at most {share:.0%} of the variance of the force: rows at neighbouring "
-            f"positions differ by {force_unit.text(apart)} RMS. No model of {inputs} has an NRMSE below "
-            f"{np.sqrt(least):.2g}. Likely cause: {cause}. Cure: {cure}"
-        )
-    ]
-
-
-MOST_SAMPLED_ROWS = 10_000
-"""Largest number of rows from which the standard deviation of the force is computed; of more rows an evenly
-spread part is used."""
-
-EXTREME_SHARE = 0.01
-"""Share of the rows, those with the most extreme forces, that a second NRMSE leaves out, to show an error
-that these rows hide [-]."""
-
-LEAST_ROWS = 100
-"""Least number of rows for the check of extreme forces: 1 % of them is one row."""
-
-HIDDEN_ERROR_RATIO = 1.2
-"""Ratio of the NRMSE without the rows of extreme force to the NRMSE over all rows, above which a finding
-reports both [-]."""
-
-
-def extreme_force_findings(error: RowError, force_unit: Unit = UNSTATED_UNIT) -> list[Finding]:
-    """Returns a finding if few rows of extreme force hide a large error of all other rows."""
-    rows = np.flatnonzero(error.weight > 0.0)
-    if len(rows) < LEAST_ROWS or error.spread == 0.0 or _plainly_small(error, rows):
-        return []
-    far = np.abs(error.force[rows] - np.median(error.force[rows]))
-    count = len(rows) - int(EXTREME_SHARE * len(rows))
-    kept = rows[np.sort(np.argpartition(far, count - 1)[:count])]
-    inner = RowError(error.residual[kept], error.force[kept], error.weight[kept])
-    if inner.nrmse <= max(USABLE_NRMSE, HIDDEN_ERROR_RATIO * error.nrmse):
-        return []
-    judge = no if inner.nrmse > UNFIT_NRMSE else usable
-    return [
-        judge(
-            f"the NRMSE is {error.nrmse:.3g} over all rows, but {inner.nrmse:.3g} without the "
-            f"{EXTREME_SHARE:.0%} with the most extreme forces. These reach "
-            f"{force_unit.text(float(np.abs(error.force).max()))}, the others have a range of "
-            f"{force_unit.text(float(np.ptp(error.force[kept])))}, so that few rows hide the error of the "
-            "others. If they are wrong readings, remove these rows or give --loss huber"
-        )
-    ]
-
-
-def _plainly_small(error: RowError, rows: NDArray[np.intp]) -> bool:
-    """True if the RMS error of the model is small compared with the standard deviation of the recorded forces
-    (k,) without the most extreme ones."""
-    some = error.force[rows[:: max(1, len(rows) // MOST_SAMPLED_ROWS)]]
-    low, high = np.quantile(some, (EXTREME_SHARE, 1.0 - EXTREME_SHARE))
-    inner = some[(some >= low) & (some <= high)]
-    return bool(error.rmse < 0.5 * USABLE_NRMSE * float(np.std(inner)))
 
 
 def wait_findings(best: Candidate) -> list[Finding]:
@@ -270,7 +71,7 @@ def wait_findings(best: Candidate) -> list[Finding]:
     Between press and release any force is possible, and a position within its noise.
     """
     data = best.data
-    if data.fitted is None or data.fitted.all() or best.error.spread == 0.0:
+    if data.fitted.all() or best.error.spread == 0.0:
         return []
     box, force, band = data.box[~data.fitted], data.force[~data.fitted], noise_band(data.path[:, 0])
     low, high = np.full(len(force), np.inf), np.full(len(force), -np.inf)
@@ -361,22 +162,12 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         note, of_period = period_notes(positions, data.period, data.position_unit.si)
         notes, findings = [*notes, note], findings + of_period
     findings += report.findings + limit_findings(best, options) + wait_findings(best) + place_findings(best)
-    if data.robust is not None:
-        findings += data.robust.findings(best.residual, data.force_unit)
-    findings += extreme_force_findings(error, data.force_unit)
-    if data.counted is None and single:
-        rows = np.flatnonzero(counted)
-        side, position = None if best.side is None else best.side[rows], data.domain[rows, 0]
-        findings += explained_findings(
-            position, data.force[rows], best.residual[rows], side, error.nrmse, data.force_unit
-        )
     band, checked = band_with_check(best)
     below = options.below
     if below == "auto":
         force = data.force[data.reported]
         near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(force)))
-        most = max(1, int(PULLING_ROWS * len(force)))
-        pulls = float(np.partition(force, most)[most]) < -near_zero
+        pulls = float(np.partition(force, 1)[1]) < -near_zero  # in more than one row
         below = "free" if single and data.period is None and not pulls else "linear"
     return replace(
         network,

@@ -20,7 +20,7 @@ from ..network.basis import Basis
 from ..network.constraints import crosses_where_steep, impose
 from ..options import IdentifyOptions
 from ..search.evidence import ON_HELD_OUT_ROWS, Candidate, Samples
-from .class_selection import ClassSelection, ModelClass, straight_line
+from .class_selection import ClassSelection, ModelClass
 from .findings import USABLE_NRMSE
 
 REPORTED_ERROR_RATIO = 2.0
@@ -56,11 +56,7 @@ class Hysteresis(ModelClass):
 
     def __init__(self, selection: ClassSelection) -> None:
         super().__init__(selection)
-        data, options = selection.data, selection.options
-        self._named = options.inputs != "auto"
-        self._play: PlaySearch | None = None
-        if data.side is None and data.starts is not None and len(data.names) == 1:
-            self._play = PlaySearch(selection.samples, options)
+        self._named = selection.options.inputs != "auto"
 
     @classmethod
     def possible(cls, selection: ClassSelection) -> bool:
@@ -81,19 +77,17 @@ class Hysteresis(ModelClass):
         return has_direction and (inputs == "auto" or "hysteresis" in inputs)
 
     def better(self, below: Candidate) -> Candidate:
-        if self._play is None:
-            assert self._selection.data.side is not None
-            return self._of(below, HysteresisInput.of_strokes(self._selection.data.side))
-        play, report, of_order, basis = self._play, self._selection.report, None, below.solution.basis
-        order = self._selection.data.order
-        if order is not None and {-1.0, 1.0} <= set(order.tolist()):
+        selection, data, report = self._selection, self._selection.data, self._selection.report
+        if data.side is not None:
+            return self._of(below, HysteresisInput.of_strokes(data.side))
+        play, of_order, basis = PlaySearch(selection.samples, selection.options), None, below.solution.basis
+        if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()):
             # The direction can also change at once at a turn. Its wavelets show the radius better than those
             # without hysteresis.
-            self._play = None
-            of_order = self._of(below, HysteresisInput(order, order != 0.0))
-            self._play, basis = play, of_order.solution.basis
+            of_order = self._of(below, HysteresisInput(data.order, data.order != 0.0))
+            basis = of_order.solution.basis
         before, strokes = list(report.decisions), play.best_of_options(basis)
-        of_play = None if strokes is None else self._of(below, strokes)
+        of_play = None if strokes is None else self._of(below, strokes, play)
         if of_order is not None and (of_play is None or self._fits_better(of_order, of_play)):
             report.decisions[:] = before
             return of_order
@@ -102,7 +96,7 @@ class Hysteresis(ModelClass):
         untested = "the motions of the recording between gaps of time are too short, or never turn back"
         if self._named:
             raise InputError(f"inputs names hysteresis: {untested}")
-        self._selection.report.decisions.append(Decision("hysteresis", "not tested", untested))
+        report.decisions.append(Decision("hysteresis", "not tested", untested))
         return below
 
     def _fits_better(self, one: Candidate, other: Candidate) -> bool:
@@ -113,9 +107,9 @@ class Hysteresis(ModelClass):
             name = "bic"
         return one.on_rows(name, weight) <= other.on_rows(name, weight)
 
-    def _of(self, below: Candidate, strokes: HysteresisInput) -> Candidate:
+    def _of(self, below: Candidate, strokes: HysteresisInput, play: PlaySearch | None = None) -> Candidate:
         """Returns the better of the simpler candidate and a network with hysteresis for given direction
-        states.
+        states, or for those of the best play radius if `play` searches it.
 
         A hysteresis h >= 0 has a mean, which a fit with the wavelets of the simpler candidate already shows.
         If the criterion does not decrease with these wavelets, and the options do not name hysteresis, no
@@ -132,24 +126,18 @@ class Hysteresis(ModelClass):
         first = problem.solve(below.solution.basis)
         free = selection.candidate(self.name, problem, first, judge.criterion, rows=rows, strokes=strokes)
         if named or judge.fall(below, free) > 0.0:
-            free = self._grown(below, free)
+            free = self._grown(below, free, play)
         if not named and not judge.accepts(below, free):
             return judge.better(below, free)
         kept = self._selection.constrained(free)
         if named:
             self._report_sign(kept, kept, free)
             return kept
-        single = self._single_valued(kept) if kept is not free and below.n_wavelets else below
-        best = judge.better(single, kept)
-        if best is single and best.n_wavelets < below.n_wavelets:
-            self._selection.report.notes.append(
-                f"{best.n_wavelets} of {below.n_wavelets} wavelets over position are kept. The removed "
-                "wavelets modelled the difference between press and release."
-            )
+        best = judge.better(below, kept)
         self._report_sign(best, kept, free)
         return best
 
-    def _grown(self, below: Candidate, found: Candidate) -> Candidate:
+    def _grown(self, below: Candidate, found: Candidate, play: PlaySearch | None) -> Candidate:
         """Returns a network with hysteresis; its play radius is searched if hysteresis is accepted or the
         options name it.
 
@@ -158,7 +146,7 @@ class Hysteresis(ModelClass):
         wavelets, and the radius is searched again each time the allowed number of wavelets doubles.
         """
         assert found.strokes is not None
-        selection, play, most = self._selection, self._play, self._selection.options.max_wavelets
+        selection, most = self._selection, self._selection.options.max_wavelets
         strokes = found.strokes
         basis = selection.start_basis.get(self.name, found.solution.basis)
         has_start, complete = self.name in selection.start_basis, False
@@ -179,26 +167,6 @@ class Hysteresis(ModelClass):
             )
             complete = limit == most or max(point.n_wavelets for point in grown.path) < limit
         return found
-
-    def _single_valued(self, hysteresis: Candidate) -> Candidate:
-        """Returns a single-valued force with the wavelets of a network with hysteresis; superfluous wavelets
-        are removed.
-
-        This force is the simpler candidate if the constraints change the network with hysteresis. A network
-        grown without hysteresis is not used: press and release, sampled at different positions by a periodic
-        motion, would look like one rapidly changing force.
-        """
-        selection = self._selection
-        problem = selection.samples.problem(selection.rows)
-        start = problem.solve(hysteresis.solution.basis)
-        problem = problem.with_prior(start.rss)
-        problem, solution = selection.growth.prune(problem, problem.solve(start.basis))
-        line = selection.recorded(selection.constrained(straight_line(selection)))
-        if len(solution.basis) == 0:
-            return line
-        found = selection.candidate("position", problem, solution, hysteresis.stop_reason)
-        found = selection.recorded(selection.constrained(found))
-        return found if selection.judge.accepts(line, found) else line
 
     def _report_sign(self, best: Candidate, kept: Candidate, free: Candidate) -> None:
         """Reports a cure if the constraint h >= 0 raises the error much: the opposite sign of a column, or no

@@ -270,8 +270,6 @@ def _unsupported(options: IdentifyOptions) -> str | None:
     """Returns the reason why the options exclude a memory; None if they do not."""
     if options.slope_limits is not None or options.fixed_force is not None:
         return "constraints of the slope or of a force are not imposed on a memory"
-    if options.loss != "squares":
-        return "the loss huber is not defined for a memory"
     return None
 
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model selection of one recording: all model classes, repeated if outliers or correlated noise require
-it."""
+"""Model selection of one recording: all model classes, repeated if correlated noise requires it."""
 
 from __future__ import annotations
 
@@ -8,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..._typing import Float1D
 from ..data.limits import (
     FORCE_RESOLUTION,
     MOST_ORDERED_ROWS,
@@ -16,7 +14,6 @@ from ..data.limits import (
     independent_share,
     innovation_deviance,
 )
-from ..data.outliers import robust_weights, suspects
 from ..data.rows import Rows
 from ..decision import decided, in_words, lowered
 from ..options import IdentifyOptions
@@ -46,28 +43,11 @@ regular grid over many inputs has few cells along each of them, so that the rows
 
 
 def select(rows: Rows, options: IdentifyOptions) -> ClassSelection:
-    """Selects a model: first the model classes without velocity, mass and damping, then those with them.
-
-    Outliers get less weight if the loss is Huber's.
-    """
+    """Selects a model: first the model classes without velocity, mass and damping, then those with them."""
     rows = rows.limited()
-    given, robust = rows.weight, options.loss == "huber"
-    if robust:
-        suspect = suspects(rows.box, rows.force, rows.side, given)
-        rows = replace(rows, weight=np.where(suspect, 0.0, 1.0 if given is None else given))
     inputs = min(rows.box.shape[1], len(POSITION_FACTORS))
     cells = options.search.max_positions * POSITION_FACTORS[inputs - 1]
-    found = ClassSelection(rows, options, STATIC_CLASSES, cells)
-    if robust:
-        first = found
-
-        def fit(weight: Float1D) -> Float1D:
-            return first.repeated(replace(rows, weight=weight), keep=True).best.force_at()
-
-        weights = robust_weights(fit, found.best.force_at(), rows.force, given, suspect)
-        found = found.repeated(replace(rows, weight=weights.weight, robust=weights), keep=True)
-        found.report.notes.append(weights.note)
-    found = correlated_noise(found)
+    found = correlated_noise(ClassSelection(rows, options, STATIC_CLASSES, cells))
     found.try_classes(DYNAMIC_CLASSES)
     return no_finer_than_repeats(found)
 

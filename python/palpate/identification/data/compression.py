@@ -58,8 +58,8 @@ class Compressed:
     samples: float
     """Number of represented rows of the recording, or the sum of their weights"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the rows: share of independent rows, RMS error hidden by the resolution of
-    the force, and noise of the position"""
+    """Limits of the information in the rows: share of independent rows, and RMS error hidden by the
+    resolution of the force"""
     cells: int = 0
     """Largest number of distinct positions; if a recording has more, its rows are gathered in this number of
     position cells"""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Limits of the information in rows: repeated rows, force steps, correlated noise, and noise of the position.
+"""Limits of the information in rows: repeated rows, force steps and correlated noise.
 
 A criterion that counts rows takes each of them as independent and exact. Held samples, a coarse converter and
 correlated noise break this: then structure is fitted that is not there.
@@ -50,23 +50,15 @@ LEAST_CORRELATION = 0.15
 """Correlation of neighbouring residuals below which the residuals are taken as independent [-]."""
 
 SIGNIFICANT_STANDARD_ERRORS = 5.0
-"""A correlation of neighbouring residuals is not random if it exceeds this number of standard errors of a
-correlation of zero."""
+"""A correlation of neighbouring residuals, or a difference of mean forces, is not random if it exceeds this
+number of standard errors."""
 
 LEAST_NOISE_EVENNESS = 0.8
 """Least ratio of the median to the RMS of correlated residuals, 1 for normal noise, at which they are taken
 as noise [-]. Residuals of an unfitted force are large at a few positions and small at others."""
 
 MOST_ORDERED_ROWS = 50_000
-"""Largest number of successive rows for the estimates of position noise and of correlated force noise."""
-
-LEAST_REVERSALS = 0.1
-"""If a smaller share of the position steps is opposite to the previous step, no position noise is estimated
-[-]."""
-
-LARGEST_NOISE_STEP = 0.02
-"""Largest position step that can be noise [share of the travel]. Larger steps back and forth belong to a
-shuffled table."""
+"""Largest number of successive rows for the estimate of correlated force noise."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +70,6 @@ class RowLimits:
     force_error: float = 0.0
     """RMS error that the force step or the differences between repeats hide [force]; a criterion does not
     count smaller errors"""
-    position_noise: float = 0.0
-    """Standard deviation of the noise of the position, as a share of the range of recorded positions [-]"""
 
 
 NO_LIMITS = RowLimits()
@@ -199,25 +189,6 @@ def innovation_deviance(residual: Float1D, n_parameters: int, least: float) -> f
     rho = float(residual[1:] @ residual[:-1]) / power
     new = residual[1:] - rho * residual[:-1]
     return n * float(np.log(max(float(new @ new) / n, least))) + n_parameters * float(np.log(n))
-
-
-def position_noise(position: Float1D) -> float:
-    """Returns the noise of a position (n,) in recorded order: median of the smaller of two successive
-    opposite steps [box]; 0 if such steps are few or large.
-
-    During a pause the position changes only by noise, and a change of force in the pause does not depend on
-    the position.
-    """
-    first = max(0, (len(position) - MOST_ORDERED_ROWS) // 2)
-    steps = np.diff(position[first : first + MOST_ORDERED_ROWS])
-    steps = steps[steps != 0.0]
-    if len(steps) < 2:
-        return 0.0
-    turned = steps[1:] * steps[:-1] < 0.0
-    if turned.mean() < LEAST_REVERSALS:
-        return 0.0
-    size = float(np.median(np.minimum(np.abs(steps[1:]), np.abs(steps[:-1]))[turned]))
-    return size if size < LARGEST_NOISE_STEP else 0.0
 
 
 LARGE_OFFSET_RATIO = 1e3

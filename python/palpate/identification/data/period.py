@@ -11,12 +11,6 @@ from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.motion import ordered_strokes
 
-CELLS = 8192
-"""Largest number of position cells whose mean forces are correlated."""
-
-LEAST_CELLS = 16
-"""Least number of cells in a period: fewer do not show its curve."""
-
 LEAST_CORRELATION = 0.5
 """Correlation of the force with itself, one period apart, from which a periodic model is tried [-]."""
 
@@ -38,8 +32,8 @@ def period_of(recordings: Sequence[Recording]) -> float | None:
         return None
     position = np.concatenate([each.position for each in recordings])[press]
     force = np.concatenate([each.force for each in recordings])[press]
-    travel, cells = float(np.ptp(position)), min(CELLS, len(force) // 2)
-    if cells < 2 * LEAST_CELLS or not travel > 0.0:
+    travel, cells = float(np.ptp(position)), len(force) // 2
+    if not travel > 0.0:
         return None
     peak = _first_peak(_autocorrelation(_curve((position - position.min()) / travel, force, cells)))
     return None if peak is None else peak * travel / cells
@@ -76,7 +70,7 @@ def _first_peak(correlation: Float1D) -> float | None:
     inner, apart = correlation[1:-1], np.flatnonzero(correlation < 0.0)
     peaks = 1 + np.flatnonzero((inner >= correlation[:-2]) & (inner > correlation[2:]))
     # A smooth force is similar to itself at short distances; a repeat follows a distance at which it is not.
-    peaks = peaks[peaks >= max(LEAST_CELLS, int(apart[0]) if len(apart) else len(correlation))]
+    peaks = peaks[peaks >= (apart[0] if len(apart) else len(correlation))]
     if not len(peaks) or correlation[peaks].max() < LEAST_CORRELATION:
         return None
     first = float(peaks[correlation[peaks] >= SAME_PEAK * correlation[peaks].max()][0])

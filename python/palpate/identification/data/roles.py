@@ -9,14 +9,16 @@ nearby.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from enum import IntEnum
 
 import numpy as np
 
 from ..._typing import Float1D, Int8Vector
 from ...recording import Recording
-from ...recording.motion import LEAST_STROKE_ROWS, noise_of, resolution_of, strokes_from_order, waits
-from .limits import FORCE_RESOLUTION
+from ...recording.motion import LEAST_STROKE_ROWS, noise_of, resolution_of, waits
+from .limits import FORCE_RESOLUTION, SIGNIFICANT_STANDARD_ERRORS
 
 
 class Role(IntEnum):
@@ -36,15 +38,6 @@ AIR_MARGIN = 1.0
 """Distance before the contact that is fitted, as a share of the travel in contact [-]: the force is the same
 further away, however long the approach is."""
 
-AIR_SHARE = 0.05
-"""Share of the rows, those at the smallest positions, whose median force is that of the air [-]."""
-
-AIR_BLOCKS = 500
-"""Largest number of groups of neighbouring rows whose mean forces are compared with the force of the air."""
-
-AIR_ERRORS = 4.0
-"""Deviation of a mean force from that of the air at which there is contact [standard errors of both]."""
-
 
 def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     """Returns the role of each row (n,) as the number of a :class:`Role`, from position and force in recorded
@@ -54,11 +47,8 @@ def roles_of(recording: Recording, deepest: float | None = None) -> Int8Vector:
     recording with further inputs, or whose rows are not in the order of a motion, has only moving rows.
     """
     role = np.full(len(recording), Role.MOVING, dtype=np.int8)
-    motion = recording.motion
-    if recording.input_names or strokes_from_order(motion.position) is None:
-        return role
-    waiting = waits(motion.position)[motion.rows]
-    if waiting.all():
+    of_motion = None if recording.input_names else waits(recording.motion.position)
+    if of_motion is None or (waiting := of_motion[recording.motion.rows]).all():
         return role
     position = recording.position
     contact = contact_at(position[~waiting], recording.force[~waiting])
@@ -77,34 +67,40 @@ ROLE_NAMES = {
 """What the rows of each role do, for texts."""
 
 
-def role_counts(role: Int8Vector) -> str:
-    """Returns how many rows have each role (n,): "2186 move, 155 wait in contact"."""
+def role_counts(role: Int8Vector) -> dict[str, int]:
+    """Returns the number of rows of each role (n,) that occurs, by its name."""
     counts = np.bincount(role, minlength=len(Role)).tolist()
-    return ", ".join(f"{counts[each]} {name}" for each, name in ROLE_NAMES.items() if counts[each])
+    return {name: counts[each] for each, name in ROLE_NAMES.items() if counts[each]}
+
+
+def counts_text(counts: Mapping[str, int]) -> str:
+    """Returns numbers of rows as text: "2186 move, 155 wait in contact"."""
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
 
 
 def unused_rows(role: Int8Vector, used: str = "fitted") -> str:
     """Returns a sentence on the rows of each role (n,) that are not fitted or compared."""
     unused = role[role != Role.MOVING]
-    return f"{len(unused)} of {len(role)} rows are not {used}: {role_counts(unused)}."
+    return f"{len(unused)} of {len(role)} rows are not {used}: {counts_text(role_counts(unused))}."
 
 
 def contact_at(position: Float1D, force: Float1D) -> float:
-    """Returns the smallest position at which the force of moving rows (n,) differs from that at the smallest
+    """Returns the smallest position at which the force of moving rows (n,) differs from that at all smaller
     positions by more than its noise: there the tool meets the object. Without a difference it is the smallest
-    position."""
+    position.
+
+    Rows that are neighbours in position are compared in blocks, as many as each has rows.
+    """
     order = np.argsort(position, kind="stable")
     reach = float(np.ptp(force))
     if not reach > 0.0 or len(force) < LEAST_STROKE_ROWS:
         return float(position.min())
     force = (force - force.min()) / reach
-    x, f = position[order], force[order]
-    air = f[: max(2, int(AIR_SHARE * len(f)))]
-    level = float(np.median(air))
     noise = max(noise_of(force), 0.5 * resolution_of(force), FORCE_RESOLUTION)
-    starts = np.linspace(0, len(f), min(AIR_BLOCKS, len(f)), endpoint=False).astype(np.intp)
-    rows = np.diff(starts, append=len(f))
-    mean = np.add.reduceat(f, starts) / rows
-    error = noise * np.sqrt(1.0 / rows + 1.0 / len(air))
-    apart = np.flatnonzero(np.abs(mean - level) > AIR_ERRORS * error)
-    return float(x[starts[apart[0]]] if len(apart) else x[0])
+    starts = np.linspace(0, len(force), math.isqrt(len(force)), endpoint=False).astype(np.intp)
+    total, rows = np.add.reduceat(force[order], starts), np.diff(starts, append=len(force))
+    air = np.cumsum(total)[:-1] / np.cumsum(rows)[:-1]
+    error = noise * np.sqrt(1.0 / rows[1:] + 1.0 / np.cumsum(rows)[:-1])
+    apart = np.flatnonzero(np.abs(total[1:] / rows[1:] - air) > SIGNIFICANT_STANDARD_ERRORS * error)
+    # If the second block already differs from the first one, there is no air.
+    return float(position[order][starts[1 + apart[0]] if len(apart) and apart[0] else 0])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..._core.dynamics import environment_filters, paper_sample_time_s
 from ..._core.model import most_wavelets
-from ..._typing import Float1D, Float2D
+from ..._typing import Float1D, Float2D, Int8Vector
 from ...errors import InputError
 from ...recording import Recording
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
@@ -23,8 +23,7 @@ from ...verdict import Finding, no, usable
 from ..decision import Decision
 from ..options import IdentifyOptions
 from .compression import HELD_OUT_EVERY, held_out_rows
-from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, position_noise, repeated
-from .outliers import Robust
+from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, repeated
 from .repeats import Repeats
 from .roles import Role, roles_of, unused_rows
 from .strokes import strokes_of
@@ -83,15 +82,13 @@ class Rows:
     """Findings that can lower the verdict"""
     counted: Float1D | None = None
     """(n,) number of recorded rows that each row represents in the reported error; None: 1 each"""
-    robust: Robust | None = None
-    """Weights and outliers of Huber's loss; None for least squares"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the rows: share of independent rows, RMS error hidden by the resolution of
-    the force, and noise of the position"""
+    """Limits of the information in the rows: share of independent rows, and RMS error hidden by the
+    resolution of the force"""
     corners: tuple[Float1D, Float1D] | None = None
     """(d,) smallest and largest position of the unit box; None: those of the rows"""
-    fitted: NDArray[np.bool_] | None = None
-    """(n,) True for the rows that show the force law; the others belong to the motion only. None: all rows"""
+    role: Int8Vector | None = None
+    """(n,) number of the :class:`Role` of each row; None: all rows are moving"""
     repeats: Repeats | None = None
     """Recording and object of each row; None for one recording"""
     position_unit: Unit = UNSTATED_UNIT
@@ -130,11 +127,19 @@ class Rows:
         return self.positions if self.period is None else self.lower + self.box * self.reach
 
     @property
+    def roles(self) -> Int8Vector:
+        """(n,) number of the :class:`Role` of each row."""
+        return np.full(len(self.force), Role.MOVING, dtype=np.int8) if self.role is None else self.role
+
+    @cached_property
+    def fitted(self) -> NDArray[np.bool_]:
+        """(n,) True for the rows that show the force law; the others belong to the motion only."""
+        return np.asarray(self.roles == Role.MOVING)
+
+    @property
     def reported(self) -> NDArray[np.bool_]:
         """(n,) True for rows that are used for the reported error."""
-        rows = np.ones(len(self.force), dtype=bool) if self.counted is None else self.counted > 0.0
-        rows = rows if self.fitted is None else rows & self.fitted
-        return rows if self.robust is None else rows & ~self.robust.outliers
+        return self.fitted if self.counted is None else self.fitted & (self.counted > 0.0)
 
     def held_out(self) -> NDArray[np.bool_]:
         """Returns True (n,) for held-out rows."""
@@ -163,7 +168,7 @@ class Rows:
             order=order,
             within=self.within * float(share),
             parts=(),
-            fitted=None if self.fitted is None else self.fitted[rows],
+            role=None if self.role is None else self.role[rows],
             repeats=None if self.repeats is None else self.repeats.only(rows),
         )
 
@@ -178,18 +183,17 @@ class Rows:
         )
 
     def limited(self) -> Rows:
-        """Returns the rows with their dependence, force resolution and noise; rows that repeat others get
+        """Returns the rows with their dependence and force resolution; rows that repeat others get
         weight 0.
 
         Rows with a given weight use it in the fit and in the error, and get no such limits.
         """
         if self.weight is not None:
             return replace(self, counted=self.weight)
-        noise = position_noise(self.positions[:, 0] / self.reach[0]) if len(self.names) == 1 else 0.0
-        limits = RowLimits(force_error=STEP_ERROR * force_step(self.force), position_noise=noise)
+        limits = RowLimits(force_error=STEP_ERROR * force_step(self.force))
         again, repeats = repeated(self.positions, self.force, self.side)
         notes = (*self.notes, repeats) if repeats else self.notes
-        unused = again if self.fitted is None else again | ~self.fitted
+        unused = again | ~self.fitted
         weight = np.where(unused, 0.0, 1.0) if unused.any() else None
         return replace(self, limits=limits, weight=weight, notes=notes)
 
@@ -331,7 +335,7 @@ def rows_of(
         notes=notes,
         findings=findings,
         corners=corners,
-        fitted=None if fitted.all() else fitted,
+        role=role,
         repeats=repeats,
         position_unit=recordings[0].file_unit("position"),
         force_unit=recordings[0].file_unit("force"),

@@ -34,22 +34,6 @@ LEAST_GROUP_GAP = 3.0
 between recordings of the same stroke [-]. Repeats of one stroke also form two groups by chance, but close
 ones."""
 
-WINDOW_ROWS = 16
-"""Number of rows of a window; the rows are neighbours in position and are divided into two groups by
-force."""
-
-LEAST_WINDOWS = 5
-"""A finding that press and release force differ needs at least this number of windows of rows that are
-neighbours in position."""
-
-LEAST_GROUP_VARIANCE = 0.85
-"""Least share of the force variance of a window between its two groups, for two forces at one position [-]:
-about 0.70 for normal noise, near 1 for two separate forces."""
-
-REPORTED_SPREAD = 0.02
-"""If the rows are shuffled, a finding reports the standard deviation of the force at one position from this
-value on [share of the force range]."""
-
 DIRECTION_CURE = (
     "keep the rows in the order of the recording, or add a column direction with the words press and release"
 )
@@ -83,9 +67,7 @@ def strokes_of(recordings: Sequence[Recording]) -> Strokes:
     unit = recordings[0].units["force"] and f" {recordings[0].units['force']}"
     if len(known) < len(found):
         missing = _names(recordings, [direction is None for direction in found])
-        return _untested(
-            position, force, unit, f"the rows of {missing} have no direction and are not in recorded order"
-        )
+        return _untested(f"the rows of {missing} have no direction and are not in recorded order")
     findings: tuple[Finding, ...] = ()
     turns = sum(map(turns_of, known))
     side = np.concatenate(known).astype(np.float64)
@@ -95,7 +77,7 @@ def strokes_of(recordings: Sequence[Recording]) -> Strokes:
     if not ((side > 0).any() and (side < 0).any()):
         press = _press(recordings)
         if press is None:
-            return _untested(position, force, unit, None)
+            return _untested("the position never turns back in the order of rows")
         side = np.concatenate([np.full(len(part), up) for part, up in zip(recordings, press, strict=True)])
         press_files, release_files = _names(recordings, press > 0), _names(recordings, press < 0)
         difference = float(np.nanmean(_difference(position, force, side)))
@@ -179,56 +161,9 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
     return np.where(high, 1.0, -1.0)
 
 
-def _untested(position: Float1D, force: Float1D, unit: str, why: str | None) -> Strokes:
-    """Returns no directions, and a finding on the possible difference of press and release if the rows show
-    one."""
-    reason = why or "the position never turns back in the order of rows"
-    decisions = (Decision("hysteresis", "not tested", reason),)
-    # Repeated rows are used once: their equal forces would look like one of the two strokes.
-    rows = np.unique(position + 1j * force)
-    if len(rows) < LEAST_WINDOWS * WINDOW_ROWS:
-        return Strokes(None, decisions=decisions)
-    reach = float(np.ptp(force)) or 1.0
-    shares, gaps, spreads = _two_groups(rows.real, rows.imag)
-    gap, most, spread = float(np.median(gaps)), float(np.quantile(gaps, 0.95)), float(np.median(spreads))
-    levels = np.diff(np.unique(force))
-    step = float(levels[levels > 1e-9 * reach].min(initial=reach))
-    if np.median(shares) > LEAST_GROUP_VARIANCE and gap > max(REPORTED_SPREAD / 2 * reach, 1.5 * step):
-        evidence = (
-            f"At the same position the force has two values, typically {gap:.3g}{unit} and up to "
-            f"{most:.3g}{unit} apart ({gap / reach:.1%} and {most / reach:.1%} of its range), as for press "
-            "and release. The model lies between them"
-        )
-    elif why is not None and spread > REPORTED_SPREAD * reach:
-        evidence = (
-            f"At the same position the force has a standard deviation of {spread:.3g}{unit} "
-            f"({spread / reach:.1%} of its range), from noise or from a difference between press and release"
-        )
-    else:
-        return Strokes(None, decisions=decisions)
-    finding = usable(f"hysteresis was not tested: {reason}. {evidence}. Cure: {DIRECTION_CURE}")
-    return Strokes(None, findings=(finding,), decisions=decisions)
-
-
-def _two_groups(x: Float1D, f: Float1D) -> tuple[Float1D, Float1D, Float1D]:
-    """Divides each window of rows in order of position into two groups by force. Returns the share of the
-    force variance between the groups, the distance of their mean forces, and the standard deviation, each
-    (windows,).
-    """
-    rows = len(x) // WINDOW_ROWS * WINDOW_ROWS
-    x, f = x[:rows].reshape(-1, WINDOW_ROWS), f[:rows].reshape(-1, WINDOW_ROWS)
-    dx, df = x - x.mean(axis=1, keepdims=True), f - f.mean(axis=1, keepdims=True)
-    xx = np.sum(dx * dx, axis=1)
-    slope = np.divide(np.sum(dx * df, axis=1), xx, out=np.zeros(len(xx)), where=xx > 0)
-    rest = np.sort(df - slope[:, None] * dx, axis=1)
-    total = np.maximum(np.sum(rest * rest, axis=1), 1e-30)
-    low = np.arange(1, WINDOW_ROWS)
-    sums = np.cumsum(rest, axis=1)[:, :-1]
-    parted = sums**2 * (1.0 / low + 1.0 / (WINDOW_ROWS - low))
-    best = np.argmax(parted, axis=1)
-    at = np.arange(len(best)), best
-    gap = -sums[at] * (1.0 / low[best] + 1.0 / (WINDOW_ROWS - low[best]))
-    return parted[at] / total, gap, np.sqrt(total / (WINDOW_ROWS - 2))
+def _untested(why: str) -> Strokes:
+    """Returns no directions, and the decision that hysteresis is not tested."""
+    return Strokes(None, decisions=(Decision("hysteresis", "not tested", why),))
 
 
 def _names(recordings: Sequence[Recording], which: Sequence[bool] | NDArray[np.bool_]) -> str:
@@ -272,18 +207,15 @@ class HysteresisInput:
         return cls(side, np.ones(len(side), dtype=bool))
 
     @classmethod
-    def of_play(
-        cls, motions: Sequence[Float1D], radius: float, first: Sequence[float] | None = None
-    ) -> HysteresisInput:
-        """Returns the direction states of the play operator along motions that each start at s = 0, or at
-        `first`.
+    def of_play(cls, motions: Sequence[Float1D], radius: float) -> HysteresisInput:
+        """Returns the direction states of the play operator along motions that each start at s = 0.
 
         After a motion has covered twice the play radius, the direction state no longer depends on its start
         value, and counts as known. If no motion is this long, all rows count as known.
         """
         side, known = [], []
-        for motion, s in zip(motions, first if first is not None else [0.0] * len(motions), strict=True):
-            play = _core.model.play(motion, radius, start=motion[0] - s * radius)
+        for motion in motions:
+            play = _core.model.play(motion, radius, start=motion[0])
             side.append(np.clip((motion - play) / radius, -1.0, 1.0))
             covered = np.maximum.accumulate(motion) - np.minimum.accumulate(motion)
             known.append(covered >= 2.0 * radius)

@@ -78,9 +78,6 @@ CORE_RADIUS = float(np.sqrt(3.0))
 """Half width of a wavelet's core, the part between its two side lobes, in the scaled distance u from the
 wavelet's centre [-]; the data must resolve the core."""
 
-HALF_CORE_NOISE_RATIO = 5.0
-"""Least half width of a wavelet's core [standard deviations of the position noise]."""
-
 SIGNIFICANT_CORRELATION = 3.0
 """Correlation of neighbouring residuals above which the residuals are not noise [standard errors]."""
 
@@ -176,8 +173,8 @@ class SeparableProblem:
     held_out: HeldOutRows | None = None
     """Held-out rows, for the criteria that use held-out rows"""
     limits: RowLimits = NO_LIMITS
-    """Limits of the information in the rows: share of independent rows, RMS error hidden by the resolution of
-    the force, and noise of the position"""
+    """Limits of the information in the rows: share of independent rows, and RMS error hidden by the
+    resolution of the force"""
     every_input: bool = True
     """True if each wavelet uses every input"""
     prior: float = 0.0
@@ -288,8 +285,7 @@ class SeparableProblem:
         """Returns the largest dilation (N, 1) that the positions around each wavelet resolve, on every
         stroke [1/range of recorded positions]."""
         reach = np.max([each.reach(basis, self.resolved_by) for each in self.resolutions], axis=0)
-        least = max(HALF_CORE_NOISE_RATIO * self.limits.position_noise, 1e-9)
-        return np.asarray(CORE_RADIUS / np.maximum(reach, least))[:, None]
+        return np.asarray(CORE_RADIUS / np.maximum(reach, 1e-9))[:, None]
 
     def solve(self, basis: Basis) -> Solution:
         """Fits weights, slopes and biases of all channels for given wavelets."""

@@ -308,7 +308,7 @@ class Candidate:
 
     @cached_property
     def error(self) -> RowError:
-        """Error on all rows except outliers; the rows have the weights `data.counted`."""
+        """Error on the rows that are reported; they have the weights `data.counted`."""
         error = self.error_on(self.data.counted)
         return replace(error, weight=np.where(self.data.reported, error.weight, 0.0))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reported error is the error of the rows; findings name force errors that no input explains."""
+"""The reported error is the error of the rows; findings name forces that no input explains."""
 
 import os
 from pathlib import Path
@@ -8,17 +8,8 @@ import numpy as np
 import pytest
 
 import palpate
-from imperfect import Array, noise, recorded, strokes, sweep, wall, wandering
+from imperfect import Array, noise, recorded, strokes, sweep, wall
 from palpate import WaveletNetworkRegressor
-from palpate.identification.classes.findings import (
-    explained_findings,
-    extreme_force_findings,
-    likely_cause,
-    unexplained_share,
-    unexplained_variance,
-)
-from palpate.identification.data.strokes import HysteresisInput
-from palpate.identification.search.evidence import RowError
 
 N = 4000
 X = strokes(N)
@@ -103,17 +94,6 @@ def test_a_file_of_forces_beyond_the_bound_is_refused_without_warnings(
         palpate.verify(PLAIN, tmp_path / "a.csv")
 
 
-def test_few_extreme_forces_do_not_hide_the_error_of_the_others() -> None:
-    force = np.concatenate([noise(990), [1e3] * 10])
-    residual = np.concatenate([noise(990), np.zeros(10)])
-    error = RowError(residual, force, np.ones(1000))
-    assert error.nrmse < 1e-3
-    (finding,) = extreme_force_findings(error)
-    assert finding.level == "no"
-    assert "without the 1% with the most extreme forces" in finding.sentence
-    assert extreme_force_findings(RowError(0.01 * residual, force, np.ones(1000))) == []
-
-
 def test_constant_force_is_a_constant() -> None:
     model = palpate.identify(recorded(X, np.full(N, 3.0)))
     assert (model.n_wavelets, model.fit.nrmse) == (0, 0.0)
@@ -143,18 +123,6 @@ def relaxation() -> tuple[Array, Array, Array]:
     return x, force + random.normal(0.0, 0.002, len(x)), 0.01 * np.arange(len(x))
 
 
-def test_unexplained_variance_is_that_of_the_noise() -> None:
-    x = strokes(N)
-    assert unexplained_variance(x, wall(x) + noise(N)) == pytest.approx(0.02**2, rel=0.1)
-    assert unexplained_variance(x, wall(x)) < 1e-6
-    side = np.sign(np.gradient(x))
-    both = wall(x) + side
-    assert unexplained_variance(x, both) > 0.5
-    assert unexplained_variance(x, both, side) < 1e-3
-    # forces at equal positions are compared with each other, also if they are of different times
-    assert unexplained_variance(np.repeat([0.0, 1.0], 1000), np.tile(np.arange(1000.0), 2)) > 5e4
-
-
 def test_relaxation_is_named_and_gives_no_steep_slope() -> None:
     x, force, time = relaxation()
     assert palpate.identify(recorded(x, force, time)).fit.model_class == "memory"
@@ -165,53 +133,24 @@ def test_relaxation_is_named_and_gives_no_steep_slope() -> None:
     assert max(np.abs(model.slope_bounds)) < 200.0
 
 
-def test_likely_cause_is_time_direction_or_another_input() -> None:
-    x = strokes(N)
-    random = np.random.default_rng(5)
-    assert "time" in likely_cause(x, np.linspace(0.0, 1.0, N))[0]
-    assert "press and release" in likely_cause(x, np.sign(np.gradient(x)) * x)[0]
-    assert "another input" in likely_cause(x, random.normal(size=N))[0]
-
-
-def test_rows_inside_the_play_are_not_compared() -> None:
-    x = wandering(4000, 1)
-    side = HysteresisInput.of_play([x], 0.01).side
-    force = x + 0.2 * side
-    assert unexplained_share(x, force, side) < 1e-3
-    # a play radius that is too large leaves fewer complete strokes, and these are explained
-    assert unexplained_share(x, force, HysteresisInput.of_play([x], 0.02).side) < 1e-3
-    # one that is too small takes rows inside the play for complete strokes
-    assert unexplained_share(x, force, HysteresisInput.of_play([x], 0.001).side) > 0.01
-    assert unexplained_share(x, force, np.zeros(len(x))) == 0.0
-
-
-def test_model_with_a_small_error_has_no_finding() -> None:
-    x = strokes(N)
-    assert explained_findings(x, wall(x) + noise(N), noise(N), None, 0.005) == []
-    # the model lacks a part of the force; the position column has no defect
-    assert explained_findings(x, wall(x), wall(x) - wall(x).mean(), None, 1.0) == []
-
-
 @pytest.mark.full
 @pytest.mark.skipif(not DATA.is_dir(), reason="needs measured data, set PALPATE_DATA")
-@pytest.mark.parametrize(
-    ("name", "least"),
-    [
-        ("relax_stretch_1d5", 0.5),
-        ("relax_stretch_2d0", 0.5),
-        ("relax_stretch_4d0", 0.5),
-        ("relax_stretch_6d0", 0.4),
-    ],
-)
-def test_measured_relaxation_is_named(name: str, least: float) -> None:
-    recording = palpate.read_recording(DATA / "vhb4910_viscoelastic" / f"{name}.csv")
+@pytest.mark.parametrize("stretch", ["1d5", "2d0", "4d0", "6d0"])
+def test_measured_relaxation_is_named(stretch: str) -> None:
+    """Most rows wait: they are not fitted, and the model is not good for them."""
+    recording = palpate.read_recording(DATA / "vhb4910_viscoelastic" / f"relax_stretch_{stretch}.csv")
     assert palpate.identify(recording).fit.nrmse < 0.05
     model = palpate.identify(recording, inputs=("position",))
-    assert model.fit.nrmse > least
+    waits = model.notes["roles"]["wait in contact"]
+    assert waits > 0.8 * len(recording)
+    assert model.verdict.level == "usable"
+    assert f"{waits + model.notes['roles'].get('wait in air', 0)} rows in which the tool waits" in str(
+        model.verdict
+    )
     assert "relaxation, creep or drift" in str(model.verdict)
     secant = float(np.ptp(recording.force) / np.ptp(recording.position))
     assert model.slope_bounds is not None
-    assert max(np.abs(model.slope_bounds)) < 250.0 * secant  # formerly 100 000 times
+    assert max(np.abs(model.slope_bounds)) < 500.0 * secant  # formerly 100 000 times
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="needs measured data, set PALPATE_DATA")
@@ -223,8 +162,8 @@ def test_measured_probing_at_several_places_is_named() -> None:
     )
     model = palpate.identify(recording)
     assert model.n_wavelets <= 3
-    assert "position can explain at most 62%" in str(model.verdict)
-    assert "another input" in str(model.verdict)
+    assert model.verdict.level == "no"
+    assert "identify different objects or places separately" in str(model.verdict)
 
 
 def test_shuffled_rows_lose_nothing() -> None:

@@ -6,8 +6,9 @@ import os
 import numpy as np
 import pytest
 
-from imperfect import wandering
+from imperfect import Array, wandering
 from palpate import InputError, SearchOptions, identify, verify
+from palpate._core.model import play
 from palpate.identification.data.strokes import HysteresisInput
 from palpate.recording import Recording
 from palpate.verification import compare
@@ -15,24 +16,26 @@ from palpate.verification import compare
 MOTIONS = 20 * max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 
 
+def state(motion: Array, radius: float, start: float) -> Array:
+    """Returns the direction states along a motion (n,) that begins with a given one."""
+    return np.asarray((motion - play(motion, radius, start=motion[0] - start * radius)) / radius)
+
+
 def test_known_hysteresis_input_does_not_depend_on_earlier_motion() -> None:
     rng = np.random.default_rng(3)
     for seed in range(MOTIONS):
         motion, radius = wandering(1500, seed), float(rng.uniform(0.001, 0.3))
-        one = HysteresisInput.of_play([motion], radius, [float(rng.uniform(-1, 1))])
-        other = HysteresisInput.of_play([motion], radius, [float(rng.uniform(-1, 1))])
-        assert np.array_equal(one.known, other.known)
-        np.testing.assert_allclose(one.side[one.known], other.side[other.known], atol=1e-12)
-        edge = HysteresisInput.of_play([motion], radius, [1.0])
-        far = HysteresisInput.of_play([motion], radius, [-1.0])
-        first = int(np.argmax(edge.known))
+        found, other = HysteresisInput.of_play([motion], radius), state(motion, radius, rng.uniform(-1, 1))
+        np.testing.assert_allclose(found.side[found.known], other[found.known], atol=1e-12)
+        first = int(np.argmax(found.known))
         if first:  # no row is left out of the fit without reason
-            assert edge.side[first - 1] != pytest.approx(far.side[first - 1], abs=1e-9)
+            edge, far = (state(motion, radius, start)[first - 1] for start in (1.0, -1.0))
+            assert edge != pytest.approx(far, abs=1e-9)
 
 
 def test_a_motion_that_begins_in_the_middle_of_its_play_is_fitted_to_its_noise() -> None:
     x = wandering(20_000, 1)
-    side = HysteresisInput.of_play([x], 0.01, [-0.6]).side
+    side = state(x, 0.01, -0.6)
     noise = np.random.default_rng(2).normal(0.0, 0.005, len(x))
     force = np.tanh(6 * (x - 0.5)) + side * (0.2 + 0.1 * x) + noise
     recording = Recording.from_arrays(x, force, time=1e-3 * np.arange(len(x)))

@@ -9,7 +9,7 @@ import pytest
 
 import palpate
 from conftest import sampled
-from imperfect import NOISE, TRAVEL, Array, Law, line, noise, recorded, strokes, sweep, true_nrmse, wall
+from imperfect import NOISE, Array, Law, line, noise, recorded, strokes, sweep, true_nrmse, wall
 from palpate.identification.data.limits import (
     NO_LIMITS,
     RowLimits,
@@ -17,7 +17,6 @@ from palpate.identification.data.limits import (
     distinct_rows,
     force_step,
     independent_share,
-    position_noise,
     repeated,
 )
 
@@ -91,7 +90,7 @@ def test_wall_is_found_with_few_wavelets(name: str) -> None:
 @pytest.mark.parametrize("law", [line, wall])
 def test_independent_exact_rows_are_not_limited(law: Law) -> None:
     x, force = sweep(N), law(sweep(N)) + noise(N)
-    assert RowLimits(force_error=force_step(force), position_noise=position_noise(x / TRAVEL)) == NO_LIMITS
+    assert RowLimits(force_error=force_step(force)) == NO_LIMITS
     notes = palpate.identify(recorded(x, force)).notes["identification"]
     assert not any("correlated" in note or "once" in note for note in notes)
 
@@ -123,14 +122,6 @@ def test_repeats_are_rows_that_copy_others() -> None:
     assert np.count_nonzero(repeated(np.tile(x, (3, 1)), np.tile(y, 3), None)[0]) == 400
     # rows with equal positions but independent forces are not repeated rows
     assert not repeated(np.repeat(x, 5, axis=0), noise(1000), None)[0].any()
-
-
-def test_position_noise_is_that_of_pauses() -> None:
-    random = np.random.default_rng(0)
-    assert position_noise(sweep(N)) == 0.0
-    assert position_noise(random.permutation(sweep(N)) / TRAVEL) == 0.0
-    pause = np.concatenate([np.linspace(0.0, 1.0, 200), 1.0 + random.normal(0.0, 1e-4, 1000)])
-    assert position_noise(pause) == pytest.approx(1e-4, rel=0.5)
 
 
 def test_correlation_is_named_in_the_notes() -> None:

@@ -69,10 +69,18 @@ def test_a_force_that_does_not_repeat_has_no_period(law: Callable[[Array], Array
     assert palpate.identify(recording).period is None
 
 
-@pytest.mark.parametrize("rows", [10, 20, 60])
+@pytest.mark.parametrize("rows", [10, 20])
 def test_few_rows_have_no_period(rows: int) -> None:
     x = np.linspace(0.0, 1080.0, rows)
     assert period_of([Recording.from_arrays(x, knob(x))]) is None
+
+
+@pytest.mark.parametrize("rows", [8, 16, 24])
+@pytest.mark.parametrize("detents", [4, 10])
+def test_few_rows_in_each_detent_give_the_period_of_one_detent(rows: int, detents: int) -> None:
+    x = press_and_release(rows * detents, 15.0 * detents)
+    torque = np.sin(2.0 * np.pi * x / 15.0)
+    assert period_of([turned(x, 10.0 * torque)]) == pytest.approx(15.0, rel=0.01)
 
 
 def test_shuffled_rows_and_further_inputs_have_no_period() -> None:

@@ -141,8 +141,11 @@ def test_hysteresis_is_not_tested_if_one_recording_lacks_direction() -> None:
     stated = Recording.from_arrays(x, force, direction=side)
     order = np.random.default_rng(1).permutation(400)
     shuffled = Recording.from_arrays(x[order], force[order])
-    reported = str(identify([stated, shuffled]).verdict)
-    assert "hysteresis was not tested: the rows of recording 2 have no direction" in reported
+    model = identify([stated, shuffled])
+    assert "hysteresis: not tested (the rows of recording 2 have no direction" in str(
+        model.notes["model_selection"]
+    )
+    assert model.verdict.level == "no"
     assert identify([stated, stated]).kind == "hysteresis"
     assert identify([stated, Recording.from_arrays(x, force)]).kind == "hysteresis"
 

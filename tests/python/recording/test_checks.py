@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks of a recording: each finding names value, cause and cure; clean recordings have no finding."""
 
+import inspect
 import json
 import re
 from collections.abc import Callable
@@ -13,8 +14,8 @@ import pytest
 import palpate
 from corruptions import SEED, SYNTHETIC, Rows, base, base_names
 from palpate.cli.main import main
-from palpate.recording.comparison import UNIT_RATIOS
-from palpate.recording.quality import findings_of, quality_findings
+from palpate.recording.checks import CHECKS, findings_of, quality_findings
+from palpate.recording.checks.recordings import UNIT_RATIOS
 
 
 def rows_of(name: str, draw: int = 0) -> Rows:
@@ -70,12 +71,6 @@ def test_a_force_of_zero_before_the_contact_is_not_clipped() -> None:
     x = np.linspace(0.0, 1e-2, 2000)
     f = np.round(np.maximum(0.0, 1e4 * (x - 4e-3)), 2)
     assert sentences(Rows(x, f, None, None, {"position": "m", "force": "N"})) == []
-
-
-def test_a_clipped_position_is_reported() -> None:
-    rows = rows_of("P1")
-    found = sentences(replace(rows, x=np.minimum(rows.x, 0.5)))
-    assert any("the largest position, 0.5 rad, occurs in" in sentence for sentence in found)
 
 
 def test_a_stuck_position_is_reported_with_its_rows() -> None:
@@ -168,12 +163,6 @@ def test_two_objects_in_one_file_are_reported_and_each_part_has_no_finding(name:
     assert sentences(both.take(np.arange(n))) == sentences(both.take(np.arange(n, 2 * n))) == []
 
 
-def test_a_file_appended_to_itself_is_reported_with_the_row() -> None:
-    rows = rows_of("P1")
-    twice = Rows(np.r_[rows.x, rows.x], np.r_[rows.f, rows.f], None, None, rows.units)
-    assert only_sentence(twice).endswith("give --rows 0:5000")
-
-
 def test_positions_without_rows_are_reported_for_the_whole_recording_and_for_one_stroke() -> None:
     rows = rows_of("loop")
     gap = (rows.x > 1e-3) & (rows.x < 1.5e-3)
@@ -188,13 +177,6 @@ def test_a_stroke_that_ends_early_is_reported() -> None:
     assert "the release stroke has no rows from 0 to 0.0005" in only_sentence(
         rows.take((rows.d == 1) | (rows.x > 5e-4))
     )
-
-
-def test_samples_missing_in_time_are_reported_with_count_and_longest_gap() -> None:
-    rows = rows_of("sample")
-    kept = np.ones(len(rows), dtype=bool)
-    kept[1000:1200], kept[3000:3400] = False, False
-    assert "time has 2 gaps, the longest 0.401 s" in only_sentence(rows.take(kept))
 
 
 @pytest.mark.parametrize("held", ["the force changes", "the position changes", "position and force change"])
@@ -329,3 +311,10 @@ def test_rows_that_wait_do_not_hide_a_second_zero() -> None:
     f[800:] -= 0.24
     wait = np.random.default_rng(1).normal(0.0, 2e-3, 3000)
     assert len(zero_sentences(np.concatenate([np.zeros(3000), x]), np.concatenate([wait, f]))) == 1
+
+
+def test_each_check_has_its_own_function_and_uses_its_thresholds() -> None:
+    assert len({check.defect for check in CHECKS}) == len({check.findings for check in CHECKS}) == len(CHECKS)
+    for check in CHECKS:
+        keywords = set(inspect.signature(check.findings).parameters) - {"checked"}
+        assert keywords == set(check.thresholds), check.defect

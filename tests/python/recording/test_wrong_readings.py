@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wrong readings are removed or get less weight, and are counted."""
+"""Wrong readings are dropped, counted and named."""
+
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import palpate
-from conftest import sampled
 from imperfect import (
     TRAVEL,
     Array,
@@ -19,13 +20,8 @@ from imperfect import (
     true_nrmse,
     wall,
 )
-from palpate.identification.data.outliers import (
-    suspects,
-    without_isolated,
-    without_wrong_readings,
-    wrong_readings,
-)
 from palpate.identification.identify_files import identify_files
+from palpate.recording.checks.wrong_readings import without_wrong_readings, wrong_readings
 
 N = 10_000
 
@@ -70,12 +66,11 @@ def test_one_spike_in_few_rows_is_left_out() -> None:
     assert any("1 of 50 rows" in each for each in model.notes["identification"])
 
 
-def test_rows_that_stretch_the_domain_are_reported() -> None:
+def test_position_far_from_all_others_is_named_if_rows_have_no_order() -> None:
     rows = np.random.default_rng(0).permutation(N)
     x = strokes(N)
     model = palpate.identify(recorded(changed(x[rows], {5000: 3.0}), (wall(x) + noise(N))[rows]))
-    assert "row 5000 at 3" in str(model.verdict)
-    assert "extend the range of position" in str(model.verdict)
+    assert "the recording has no rows from 0.6 to 3, 80% of the travel" in str(model.verdict)
 
 
 def test_more_than_a_tenth_of_wrong_readings_give_no_good_error() -> None:
@@ -107,82 +102,38 @@ def test_wall_that_is_touched_briefly_stays(stiffness: float) -> None:
     x = 0.5 - 0.5 * np.cos(6.0 * np.pi * np.linspace(0.0, 1.0, 1001))
     y = x + stiffness * np.maximum(x - 0.99999, 0.0)
     assert 0 < np.count_nonzero(x > 0.99999) < 10
-    kept, findings = without_isolated([recorded(x, y)])
-    assert len(kept[0]) == len(x)
-    assert not any("left out" in finding.sentence for finding in findings)
+    assert wrong_rows(x, y) == []
 
 
 def test_short_fast_motion_after_a_long_rest_stays() -> None:
     random = np.random.default_rng(1)
     x = np.concatenate([random.normal(0.0, 1e-6, 2000), np.linspace(0.1, 1.0, 10)])
-    kept, _ = without_isolated([recorded(x, 2.0 * x)])
-    assert len(kept[0]) == len(x)
+    assert wrong_rows(x, 2.0 * x) == []
 
 
-def test_sums_over_files_refuse_a_spike(tmp_path: pytest.TempPathFactory) -> None:
+def test_wrong_reading_of_a_further_input_is_dropped() -> None:
     x = strokes(N)
-    y = wall(x) + noise(N)
-    path = f"{tmp_path}/press.csv"
-    pd.DataFrame({"position_rad": changed(x, {5000: 6e5}), "torque_Nm": y}).to_csv(path, index=False)
-    with pytest.raises(palpate.InputError, match=r"1 of 10000 rows have a position \(6e\+05\)"):
-        identify_files(path)
-    # the cure that the message names: the row with the wrong position is deleted
-    pd.DataFrame({"position_rad": np.delete(x, 5000), "torque_Nm": np.delete(y, 5000)}).to_csv(
-        path, index=False
-    )
-    model = identify_files(path)
-    recording = palpate.read_recording(path)
-    assert model.fit.nrmse == pytest.approx(palpate.verify(model, recording).nrmse, rel=1e-6)
+    frame = pd.DataFrame({"position_rad": x, "torque_Nm": wall(x), "side_rad": np.sin(3.0 * x) + noise(N)})
+    frame.loc[[100, 5000], "side_rad"] = [9.0, -1e6]
+    recording = palpate.Recording.from_frame(frame, inputs=["side_rad"])
+    (kept,), (note,) = without_wrong_readings([recording])
+    assert len(kept) == N - 2
+    assert note.startswith(f"2 of {N} rows are wrong readings")
 
 
-FEW = 4000
-
-
-def with_outliers(y: Array, share: float) -> Array:
-    """Returns the forces y; a share of the rows is moved by ten times the force range."""
-    random, wrong = np.random.default_rng(8), y.copy()
-    rows = random.choice(len(y), round(share * len(y)), replace=False)
-    wrong[rows] += random.choice([-10.0, 10.0], len(rows)) * np.ptp(y)
-    return wrong
-
-
-@pytest.mark.parametrize("positions", ["strokes", "shuffled"])
-@pytest.mark.parametrize("share", sampled([0.01, 0.05], 0.05))
-def test_outliers_of_ten_ranges_do_not_change_the_error(share: float, positions: str) -> None:
-    x = strokes(FEW) if positions == "strokes" else np.random.default_rng(9).permutation(sweep(FEW))
-    y = wall(x) + noise(FEW)
-    clean = palpate.identify(recorded(x, y))
-    model = palpate.identify(recorded(x, with_outliers(y, share)), loss="huber")
-    assert true_nrmse(model, wall) < max(1.5 * true_nrmse(clean, wall), 0.001)
-    assert model.fit.nrmse == pytest.approx(clean.fit.nrmse, rel=0.05)
-    assert "likely wrong readings and were dropped" in str(model.verdict)
-
-
-@pytest.mark.parametrize("share", sampled([0.01, 0.05], 0.05))
-def test_outliers_do_not_hide_hysteresis(share: float) -> None:
-    x = strokes(FEW)
-    side = np.where(np.gradient(x) > 0.0, 1, -1)
-    y = wall(x) + side + noise(FEW)
-    recording = palpate.Recording.from_arrays(x, with_outliers(y, share), direction=side)
-    model = palpate.identify(recording, loss="huber")
-    assert model.fit.model_class == "hysteresis"
-    truth = wall(x) + side
-    error = model.force(x, direction=side.astype(float)) - truth
-    assert np.sqrt(np.mean(error**2)) < 0.003 * np.std(truth)
-
-
-def test_click_and_step_are_not_outliers() -> None:
-    x = sweep(FEW)
-    click = wall(x) + np.where(np.abs(x - 0.2) < 0.005, 2.0, 0.0) + np.where(x > 0.3, 5.0, 0.0)
-    assert not suspects(x[:, None], click + noise(FEW), None, None).any()
-
-
-def test_no_row_is_dropped_without_outliers() -> None:
-    x = strokes(FEW)
-    y = wall(x) + noise(FEW)
-    model = palpate.identify(recorded(x, y), loss="huber")
-    assert model.verdict.level == "good"
-    assert true_nrmse(model, wall) < 0.001
+@pytest.mark.parametrize("column", ["position_rad", "torque_Nm"])
+def test_files_read_part_by_part_drop_and_count_wrong_readings(tmp_path: Path, column: str) -> None:
+    x = strokes(N)
+    clean = pd.DataFrame({"position_rad": x, "torque_Nm": wall(x) + noise(N)})
+    wrong = clean.copy()
+    wrong.loc[[5100, 7000], column] = [6e5, -3e3]
+    models = []
+    for name, frame in (("clean", clean.drop([5100, 7000])), ("wrong", wrong)):
+        frame.to_csv(tmp_path / f"{name}.csv", index=False)
+        models.append(identify_files(tmp_path / f"{name}.csv"))
+    assert np.array_equal(models[0].weight, models[1].weight)
+    (note,) = [note for note in models[1].notes["identification"] if "wrong reading" in note]
+    assert note == "dropped 2 rows with a wrong reading (first: line 5102)"
 
 
 PRESS = press_and_release(400)
@@ -190,7 +141,7 @@ FORCE = loop(PRESS) + np.random.default_rng(0).normal(0.0, 0.05, len(PRESS))
 
 
 def wrong_rows(x: Array, y: Array) -> list[int]:
-    return np.flatnonzero(wrong_readings(recorded(x, y))).tolist()
+    return np.flatnonzero(wrong_readings(x, x, y)).tolist()
 
 
 @pytest.mark.parametrize(
@@ -260,8 +211,10 @@ def test_few_rows_have_no_wrong_reading(rows: int) -> None:
 def test_each_part_of_a_recording_names_its_wrong_readings() -> None:
     recording = recorded(PRESS, changed(FORCE, {100: 0.0, 104: 500.0}))
     train, test = recording.split(5)
-    assert np.flatnonzero(wrong_readings(train)).tolist() == [80]
-    assert np.flatnonzero(wrong_readings(test)).tolist() == [20]
-    kept, _, notes = without_wrong_readings([train, test])
+    kept, notes = without_wrong_readings([train, test])
     assert [len(part) for part in kept] == [639, 159]
-    assert [note.split(" of ")[0] for note in notes] == ["recording 1: 1", "recording 2: 1"]
+    assert [note.split(": ", 2)[:2] for note in notes] == [
+        ["recording 1", "1 of 640 rows are wrong readings and were dropped"],
+        ["recording 2", "1 of 160 rows are wrong readings and were dropped"],
+    ]
+    assert ["row 80:" in notes[0], "row 20:" in notes[1]] == [True, True]

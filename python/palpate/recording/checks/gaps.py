@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Positions without rows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...verdict import Finding, usable
+from .cells import Checked
+
+
+def position_gaps(
+    checked: Checked, *, gap_share: float, gap_ratio: float, end_share: float, named: int
+) -> list[Finding]:
+    """Returns findings on intervals of position without rows, of the recording and of each stated stroke.
+
+    Parameters
+    ----------
+    gap_share, gap_ratio : float
+        Least width of an interval, over the travel and over the 90th percentile of the distances of adjacent
+        positions [-].
+    end_share : float
+        Share of the travel that a stroke may miss at its ends [-].
+    named : int
+        Largest number of intervals whose limits are stated.
+    """
+    recording, travel = checked.recording, checked.travel
+    if not travel > 0.0 or recording.input_names:
+        return []
+    way, unit = recording.direction, recording.file_unit("position")
+    strokes = {"recording": recording.position}
+    if way is not None:
+        strokes |= {
+            "press stroke": recording.position[way > 0],
+            "release stroke": recording.position[way < 0],
+        }
+    found: list[Finding] = []
+    reported: set[tuple[float, float]] = set()
+    for name, positions in strokes.items():
+        at = np.unique(positions)
+        if len(at) < 10:
+            continue
+        distances = np.diff(at)
+        bound = max(gap_share * travel, gap_ratio * float(np.percentile(distances, 90.0)))
+        gaps = [(float(at[k]), float(at[k + 1])) for k in np.flatnonzero(distances > bound)]
+        gaps = [gap for gap in gaps if gap not in reported]
+        reported.update(gaps)
+        ends = ((checked.lower, float(at[0])), (float(at[-1]), checked.upper))
+        gaps += [(start, stop) for start, stop in ends if stop - start > end_share * travel]
+        if not gaps:
+            continue
+        longest = sorted(gaps, key=lambda gap: gap[0] - gap[1])[:named]
+        intervals = " and ".join(unit.interval(*gap) for gap in sorted(longest))
+        more = f" ({len(gaps) - len(longest)} shorter gaps are not listed)" if len(gaps) > named else ""
+        share = sum(stop - start for start, stop in gaps) / travel
+        found.append(
+            usable(
+                f"the {name} has no rows from {intervals}{more}, {share:.0%} of the travel: the model is "
+                "interpolated or extrapolated there; record these positions too, or remove single rows "
+                "beyond a gap"
+            )
+        )
+    return found

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Contradicting signs of position, force and direction, and strokes with another sign or zero."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...verdict import Finding, no, usable
+from ..conversion import mirror_notes
+from ..lag import LONGEST_LAG_S
+from .cells import Checked, inner_range
+
+if TYPE_CHECKING:
+    from ..recording import Recording
+
+
+def reversed_sign(
+    checked: Checked, *, same_sign_share: float, least_loop_share: float, least_loop_errors: float
+) -> list[Finding]:
+    """Returns findings on a reversed direction, release force above press force, and falling force.
+
+    Parameters
+    ----------
+    same_sign_share : float
+        Share of the positions with the sign of the mean of press minus release force, for a hysteresis [-].
+    least_loop_share, least_loop_errors : float
+        Least mean of press minus release force, over the standard deviation of the force and over the
+        standard error of this mean [-].
+    """
+    recording = checked.recording
+    signs = recording.direction
+    if signs is not None and len(signs) > 1:
+        step = np.diff(recording.position) * signs[1:]
+        if step.sum() < 0:
+            against = float(np.mean(step[step != 0.0] < 0))
+            return [
+                usable(
+                    f"the position falls in rows whose direction is into the object ({against:.0%} of the "
+                    "moving rows): position or direction is probably reversed; if the position grows out of "
+                    "the object give --negate position, else exchange the words of the direction column"
+                )
+            ]
+    if recording.input_names:
+        return []
+    cells, is_loop, x, f = checked.cells, False, recording.position, recording.force
+    if cells is not None and len(cells.loop) >= 4:
+        mean = float(np.mean(cells.loop))
+        error = float(np.sqrt(np.mean(cells.loop_error**2) / len(cells.loop)))
+        large = abs(mean) > max(least_loop_errors * error, least_loop_share * float(np.std(f)))
+        is_loop = large and float(np.mean(np.sign(cells.loop) == np.sign(mean))) >= same_sign_share
+    if is_loop and mean < 0.0:
+        lag_s = _lag_of(recording, -mean)
+        late = (
+            f"; if the force was recorded late, --force-late-s {lag_s:.2g}" if lag_s <= LONGEST_LAG_S else ""
+        )
+        return [
+            usable(
+                f"on average the force on release is {recording.file_unit('force').text(-mean)} above that "
+                "on press; a passive object cannot do that. If a sign is reversed, give --negate force or "
+                f"--negate position{late}; for a latch or a stored spring, --no-hysteresis-nonnegative"
+            )
+        ]
+    if is_loop or not (np.ptp(f) > 0.0 and np.ptp(x) > 0.0):
+        return []
+    return [usable(sentence) for sentence in mirror_notes(float(np.corrcoef(x, f)[0, 1]))]
+
+
+def _lag_of(recording: Recording, gap: float) -> float:
+    """Returns the lag of the force that raises release above press by `gap` [s]; infinite without time.
+
+    A force that is late by t is lower on press and higher on release by slope * speed * t.
+    """
+    period = recording.sample_period
+    if period is None:
+        return np.inf
+    slope = abs(float(np.polyfit(recording.position, recording.force, 1)[0]))
+    speed = float(np.mean(np.abs(np.diff(recording.position)))) / period
+    return gap / (2.0 * slope * speed) if slope * speed > 0.0 else np.inf
+
+
+def mirrored_stroke(checked: Checked, *, correlation: float, range_share: float) -> list[Finding]:
+    """Returns a finding if the force of the release is that of the press with the opposite sign.
+
+    Parameters
+    ----------
+    correlation : float
+        Correlation of the press and the negative release above which they are mirrored [-].
+    range_share : float
+        Least range of each stroke as a share of that of the force [-]: a constant friction has none.
+    """
+    cells = checked.cells
+    if cells is None or len(cells.press) < 4 or not _varied(checked, range_share):
+        return []
+    press, release = cells.press, cells.release
+    # A damper mirrors its force as well, but not at the turn, where it is slow.
+    turned = min(abs(each[-1]) / np.abs(each).max() for each in (press, release)) > 0.5
+    if not turned or float(np.corrcoef(press, -release)[0, 1]) <= correlation:
+        return []
+    return [
+        no(
+            "the force of the release is that of the press with the opposite sign: one stroke was "
+            "recorded with the wrong sign. Change the sign of the force of one stroke"
+        )
+    ]
+
+
+def moved_zero(checked: Checked, *, shift_share: float, range_share: float, rows: int) -> list[Finding]:
+    """Returns a finding if the release has another zero of the force than its press.
+
+    Parameters
+    ----------
+    shift_share : float
+        The release ends below minus this share of the range of the force, and the press is never below it
+        [-].
+    range_share : float
+        Least range of each stroke as a share of that of the force [-].
+    rows : int
+        Number of rows at the smallest positions whose median force is that of the end.
+    """
+    cells, recording = checked.cells, checked.recording
+    if cells is None or len(cells.press) < 4 or not _varied(checked, range_share):
+        return []
+    shift = shift_share * inner_range(recording.force)
+    start, end = (
+        _lowest_force(recording, cells.row[(cells.cell >= cells.cells) == way], rows) for way in (False, True)
+    )
+    # The friction of an object that holds the tool is above zero in the press and below it in the release.
+    # A mirrored press begins and ends at opposite forces.
+    if end > -shift or cells.press.min() < -shift or abs(start) > 0.5 * abs(end):
+        return []
+    return [
+        usable(
+            f"the release ends at {recording.file_unit('force').text(end)}, but the press never pulls the "
+            "tool. If the tool is not fixed to the object, the zero of the force changed between the "
+            "strokes: record again without a tare in between"
+        )
+    ]
+
+
+def _varied(checked: Checked, range_share: float) -> bool:
+    """True if the force of both strokes varies; the few rows of a hard stop do not count for its range."""
+    assert checked.cells is not None
+    strokes = checked.cells.press, checked.cells.release
+    return bool(min(map(np.ptp, strokes)) > range_share * inner_range(checked.recording.force))
+
+
+def _lowest_force(recording: Recording, rows: NDArray[np.intp], count: int) -> float:
+    """Returns the median force of some rows at the smallest positions."""
+    lowest = rows[np.argsort(recording.position[rows], kind="stable")[:count]]
+    return float(np.median(recording.force[lowest]))

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Wrong readings: single values far from the rows before and after them, which are dropped before the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._typing import Float1D
+from ..motion import strokes_from_order
+
+if TYPE_CHECKING:
+    from ..recording import Recording
+
+MOST_NAMED_ROWS = 3
+"""Largest number of wrong readings that a note lists."""
+
+WRONG_RATIO = 8.0
+"""Deviation of a value from its neighbours above which the value is a wrong reading [typical changes between
+successive rows nearby]."""
+
+LEAST_WRONG = 0.01
+"""Smallest deviation of a wrong reading [share of the range of the column]: a hand does not feel less."""
+
+MOST_WRONG_SHARE = 0.1
+"""Share of the rows above which deviating values are not wrong readings [-]: so many belong to the object."""
+
+LOCAL_ROWS = 8
+"""Number of rows before a row, and after it, whose typical change is that of the motion nearby."""
+
+NEIGHBOUR_ROWS = 3
+"""Number of rows before a row, and after it, with whose median value it is compared."""
+
+
+def without_wrong_readings(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+    """Returns the recordings without wrong readings, and notes on the wrong readings."""
+    kept, notes = list(recordings), list[str]()
+    for number, recording in enumerate(kept):
+        wrong = wrong_readings(
+            recording.motion.position, recording.position, recording.force, recording.inputs.T
+        )
+        if not wrong.any():
+            continue
+        rows = np.flatnonzero(wrong)
+        position, force = recording.file_unit("position"), recording.file_unit("force")
+        named = ", ".join(
+            f"row {row}: {force.text(recording.force[row])} at {position.text(recording.position[row])}"
+            for row in rows[:MOST_NAMED_ROWS]
+        )
+        more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
+        where = f"recording {number + 1}: " if len(kept) > 1 else ""
+        notes.append(
+            f"{where}{len(rows)} of {len(recording)} rows are wrong readings and were dropped: {named}{more}."
+        )
+        kept[number] = recording.without(wrong)
+    return kept, notes
+
+
+@np.errstate(over="ignore", invalid="ignore")  # huge values, refused later, may overflow
+def wrong_readings(
+    motion: Float1D, position: Float1D, force: Float1D, inputs: Sequence[Float1D] | NDArray[np.float64] = ()
+) -> NDArray[np.bool_]:
+    """Returns True (n,) for rows with a wrong reading of position (n,), force (n,) or a further input (n,).
+
+    A wrong reading is outside the interval between the median values of the rows before it and after it, so
+    that no row of a steep wall or of a click is one. The distance is compared with the changes from row to
+    row nearby. At the largest and smallest positions a wall may be touched by a single row. Rows that are not
+    in the order of a motion have no neighbours, and no wrong readings. `motion` (m,) is the position of all
+    rows in recorded order, of which these rows can be a part.
+    """
+    found = np.zeros(len(force), dtype=bool)
+    if len(force) <= 2 * LOCAL_ROWS or strokes_from_order(motion) is None:
+        return found
+    for values, at_ends in ((position, True), *((each, True) for each in inputs), (force, False)):
+        found |= _deviating(values, position, ~found, at_ends)
+    return found if found.mean() <= MOST_WRONG_SHARE else np.zeros(len(force), dtype=bool)
+
+
+def _deviating(
+    values: Float1D, position: Float1D, given: NDArray[np.bool_], at_ends: bool
+) -> NDArray[np.bool_]:
+    """Returns True (n,) for the given rows whose value deviates from those before and after them."""
+    found = np.zeros(len(values), dtype=bool)
+    floor = LEAST_WRONG * float(np.subtract(*np.quantile(values[given], (0.99, 0.01))))
+    while len(rows := np.flatnonzero(given & ~found)) > 2 * LOCAL_ROWS:
+        v, x = values[rows], position[rows]
+        around = np.pad(v, NEIGHBOUR_ROWS, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(around, NEIGHBOUR_ROWS)
+        before, after = (np.median(each, axis=1) for each in (windows[: len(v)], windows[-len(v) :]))
+        # The first and the last row have no rows on one side: the change of the nearest rows continues there.
+        before[0] = after[0] + WRONG_RATIO * (after[0] - after[NEIGHBOUR_ROWS])
+        after[-1] = before[-1] + WRONG_RATIO * (before[-1] - before[-1 - NEIGHBOUR_ROWS])
+        apart = np.maximum(v - np.maximum(before, after), np.minimum(before, after) - v)
+        changes = np.pad(np.abs(np.diff(v)), LOCAL_ROWS, mode="reflect")
+        nearby = np.median(np.lib.stride_tricks.sliding_window_view(changes, LOCAL_ROWS), axis=1)
+        usual = np.maximum(np.maximum(nearby[: len(v)], nearby[-len(v) :]), float(np.median(changes)))
+        wrong = apart > np.maximum(WRONG_RATIO * usual, floor)
+        if not at_ends and wrong.any():
+            ordinary = x[~wrong]
+            wrong &= (x >= ordinary.min()) & (x < ordinary.max())
+        if not wrong.any():
+            break
+        found[rows[wrong]] = True
+    return found
