@@ -139,11 +139,13 @@ py::dict render_in_python(const ForceModel& model, const std::optional<Scheme>& 
                           const std::optional<ForceModel>& limited,
                           const std::optional<Certificate>& certificate, const std::string& position_unit,
                           const std::string& force_unit, const std::string& model_name,
+                          const std::vector<std::string>& findings,
                           const std::optional<py::function>& progress, const py::kwargs& given) {
     RenderOptions options;
     set_options(options, given);
     options.rate_given = given.contains("rate_hz") && !given["rate_hz"].is_none();
-    const PlannedModel planned{model_name, model, position_unit, force_unit, plan, limited, certificate};
+    const PlannedModel planned{model_name, model,   position_unit, force_unit,
+                               plan,       limited, certificate,   findings};
     const auto device = open_device(options, planned);
     RecordSinks sinks;
     const RenderJob job = prepare_rendering(options, planned, *device, sinks);
@@ -214,11 +216,13 @@ void bind_run(py::module_& module) {
     module.def(
         "render", &render_in_python, "model"_a, "plan"_a = py::none(), py::kw_only(),
         "limited"_a = py::none(), "certificate"_a = py::none(), "position_unit"_a = "rad",
-        "force_unit"_a = "N*m", "model_name"_a = "", "progress"_a = py::none(),
+        "force_unit"_a = "N*m", "model_name"_a = "", "findings"_a = std::vector<std::string>{},
+        "progress"_a = py::none(),
         "Renders a model in real time on a device: the loop of palpate-control.\n\n"
         "`plan`, `limited` and `certificate` are read from the model file; `limited` is the model that the "
         "plan\n"
-        "renders instead. Without a plan the default scheme is used. Options are keywords, None for the "
+        "renders instead. `findings` are the defects of the model, which the verdict repeats. Without a plan "
+        "the default scheme is used. Options are keywords, None for the "
         "default:\n\n"
         "- device (simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]), wait_s, uncertified, faults.\n"
         "- rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.\n"

@@ -79,7 +79,9 @@ int exit_code_after_output(int code) {
             std::move(file.force_unit),
             std::move(file.plan),
             std::move(file.limited),
-            std::move(file.certificate)};
+            std::move(file.certificate),
+            std::move(file.findings),
+            std::move(file.refusal)};
 }
 
 int run(const Options& options) {

@@ -206,6 +206,7 @@ void add_running(CLI::App& app, RenderOptions& options) {
         ->capture_default_str();
     app.add_flag("--uncertified", options.uncertified,
                  "Render without a valid certificate; stability is not proved");
+    app.add_flag("--accept-model", options.accept_model, "Render the model although its verdict is no");
     app.add_option_function<double>(
            "--wait-ms", [&options](double wait_ms) { options.wait_s = 1e-3 * wait_ms; },
            "Longest wait in ms for the device [5 for a USB packet, 20 for an answer of an Inverse3]")

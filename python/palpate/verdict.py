@@ -63,6 +63,17 @@ class Verdict:
         """Returns one verdict that has the findings of both verdicts, without repetitions."""
         return Verdict(tuple(dict.fromkeys(self.findings + other.findings)))
 
+    def accepted(self) -> Verdict:
+        """Returns the verdict of a result that is used although it is "no": it is "usable", and says so."""
+        return Verdict(
+            tuple(
+                usable(f"accepted although it is no: {finding.sentence}")
+                if finding.level == "no"
+                else finding
+                for finding in self.findings
+            )
+        )
+
     def record(self) -> list[dict[str, str]]:
         """Returns the findings of the verdict as they are written to a model file."""
         return [{"level": finding.level, "sentence": finding.sentence} for finding in self.findings]

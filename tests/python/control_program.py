@@ -30,7 +30,7 @@ def in_virtual_time(environment: Mapping[str, str] = os.environ) -> dict[str, st
     return {**environment, **lists}
 
 
-def run(*command: Any, timeout: float = 60.0, **options: Any) -> subprocess.CompletedProcess[str]:
+def run(*command: Any, timeout: float = 600.0, **options: Any) -> subprocess.CompletedProcess[str]:
     """Runs a program in virtual time, and captures its output."""
     environment = in_virtual_time(options.pop("env", os.environ))
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}

@@ -44,12 +44,12 @@ def measure(*, object: palpate._core.model.ForceModel | None = None, position_un
     Returns the values of the summary by name; with `keep` the columns of all ticks are under `kept`.
     Raises InputError if the measurement is refused, before the device moves.
     """
-def render(model: palpate._core.model.ForceModel, plan: palpate._core.rendering.Scheme | None = None, *, limited: palpate._core.model.ForceModel | None = None, certificate: palpate._core.stability.Certificate | None = None, position_unit: str = 'rad', force_unit: str = 'N*m', model_name: str = '', progress: collections.abc.Callable | None = None, **kwargs) -> dict:
+def render(model: palpate._core.model.ForceModel, plan: palpate._core.rendering.Scheme | None = None, *, limited: palpate._core.model.ForceModel | None = None, certificate: palpate._core.stability.Certificate | None = None, position_unit: str = 'rad', force_unit: str = 'N*m', model_name: str = '', findings: collections.abc.Sequence[str] = [], progress: collections.abc.Callable | None = None, **kwargs) -> dict:
     """
     Renders a model in real time on a device: the loop of palpate-control.
     
     `plan`, `limited` and `certificate` are read from the model file; `limited` is the model that the plan
-    renders instead. Without a plan the default scheme is used. Options are keywords, None for the default:
+    renders instead. `findings` are the defects of the model, which the verdict repeats. Without a plan the default scheme is used. Options are keywords, None for the default:
     
     - device (simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]), wait_s, uncertified, faults.
     - rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.

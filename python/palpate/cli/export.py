@@ -19,6 +19,7 @@ from .verb import (
     PATH,
     READING_NAMES,
     ReadingOptions,
+    accept_model_option,
     json_option,
     options,
     reading_options,
@@ -30,14 +31,14 @@ FORMATS = {
     "c": (
         "c_header",
         "A C header for a microcontroller: force law and structure with proved errors.",
-        {"source", "precision", "name", "uncertified", "encoder_step", "force_limit"},
+        {"source", "precision", "name", "uncertified", "encoder_step", "force_limit", "accept_model"},
     ),
     "fmu": (
         "fmu",
         "An FMU (FMI 3.0, co-simulation) of the force law for simulators; needs a C compiler.",
-        {"source", "name"},
+        {"source", "name", "accept_model"},
     ),
-    "table": ("table", "A CSV table of the force over the position.", {"source"}),
+    "table": ("table", "A CSV table of the force over the position.", {"source", "accept_model"}),
     "schema": ("schema", "The JSON schema of model files; needs no MODEL.json.", set[str]()),
     "mcap": (
         "mcap",
@@ -111,6 +112,7 @@ def _require_use(kind: str) -> None:
     show_default="of the certified device",
     help="Largest force of the device, without certificate.",
 )
+@accept_model_option
 @json_option
 @reading_options
 def export(
@@ -122,6 +124,7 @@ def export(
     uncertified: bool,
     encoder_step: float | None,
     force_limit: float | None,
+    accept_model: bool,
     as_json: bool,
     reading: ReadingOptions,
 ) -> None:
@@ -138,14 +141,17 @@ def export(
     talk(f"writing {output} ...")
     module = import_module(f"palpate.export.{FORMATS[kind][0]}")
     recording = reading.read(source) if kind == "mcap" and source is not None else None
-    request = Request(output, source, precision, name, uncertified, encoder_step, force_limit, recording)
+    request = Request(
+        output, source, precision, name, uncertified, encoder_step, force_limit, accept_model, recording
+    )
     with finishing():
         written: Written = module.write(request)
+        verdict = written.verdict
+        if "accept_model" in FORMATS[kind][2]:
+            verdict = request.model.verdict + verdict
         if as_json:
-            print_json(
-                {"output": str(output), "format": kind, "verdict": str(written.verdict)} | written.record
-            )
+            print_json({"output": str(output), "format": kind, "verdict": str(verdict)} | written.record)
         else:
-            print_verdict(written.verdict)
+            print_verdict(verdict)
             print_numbers(written.numbers)
-    end_with(written.verdict)
+    end_with(verdict)

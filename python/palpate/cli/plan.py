@@ -31,6 +31,7 @@ from .printing import (
 from .profiles import ProfileName, device_for
 from .verb import (
     PATH,
+    accept_model_option,
     json_option,
     plot_option,
     require_model_name,
@@ -156,6 +157,7 @@ def _list_examples(*, as_json: bool) -> None:
     show_default="0.1",
     help="Largest accepted force error, as a share of the range of the force.",
 )
+@accept_model_option
 @plot_option("the root locus of the explicit structure over its damping")
 @click.option(
     "--examples",
@@ -169,6 +171,7 @@ def plan(
     model_file: Path,
     device: str,
     output: Path | None,
+    accept_model: bool,
     plot: Path | None,
     as_json: bool,
     verbose: bool,
@@ -180,13 +183,13 @@ def plan(
     profile_path = profile_file(device)
     require_writable(plot, inputs=(model_file, profile_path))
     require_writable(output, plot, inputs=(profile_path,))  # the output may be the model file
-    model = load_model(model_file, with_plan=False)
+    model = load_model(model_file, with_plan=False).require_use(model_file, accepted=accept_model)
     profile = device_for(model, device)
     talk(f"read {model_file}: {sized(model)}; for {profile.id}, {profile_path}")
     began = time.perf_counter()
     chosen = choose(model, profile, **{name: value for name, value in given.items() if value is not None})
     seconds = time.perf_counter() - began
-    verdict, certificate = chosen.verdict, chosen.certificate
+    verdict, certificate = model.verdict + chosen.verdict, chosen.certificate
     assert certificate is not None
     holds = verdict.level != "no"
     with drawing() as write_figures:
@@ -198,7 +201,7 @@ def plan(
         write_figures()
         written = output if holds else None
         if as_json:
-            print_json(_result(chosen, certificate, written, seconds))
+            print_json(_result(chosen, verdict, certificate, written, seconds))
         else:
             print_verdict(verdict)
             print_numbers(_summary(chosen, certificate, profile, written))
@@ -210,12 +213,14 @@ def plan(
 _LINE = ("id", "name", "formula", "left", "right", "margin", "strict", "holds", "basis", "source")
 
 
-def _result(plan: Plan, certificate: Certificate, written: Path | None, seconds: float) -> dict[str, Any]:
+def _result(
+    plan: Plan, verdict: Verdict, certificate: Certificate, written: Path | None, seconds: float
+) -> dict[str, Any]:
     error = plan.force_error
     slope, steepest = plan.slopes_behind_coupling
     return {
         "structure": plan.structure,
-        "verdict": str(plan.verdict),
+        "verdict": str(verdict),
         "force_error_share": error.share,
         "force_error_rms_share": error.rms_share,
         "force_error": {"largest": error.largest, "rms": error.rms},

@@ -16,7 +16,7 @@ from ..planning import Plan, example_profiles
 from .exit_status import end_with
 from .live import live_line, session_verdict
 from .printing import print_json, print_numbers, print_verdict, talk
-from .verb import PATH, json_option, require_writable, scheme_options, sized, verb
+from .verb import PATH, accept_model_option, json_option, require_writable, scheme_options, sized, verb
 
 _LOOP = LoopSettings()
 
@@ -69,6 +69,7 @@ _LOOP = LoopSettings()
     default=_LOOP.lowest_rate_share,
     help="A rate below this share of --rate-hz for half a second ends the run; 0: never.",
 )
+@accept_model_option
 @json_option
 @scheme_options
 def render(
@@ -77,6 +78,7 @@ def render(
     wait_ms: float | None,
     record: Path | None,
     force: bool,
+    accept_model: bool,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -93,7 +95,7 @@ def render(
             f"--device {device} is a profile: give it to palpate plan, which writes it into the model file; "
             "here --device names the connection, such as usb"
         )
-    model = load_model(model_file)
+    model = load_model(model_file).require_use(model_file, accepted=accept_model)
     plan = None if model.plan is None else Plan.of(model)
     units = (model.units["position"], model.units["force"])
     nothing_moves = ", which is simulated: nothing moves" if device == "simulated" else ""
@@ -107,6 +109,7 @@ def render(
             position_unit=units[0],
             force_unit=units[1],
             model_name=str(model_file),
+            findings=list(model.verdict.reasons),
             progress=line.show,
             device=device,
             wait_s=None if wait_ms is None else 1e-3 * wait_ms,

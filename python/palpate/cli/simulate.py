@@ -26,7 +26,16 @@ from .printing import (
     progress,
     talk,
 )
-from .verb import PATH, json_option, plot_option, require_writable, scheme_options, sized, verb
+from .verb import (
+    PATH,
+    accept_model_option,
+    json_option,
+    plot_option,
+    require_writable,
+    scheme_options,
+    sized,
+    verb,
+)
 
 
 def _refuse_device(ctx: click.Context, param: click.Parameter, device: str | None) -> None:
@@ -60,6 +69,7 @@ def _refuse_device(ctx: click.Context, param: click.Parameter, device: str | Non
     "-o", "--output", type=PATH, metavar="OUT.csv", default=None, help="Recording of the rendering to write."
 )
 @click.option("--force", is_flag=True, help="Replace an existing recording.")
+@accept_model_option
 @plot_option("rendered and modelled force, with their difference")
 @json_option
 def simulate(
@@ -68,6 +78,7 @@ def simulate(
     hold_at: float | None,
     output: Path | None,
     force: bool,
+    accept_model: bool,
     plot: Path | None,
     as_json: bool,
     **scheme: Any,
@@ -81,7 +92,7 @@ def simulate(
     A simulation shows one case; it does not prove stability.
     """
     require_writable(plot, recording=output, force=force, inputs=(model_file,))
-    model = load_model(model_file)
+    model = load_model(model_file).require_use(model_file, accepted=accept_model)
     rig = rig_for(model)
     plan = _chosen_plan(model, rig, scheme)
     device = rig.device if plan.certificate is None else plan.certificate.device
@@ -97,7 +108,7 @@ def simulate(
             lambda tick: shown(f"{100 * tick / ticks:.1f} %"),
         )
     error = force_error(plan, rendered)
-    verdict = judge(plan, rendered, error)
+    verdict = model.verdict + judge(plan, rendered, error)
     status_counts = Counter(rendered.columns["status"])
     span = force_range(plan)
     share = error.end / span if span > 0 else None

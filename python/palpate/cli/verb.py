@@ -191,6 +191,10 @@ def reading_options(command: F) -> F:
     return cast(F, _READING(invoke))
 
 
+accept_model_option = click.option(
+    "--accept-model", is_flag=True, help="Use the model although its verdict is no; the result says so."
+)
+
 scheme_options = options(
     click.option(
         "--structure",

@@ -53,7 +53,7 @@ class Exported:
             the cure.
         """
         name = request.identifier()
-        model = request.model()
+        model = request.model
         require_force(model)
         plan = None if model.plan is None else Plan.of(model)
         certificate = None if plan is None else plan.certificate

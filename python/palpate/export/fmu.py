@@ -114,7 +114,7 @@ class Fmu:
     @classmethod
     def of(cls, request: Request) -> Fmu:
         """Makes the tables of the identified model. Its plan is left out, because it holds for a device."""
-        model = request.model()
+        model = request.model
         require_force(model)
         if model.memory is not None:
             raise InputError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -45,14 +46,23 @@ class Request:
     """Position for each count, for a model without the profile of a device"""
     force_limit: float | None = None
     """Largest force of the device, for a model without the profile of a device"""
+    accept_model: bool = False
+    """True if a model with the verdict "no" is exported too"""
     recording: Recording | None = None
     """Recording to export in place of a model"""
 
+    @cached_property
     def model(self) -> Model:
-        """Reads the model file."""
+        """Model of the model file.
+
+        Raises
+        ------
+        InputError
+            The file is no model, or its verdict is "no".
+        """
         if self.model_file is None:
             raise InputError("no model is given: palpate export MODEL.json -o OUT")
-        return load_model(self.model_file)
+        return load_model(self.model_file).require_use(self.model_file, accepted=self.accept_model)
 
     def identifier(self) -> str:
         """Returns the name of the model, which is a C identifier.

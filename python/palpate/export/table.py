@@ -18,7 +18,7 @@ ROWS = 1001
 
 def write(request: Request) -> Written:
     """Writes position, force, slope and energy over the domain; with hysteresis press and release."""
-    model = request.model()
+    model = request.model
     table = table_of(model)
     request.write_text(table.to_csv(index=False, float_format="%.17g", lineterminator="\n"))
     return Written(

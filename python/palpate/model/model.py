@@ -239,6 +239,33 @@ class Model(ForceModel):
         record = self.notes.get("verdict", ())
         return Verdict.from_record(record if isinstance(record, list) else ())
 
+    def require_use(self, name: Path | str, *, accepted: bool = False) -> Model:
+        """Returns the model if it may be used. Every verb that plans, renders or exports a model calls this.
+
+        Parameters
+        ----------
+        name : path or str
+            Name of the model file, for the message.
+        accepted : bool
+            True: a model with the verdict "no" may be used. The verdict of the returned copy is "usable" and
+            says so.
+
+        Raises
+        ------
+        InputError
+            The verdict of the model is "no".
+        """
+        if self.verdict.level != "no":
+            return self
+        if not accepted:
+            raise InputError(
+                f"the verdict of {name} is no: {self.verdict.reasons[0]}. Identify a better model, or give "
+                "--accept-model to use this one"
+            )
+        content = self.to_dict()
+        content["notes"] = {**content["notes"], "verdict": self.verdict.accepted().record()}
+        return Model.from_dict(content)
+
     @property
     def path(self) -> Sequence[PathStep]:
         """Networks that identification compared: the number of wavelets, error and criterion of each."""

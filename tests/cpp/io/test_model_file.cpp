@@ -4,6 +4,7 @@
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -106,6 +107,23 @@ Json with_wavelets(const std::string& file, std::size_t n) {
     content["fit"]["n_wavelets"] = n;
     content["slope_bounds"] = nullptr;
     return content;
+}
+
+TEST(ModelFile, KeepsTheVerdictOfTheIdentificationAndIgnoresOtherNotes) {
+    Json file = Json::parse(std::ifstream{corpus + "good/position.json"});
+    file["notes"]["verdict"] = Json::parse(
+        R"([{"level": "usable", "sentence": "two rows are odd"}, 3, {"level": "no"}, {"level": "good", "sentence": "a"},
+            {"level": "no", "sentence": "19 % are explained"}, {"level": 5, "sentence": "b"}])");
+    const ModelFile read = parse_model(file);
+    const std::vector<std::string> expected{"two rows are odd",
+                                            "accepted although it is no: 19 % are explained"};
+    EXPECT_EQ(read.findings, expected);
+    EXPECT_EQ(read.refusal, "19 % are explained");
+    for (const char* other : {"3", "{}", "[]", "\"no\"", "null"}) {
+        file["notes"]["verdict"] = Json::parse(other);
+        EXPECT_EQ(parse_model(file).refusal, "") << other;
+        EXPECT_TRUE(parse_model(file).findings.empty()) << other;
+    }
 }
 
 TEST(ModelFile, RefusesMoreWaveletsThanATickCanEvaluate) {

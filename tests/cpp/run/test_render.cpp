@@ -99,6 +99,20 @@ struct Change {
     void (*apply)(RenderOptions& options);
 };
 
+TEST(PrepareRendering, NeedsAModelThatItsIdentificationDoesNotRefuse) {
+    PlannedModel model = stored("certificate_massless.json");
+    model.name = "switch.json";
+    model.refusal = "19 % are explained";
+    for (const bool simulated : {false, true}) {
+        RenderOptions options;
+        EXPECT_EQ(test::refusal([&] { (void)prepared(model, simulated, options); }),
+                  "the verdict of switch.json is no: 19 % are explained. Identify a better model, or give "
+                  "--accept-model to use this one");
+        options.accept_model = true;
+        EXPECT_TRUE(prepared(model, simulated, options).guards.certified);
+    }
+}
+
 // A real device moves only if a certificate holds for model, plan and device, or if uncertified is set. The guards rely
 // on a certificate only if it holds.
 TEST(PrepareRendering, NeedsACertificateThatHoldsOrTheOptionUncertified) {

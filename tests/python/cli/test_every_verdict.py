@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from control_program import PROGRAM, needs_program, run
 from models_by_hand import model_by_hand
 from palpate.cli.main import main
-from palpate.verdict import LEVELS, Verdict, no
+from palpate.verdict import LEVELS, Verdict, no, usable
 from test_cli_identify import spring
 from test_every_verb import VERBS
 
@@ -54,6 +55,69 @@ def test_show_exits_with_code_1_if_the_verdict_of_the_identification_is_no(
     assert capsys.readouterr().out.startswith("verdict: no\n  the model explains 20% of the force\n")
     assert main(["show", "bad.json", "--json"]) == 1
     assert json.loads(capsys.readouterr().out)["verdict"] == "no: the model explains 20% of the force"
+
+
+USES_OF_A_MODEL = {
+    "plan": "plan bad.json --device bench-knob",
+    "simulate": "simulate bad.json --structure direct --duration-s 4",
+    "render": "render bad.json --structure direct --duration-s 0.3 --ramp-s 0",
+    "table": "export bad.json --table -o bad.csv",
+    "fmu": "export bad.json --fmu -o bad.fmu",
+    "c": "export bad.json --c -o bad.h --uncertified --encoder-step 1e-4 --force-limit 3",
+}
+"""Verbs that plan, render or export a model."""
+
+
+def refused_model(path: str) -> None:
+    """Writes a model whose verdict is no, with a second finding."""
+    model = model_by_hand()
+    findings = (usable("two rows are odd"), no("the model explains 20% of the force"))
+    model.notes["verdict"] = Verdict(findings).record()
+    model.save(path)
+
+
+@pytest.mark.parametrize("use", sorted(USES_OF_A_MODEL))
+def test_a_model_with_the_verdict_no_is_used_only_if_that_is_accepted(
+    use: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused_model("bad.json")
+    before = sorted(folder.iterdir())
+    assert main(USES_OF_A_MODEL[use].split()) == 2
+    refusal = (
+        "the verdict of bad.json is no: the model explains 20% of the force. Identify a better model, or"
+    )
+    assert f"{refusal} give --accept-model to use this one" in capsys.readouterr().err
+    assert sorted(folder.iterdir()) == before
+    main([*USES_OF_A_MODEL[use].split(), "--accept-model", "--json"])
+    verdict = json.loads(capsys.readouterr().out)["verdict"]
+    assert "accepted although it is no: the model explains 20% of the force" in verdict
+    assert "two rows are odd" in verdict
+
+
+def test_an_accepted_model_is_accepted_by_all_verbs_that_use_its_plan(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused_model("bad.json")
+    assert main(["plan", "bad.json", "--device", "bench-knob", "--accept-model", "-o", "planned.json"]) == 0
+    capsys.readouterr()
+    for words in ("simulate planned.json --duration-s 4", "export planned.json --c -o planned.h"):
+        assert main([*words.split(), "--json"]) == 0
+        verdict = json.loads(capsys.readouterr().out)["verdict"]
+        assert verdict.startswith("usable: ")
+        assert "accepted although it is no: the model explains 20% of the force" in verdict
+
+
+@needs_program
+def test_the_program_renders_a_model_with_the_verdict_no_only_if_that_is_accepted(folder: Path) -> None:
+    refused_model("bad.json")
+    words = [PROGRAM, "bad.json", "--structure", "direct", "--duration-s", "0.3", "--ramp-s", "0"]
+    refused = run(*words)
+    assert refused.returncode == 2
+    assert "the verdict of bad.json is no: the model explains 20% of the force" in refused.stderr
+    assert "--accept-model" in refused.stderr
+    accepted = json.loads(run(*words, "--accept-model", "--json").stdout)["verdict"]
+    assert "accepted although it is no: the model explains 20% of the force" in accepted
+    assert "two rows are odd" in accepted
 
 
 def test_show_prints_one_json_object_with_the_fields_of_the_model(

@@ -21,6 +21,9 @@ struct ModelFile {
     std::optional<Scheme> plan;              ///< the plan: structure and its numbers; unset: no plan
     std::optional<ForceModel> limited;       ///< model that the plan renders instead of the identified model
     std::optional<Certificate> certificate;  ///< certificate of the plan, recomputed on reading
+    std::vector<std::string>
+        findings{};  ///< defects that the identification found, as a verdict repeats them
+    std::optional<std::string> refusal{};  ///< the defect with which the verdict on the model is no
 
     /// Returns the model that the plan renders.
     [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }

@@ -74,6 +74,7 @@ struct RenderOptions : RunOptions {
     double frozen_s = GuardSettings{}.frozen_s;
     bool energy_tank = true;
     bool uncertified = false;
+    bool accept_model = false;        ///< true: a model whose verdict is no is rendered
     std::vector<std::string> faults;  ///< faults that the simulated device must produce, for tests
 };
 
@@ -92,6 +93,8 @@ struct PlannedModel {
     std::optional<Scheme> plan;
     std::optional<ForceModel> limited;  ///< model that the plan renders instead of `model`
     std::optional<Certificate> certificate;
+    std::vector<std::string> findings{};   ///< defects that the identification found
+    std::optional<std::string> refusal{};  ///< the defect with which the verdict on the model is no
 
     /// Returns the model that the plan renders.
     [[nodiscard]] const ForceModel& planned() const noexcept { return limited ? *limited : model; }
@@ -272,7 +275,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
                 write_last_ticks(options.record, options.force, units, metadata, summary.report, loop);
         }
     }
-    expected.warnings = summary.warnings;
+    expected.warnings.insert(expected.warnings.end(), summary.warnings.begin(), summary.warnings.end());
     summary.findings = judge_session(summary.report, loop, sinks, expected);
     summary.recorded = sinks.file.written();
     summary.lost_records = summary.report.lost_records + sinks.file.refused();
@@ -293,6 +296,10 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
 /// the reason if the rendering is not allowed.
 [[nodiscard]] inline RenderJob prepare_rendering(const RenderOptions& options, const PlannedModel& model,
                                                  const LiveDevice& device, RecordSinks& sinks) {
+    if (model.refusal && !options.accept_model) {
+        refuse("the verdict of " + model.name + " is no: " + *model.refusal +
+               ". Identify a better model, or give --accept-model to use this one");
+    }
     std::string reason = uncertified_reason(options, model);
     if (!device.simulated && !options.uncertified) {
         reason = detail::certificate_mismatch(options, model, device.profile);
@@ -371,7 +378,8 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
         detail::finish(options, job.session.loop, model.units(), job.metadata, sinks, std::move(report),
                        {.encoder_step = job.guards.encoder_step,
                         .domain = {domain.lower[0], domain.upper[0]},
-                        .position_unit = model.position_unit},
+                        .position_unit = model.position_unit,
+                        .warnings = model.findings},
                        device);
     summary.notes = job.notes;
     return summary;

@@ -31,7 +31,7 @@ struct SessionExpectation {
     double encoder_step = 0.0;  ///< encoder step of the device [m or rad]; 0: the encoder has no steps
     Range domain{};             ///< domain of the rendered model [m or rad]; NaN for a real object
     std::string position_unit{};
-    std::vector<std::string> warnings{};  ///< warnings about the recording
+    std::vector<std::string> warnings{};  ///< warnings about the model or the recording
 };
 
 namespace detail {

@@ -233,6 +233,24 @@ inline std::optional<ForceModel> read_limited(const JsonField& file) {
     return read_network(network, file);
 }
 
+/// Reads the verdict of the identification. Other notes belong to the user, so an entry of another form is ignored.
+inline void read_findings(const Json& notes, ModelFile& read) {
+    for (const Json& finding : notes.value("verdict", Json::array())) {
+        const auto text = [&](const char* key) {
+            return finding.is_object() && finding.contains(key) && finding[key].is_string()
+                       ? finding[key].template get<std::string>()
+                       : std::string{};
+        };
+        const std::string level = text("level");
+        if (level == "usable" || level == "no") {
+            read.findings.push_back((level == "no" ? "accepted although it is no: " : "") + text("sentence"));
+            if (level == "no" && !read.refusal) {
+                read.refusal = text("sentence");
+            }
+        }
+    }
+}
+
 }  // namespace detail
 
 PALPATE_INLINE ModelFile parse_model(const Json& content) {
@@ -275,6 +293,7 @@ PALPATE_INLINE ModelFile parse_model(const Json& content) {
     if (content.contains("notes")) {
         file["notes"].require_object();
         file["notes"].require_finite();
+        detail::read_findings(content["notes"], read);
     }
     return read;
 }
