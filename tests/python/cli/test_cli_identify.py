@@ -27,6 +27,7 @@ JSON_FIELDS = [
     "nrmse",
     "verdict",
     "seconds",
+    "roles",
 ]
 
 
