@@ -15,6 +15,7 @@ from ..model.model_file import certificate_record
 from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, profile_file
 from ..planning.candidates import CANDIDATES
 from ..planning.search import plan as choose
+from ..verdict import Verdict
 from .exit_status import end_with, finishing
 from .figures import drawing, figure_file, source_name
 from .printing import (

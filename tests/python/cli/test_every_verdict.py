@@ -60,7 +60,7 @@ def test_show_exits_with_code_1_if_the_verdict_of_the_identification_is_no(
 USES_OF_A_MODEL = {
     "plan": "plan bad.json --device bench-knob",
     "simulate": "simulate bad.json --structure direct --duration-s 4",
-    "render": "render bad.json --structure direct --duration-s 0.3 --ramp-s 0",
+    "render": "render bad.json --structure direct --duration-s 0.3",
     "table": "export bad.json --table -o bad.csv",
     "fmu": "export bad.json --fmu -o bad.fmu",
     "c": "export bad.json --c -o bad.h --uncertified --encoder-step 1e-4 --force-limit 3",
