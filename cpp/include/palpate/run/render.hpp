@@ -74,7 +74,7 @@ struct RenderOptions : RunOptions {
     double frozen_s = GuardSettings{}.frozen_s;
     bool energy_tank = true;
     bool uncertified = false;
-    bool accept_model = false;        ///< true: a model whose verdict is no is rendered
+    bool accept_model = false;        ///< true: a model with the verdict no is rendered
     std::vector<std::string> faults;  ///< faults that the simulated device must produce, for tests
 };
 
