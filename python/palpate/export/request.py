@@ -53,12 +53,12 @@ class Request:
 
     @cached_property
     def model(self) -> Model:
-        """Model of the model file.
+        """Model to export.
 
         Raises
         ------
         InputError
-            The file is no model, or its verdict is "no".
+            The file is not a model file, or its verdict is "no".
         """
         if self.model_file is None:
             raise InputError("no model is given: palpate export MODEL.json -o OUT")
