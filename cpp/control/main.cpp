@@ -36,6 +36,7 @@ void request_stop(int /*signal*/) {
 void handle_signals() {
     struct sigaction stop{};
     stop.sa_handler = request_stop;
+    stop.sa_flags = SA_RESTART;  // an interrupted write would end all later output of std::cerr
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
         sigaction(signal, &stop, nullptr);
     }

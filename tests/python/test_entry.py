@@ -288,5 +288,6 @@ def test_a_printed_model_states_its_verdict_first() -> None:
     unsorted_model = identify(X[ascending], force()[ascending])
     lines = str(unsorted_model).splitlines()
     assert lines[0] == "verdict: usable"
-    assert lines[1].startswith("  hysteresis was not tested")
+    assert lines[1].startswith("  the NRMSE on rows that were left out of the fit is")
+    assert "record time, direction" in lines[1]
     assert unsorted_model.verdict.level == "usable"

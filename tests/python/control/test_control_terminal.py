@@ -8,12 +8,14 @@ import json
 import os
 import re
 import select
+import signal
 import struct
 import subprocess
 import termios
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,6 +26,9 @@ pytestmark = needs_program
 
 CLEAR_LINE = "\r\x1b[K"
 """Characters that move the cursor to the start of a terminal line and clear the line."""
+
+WRITES_TO_TERMINAL = ("1 0x2 ", "64 0x2 ")
+"""Begin of /proc/PID/syscall during a write to standard error on x86-64 and ARM64."""
 
 LIVE_LINE = re.compile(r"[\d.]+ s  -?[\d.e-]+ rad  -?[\d.e-]+ Nm  [\d.]+ Hz  missed \d+")
 
@@ -122,6 +127,26 @@ def test_a_terminal_without_a_known_width_has_80_columns() -> None:
         assert session.process.wait() == 0
         assert len(session.lines) >= 2
         assert all(LIVE_LINE.fullmatch(line) and len(line) < 80 for line in session.lines)
+
+
+def test_ctrl_c_during_a_write_to_the_terminal_loses_no_later_text() -> None:
+    """The terminal shows nothing for a while (Ctrl-S); a signal then interrupts the write."""
+    with terminal(80, MODEL, "--duration-s", "inf") as session:
+        session.watch(until_lines=2)
+        session.press(b"\x13")
+        tasks = Path(f"/proc/{session.process.pid}/task")
+        while not any(
+            (task / "syscall").read_text().startswith(WRITES_TO_TERMINAL) for task in tasks.iterdir()
+        ):
+            time.sleep(0.01)
+        session.process.send_signal(signal.SIGINT)
+        pending = f"ShdPnd:\t{1 << (signal.SIGINT - 1):016x}"
+        while pending in (tasks.parent / "status").read_text():
+            time.sleep(0.01)
+        session.press(b"\x11")
+        session.watch()
+        assert session.process.wait() == 0
+        assert session.output.endswith(CLEAR_LINE)
 
 
 def test_ctrl_c_in_a_terminal_exits_with_code_0_and_a_summary() -> None:
