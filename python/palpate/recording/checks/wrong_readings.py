@@ -67,7 +67,7 @@ def wrong_readings(
 
     A wrong reading is outside the interval between the median values of the rows before it and after it, so
     that no row of a steep wall or of a click is one. The distance is compared with the changes from row to
-    row nearby. At the largest and smallest positions a wall may be touched by a single row. Rows that are not
+    row nearby. Several wrong readings side by side are outside the range of all others. At the largest and smallest positions a wall may be touched by a single row. Rows that are not
     in the order of a motion have no neighbours, and no wrong readings. `motion` (m,) is the position of all
     rows in recorded order, of which these rows can be a part.
     """
@@ -82,26 +82,46 @@ def wrong_readings(
 def _deviating(
     values: Float1D, position: Float1D, given: NDArray[np.bool_], at_ends: bool
 ) -> NDArray[np.bool_]:
-    """Returns True (n,) for the given rows whose value deviates from those before and after them."""
+    """Returns True (n,) for the given rows whose value deviates from those before and after them.
+
+    First the values are found that are further from all others than these are from each other: several of
+    them hide each other from their neighbours. All others are compared with few neighbours.
+    """
     found = np.zeros(len(values), dtype=bool)
-    floor = LEAST_WRONG * float(np.subtract(*np.quantile(values[given], (0.99, 0.01))))
+    reach = float(np.subtract(*np.quantile(values[given], (1.0 - MOST_WRONG_SHARE, MOST_WRONG_SHARE))))
+
+    def inner(rows: NDArray[np.intp], others: NDArray[np.intp]) -> NDArray[np.bool_]:
+        x, of_others = position[rows], position[others]
+        return np.asarray(at_ends | ((x >= of_others.min()) & (x < of_others.max())))
+
     while len(rows := np.flatnonzero(given & ~found)) > 2 * LOCAL_ROWS:
-        v, x = values[rows], position[rows]
-        around = np.pad(v, NEIGHBOUR_ROWS, mode="edge")
-        windows = np.lib.stride_tricks.sliding_window_view(around, NEIGHBOUR_ROWS)
-        before, after = (np.median(each, axis=1) for each in (windows[: len(v)], windows[-len(v) :]))
-        # The first and the last row have no rows on one side: the change of the nearest rows continues there.
-        before[0] = after[0] + WRONG_RATIO * (after[0] - after[NEIGHBOUR_ROWS])
-        after[-1] = before[-1] + WRONG_RATIO * (before[-1] - before[-1 - NEIGHBOUR_ROWS])
-        apart = np.maximum(v - np.maximum(before, after), np.minimum(before, after) - v)
-        changes = np.pad(np.abs(np.diff(v)), LOCAL_ROWS, mode="reflect")
+        wrong = _apart(values[rows], LOCAL_ROWS) > reach
+        if not wrong.any():
+            break
+        found[rows[wrong]] = True
+    rest, far = values[rows], np.flatnonzero(found)
+    found[far] = inner(far, rows) & (np.abs(values[far] - np.median(rest)) > np.ptp(rest))
+    while len(rows := np.flatnonzero(given & ~found)) > 2 * LOCAL_ROWS:
+        changes = np.pad(np.abs(np.diff(values[rows])), LOCAL_ROWS, mode="reflect")
         nearby = np.median(np.lib.stride_tricks.sliding_window_view(changes, LOCAL_ROWS), axis=1)
-        usual = np.maximum(np.maximum(nearby[: len(v)], nearby[-len(v) :]), float(np.median(changes)))
-        wrong = apart > np.maximum(WRONG_RATIO * usual, floor)
-        if not at_ends and wrong.any():
-            ordinary = x[~wrong]
-            wrong &= (x >= ordinary.min()) & (x < ordinary.max())
+        nearby = np.maximum(nearby[: len(rows)], nearby[-len(rows) :])
+        usual = np.maximum(nearby, float(np.median(np.abs(np.diff(values[rows])))))
+        wrong = _apart(values[rows], NEIGHBOUR_ROWS) > np.maximum(WRONG_RATIO * usual, LEAST_WRONG * reach)
+        if wrong.any():
+            wrong &= inner(rows, rows[~wrong])
         if not wrong.any():
             break
         found[rows[wrong]] = True
     return found
+
+
+def _apart(values: Float1D, count: int) -> Float1D:
+    """Returns the distance of each value (n,) from the interval between the median of `count` values before
+    it and that of `count` values after it."""
+    around = np.pad(values, count, mode="edge")
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(around, count), axis=1)
+    before, after = medians[: len(values)].copy(), medians[-len(values) :].copy()
+    # The first and the last row have no rows on one side: the change of the nearest rows continues there.
+    before[0] = after[0] + WRONG_RATIO * (after[0] - after[count])
+    after[-1] = before[-1] + WRONG_RATIO * (before[-1] - before[-1 - count])
+    return np.maximum(values - np.maximum(before, after), np.minimum(before, after) - values)
