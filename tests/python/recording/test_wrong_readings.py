@@ -111,6 +111,11 @@ def test_short_fast_motion_after_a_long_rest_stays() -> None:
     assert wrong_rows(x, 2.0 * x) == []
 
 
+def test_strokes_after_a_long_exact_rest_stay() -> None:
+    at_rest = np.zeros(5000)
+    assert wrong_rows(np.r_[at_rest, PRESS[::2]], np.r_[at_rest, 2.0 * PRESS[::2]]) == []
+
+
 def test_wrong_reading_of_a_further_input_is_dropped() -> None:
     x = strokes(N)
     frame = pd.DataFrame({"position_rad": x, "torque_Nm": wall(x), "side_rad": np.sin(3.0 * x) + noise(N)})

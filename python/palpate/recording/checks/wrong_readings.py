@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wrong readings: single values far from the rows before and after them, which are dropped before the fit."""
+"""Rows without information, which are dropped before the fit: rows that repeat the previous one, and wrong
+readings, which are far from the rows before and after them."""
 
 from __future__ import annotations
 
@@ -35,6 +36,31 @@ NEIGHBOUR_ROWS = 3
 """Number of rows before a row, and after it, with whose median value it is compared."""
 
 
+REPEATED_ROWS_SHARE = 1.0 / 3.0
+"""Share of rows that equal the previous row, above which they are repeated [-]: a coarse sensor gives fewer
+equal rows."""
+
+
+def without_repeated_rows(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+    """Returns the recordings without the rows that repeat the previous row, and notes on them: a sensor that
+    is slower than the recorder measures only the first one."""
+    kept, notes = list(recordings), list[str]()
+    for number, recording in enumerate(kept):
+        columns = [recording.position, recording.force, *recording.inputs.T]
+        if recording.direction is not None:
+            columns.append(recording.direction)
+        again = np.zeros(len(recording), dtype=bool)
+        again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
+        if again.mean() > REPEATED_ROWS_SHARE:
+            where = f"recording {number + 1}: " if len(kept) > 1 else ""
+            notes.append(
+                f"{where}{np.count_nonzero(again)} of {len(recording)} rows repeat the previous row and were "
+                "dropped."
+            )
+            kept[number] = recording.without(again)
+    return kept, notes
+
+
 def without_wrong_readings(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
     """Returns the recordings without wrong readings, and notes on the wrong readings."""
     kept, notes = list(recordings), list[str]()
@@ -67,9 +93,10 @@ def wrong_readings(
 
     A wrong reading is outside the interval between the median values of the rows before it and after it, so
     that no row of a steep wall or of a click is one. The distance is compared with the changes from row to
-    row nearby. Several wrong readings side by side are outside the range of all others. At the largest and smallest positions a wall may be touched by a single row. Rows that are not
-    in the order of a motion have no neighbours, and no wrong readings. `motion` (m,) is the position of all
-    rows in recorded order, of which these rows can be a part.
+    row nearby. Several wrong readings side by side are outside the range of all others. At the largest and
+    smallest positions a wall may be touched by a single row. Rows that are not in the order of a motion have
+    no neighbours, and no wrong readings. `motion` (m,) is the position of all rows in recorded order, of
+    which these rows can be a part.
     """
     found = np.zeros(len(force), dtype=bool)
     if len(force) <= 2 * LOCAL_ROWS or strokes_from_order(motion) is None:
@@ -99,7 +126,10 @@ def _deviating(
         if not wrong.any():
             break
         found[rows[wrong]] = True
-    rest, far = values[rows], np.flatnonzero(found)
+    for begin, end in np.flatnonzero(np.diff(found, prepend=False, append=False)).reshape(-1, 2).tolist():
+        found[begin:end] &= 2 * (end - begin) <= LOCAL_ROWS  # more rows move the medians as well
+    rows, far = np.flatnonzero(given & ~found), np.flatnonzero(found)
+    rest = values[rows]
     found[far] = inner(far, rows) & (np.abs(values[far] - np.median(rest)) > np.ptp(rest))
     while len(rows := np.flatnonzero(given & ~found)) > 2 * LOCAL_ROWS:
         changes = np.pad(np.abs(np.diff(values[rows])), LOCAL_ROWS, mode="reflect")
