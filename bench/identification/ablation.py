@@ -155,6 +155,10 @@ def _no_wrong_readings(motion: Any, position: Any, *_: Any) -> Any:
     return _none(position)
 
 
+def _no_rows_dropped(recordings: Any) -> Any:
+    return recordings, []
+
+
 def _no_waits(position: Any) -> Any:
     return None if strokes_from_order(position) is None else _none(position)
 
@@ -195,7 +199,8 @@ RULES = (
         "wrong readings are dropped", f"{CHECKS}.wrong_readings", "wrong_readings", lambda _, x, *__: _none(x)
     ),
     Rule("period is found", "identification.identify", "period_of", _nothing),
-    Rule("repeated rows count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
+    Rule("repeated rows are dropped", "identification.identify", "without_repeated_rows", _no_rows_dropped),
+    Rule("copies count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
     Rule("force step hides errors", f"{DATA}.rows", "force_step", _zero),
     Rule("correlated noise", f"{CLASSES}.model_selection", "correlated_noise", _first),
     Rule("noise where candidates differ", f"{SEARCH}.evidence", "local_noise_ratio", _one),

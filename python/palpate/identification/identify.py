@@ -18,7 +18,7 @@ from ..arguments import parameter_texts, shown
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording, Source, read_recording
-from ..recording.checks.wrong_readings import without_wrong_readings
+from ..recording.checks.wrong_readings import without_repeated_rows, without_wrong_readings
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
@@ -138,7 +138,9 @@ def identify(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify each one "
                 "separately"
             )
-    given_rows = sum(map(len, recordings))
+    every = sum(map(len, recordings))
+    recordings, repeated = without_repeated_rows(recordings)
+    distinct = sum(map(len, recordings))
     recordings, wrong = without_wrong_readings(recordings)
     for each in recordings:
         require_in_range("position", each.position)
@@ -150,7 +152,7 @@ def identify(
     # result.
     with threadpool_limits(limits=1, user_api="blas"):
         network, settings, rows = _fitted_with_period(fitted, settings, object_of)
-        network = replace(network, notes=(*wrong, *sections, *network.notes))
+        network = replace(network, notes=(*repeated, *wrong, *sections, *network.notes))
         rest = _resting(rows, settings)
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)
     source = Source.merged(part.source for part in fitted)
@@ -158,7 +160,11 @@ def identify(
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
     model = model_of(network, recordings[0].units, source, settings, verdict)
     used = sum(map(len, recordings))
-    unused = {"wrong reading": given_rows - used, "left out": used - len(rows.force)}
+    unused = {
+        "repeated": every - distinct,
+        "wrong reading": distinct - used,
+        "left out": used - len(rows.force),
+    }
     model.notes["roles"] = role_counts(rows.roles) | {name: count for name, count in unused.items() if count}
     return model
 

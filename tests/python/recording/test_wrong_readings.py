@@ -111,6 +111,11 @@ def test_short_fast_motion_after_a_long_rest_stays() -> None:
     assert wrong_rows(x, 2.0 * x) == []
 
 
+def test_strokes_after_a_long_exact_rest_stay() -> None:
+    at_rest = np.zeros(5000)
+    assert wrong_rows(np.r_[at_rest, PRESS[::2]], np.r_[at_rest, 2.0 * PRESS[::2]]) == []
+
+
 def test_wrong_reading_of_a_further_input_is_dropped() -> None:
     x = strokes(N)
     frame = pd.DataFrame({"position_rad": x, "torque_Nm": wall(x), "side_rad": np.sin(3.0 * x) + noise(N)})
@@ -184,7 +189,13 @@ def test_wrong_readings_do_not_depend_on_the_units(length: float, force: float) 
 
 
 def test_four_equal_readings_in_sequence_belong_to_the_object() -> None:
-    assert wrong_rows(PRESS, changed(FORCE, dict.fromkeys(range(100, 104), 500.0))) == []
+    assert wrong_rows(PRESS, changed(FORCE, dict.fromkeys(range(100, 104), 50.0))) == []
+
+
+def test_neighbouring_readings_far_beyond_all_others_are_wrong() -> None:
+    at = [100, 101, 103, 104, 600, 601, 602, 603]
+    assert wrong_rows(PRESS, changed(FORCE, dict.fromkeys(at, 500.0))) == at
+    assert wrong_rows(PRESS, changed(FORCE, dict.fromkeys([*at, 399], -500.0))) == at
 
 
 def test_more_than_a_tenth_of_the_rows_are_not_wrong_readings() -> None:

@@ -21,9 +21,6 @@ FORCE_RESOLUTION = 2.0**-16
 converter. A simulated force has no noise, so that a criterion would add wavelets until the error is a
 rounding error."""
 
-REPEATED_ROWS_SHARE = 1.0 / 3.0
-"""Share of rows that equal the previous row, above which repeated rows are used once [-]."""
-
 PROBED_ROWS = 7
 """Number of evenly spread rows that are tested first: if each of their forces also occurs in another row, the
 whole table is searched for repeated rows."""
@@ -108,17 +105,10 @@ def distinct_rows(table: NDArray[np.generic]) -> tuple[NDArray[np.intp], NDArray
 
 
 def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[NDArray[np.bool_], str]:
-    """Returns the rows (n,) that repeat others, so that they are used once, and a note; no rows if few are
-    repeated.
-
-    Held samples repeat the previous row. A file joined from copies of one recording has the same number of
-    copies of each row.
-    """
+    """Returns the rows (n,) that copy others, so that they are used once, and a note; no rows if few are
+    copies: a file joined from copies of one recording has the same number of copies of each row."""
     columns = [*positions.T, force] if side is None else [*positions.T, force, side]
     again = np.zeros(len(force), dtype=bool)
-    again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
-    if again.mean() > REPEATED_ROWS_SHARE:
-        return again, f"{np.count_nonzero(again)} rows repeat the previous row and are left out of the fit."
     probes = np.linspace(0, len(force) - 1, PROBED_ROWS).astype(np.intp)
     if all(np.count_nonzero(force == force[row]) > 1 for row in probes):
         chosen, _, count = distinct_rows(np.column_stack(columns))
@@ -127,7 +117,7 @@ def repeated(positions: Float2D, force: Float1D, side: Float1D | None) -> tuple[
             again[:] = True
             again[chosen] = False
             return again, f"Each row occurs {usual} times in the data and is counted once."
-    return np.zeros(len(force), dtype=bool), ""
+    return again, ""
 
 
 def force_step(force: Float1D) -> float:

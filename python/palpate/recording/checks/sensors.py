@@ -100,7 +100,7 @@ def repeated_samples(
 ) -> list[Finding]:
     """Returns findings if position or force changes only once in several rows: a repeated, slower sensor.
 
-    If both columns change equally often, this is a defect only with time: the time of most rows is wrong.
+    If both columns repeat, rows repeat, which are used once.
 
     Parameters
     ----------
@@ -123,26 +123,21 @@ def repeated_samples(
     if len(moved) and np.median(moved) <= TURN_STEPS * moved.min():
         rows["position"] = 1  # steps of a coarse sensor, not repeated values
     changes = {name: np.count_nonzero(np.diff(values)) for name, values in (("position", x), ("force", f))}
-    held: list[tuple[str, int, str]] = []
-    if rows["position"] == rows["force"]:
-        if recording.time is not None:
-            held.append(("position and force change", rows["force"], ""))
-    else:
-        for name, other in (("force", "position"), ("position", "force")):
-            if changes[other] >= change_ratio * changes[name]:
-                held.append((f"the {name} changes", rows[name], " while the other column changes in between"))
     found = []
-    for subject, count, other in held:
-        if count < 2 or not np.std(f[count:] - f[:-count]) > change_share * np.std(f):
+    for name, other in (("force", "position"), ("position", "force")):
+        count = rows[name]
+        if count < 2 or count == rows[other] or changes[other] < change_ratio * changes[name]:
+            continue
+        if not np.std(f[count:] - f[:-count]) > change_share * np.std(f):
             continue
         lag, late = (count - 1) / 2.0, ""
-        if subject == "the force changes" and period is not None:
+        if name == "force" and period is not None:
             late = f", or give --force-late-s {lag * period:.3g}"
         found.append(
             usable(
-                f"{subject} only once in {count} rows{other}: a slower sensor was probably repeated, and "
-                f"is late by {lag:g} rows on average; keep one row of each {count}, the first with a new "
-                f"value{late}"
+                f"the {name} changes only once in {count} rows while the other column changes in between: a "
+                f"slower sensor was probably repeated, and is late by {lag:g} rows on average; keep one row "
+                f"of each {count}, the first with a new value{late}"
             )
         )
     return found

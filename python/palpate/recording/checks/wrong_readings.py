@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wrong readings: single values far from the rows before and after them, which are dropped before the fit."""
+"""Rows without information, which are dropped before the fit: rows that repeat the previous one, and wrong
+readings, which are far from the rows before and after them."""
 
 from __future__ import annotations
 
@@ -35,6 +36,31 @@ NEIGHBOUR_ROWS = 3
 """Number of rows before a row, and after it, with whose median value it is compared."""
 
 
+REPEATED_ROWS_SHARE = 1.0 / 3.0
+"""Share of rows that equal the previous row, above which they are repeated [-]: a coarse sensor gives fewer
+equal rows."""
+
+
+def without_repeated_rows(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+    """Returns the recordings without the rows that repeat the previous row, and notes on them: a sensor that
+    is slower than the recorder measures only the first one."""
+    kept, notes = list(recordings), list[str]()
+    for number, recording in enumerate(kept):
+        columns = [recording.position, recording.force, *recording.inputs.T]
+        if recording.direction is not None:
+            columns.append(recording.direction)
+        again = np.zeros(len(recording), dtype=bool)
+        again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
+        if again.mean() > REPEATED_ROWS_SHARE:
+            where = f"recording {number + 1}: " if len(kept) > 1 else ""
+            notes.append(
+                f"{where}{np.count_nonzero(again)} of {len(recording)} rows repeat the previous row and were "
+                "dropped."
+            )
+            kept[number] = recording.without(again)
+    return kept, notes
+
+
 def without_wrong_readings(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
     """Returns the recordings without wrong readings, and notes on the wrong readings."""
     kept, notes = list(recordings), list[str]()
@@ -67,9 +93,10 @@ def wrong_readings(
 
     A wrong reading is outside the interval between the median values of the rows before it and after it, so
     that no row of a steep wall or of a click is one. The distance is compared with the changes from row to
-    row nearby. At the largest and smallest positions a wall may be touched by a single row. Rows that are not
-    in the order of a motion have no neighbours, and no wrong readings. `motion` (m,) is the position of all
-    rows in recorded order, of which these rows can be a part.
+    row nearby. Several wrong readings side by side are outside the range of all others. At the largest and
+    smallest positions a wall may be touched by a single row. Rows that are not in the order of a motion have
+    no neighbours, and no wrong readings. `motion` (m,) is the position of all rows in recorded order, of
+    which these rows can be a part.
     """
     found = np.zeros(len(force), dtype=bool)
     if len(force) <= 2 * LOCAL_ROWS or strokes_from_order(motion) is None:
@@ -82,26 +109,49 @@ def wrong_readings(
 def _deviating(
     values: Float1D, position: Float1D, given: NDArray[np.bool_], at_ends: bool
 ) -> NDArray[np.bool_]:
-    """Returns True (n,) for the given rows whose value deviates from those before and after them."""
+    """Returns True (n,) for the given rows whose value deviates from those before and after them.
+
+    First the values are found that are further from all others than these are from each other: several of
+    them hide each other from their neighbours. All others are compared with few neighbours.
+    """
     found = np.zeros(len(values), dtype=bool)
-    floor = LEAST_WRONG * float(np.subtract(*np.quantile(values[given], (0.99, 0.01))))
+    reach = float(np.subtract(*np.quantile(values[given], (1.0 - MOST_WRONG_SHARE, MOST_WRONG_SHARE))))
+
+    def inner(rows: NDArray[np.intp], others: NDArray[np.intp]) -> NDArray[np.bool_]:
+        x, of_others = position[rows], position[others]
+        return np.asarray(at_ends | ((x >= of_others.min()) & (x < of_others.max())))
+
     while len(rows := np.flatnonzero(given & ~found)) > 2 * LOCAL_ROWS:
-        v, x = values[rows], position[rows]
-        around = np.pad(v, NEIGHBOUR_ROWS, mode="edge")
-        windows = np.lib.stride_tricks.sliding_window_view(around, NEIGHBOUR_ROWS)
-        before, after = (np.median(each, axis=1) for each in (windows[: len(v)], windows[-len(v) :]))
-        # The first and the last row have no rows on one side: the change of the nearest rows continues there.
-        before[0] = after[0] + WRONG_RATIO * (after[0] - after[NEIGHBOUR_ROWS])
-        after[-1] = before[-1] + WRONG_RATIO * (before[-1] - before[-1 - NEIGHBOUR_ROWS])
-        apart = np.maximum(v - np.maximum(before, after), np.minimum(before, after) - v)
-        changes = np.pad(np.abs(np.diff(v)), LOCAL_ROWS, mode="reflect")
+        wrong = _apart(values[rows], LOCAL_ROWS) > reach
+        if not wrong.any():
+            break
+        found[rows[wrong]] = True
+    for begin, end in np.flatnonzero(np.diff(found, prepend=False, append=False)).reshape(-1, 2).tolist():
+        found[begin:end] &= 2 * (end - begin) <= LOCAL_ROWS  # more rows move the medians as well
+    rows, far = np.flatnonzero(given & ~found), np.flatnonzero(found)
+    rest = values[rows]
+    found[far] = inner(far, rows) & (np.abs(values[far] - np.median(rest)) > np.ptp(rest))
+    while len(rows := np.flatnonzero(given & ~found)) > 2 * LOCAL_ROWS:
+        changes = np.pad(np.abs(np.diff(values[rows])), LOCAL_ROWS, mode="reflect")
         nearby = np.median(np.lib.stride_tricks.sliding_window_view(changes, LOCAL_ROWS), axis=1)
-        usual = np.maximum(np.maximum(nearby[: len(v)], nearby[-len(v) :]), float(np.median(changes)))
-        wrong = apart > np.maximum(WRONG_RATIO * usual, floor)
-        if not at_ends and wrong.any():
-            ordinary = x[~wrong]
-            wrong &= (x >= ordinary.min()) & (x < ordinary.max())
+        nearby = np.maximum(nearby[: len(rows)], nearby[-len(rows) :])
+        usual = np.maximum(nearby, float(np.median(np.abs(np.diff(values[rows])))))
+        wrong = _apart(values[rows], NEIGHBOUR_ROWS) > np.maximum(WRONG_RATIO * usual, LEAST_WRONG * reach)
+        if wrong.any():
+            wrong &= inner(rows, rows[~wrong])
         if not wrong.any():
             break
         found[rows[wrong]] = True
     return found
+
+
+def _apart(values: Float1D, count: int) -> Float1D:
+    """Returns the distance of each value (n,) from the interval between the median of `count` values before
+    it and that of `count` values after it."""
+    around = np.pad(values, count, mode="edge")
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(around, count), axis=1)
+    before, after = medians[: len(values)].copy(), medians[-len(values) :].copy()
+    # The first and the last row have no rows on one side: the change of the nearest rows continues there.
+    before[0] = after[0] + WRONG_RATIO * (after[0] - after[count])
+    after[-1] = before[-1] + WRONG_RATIO * (before[-1] - before[-1 - count])
+    return np.maximum(values - np.maximum(before, after), np.minimum(before, after) - values)

@@ -124,6 +124,20 @@ def test_repeats_are_rows_that_copy_others() -> None:
     assert not repeated(np.repeat(x, 5, axis=0), noise(1000), None)[0].any()
 
 
+@pytest.mark.parametrize("times", [2, 8])
+def test_repeated_rows_change_neither_model_nor_verdict(times: int) -> None:
+    x = np.r_[sweep(400), sweep(400)[::-1]]
+    y = wall(x) + noise(800)
+    time = 1e-3 * np.arange(800.0 * times)
+    once = palpate.identify(palpate.Recording.from_arrays(x, y, time[::times]))
+    again = palpate.Recording.from_arrays(np.repeat(x, times), np.repeat(y, times), time)
+    model = palpate.identify(again)
+    assert np.array_equal(model.weight, once.weight)
+    assert (model.verdict, again.verdict) == (once.verdict, once.verdict)
+    assert model.notes["roles"]["repeated"] == 800 * (times - 1)
+    assert f"{800 * (times - 1)} of {800 * times} rows repeat" in model.notes["identification"][0]
+
+
 def test_correlation_is_named_in_the_notes() -> None:
     model = identified("noise of correlation 0.9", wall)
     assert any("The noise is correlated" in note for note in model.notes["identification"])
