@@ -102,6 +102,7 @@ def test_a_recording_that_begins_with_the_release_has_no_jump() -> None:
 
 @pytest.mark.parametrize("draw", [5, 13], ids=["spring with wall", "pedal"])
 def test_changes_without_new_information_keep_class_and_verdict(draw: int) -> None:
-    for change, agreed in measure(draw, list(KEPT)).items():
-        lost = [name for name in KEPT[change] if not agreed[name]]
+    measured = measure(draw, list(KEPT))
+    for change in KEPT.keys() & measured.keys():
+        lost = [name for name in KEPT[change] if not measured[change][name]]
         assert not lost, change
