@@ -155,10 +155,6 @@ def _no_wrong_readings(motion: Any, position: Any, *_: Any) -> Any:
     return _none(position)
 
 
-def _no_rows_dropped(recordings: Any) -> Any:
-    return recordings, []
-
-
 def _no_waits(position: Any) -> Any:
     return None if strokes_from_order(position) is None else _none(position)
 
@@ -199,7 +195,12 @@ RULES = (
         "wrong readings are dropped", f"{CHECKS}.wrong_readings", "wrong_readings", lambda _, x, *__: _none(x)
     ),
     Rule("period is found", "identification.identify", "period_of", _nothing),
-    Rule("repeated rows are dropped", "identification.identify", "without_repeated_rows", _no_rows_dropped),
+    Rule(
+        "repeated rows are dropped",
+        f"{CHECKS}.wrong_readings",
+        "_repeated_rows",
+        lambda recording: _none(recording.force),
+    ),
     Rule("copies count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
     Rule("force step hides errors", f"{DATA}.rows", "force_step", _zero),
     Rule("correlated noise", f"{CLASSES}.model_selection", "correlated_noise", _first),

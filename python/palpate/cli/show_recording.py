@@ -11,7 +11,7 @@ import numpy as np
 from ..identification.data.roles import counts_text, role_counts, roles_of
 from ..recording import Recording
 from ..recording.checks import quality_findings
-from ..recording.checks.wrong_readings import without_repeated_rows, without_wrong_readings
+from ..recording.checks.wrong_readings import informative
 from ..recording.motion import GAP_RATIO, ordered_strokes
 from ..verdict import Verdict
 from .exit_status import end_with, finishing
@@ -45,15 +45,9 @@ def show_recording(
 ) -> None:
     """Prints a recording, its verdict first, and draws its views."""
     recording = reading.read(file)
-    distinct, _ = without_repeated_rows([recording])
-    (kept,), _ = without_wrong_readings(distinct)
+    (kept,), _, dropped = informative([recording])
     verdict = Verdict(tuple(quality_findings(kept)))
-    strokes, roles = _strokes(recording), role_counts(roles_of(kept))
-    dropped = {
-        "repeated": len(recording) - len(distinct[0]),
-        "wrong reading": len(distinct[0]) - len(kept),
-    }
-    roles |= {name: count for name, count in dropped.items() if count}
+    strokes, roles = _strokes(recording), role_counts(roles_of(kept)) | dropped
     with drawing() as write_figures:
         notes = () if plot is None else picture_recording(plot, recording)
         if frame is not None:

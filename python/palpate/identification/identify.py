@@ -18,7 +18,7 @@ from ..arguments import parameter_texts, shown
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording, Source, read_recording
-from ..recording.checks.wrong_readings import without_repeated_rows, without_wrong_readings
+from ..recording.checks.wrong_readings import informative
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.units import Unit
 from ..verdict import Verdict
@@ -138,10 +138,7 @@ def identify(
                 f"the recordings have different units, {units} and {dict(other.units)}; identify each one "
                 "separately"
             )
-    every = sum(map(len, recordings))
-    recordings, repeated = without_repeated_rows(recordings)
-    distinct = sum(map(len, recordings))
-    recordings, wrong = without_wrong_readings(recordings)
+    recordings, notes, dropped = informative(recordings)
     for each in recordings:
         require_in_range("position", each.position)
         require_in_range("force", each.force)
@@ -152,20 +149,16 @@ def identify(
     # result.
     with threadpool_limits(limits=1, user_api="blas"):
         network, settings, rows = _fitted_with_period(fitted, settings, object_of)
-        network = replace(network, notes=(*repeated, *wrong, *sections, *network.notes))
+        network = replace(network, notes=(*notes, *sections, *network.notes))
         rest = _resting(rows, settings)
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
     verdict = verdict_of(network, recordings, rows.side if every_row else None)
     model = model_of(network, recordings[0].units, source, settings, verdict)
-    used = sum(map(len, recordings))
-    unused = {
-        "repeated": every - distinct,
-        "wrong reading": distinct - used,
-        "left out": used - len(rows.force),
-    }
-    model.notes["roles"] = role_counts(rows.roles) | {name: count for name, count in unused.items() if count}
+    if left_out := sum(map(len, recordings)) - len(rows.force):
+        dropped["left out"] = left_out
+    model.notes["roles"] = role_counts(rows.roles) | dropped
     return model
 
 

@@ -18,7 +18,7 @@ from ..arguments import number_of, path_of, real_of, shown, vector_of
 from ..errors import InputError
 from ..verdict import Verdict
 from .checks import quality_findings
-from .checks.wrong_readings import without_repeated_rows, without_wrong_readings
+from .checks.wrong_readings import informative
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
 from .display import columns_of, html_of
 from .files import write_csv
@@ -235,7 +235,7 @@ class Recording:
     @property
     def verdict(self) -> Verdict:
         """Verdict on the quality of the recording: clipped or stuck sensors, gaps, wrong signs or units."""
-        (kept,), _ = without_wrong_readings(without_repeated_rows([self])[0])
+        (kept,), *_ = informative([self])
         return Verdict(tuple(quality_findings(kept)))
 
     @property

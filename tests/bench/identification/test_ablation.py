@@ -90,7 +90,7 @@ def test_the_study_prints_each_rule_and_writes_its_results(
     rules = json.loads(file.read_text())["results"]["rules"]
     assert [each["rule"] for each in rules] == [rule.name for rule in RULES]
     changes = {each["rule"]: each["changed"] for each in rules}
-    assert changes["pruning"] == changes["repeated rows count once"] == 1
+    assert changes["pruning"] == changes["repeated rows are dropped"] == 1
     table = capsys.readouterr().out
     assert "| pruning | 1 |" in table
     assert "| no finer than repeats | no change |" in table

@@ -193,6 +193,16 @@ def test_held_columns_are_reported_with_their_period(held: str) -> None:
     assert ("--force-late-s 0.0035" in found) == (held == "the force changes")
 
 
+def test_waits_do_not_decide_whether_the_force_falls_with_position() -> None:
+    random = np.random.default_rng(0)
+    press = np.linspace(0.0, 4.0, 400)
+    x = np.concatenate([np.zeros(2000), press, np.full(2000, 4.0), press[::-1]])
+    force = np.cos(1.25 * np.pi * x) + random.normal(0.0, 1e-3, len(x))
+    recording = palpate.Recording.from_arrays(1e-3 * x + random.normal(0.0, 1e-7, len(x)), force)
+    assert float(np.corrcoef(x, force)[0, 1]) < -0.9
+    assert not [each for each in quality_findings(recording) if "falls with position" in each.sentence]
+
+
 def test_findings_on_several_recordings_name_the_recording() -> None:
     first, second = rows_of("P1", 0), rows_of("P1", 1)
     assert only_sentence(first, replace(second, f=np.minimum(second.f, 8.0))).startswith(

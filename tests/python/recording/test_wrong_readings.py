@@ -21,7 +21,7 @@ from imperfect import (
     wall,
 )
 from palpate.identification.identify_files import identify_files
-from palpate.recording.checks.wrong_readings import without_wrong_readings, wrong_readings
+from palpate.recording.checks.wrong_readings import informative, wrong_readings
 
 N = 10_000
 
@@ -121,7 +121,7 @@ def test_wrong_reading_of_a_further_input_is_dropped() -> None:
     frame = pd.DataFrame({"position_rad": x, "torque_Nm": wall(x), "side_rad": np.sin(3.0 * x) + noise(N)})
     frame.loc[[100, 5000], "side_rad"] = [9.0, -1e6]
     recording = palpate.Recording.from_frame(frame, inputs=["side_rad"])
-    (kept,), (note,) = without_wrong_readings([recording])
+    (kept,), (note,), _ = informative([recording])
     assert len(kept) == N - 2
     assert note.startswith(f"2 of {N} rows are wrong readings")
 
@@ -222,7 +222,7 @@ def test_few_rows_have_no_wrong_reading(rows: int) -> None:
 def test_each_part_of_a_recording_names_its_wrong_readings() -> None:
     recording = recorded(PRESS, changed(FORCE, {100: 0.0, 104: 500.0}))
     train, test = recording.split(5)
-    kept, notes = without_wrong_readings([train, test])
+    kept, notes, _ = informative([train, test])
     assert [len(part) for part in kept] == [639, 159]
     assert [note.split(": ", 2)[:2] for note in notes] == [
         ["recording 1", "1 of 640 rows are wrong readings and were dropped"],

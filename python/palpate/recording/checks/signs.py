@@ -63,6 +63,8 @@ def reversed_sign(
                 f"--negate position{late}; for a latch or a stored spring, --no-hysteresis-nonnegative"
             )
         ]
+    if cells is not None:  # a wait repeats one position and its force
+        x, f = x[cells.row], f[cells.row]
     if is_loop or not (np.ptp(f) > 0.0 and np.ptp(x) > 0.0):
         return []
     return [usable(sentence) for sentence in mirror_notes(float(np.corrcoef(x, f)[0, 1]))]

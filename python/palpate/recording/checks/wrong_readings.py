@@ -41,48 +41,44 @@ REPEATED_ROWS_SHARE = 1.0 / 3.0
 equal rows."""
 
 
-def without_repeated_rows(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
-    """Returns the recordings without the rows that repeat the previous row, and notes on them: a sensor that
-    is slower than the recorder measures only the first one."""
-    kept, notes = list(recordings), list[str]()
+def informative(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str], dict[str, int]]:
+    """Returns the recordings without repeated rows and wrong readings, notes on both, and their numbers."""
+    kept, notes, dropped = list(recordings), list[str](), {"repeated": 0, "wrong reading": 0}
     for number, recording in enumerate(kept):
-        columns = [recording.position, recording.force, *recording.inputs.T]
-        if recording.direction is not None:
-            columns.append(recording.direction)
-        again = np.zeros(len(recording), dtype=bool)
-        again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
-        if again.mean() > REPEATED_ROWS_SHARE:
-            where = f"recording {number + 1}: " if len(kept) > 1 else ""
-            notes.append(
-                f"{where}{np.count_nonzero(again)} of {len(recording)} rows repeat the previous row and were "
-                "dropped."
-            )
-            kept[number] = recording.without(again)
-    return kept, notes
-
-
-def without_wrong_readings(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
-    """Returns the recordings without wrong readings, and notes on the wrong readings."""
-    kept, notes = list(recordings), list[str]()
-    for number, recording in enumerate(kept):
-        wrong = wrong_readings(
-            recording.motion.position, recording.position, recording.force, recording.inputs.T
-        )
-        if not wrong.any():
-            continue
-        rows = np.flatnonzero(wrong)
-        position, force = recording.file_unit("position"), recording.file_unit("force")
-        named = ", ".join(
-            f"row {row}: {force.text(recording.force[row])} at {position.text(recording.position[row])}"
-            for row in rows[:MOST_NAMED_ROWS]
-        )
-        more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
         where = f"recording {number + 1}: " if len(kept) > 1 else ""
-        notes.append(
-            f"{where}{len(rows)} of {len(recording)} rows are wrong readings and were dropped: {named}{more}."
-        )
-        kept[number] = recording.without(wrong)
-    return kept, notes
+        again = _repeated_rows(recording)
+        if again.any():
+            count = np.count_nonzero(again)
+            notes.append(f"{where}{count} of {len(again)} rows repeat the previous row and were dropped.")
+        distinct = recording.without(again) if again.any() else recording
+        wrong = wrong_readings(distinct.motion.position, distinct.position, distinct.force, distinct.inputs.T)
+        if wrong.any():
+            rows = np.flatnonzero(~again)[wrong]
+            position, force = recording.file_unit("position"), recording.file_unit("force")
+            named = ", ".join(
+                f"row {row}: {force.text(recording.force[row])} at {position.text(recording.position[row])}"
+                for row in rows[:MOST_NAMED_ROWS]
+            )
+            more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
+            notes.append(
+                f"{where}{len(rows)} of {len(recording)} rows are wrong readings and were dropped: "
+                f"{named}{more}."
+            )
+        kept[number] = distinct.without(wrong) if wrong.any() else distinct
+        dropped["repeated"] += int(np.count_nonzero(again))
+        dropped["wrong reading"] += int(np.count_nonzero(wrong))
+    return kept, notes, {name: count for name, count in dropped.items() if count}
+
+
+def _repeated_rows(recording: Recording) -> NDArray[np.bool_]:
+    """Returns True (n,) for rows that repeat the previous row: a sensor that is slower than the recorder
+    measures only the first one."""
+    columns = [recording.position, recording.force, *recording.inputs.T]
+    if recording.direction is not None:
+        columns.append(recording.direction)
+    again = np.zeros(len(recording), dtype=bool)
+    again[1:] = np.logical_and.reduce([column[1:] == column[:-1] for column in columns])
+    return np.asarray(again & (again.mean() > REPEATED_ROWS_SHARE))
 
 
 @np.errstate(over="ignore", invalid="ignore")  # huge values, refused later, may overflow
