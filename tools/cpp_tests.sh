@@ -8,13 +8,13 @@ set -euo pipefail
 
 preset=$1
 scale=${PALPATE_TEST_SCALE:-1}
-targets=()
-tests=.
+built=()
+chosen=()
 with=()
 sample() {
     if [ "$scale" -lt 10 ]; then
-        targets=("$@")
-        tests="^($(IFS='|' && echo "$*"))$"
+        built=(--target "$@")
+        chosen=(--label-regex "^($(IFS='|' && echo "$*"))$")
     fi
 }
 
@@ -24,7 +24,11 @@ asan | tsan)
     export PALPATE_TEST_SCALE=$(((scale + 9) / 10))
     ;;
 release) sample test_model ;;
-rtsan) targets=(test_run) ;;
+# Only these tests run a tick without a forbidden action. A compiler without this sanitizer is refused by CMake.
+rtsan)
+    built=(--target test_run)
+    chosen=(--tests-regex '^(Controller|Tick|Campaign)\.')
+    ;;
 esac
 # The thread sanitizer of older compilers fails with the address randomization of newer kernels.
 if [ "$preset" = tsan ] && setarch "$(uname -m)" --addr-no-randomize true 2>/dev/null; then
@@ -32,10 +36,5 @@ if [ "$preset" = tsan ] && setarch "$(uname -m)" --addr-no-randomize true 2>/dev
 fi
 
 cmake --preset "$preset" >/dev/null
-cmake --build --preset "$preset" ${targets[@]+--target "${targets[@]}"}
-chosen=(--label-regex "$tests")
-# Only these tests run a tick without a forbidden action. A compiler without this sanitizer is refused by CMake.
-if [ "$preset" = rtsan ]; then
-    chosen=(--tests-regex '^(Controller|Tick|Campaign)\.')
-fi
+cmake --build --preset "$preset" "${built[@]}"
 "${with[@]}" ctest --preset "$preset" "${chosen[@]}" --parallel "${CMAKE_BUILD_PARALLEL_LEVEL:-1}" --progress
