@@ -49,7 +49,8 @@ def render(model: palpate._core.model.ForceModel, plan: palpate._core.rendering.
     Renders a model in real time on a device: the loop of palpate-control.
     
     `plan`, `limited` and `certificate` are read from the model file; `limited` is the model that the plan
-    renders instead. `findings` are the defects of the model, which the verdict repeats. Without a plan the default scheme is used. Options are keywords, None for the default:
+    renders instead. `findings` are the defects of the model, which the verdict repeats. Without a plan
+    the default scheme is used. Options are keywords, None for the default:
     
     - device (simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]), wait_s, uncertified, faults.
     - rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.
