@@ -25,8 +25,10 @@ tidy() {
     [ -e "$mark" ] && return
     case $source in
     *.hpp) flags=(-- -std=c++20 -Icpp/include -x c++ -Wno-pragma-once-outside-header) ;;
-    # In the bindings the analyzer would check the code of pybind11. The compiler reports deprecated calls.
-    *) flags=(-p "$commands" "--checks=-clang-analyzer-*,-bugprone-suspicious-include" --extra-arg=-Wno-deprecated-declarations) ;;
+    # In the bindings the analyzer would check the code of pybind11. The compiler reports deprecated calls; its options
+    # may be those of GCC only.
+    *) flags=(-p "$commands" "--checks=-clang-analyzer-*,-bugprone-suspicious-include"
+        --extra-arg=-Wno-deprecated-declarations --extra-arg=-Wno-unknown-warning-option) ;;
     esac
     if .venv/bin/clang-tidy --quiet "$source" "${flags[@]}" 2>/dev/null; then
         touch "$mark"
