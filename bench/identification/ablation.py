@@ -165,7 +165,7 @@ def constant(function: str, name: str, value: float, place: str = "") -> Rule:
     Parameters
     ----------
     function : str
-        Function that uses the constant, and the module that calls it: "identification.data.roles.contact_at".
+        Function that uses the constant, and the module that calls it: "recording.roles.contact_at".
     name : str
         Name of the constant.
     value : float
@@ -189,16 +189,14 @@ CHECKS = "recording.checks"
 DATA, CLASSES, SEARCH = (f"identification.{folder}" for folder in ("data", "classes", "search"))
 
 RULES = (
-    Rule("rows that wait are not fitted", f"{DATA}.roles", "waits", _no_waits),
-    Rule("approach is not fitted", f"{DATA}.roles", "contact_at", lambda x, f: float(x.min())),
-    Rule(
-        "wrong readings are dropped", f"{CHECKS}.wrong_readings", "wrong_readings", lambda _, x, *__: _none(x)
-    ),
+    Rule("rows that wait are not fitted", "recording.roles", "waits", _no_waits),
+    Rule("approach is not fitted", "recording.roles", "contact_at", lambda x, f: float(x.min())),
+    Rule("wrong readings are dropped", "recording.roles", "wrong_readings", lambda _, x, *__: _none(x)),
     Rule("period is found", "identification.identify", "period_of", _nothing),
     Rule(
         "repeated rows are dropped",
-        f"{CHECKS}.wrong_readings",
-        "_repeated_rows",
+        "recording.roles",
+        "repeated_rows",
         lambda recording: _none(recording.force),
     ),
     Rule("copies count once", f"{DATA}.rows", "repeated", lambda x, f, side: (_none(f), "")),
@@ -224,9 +222,9 @@ RULES = (
     Rule("check of places", f"{CLASSES}.findings", "place_findings", _no_findings),
     Rule("force near the recorded forces", f"{CLASSES}.class_selection", "FORCE_MARGIN", 1e9),
     Rule("force may exceed the recorded forces", f"{CLASSES}.class_selection", "FORCE_MARGIN", 0.0),
-    constant(f"{CHECKS}.wrong_readings.wrong_readings", "WRONG_RATIO", 16.0),
-    constant(f"{CHECKS}.wrong_readings.wrong_readings", "LEAST_WRONG", 0.0),
-    constant(f"{DATA}.rows.roles_of", "AIR_MARGIN", 0.5, f"{DATA}.roles"),
+    constant("recording.roles.wrong_readings", "WRONG_RATIO", 16.0, f"{CHECKS}.wrong_readings"),
+    constant("recording.roles.wrong_readings", "LEAST_WRONG", 0.0, f"{CHECKS}.wrong_readings"),
+    constant("recording.roles.roles_of", "AIR_MARGIN", 1.0),
     constant("identification.identify.period_of", "LEAST_CORRELATION", 0.25, f"{DATA}.period"),
     constant("identification.identify.period_of", "SAME_PEAK", 1.0, f"{DATA}.period"),
     constant("recording.motion.gaps_of", "SHORT_WAY", 0.0),

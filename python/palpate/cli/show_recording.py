@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..identification.data.roles import counts_text, role_counts, roles_of
 from ..recording import Recording
 from ..recording.checks import quality_findings
-from ..recording.checks.wrong_readings import informative
 from ..recording.motion import GAP_RATIO, ordered_strokes
+from ..recording.roles import counts_text, informative, role_counts, roles_of
 from ..verdict import Verdict
 from .exit_status import end_with, finishing
 from .figures import FrameFigure, drawing, picture_frame, picture_recording

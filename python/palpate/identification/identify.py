@@ -18,8 +18,8 @@ from ..arguments import parameter_texts, shown
 from ..errors import InputError
 from ..model import Model
 from ..recording import Recording, Source, read_recording
-from ..recording.checks.wrong_readings import informative
 from ..recording.reading import RecordingLike, recordings_from
+from ..recording.roles import informative, role_counts
 from ..recording.units import Unit
 from ..verdict import Verdict
 from .classes.class_selection import VELOCITY_INPUTS
@@ -28,7 +28,6 @@ from .classes.memory import IdentifyRest, better_with_memory
 from .classes.model_selection import select
 from .data.limits import ForceScale
 from .data.period import period_of
-from .data.roles import role_counts
 from .data.rows import Rows, require_in_range, require_usable, rows_of
 from .data.sections import in_sections
 from .decision import latest

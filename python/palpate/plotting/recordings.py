@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from matplotlib.axes import Axes
 
-from ..identification.data.roles import ROLE_NAMES, Role, roles_of
 from ..recording import Recording
+from ..recording.roles import ROLE_NAMES, Role, roles_of
 from .look import dots_of, legend_above, of_stroke, scale_on, strokes, thinned
 
 
@@ -24,7 +24,7 @@ def draw_recording(axes: Axes, recording: Recording) -> None:
     seen = "simulated" if "simulated" in recording.metadata else "recorded"
     x = scale_on(axes.xaxis, recording.units["position"], recording.position)
     y = scale_on(axes.yaxis, recording.units["force"], recording.force)
-    role = roles_of(recording)
+    role = roles_of(recording, float(recording.position.max()))
     drawn = [
         (
             (role == Role.MOVING) & rows,

@@ -24,6 +24,15 @@ from ..errors import InputError
 if TYPE_CHECKING:
     from .recording import Recording
 
+FORCE_RESOLUTION = 2.0**-16
+"""Force error below which errors are ignored [share of the range of the force]: one step of a 16-bit
+converter. A simulated force has no noise, so that a criterion would add wavelets until the error is a
+rounding error."""
+
+SIGNIFICANT_STANDARD_ERRORS = 5.0
+"""A correlation of neighbouring residuals, or a difference of mean forces, is not random if it exceeds this
+number of standard errors."""
+
 TURN_SHARE = 0.02
 """Least motion against the stroke that reverses the stroke, as a share of the position range [-]."""
 

@@ -18,12 +18,12 @@ from ..arguments import number_of, path_of, real_of, shown, vector_of
 from ..errors import InputError
 from ..verdict import Verdict
 from .checks import quality_findings
-from .checks.wrong_readings import informative
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
 from .display import columns_of, html_of
 from .files import write_csv
 from .lag import LAG_DIGITS, UNKNOWN_CURE, ForceLag, lag_of
 from .mcap_file import write_mcap
+from .roles import informative
 from .table import FRAME, Cells, FrameTable, python_arguments
 from .units import FORCE_UNITS, POSITION_UNITS, Unit
 

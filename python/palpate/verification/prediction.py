@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from .._core.rendering import Scheme, default_play_radius, structure_names
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
-from ..identification.data.roles import Role, roles_of, unused_rows
 from ..identification.data.rows import input_columns
 from ..identification.data.strokes import HysteresisInput
 from ..model import Model
 from ..recording import Recording
 from ..recording.conversion import Motion
 from ..recording.motion import acceleration, gaps_of, ordered_strokes, turns_of, velocity
+from ..recording.roles import Role, roles_of, unused_rows
 
 NO_VELOCITY = "{} rows at the ends and at gaps of time have no velocity and are not compared."
 """Note on rows without velocity, with their number."""
@@ -52,6 +52,8 @@ class Prediction:
     """(k,) direction state in [-1, 1]; None for a model without hysteresis, or with mass or damping"""
     over_time: bool = False
     """True if the force depends on the earlier positions, because the model has a memory"""
+    without_motion: int = 0
+    """Number of rows at which the tool waits or is far from the object"""
 
 
 def predict(model: Model, recording: Recording, *, play_radius: float | None = None) -> Prediction:
@@ -79,8 +81,15 @@ def predict(model: Model, recording: Recording, *, play_radius: float | None = N
     moving = model.mass is not None or model.damping is not None
     found = (_moving if moving else _static)(model, recording, play_radius)
     if model.memory is None:
-        found = _without_waits(model, found, roles_of(recording))
+        found = _without_waits(model, found, _roles(model, recording))
     return replace(found, notes=notes + found.notes)
+
+
+def _roles(model: Model, recording: Recording) -> Int8Vector:
+    """Returns the role of each row (n,); an approach is compared inside the domain of the model."""
+    role = roles_of(recording, float(recording.position.max()))
+    role[(role == Role.APPROACH) & (recording.position >= model.lower[0])] = Role.MOVING
+    return role
 
 
 def _without_waits(model: Model, found: Prediction, role: Int8Vector) -> Prediction:
@@ -97,6 +106,7 @@ def _without_waits(model: Model, found: Prediction, role: Int8Vector) -> Predict
         force=found.force[kept],
         extrapolated=outside if model.dimension == 1 else min(found.extrapolated, len(position)),
         notes=(*found.notes, unused_rows(role, "compared")),
+        without_motion=int(np.count_nonzero(~fitted)),
         position=position,
         side=None if found.side is None else found.side[kept],
     )

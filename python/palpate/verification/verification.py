@@ -339,10 +339,11 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
                     "palpate plan, or render with --structure direct"
                 )
             )
-    if found.n < LEAST_COMPARED_SHARE * len(recording):
+    moving = len(recording) - found.prediction.without_motion
+    if found.n < LEAST_COMPARED_SHARE * moving:
         findings.append(
             usable(
-                f"only {found.n} of {len(recording)} rows were compared, fewer than "
+                f"only {found.n} of {moving} rows were compared, fewer than "
                 f"{LEAST_COMPARED_SHARE:.0%}: {' '.join(found.notes)}"
             )
         )

@@ -12,7 +12,7 @@ from conftest import sampled
 from imperfect import loop, press_and_release
 from palpate import InputError, Model, Recording, identify
 from palpate._core.model import play
-from palpate.identification.data.roles import Role, roles_of
+from palpate.recording.roles import Role, roles_of
 from palpate.recording.sample import sample_recording
 
 SCALE = int(os.environ.get("PALPATE_TEST_SCALE", "1"))
@@ -49,7 +49,7 @@ def test_the_model_is_the_network_that_was_identified(sample_model: Model) -> No
 def test_several_recordings_of_one_environment_are_identified_together() -> None:
     x = np.linspace(0.0, 1.0, 300)
     random = np.random.default_rng(0)
-    noisy = np.maximum(x - 0.4, 0.0) * 5.0 + random.normal(0.0, 0.01, 300)
+    noisy = x + np.maximum(x - 0.4, 0.0) * 5.0 + random.normal(0.0, 0.01, 300)
     left = Recording.from_arrays(x[x < 0.6], noisy[x < 0.6])
     right = Recording.from_arrays(x[x >= 0.6], noisy[x >= 0.6])
     whole = identify(Recording.from_arrays(x, noisy))

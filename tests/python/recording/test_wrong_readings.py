@@ -21,7 +21,8 @@ from imperfect import (
     wall,
 )
 from palpate.identification.identify_files import identify_files
-from palpate.recording.checks.wrong_readings import informative, wrong_readings
+from palpate.recording.checks.wrong_readings import wrong_readings
+from palpate.recording.roles import informative
 
 N = 10_000
 

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
-from ...recording.motion import LowPass, Piece, at_rows, long_enough, quiet_low_pass
-from ..data.limits import FORCE_RESOLUTION
+from ...recording.motion import FORCE_RESOLUTION, LowPass, Piece, at_rows, long_enough, quiet_low_pass
 from ..data.rows import Rows, modulo
 from ..decision import Decision, decided, lowered, squared_error_change
 from ..network.basis import Basis

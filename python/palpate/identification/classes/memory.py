@@ -17,7 +17,7 @@ from scipy.interpolate import BSpline
 from ..._core.model import ForceModel, wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
-from ..data.limits import FORCE_RESOLUTION
+from ...recording.motion import FORCE_RESOLUTION
 from ..decision import Decision, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...recording.motion import FORCE_RESOLUTION
 from ..data.limits import (
-    FORCE_RESOLUTION,
     MOST_ORDERED_ROWS,
     correlation,
     independent_share,

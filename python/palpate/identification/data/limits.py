@@ -14,12 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._typing import Float1D, Float2D
+from ...recording.motion import SIGNIFICANT_STANDARD_ERRORS
 from ..options import IdentifyOptions
-
-FORCE_RESOLUTION = 2.0**-16
-"""Force error below which errors are ignored [share of the range of the force]: one step of a 16-bit
-converter. A simulated force has no noise, so that a criterion would add wavelets until the error is a
-rounding error."""
 
 PROBED_ROWS = 7
 """Number of evenly spread rows that are tested first: if each of their forces also occurs in another row, the
@@ -45,10 +41,6 @@ rounding errors have 1/sqrt(12)"""
 
 LEAST_CORRELATION = 0.15
 """Correlation of neighbouring residuals below which the residuals are taken as independent [-]."""
-
-SIGNIFICANT_STANDARD_ERRORS = 5.0
-"""A correlation of neighbouring residuals, or a difference of mean forces, is not random if it exceeds this
-number of standard errors."""
 
 LEAST_NOISE_EVENNESS = 0.8
 """Least ratio of the median to the RMS of correlated residuals, 1 for normal noise, at which they are taken

@@ -18,7 +18,7 @@ from scipy.special import stdtrit
 
 from ..._typing import Float1D
 from ...model.band import BAND_LEVEL, Band
-from .limits import FORCE_RESOLUTION
+from ...recording.motion import FORCE_RESOLUTION
 
 BAND_PARTS = 8
 """Number of parts of the travel. Each part has its own variances."""

@@ -18,6 +18,7 @@ from ...errors import InputError
 from ...recording import Recording
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
 from ...recording.motion import Piece, ordered_strokes, pieces, velocity
+from ...recording.roles import Role, roles_of, unused_rows
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
 from ..decision import Decision
@@ -25,7 +26,6 @@ from ..options import IdentifyOptions
 from .compression import HELD_OUT_EVERY, held_out_rows
 from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, repeated
 from .repeats import Repeats
-from .roles import Role, roles_of, unused_rows
 from .strokes import strokes_of
 
 LARGEST_MAGNITUDE = 1e100
@@ -305,10 +305,7 @@ def rows_of(
     else:
         forces, parts = [paper_target(part, options) for part in recordings], ()
     force = np.concatenate([each[rows] for each, rows in zip(forces, kept, strict=True)])
-    deepest = max(float(part.position.max()) for part in recordings)
-    role = np.concatenate(
-        [roles_of(part, deepest)[rows] for part, rows in zip(recordings, kept, strict=True)]
-    )
+    role = np.concatenate([roles_of(part)[rows] for part, rows in zip(recordings, kept, strict=True)])
     positions, fitted = np.concatenate(columns), role == Role.MOVING
     corners = None
     # During a wait the object keeps the direction of the stroke before it.

@@ -30,8 +30,9 @@ from scipy.optimize import Bounds, minimize
 
 from ..._core.model import wavelet_columns, wavelet_jacobian, wavelet_steps
 from ..._typing import Float1D, Float2D
+from ...recording.motion import FORCE_RESOLUTION
 from ..data.compression import Compressed, HeldOutRows
-from ..data.limits import FORCE_RESOLUTION, NO_LIMITS, RowLimits, evenness
+from ..data.limits import NO_LIMITS, RowLimits, evenness
 from .basis import Basis, Resolution
 
 RIDGE = 1e-11

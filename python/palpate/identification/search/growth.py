@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._typing import Float1D
-from ..data.limits import FORCE_RESOLUTION
+from ...recording.motion import FORCE_RESOLUTION
 from ..network.basis import COARSEST_CANDIDATE, MOST_LIBRARY_ENTRIES, Basis, truncated_frame
 from ..network.fitted import PathPoint
 from ..network.separable import (

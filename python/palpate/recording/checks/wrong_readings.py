@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows without information, which are dropped before the fit: rows that repeat the previous one, and wrong
-readings, which are far from the rows before and after them."""
+"""Rows that repeat the previous one, and wrong readings: values far from those before and after them."""
 
 from __future__ import annotations
 
@@ -15,9 +14,6 @@ from ..motion import strokes_from_order
 
 if TYPE_CHECKING:
     from ..recording import Recording
-
-MOST_NAMED_ROWS = 3
-"""Largest number of wrong readings that a note lists."""
 
 WRONG_RATIO = 8.0
 """Deviation of a value from its neighbours above which the value is a wrong reading [typical changes between
@@ -41,36 +37,7 @@ REPEATED_ROWS_SHARE = 1.0 / 3.0
 equal rows."""
 
 
-def informative(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str], dict[str, int]]:
-    """Returns the recordings without repeated rows and wrong readings, notes on both, and their numbers."""
-    kept, notes, dropped = list(recordings), list[str](), {"repeated": 0, "wrong reading": 0}
-    for number, recording in enumerate(kept):
-        where = f"recording {number + 1}: " if len(kept) > 1 else ""
-        again = _repeated_rows(recording)
-        if again.any():
-            count = np.count_nonzero(again)
-            notes.append(f"{where}{count} of {len(again)} rows repeat the previous row and were dropped.")
-        distinct = recording.without(again) if again.any() else recording
-        wrong = wrong_readings(distinct.motion.position, distinct.position, distinct.force, distinct.inputs.T)
-        if wrong.any():
-            rows = np.flatnonzero(~again)[wrong]
-            position, force = recording.file_unit("position"), recording.file_unit("force")
-            named = ", ".join(
-                f"row {row}: {force.text(recording.force[row])} at {position.text(recording.position[row])}"
-                for row in rows[:MOST_NAMED_ROWS]
-            )
-            more = ", ..." if len(rows) > MOST_NAMED_ROWS else ""
-            notes.append(
-                f"{where}{len(rows)} of {len(recording)} rows are wrong readings and were dropped: "
-                f"{named}{more}."
-            )
-        kept[number] = distinct.without(wrong) if wrong.any() else distinct
-        dropped["repeated"] += int(np.count_nonzero(again))
-        dropped["wrong reading"] += int(np.count_nonzero(wrong))
-    return kept, notes, {name: count for name, count in dropped.items() if count}
-
-
-def _repeated_rows(recording: Recording) -> NDArray[np.bool_]:
+def repeated_rows(recording: Recording) -> NDArray[np.bool_]:
     """Returns True (n,) for rows that repeat the previous row: a sensor that is slower than the recorder
     measures only the first one."""
     columns = [recording.position, recording.force, *recording.inputs.T]

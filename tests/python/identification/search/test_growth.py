@@ -13,7 +13,6 @@ from palpate._core.model import wavelet_columns
 from palpate._typing import Float1D, Float2D
 from palpate.identification import IdentifyOptions
 from palpate.identification.data.compression import Compressor
-from palpate.identification.data.limits import FORCE_RESOLUTION
 from palpate.identification.network.basis import Basis
 from palpate.identification.network.separable import (
     CORE_RADIUS,
@@ -30,6 +29,7 @@ from palpate.identification.search.growth import (
     Grown,
     Growth,
 )
+from palpate.recording.motion import FORCE_RESOLUTION
 
 OPTIONS = IdentifyOptions()
 

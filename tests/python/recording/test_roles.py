@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows that wait, or that move far from the contact, are not fitted: only the motion decides the model."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 import palpate
 from imperfect import Array, knob, loop, press_and_release, recorded
-from palpate.identification.data.roles import Role, contact_at, roles_of
+from palpate.recording.contact import contact_at
+from palpate.recording.roles import Role, roles_of
 
 MOTION = press_and_release()
 
@@ -50,9 +53,38 @@ def test_a_wait_in_air_is_a_rest_and_a_wait_in_contact_a_hold() -> None:
 
 def test_a_long_approach_is_fitted_only_near_the_contact() -> None:
     x = np.linspace(-40.0, 4.0, 4400)
-    role = roles_of(recorded(x, np.maximum(50.0 * x, 0.0)))
-    assert (role[x < -4.5] == Role.APPROACH).all()
-    assert (role[x > -3.5] == Role.MOVING).all()
+    role = roles_of(recorded(x, np.maximum(50.0 * x, 0.0)), 4.0)
+    assert (role[x < -0.6] == Role.APPROACH).all()
+    assert (role[x > -0.3] == Role.MOVING).all()
+
+
+@pytest.mark.parametrize(("rows", "travels"), [(40, 100.0), (2000, 2.0)], ids=["fast and far", "slow"])
+def test_an_approach_does_not_change_the_model(rows: int, travels: float) -> None:
+    rng = np.random.default_rng(4)
+    x = np.concatenate([np.linspace(-0.2, 4.0, 1000), np.linspace(4.0, -0.2, 1000)])
+    f = np.maximum(12.0 * x, 0.0) + 8.0 * np.maximum(x - 2.0, 0.0) + rng.normal(0.0, 0.05, len(x))
+    way = np.linspace(-4.0 * travels, -0.2, rows, endpoint=False)
+    air = rng.normal(0.0, 0.05, (2, rows))
+    far = recorded(np.concatenate([way, x, way[::-1]]), np.concatenate([air[0], f, air[1]]))
+    near, model = palpate.identify(recorded(x, f)), palpate.identify(far)
+    assert abs(model.n_wavelets - near.n_wavelets) <= 1
+    assert model.verdict.level == "good"
+    at = np.linspace(0.0, 4.0, 200)
+    assert np.abs(model.force(at) - near.force(at)).max() < 0.05
+    assert "rows are far from the contact and were dropped" in str(model.notes["identification"])
+    assert "compared, fewer than" not in str(palpate.verify(model, far).verdict)
+
+
+@pytest.mark.parametrize(
+    "force",
+    [lambda x: np.cos(9.0 * x), lambda x: np.cos(70.0 * x), lambda x: 0.7 * x],
+    ids=["wave", "short waves", "noisy line"],
+)
+def test_a_force_that_changes_along_the_travel_is_no_air(force: Callable[[Array], Array]) -> None:
+    x = np.linspace(0.0, 4.0, 2000)
+    for seed in range(20):
+        noise = np.random.default_rng(seed).normal(0.0, 0.3, len(x))
+        assert contact_at(x, force(x) + noise) < 0.2
 
 
 def test_the_contact_is_where_the_force_leaves_its_noise() -> None:

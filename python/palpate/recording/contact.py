@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Position at which the tool meets the object."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .._typing import Float1D
+from .motion import (
+    FORCE_RESOLUTION,
+    LEAST_STROKE_ROWS,
+    SIGNIFICANT_STANDARD_ERRORS,
+    noise_of,
+    resolution_of,
+)
+
+
+@np.errstate(over="ignore")  # huge forces are refused later
+def contact_at(position: Float1D, force: Float1D) -> float:
+    """Returns the smallest position at which the force of moving rows (n,) differs from the mean force at all
+    smaller positions by more than its noise: there the tool meets the object. If it differs nowhere, or from
+    the start, this is the smallest position.
+
+    Rows that are neighbours in position are compared in blocks, as many as each has rows, by their mean and
+    by their spread.
+    """
+    order = np.argsort(position, kind="stable")
+    reach = float(np.ptp(force))
+    if not 0.0 < reach < math.inf or len(force) < LEAST_STROKE_ROWS:
+        return float(position.min())
+    force = (force - force.min()) / reach
+    of_rows, resolution = noise_of(force), 0.5 * resolution_of(force)
+    force = force[order]
+    starts = np.linspace(0, len(force), math.isqrt(len(force)), endpoint=False).astype(np.intp)
+    rows = np.diff(starts, append=len(force))
+    spread = float(np.std(force[: rows[0]])) * (1.0 + SIGNIFICANT_STANDARD_ERRORS / math.sqrt(2.0 * rows[0]))
+    noise = max(min(of_rows, spread), resolution, FORCE_RESOLUTION)
+    total, before = np.add.reduceat(force, starts), np.append(0, np.cumsum(rows)[:-1])
+    air = np.append(total[0] / rows[0], np.cumsum(total)[:-1] / before[1:])
+    away = (force - np.repeat(air, rows)) / noise
+    squares = np.add.reduceat(away**2, starts) - rows
+    shift = np.abs(np.add.reduceat(away, starts)) / np.sqrt(rows * (1.0 + rows / np.fmax(before, 1)))
+    apart = np.flatnonzero(np.fmax(shift, squares / np.sqrt(2.0 * rows)) > SIGNIFICANT_STANDARD_ERRORS)
+    if not len(apart) or apart[0] < 2:
+        return float(position.min())  # the second block already differs from the first one: there is no air
+    first, of_air = starts[apart[0]], starts[apart[0] - 1]
+    met = np.abs(away[first : first + rows[apart[0]]]) > SIGNIFICANT_STANDARD_ERRORS
+    contact = float(position[order[first + int(np.argmax(met))]])
+    # There is no air if the force changes along it, or may change as much as behind it.
+    x = position[order[:of_air]] - position[order[:of_air]].mean()
+    significant = SIGNIFICANT_STANDARD_ERRORS * noise * math.sqrt(x @ x)
+    behind = 0.5 * (x @ x) * float(np.abs(force - air[apart[0]]).max()) / (float(position.max()) - contact)
+    return contact if abs(x @ force[:of_air]) < min(significant, behind) else float(position.min())
