@@ -80,7 +80,7 @@ def test_an_approach_does_not_change_the_model(rows: int, travels: float) -> Non
     [lambda x: np.cos(9.0 * x), lambda x: np.cos(70.0 * x), lambda x: 0.7 * x],
     ids=["wave", "short waves", "noisy line"],
 )
-def test_a_force_that_changes_along_the_travel_is_no_air(force: Callable[[Array], Array]) -> None:
+def test_a_force_that_changes_along_the_travel_is_not_an_approach(force: Callable[[Array], Array]) -> None:
     x = np.linspace(0.0, 4.0, 2000)
     for seed in range(20):
         noise = np.random.default_rng(seed).normal(0.0, 0.3, len(x))
