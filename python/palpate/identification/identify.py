@@ -153,7 +153,8 @@ def identify(
         network = better_with_memory(network, recordings, len(rows.force), settings, rest)
     source = Source.merged(part.source for part in fitted)
     every_row = len(rows.force) == sum(map(len, recordings))
-    verdict = verdict_of(network, recordings, rows.side if every_row else None)
+    known = rows.order if rows.side is None else rows.side
+    verdict = verdict_of(network, recordings, known if every_row else None)
     model = model_of(network, recordings[0].units, source, settings, verdict)
     if left_out := sum(map(len, recordings)) - len(rows.force):
         dropped["left out"] = left_out

@@ -17,7 +17,7 @@ from ..._typing import Float1D, Float2D, Int8Vector
 from ...errors import InputError
 from ...recording import Recording
 from ...recording.conversion import MIN_POSITIONS, MIN_ROWS
-from ...recording.motion import Piece, ordered_strokes, pieces, velocity
+from ...recording.motion import Piece, pieces, velocity
 from ...recording.roles import Role, roles_of, unused_rows
 from ...recording.units import UNSTATED_UNIT, Unit
 from ...verdict import Finding, no, usable
@@ -26,7 +26,7 @@ from ..options import IdentifyOptions
 from .compression import HELD_OUT_EVERY, held_out_rows
 from .limits import NO_LIMITS, STEP_ERROR, ForceScale, RowLimits, force_step, repeated
 from .repeats import Repeats
-from .strokes import strokes_of
+from .strokes import stated_strokes, strokes_of
 
 LARGEST_MAGNITUDE = 1e100
 """Largest accepted absolute value of position and force, and inverse of the smallest accepted travel and
@@ -275,10 +275,13 @@ def rows_of(
     notes: tuple[str, ...] = (
         (f"{lost} rows at the ends and at gaps of time have no velocity and are not used.",) if lost else ()
     )
-    side, starts = None, None
-    if all(part.direction is not None for part in recordings):
-        sides = [np.asarray(part.direction, dtype=float) for part in recordings]
-        side = np.concatenate([each[rows] for each, rows in zip(sides, kept, strict=True)])
+    hysteresis = len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs)
+    strokes = strokes_of(recordings) if hysteresis else stated_strokes(recordings)
+    side, order = (
+        None if each is None else each[np.concatenate(kept)] for each in (strokes.side, strokes.order)
+    )
+    starts = _starts(recordings, kept) if strokes.in_order else None
+    notes += strokes.notes
     parts: tuple[Piece, ...] = ()
     if len(names) == 1 and all(part.time is not None for part in recordings):
         first = np.cumsum([0, *(len(part) for part in recordings)])
@@ -287,19 +290,6 @@ def rows_of(
             for start, recording in zip(first[:-1].tolist(), recordings, strict=True)
             for piece in pieces(recording)
         )
-    decisions: tuple[Decision, ...] = ()
-    findings: tuple[Finding, ...] = ()
-    order = None
-    if side is None and all(part.time is not None for part in recordings):
-        starts = _starts(recordings, kept)
-        ordered = [ordered_strokes(part) for part in recordings] if len(names) == 1 else [None]
-        if all(each is not None for each in ordered):
-            pairs = zip(ordered, kept, strict=True)
-            order = np.concatenate([np.asarray(each, dtype=float)[rows] for each, rows in pairs])
-    elif side is None and len(names) == 1 and (options.inputs == "auto" or "hysteresis" in options.inputs):
-        strokes = strokes_of(recordings)
-        side, notes, findings = strokes.side, notes + strokes.notes, strokes.findings
-        decisions = strokes.decisions
     if options.search.filters == "matched":
         forces = [part.force for part in recordings]
     else:
@@ -328,9 +318,9 @@ def rows_of(
         starts,
         parts,
         period=options.period,
-        decisions=decisions,
+        decisions=strokes.decisions,
         notes=notes,
-        findings=findings,
+        findings=strokes.findings,
         corners=corners,
         role=role,
         repeats=repeats,
@@ -361,7 +351,8 @@ def _starts(recordings: Sequence[Recording], kept: Sequence[NDArray[np.bool_]]) 
     starts."""
     starts, before = [], 0
     for recording, rows in zip(recordings, kept, strict=True):
-        starts += [before + int(np.count_nonzero(rows[: piece.rows.start])) for piece in pieces(recording)]
+        first = [0] if recording.time is None else [piece.rows.start for piece in pieces(recording)]
+        starts += [before + int(np.count_nonzero(rows[:row])) for row in first]
         before += int(np.count_nonzero(rows))
     return tuple(dict.fromkeys(start for start in starts if start < before))
 

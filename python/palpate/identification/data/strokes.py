@@ -5,7 +5,7 @@ force."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -42,54 +42,74 @@ DIRECTION_CURE = (
 
 @dataclass(frozen=True)
 class Strokes:
-    """Directions of all rows of all recordings, if they are known."""
+    """Directions of all rows of all recordings, as far as they are known."""
 
-    side: Float1D | None
-    """(n,) +1 into the object, -1 out of it, 0 neither; None if hysteresis is not tested"""
+    side: Float1D | None = None
+    """(n,) +1 into the object, -1 out of it, 0 neither; None if the recordings do not state it"""
+    order: Float1D | None = None
+    """(n,) the same from the order of rows; None if `side` is known or the order shows no strokes"""
+    in_order: bool = False
+    """True if a play operator can follow the rows, which are in the order of a motion"""
     notes: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     decisions: tuple[Decision, ...] = ()
 
 
-def strokes_of(recordings: Sequence[Recording]) -> Strokes:
-    """Returns the directions of recordings; without a direction column they follow from the order of rows.
+def stated_strokes(recordings: Sequence[Recording]) -> Strokes:
+    """Returns the directions that all recordings state; without them, whether the rows have a time."""
+    side = _all_of([recording.direction for recording in recordings])
+    return Strokes(side, in_order=side is None and all(each.time is not None for each in recordings))
 
-    If the position of all recordings changes in the same direction, the recordings with the higher force are
-    press: the press force of a passive object is above its release force.
+
+def strokes_of(recordings: Sequence[Recording]) -> Strokes:
+    """Returns the directions of recordings of a force over position: stated ones, or those of the motion.
+
+    If all positions change in the same direction, the recordings with the higher force are press: the press
+    force of a passive object is above its release force.
     """
+    stated = stated_strokes(recordings)
+    if stated.side is not None:
+        return stated
+    found = [ordered_strokes(recording) for recording in recordings]
+    if stated.in_order:
+        return replace(stated, order=_all_of(found))
     found = [
-        recording.direction if recording.direction is not None else ordered_strokes(recording)
-        for recording in recordings
+        direction if recording.direction is None else recording.direction
+        for recording, direction in zip(recordings, found, strict=True)
     ]
-    position = np.concatenate([recording.position for recording in recordings])
-    force = np.concatenate([recording.force for recording in recordings])
     known = [direction for direction in found if direction is not None]
-    unit = recordings[0].units["force"] and f" {recordings[0].units['force']}"
     if len(known) < len(found):
         missing = _names(recordings, [direction is None for direction in found])
         return _untested(f"the rows of {missing} have no direction and are not in recorded order")
-    findings: tuple[Finding, ...] = ()
     turns = sum(map(turns_of, known))
     side = np.concatenate(known).astype(np.float64)
     note = f"The direction is taken from the order of rows: {turns} turn{'s' * (turns != 1)}"
     if len(recordings) > 1:
         note += f" in {len(recordings)} recordings, " + _ways(recordings, known)
-    if not ((side > 0).any() and (side < 0).any()):
-        press = _press(recordings)
-        if press is None:
-            return _untested("the position never turns back in the order of rows")
-        side = np.concatenate([np.full(len(part), up) for part, up in zip(recordings, press, strict=True)])
-        press_files, release_files = _names(recordings, press > 0), _names(recordings, press < 0)
-        difference = float(np.nanmean(_difference(position, force, side)))
-        note = f"{press_files} is taken as press and {release_files} as release: the press force is higher"
-        findings = (
-            usable(
-                f"{note} by {difference:.3g}{unit} on average. There is no direction column, and all "
-                "positions change in the same direction. If these are two objects, identify each one "
-                f"separately. If they repeat one stroke, give --inputs position. Else {DIRECTION_CURE}"
-            ),
-        )
-    return Strokes(side, (f"{note}.",), findings)
+    if (side > 0).any() and (side < 0).any():
+        return Strokes(order=side, in_order=True, notes=(f"{note}.",))
+    press = _press(recordings)
+    if press is None:
+        return _untested("the position never turns back in the order of rows")
+    side = np.concatenate([np.full(len(part), up) for part, up in zip(recordings, press, strict=True)])
+    position = np.concatenate([recording.position for recording in recordings])
+    force = np.concatenate([recording.force for recording in recordings])
+    unit = recordings[0].units["force"] and f" {recordings[0].units['force']}"
+    press_files, release_files = _names(recordings, press > 0), _names(recordings, press < 0)
+    difference = float(np.nanmean(_difference(position, force, side)))
+    note = f"{press_files} is taken as press and {release_files} as release: the press force is higher"
+    finding = usable(
+        f"{note} by {difference:.3g}{unit} on average. There is no direction column, and all "
+        "positions change in the same direction. If these are two objects, identify each one "
+        f"separately. If they repeat one stroke, give --inputs position. Else {DIRECTION_CURE}"
+    )
+    return Strokes(side, notes=(f"{note}.",), findings=(finding,))
+
+
+def _all_of(directions: Sequence[Int8Vector | None]) -> Float1D | None:
+    """Returns the directions of all recordings in sequence; None if those of one are not known."""
+    known = [each for each in directions if each is not None]
+    return np.concatenate(known).astype(np.float64) if len(known) == len(directions) else None
 
 
 def _difference(position: Float1D, force: Float1D, side: Float1D) -> Float1D:
@@ -163,7 +183,7 @@ def _press(recordings: Sequence[Recording]) -> Float1D | None:
 
 def _untested(why: str) -> Strokes:
     """Returns no directions, and the decision that hysteresis is not tested."""
-    return Strokes(None, decisions=(Decision("hysteresis", "not tested", why),))
+    return Strokes(decisions=(Decision("hysteresis", "not tested", why),))
 
 
 def _names(recordings: Sequence[Recording], which: Sequence[bool] | NDArray[np.bool_]) -> str:

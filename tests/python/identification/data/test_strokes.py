@@ -10,6 +10,7 @@ import pytest
 
 from any_input import SCALE
 from conftest import sampled
+from imperfect import loop, press_and_release, recorded
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate.cli.main import main
 from palpate.identification.data.strokes import strokes_of
@@ -233,7 +234,7 @@ def test_measured_recordings_without_direction_are_identified_as_well(data: Path
         stated = replace(read_recording(path), time=None)
         unstated = replace(stated, direction=None)
         assert stated.direction is not None
-        found = strokes_of([unstated]).side
+        found = strokes_of([unstated]).order
         assert found is not None, path.name
         if np.count_nonzero(found != stated.direction) < 3:
             continue
@@ -251,3 +252,13 @@ def test_measured_files_of_one_stroke_each_are_not_taken_for_two_objects(data: P
         assert not scale_findings([replace(each, direction=None) for each in stated]), path.name
         stiffer = replace(stated[1], force=3.0 * stated[1].force)
         assert scale_findings([stated[0], stiffer]), path.name
+
+
+def test_the_order_of_rows_gives_the_same_model_with_and_without_time() -> None:
+    x = press_and_release(400)
+    f = loop(x) + np.random.default_rng(2).normal(0.0, 0.05, len(x))
+    ordered = identify(recorded(x, f), inputs=("position", "hysteresis"))
+    timed = identify(recorded(x, f, 1e-3 * np.arange(len(x))), inputs=("position", "hysteresis"))
+    at, press = np.linspace(0.0, 4.0, 50), np.ones(50)
+    assert ordered.play_radius == timed.play_radius
+    assert (ordered.force(at, direction=press) == timed.force(at, direction=press)).all()
