@@ -282,18 +282,21 @@ def default_of(each: Field[Any]) -> Any:
 
 
 @cache
-def field_texts(kind: type[IdentifyOptions | SearchOptions] = IdentifyOptions) -> Mapping[str, str]:
-    """Returns the docstring of each field of options, by name; empty if the source file is missing."""
+def _source() -> ast.Module:
+    """Returns the source of this file; empty if the file is missing."""
     try:
-        # that of one class takes ten times as long
-        tree = ast.parse(inspect.getsource(sys.modules[kind.__module__]))
+        return ast.parse(inspect.getsource(sys.modules[__name__]))
     except (OSError, SyntaxError):
-        return {}
+        return ast.Module([], [])
+
+
+def field_texts(kind: type[IdentifyOptions | SearchOptions] = IdentifyOptions) -> dict[str, str]:
+    """Returns the docstring of each field of options, by name; empty if the source file is missing."""
     return {
         ast.unparse(each.target): inspect.cleandoc(ast.literal_eval(text.value))
-        for class_ in tree.body
-        if isinstance(class_, ast.ClassDef) and class_.name == kind.__name__
-        for each, text in pairwise(class_.body)
+        for found in _source().body
+        if isinstance(found, ast.ClassDef) and found.name == kind.__name__
+        for each, text in pairwise(found.body)
         if isinstance(each, ast.AnnAssign) and isinstance(text, ast.Expr)
     }
 
