@@ -41,6 +41,8 @@ export CMAKE_CXX_COMPILER_LAUNCHER ?= $(shell command -v ccache)
 export PIP_NO_CACHE_DIR ?= 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export MPLCONFIGDIR ?= $(CURDIR)/build/matplotlib
+# The tests start many Python programs, which start faster with stored bytecode.
+unexport PYTHONDONTWRITEBYTECODE
 
 python := .venv/bin/python
 # Two runs of pip must not change one environment at the same time.

@@ -18,6 +18,7 @@ sys.path.insert(0, str(DOCS / "builder"))
 import command_pages  # noqa: E402
 import cpp_pages  # noqa: E402
 import figures  # noqa: E402
+import navigation  # noqa: E402
 import notebook_page  # noqa: E402
 import page_code  # noqa: E402
 import python_pages  # noqa: E402
@@ -125,3 +126,6 @@ def setup(app: Any) -> None:
     app.connect("autodoc-process-docstring", python_pages.escape_formulas, priority=400)
     app.connect("autodoc-process-signature", python_pages.shorten_signature)
     app.connect("source-read", site_links.inside_the_site)
+    app.connect("write-started", navigation.select_titles)
+    # Before the theme, which makes the navigation.
+    app.connect("html-page-context", navigation.use_titles, priority=400)

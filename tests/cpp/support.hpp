@@ -28,6 +28,12 @@ inline int cases(int quick) {
     return quick * std::max(1, scale == nullptr ? 1 : std::atoi(scale));
 }
 
+/// Returns true if the normal test run includes the combination of this number: one of `every`. The full test run
+/// includes all. If `every` has no common divisor with the number of values of a parameter, each value is included.
+inline bool is_sampled(int number, int every) {
+    return cases(1) > 1 || number % every == 0;
+}
+
 using Random = std::mt19937_64;
 
 /// Returns a uniform random number.

@@ -83,6 +83,18 @@ def test_the_notebook_is_in_the_navigation_with_its_outputs() -> None:
     assert (SITE / page).parent.joinpath(download).is_file()
 
 
+@pytest.mark.parametrize("page", ["index.html", "generated/cpp/model.html"])
+def test_the_navigation_has_the_titles_of_all_pages_and_no_names_within_them(page: str) -> None:
+    text = (SITE / page).read_text(encoding="utf-8")
+    (navigation,) = re.findall(r'<div class="sidebar-tree">.*?</div>', text, re.DOTALL)
+    linked = re.findall(r'<a class="[^"]*reference internal" href="([^"]+)"', navigation)
+    assert [address for address in linked if re.search("#.", address)] == []
+    pages = {address.rsplit("/", 1)[-1] for address in linked}
+    made = {file.name for file in (SITE / "generated").rglob("*.html")}
+    assert len(made) > 100
+    assert made - pages <= {Path(page).name}
+
+
 def search_index() -> dict[str, object]:
     text = (SITE / "searchindex.js").read_text(encoding="utf-8")
     index: dict[str, object] = json.loads(text.removeprefix("Search.setIndex(").rstrip().rstrip(")"))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Test fixtures: the folder of measured recordings, small recording files, a terminal; samples of cases."""
 
+import gc
 import os
 import pty
 import signal
@@ -18,6 +19,11 @@ sys.path.insert(0, str(ROOT / "tests" / "clock"))
 # A shell that starts the tests in the background makes the tests and their child processes ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish() -> None:
+    """Excludes the objects of the imported modules from the searches of the garbage collector."""
+    gc.freeze()
 
 
 def sampled(cases: Iterable[Any], *kept: Any) -> list[Any]:

@@ -13,7 +13,14 @@ from typing import Any
 
 from palpate.cli.main import main
 
-for slow in ("bokeh.plotting", "matplotlib.figure", "palpate.export.fmu"):
+for slow in (
+    "bokeh.plotting",
+    "matplotlib.figure",
+    "palpate.export.fmu",
+    "scipy.interpolate",
+    "scipy.ndimage",
+    "scipy.signal",
+):
     importlib.import_module(slow)
 
 

@@ -23,8 +23,8 @@ IMPORTED_LATE = {
     "bokeh",
     "jinja2",
     "pywt",
+    "usb",
 }
-IMPORTED_LATE |= {"scipy.io", "scipy.signal", "usb"}
 
 
 def module_of(path: Path) -> str:
@@ -59,6 +59,15 @@ def test_functions_import_only_optional_or_slow_packages(path: Path) -> None:
         if not is_late(target)
     }
     assert not forbidden, f"{path.name} imports {sorted(forbidden)} inside a function"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_module_of_scipy_is_loaded_by_its_first_use(path: Path) -> None:
+    """After `import scipy`, SciPy loads a module such as `scipy.linalg` at its first use."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    imports = [node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))]
+    targets = {target for node in imports for target in targets_of(path, node)}
+    assert not [target for target in targets if target.startswith("scipy.")]
 
 
 def imported_modules(path: Path, all_modules: set[str]) -> set[str]:

@@ -145,10 +145,14 @@ TEST(UsbDelay, NoForceIsOlderThanAllowed) {
     std::uint64_t ticks = 0;
     int runs = 0;
     int ended_early = 0;
+    int combinations = 0;
     for (int round = 0; round < test::cases(1); ++round) {
         for (const std::string_view kind : kinds) {
             for (const int length : lengths) {
                 for (const bool watchdog : {true, false}) {
+                    if (!test::is_sampled(combinations++, 5)) {
+                        continue;
+                    }
                     if (!watchdog) {
                         test::send_order("fault no-watchdog 500");
                     }
@@ -213,9 +217,13 @@ TEST(UsbEnding, TheStatementAboutZeroForceIsTrueForEveryEndingAndConnection) {
                                                             {"encoder 999"},
                                                             {"emergency-stop 999"}};
     std::array<int, 4> statements{};
+    int combinations = 0;
     for (const std::vector<std::string>& connection : connections) {
         for (const bool refuses : {false, true}) {
             for (const Ending ending : {Ending::TimeUp, Ending::Stop, Ending::Guard, Ending::LateTick}) {
+                if (!test::is_sampled(combinations++, 3)) {
+                    continue;
+                }
                 std::vector<std::string> orders;
                 std::string run = "ending " + std::to_string(static_cast<int>(ending));
                 for (const std::string& fault : connection) {

@@ -11,8 +11,7 @@ from itertools import product
 from typing import Protocol, TypeVar
 
 import numpy as np
-from scipy.interpolate import UnivariateSpline, make_lsq_spline
-from scipy.optimize import least_squares
+import scipy
 
 from .._typing import Float1D, Float2D
 
@@ -164,7 +163,7 @@ class LookupTable:
         while True:
             try:
                 knots = np.concatenate([[x[0]], entries, [x[-1]]])
-                spline = make_lsq_spline(x, mean, knots, k=1, w=np.sqrt(count))
+                spline = scipy.interpolate.make_lsq_spline(x, mean, knots, k=1, w=np.sqrt(count))
                 break
             except (ValueError, np.linalg.LinAlgError):
                 if len(entries) == 2:
@@ -210,7 +209,9 @@ class SmoothingSpline:
         allowed = max(multiple * len(y) * _noise(X[:, 0], y) - scatter, 0.0)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # FITPACK warns if the largest number of knots is reached
-            self.spline_ = UnivariateSpline(x, mean, w=np.sqrt(count), s=allowed, k=3, ext=3)
+            self.spline_ = scipy.interpolate.UnivariateSpline(
+                x, mean, w=np.sqrt(count), s=allowed, k=3, ext=3
+            )
         interior = len(self.spline_.get_knots()) - 2
         self.n_parameters_ = len(self.spline_.get_coeffs()) + interior
         return self
@@ -248,7 +249,7 @@ class HuntCrossley:
             return np.asarray(self._linear(rows, force, unknown)[1])
 
         outcomes = [
-            least_squares(
+            scipy.optimize.least_squares(
                 residual,
                 (low + share * self.reach_, exponent),
                 bounds=((low - self.reach_, EXPONENTS[0]), (high - 1e-3 * self.reach_, EXPONENTS[1])),

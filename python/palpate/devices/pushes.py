@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from .._typing import Float1D, Float2D
 
@@ -203,7 +203,8 @@ def _mechanics(
         [_LARGEST_LOGARITHM, _LARGEST_LOGARITHM, 1.0],
     )
     fits = [
-        least_squares(residuals, each, bounds=(lower[: len(each)], upper[: len(each)])) for each in starts
+        scipy.optimize.least_squares(residuals, each, bounds=(lower[: len(each)], upper[: len(each)]))
+        for each in starts
     ]
     fit = min(fits, key=lambda each: float(each.cost))
     rms = least * np.sqrt(2.0 * fit.cost / fit.fun.size)

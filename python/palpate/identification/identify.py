@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from threadpoolctl import threadpool_limits
 
 from .._typing import Float1D, Float2D
 from ..arguments import parameter_texts, shown
@@ -35,6 +34,7 @@ from .network.fitted import FittedNetwork
 from .network.separable import TINY
 from .options import RESERVED_INPUTS, IdentifyOptions, default_of, described_fields, kind_of, options_from
 from .search.evidence import deviance
+from .threads import one_thread
 
 
 def identify(
@@ -144,9 +144,7 @@ def identify(
         for name, column in zip(each.input_names, each.inputs.T, strict=True):
             require_in_range(name, column)
     fitted, sections = in_sections(recordings)
-    # The matrices are small: several threads make the computation slower and change the last digits of the
-    # result.
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_thread():
         network, settings, rows = _fitted_with_period(fitted, settings, object_of)
         network = replace(network, notes=(*notes, *sections, *network.notes))
         rest = _resting(rows, settings)

@@ -27,7 +27,6 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from .._core.model import ForceModel
 from .._typing import Float1D, Float2D
@@ -50,6 +49,7 @@ from .decision import Decision, in_words
 from .identify import fit_environment, model_of
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions, options_from
+from .threads import one_thread
 
 LEAST_KNOWN_SHARE = 0.5
 """Without a direction column, hysteresis is tested only if the order of rows shows the direction of at least
@@ -272,7 +272,7 @@ def _identified(
             side = None
             decisions.insert(0, Decision("hysteresis", "not tested", UNKNOWN_STROKES))
             findings.append(usable(f"hysteresis was not tested: {UNKNOWN_STROKES}. Cure: {DIRECTION_CURE}"))
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_thread():
         network = fit_environment(
             summary.position[:, None],
             summary.force,

@@ -4,9 +4,11 @@
 import ast
 import inspect
 import math
+import sys
 import textwrap
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -279,15 +281,22 @@ def default_of(each: Field[Any]) -> Any:
     return each.default if each.default_factory is MISSING else each.default_factory()
 
 
+@cache
+def _source() -> ast.Module:
+    """Returns the source of this file; empty if the file is missing."""
+    try:
+        return ast.parse(inspect.getsource(sys.modules[__name__]))
+    except (OSError, SyntaxError):
+        return ast.Module([], [])
+
+
 def field_texts(kind: type[IdentifyOptions | SearchOptions] = IdentifyOptions) -> dict[str, str]:
     """Returns the docstring of each field of options, by name; empty if the source file is missing."""
-    try:
-        tree = ast.parse(inspect.getsource(kind)).body[0]
-    except (OSError, SyntaxError):
-        tree = ast.Pass()
     return {
         ast.unparse(each.target): inspect.cleandoc(ast.literal_eval(text.value))
-        for each, text in pairwise(tree.body if isinstance(tree, ast.ClassDef) else [])
+        for found in _source().body
+        if isinstance(found, ast.ClassDef) and found.name == kind.__name__
+        for each, text in pairwise(found.body)
         if isinstance(each, ast.AnnAssign) and isinstance(text, ast.Expr)
     }
 

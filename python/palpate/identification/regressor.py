@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from .._typing import Float1D, Float2D
 from ..arguments import holds_numbers, shown
@@ -25,6 +24,7 @@ from .data.rows import LARGEST_MAGNITUDE, Rows
 from .network.fitted import FittedNetwork
 from .options import IdentifyOptions
 from .search.evidence import ON_HELD_OUT_ROWS, RowError
+from .threads import one_thread
 
 try:
     from sklearn.base import BaseEstimator, RegressorMixin
@@ -242,7 +242,7 @@ def fit_regression(
         )
     names = tuple(f"x{column}" for column in columns)
     rows = Rows(names, X[:, columns], y, weight=weight, corners=(lower, upper))
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_thread():
         selection = select(rows, options)
         best = selection.best
         some = slice(None, None, max(1, -(-len(y) // MOST_ERROR_ROWS)))

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+import scipy
 
 from .._core import stability
 from .._core.device import DeviceProfile
@@ -194,9 +194,9 @@ def _changes_needed(
     changes = []
     for force, limited in zip(strokes, nearest, strict=True):
         extended = _extended(limited, margin)
-        smooth = gaussian_filter1d(extended, sigma / step, mode="nearest")[inside]
+        smooth = scipy.ndimage.gaussian_filter1d(extended, sigma / step, mode="nearest")[inside]
         touched = np.abs(extended[inside] - force) > 1e-9 * np.ptp(force)
-        near = gaussian_filter1d(touched.astype(float), sigma / step, mode="nearest") > 1e-4
+        near = scipy.ndimage.gaussian_filter1d(touched.astype(float), sigma / step, mode="nearest") > 1e-4
         changes.append(np.where(near, smooth - force, 0.0))
     return np.array(changes)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from .._typing import Float1D, Float2D
 from ..errors import InputError
@@ -160,7 +160,7 @@ def power_spectrum(history: History) -> tuple[Float1D, Float1D]:
     Welch's method with a Hann window; the mean force is subtracted.
     """
     segment = min(len(history.force), MOST_SEGMENT_SAMPLES)
-    frequency, power = signal.welch(
+    frequency, power = scipy.signal.welch(
         history.force, fs=1.0 / history.step, window="hann", nperseg=segment, scaling="spectrum"
     )
     return np.asarray(frequency), np.asarray(power)
@@ -174,8 +174,8 @@ def short_time_transform(history: History) -> Plane:
     force, step = _decimated(history, MOST_SHORT_TIME_SAMPLES)
     n = len(force)
     m = min(n, int(np.clip(n // WINDOWS, LEAST_WINDOW_SAMPLES, MOST_WINDOW_SAMPLES)))
-    transform = signal.ShortTimeFFT(
-        signal.windows.hann(m, sym=False),
+    transform = scipy.signal.ShortTimeFFT(
+        scipy.signal.windows.hann(m, sym=False),
         hop=max(1, m // 8, n // 2000),
         fs=1.0 / step,
         mfft=4 * m,
@@ -223,5 +223,5 @@ def _decimated(history: History, most: int) -> tuple[Float1D, float]:
     every = -(-len(history.force) // most)
     force = history.force - history.force.mean()
     if every > 1:
-        force = signal.resample_poly(force, 1, every, padtype="line")
+        force = scipy.signal.resample_poly(force, 1, every, padtype="line")
     return force, every * history.step

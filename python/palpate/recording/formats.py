@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from ..errors import InputError, escaped, listed, shortened
 from .csv_file import CsvFile
@@ -356,12 +357,11 @@ def _numpy(path: Path) -> Table:
 
 def _matlab(path: Path) -> Table:
     """Returns the vectors of a .mat file by name, fields of a structure included."""
-    from scipy.io import loadmat
 
     with readable(path, "MATLAB (.mat)"):
         stream: Any = io.BytesIO(_inflated(path))
         try:
-            found = loadmat(stream, squeeze_me=True, struct_as_record=True)
+            found = scipy.io.loadmat(stream, squeeze_me=True, struct_as_record=True)
         except NotImplementedError:
             raise InputError(
                 f"{path} is MATLAB 7.3 (HDF5); save it in MATLAB as version 7: save('NEW.mat', '-v7')"

@@ -78,18 +78,22 @@ def test_the_judgement_of_a_model_uses_every_rule() -> None:
     assert inside == [kept]
 
 
+@pytest.mark.parametrize("number", [4, pytest.param(len(RULES), marks=pytest.mark.full)])
 def test_the_study_prints_each_rule_and_writes_its_results(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    printed = [NAMED[name] for name in ("pruning", "repeated rows are dropped", "no finer than repeats")]
+    rules = (*printed, *(rule for rule in RULES if rule not in printed))[:number]
+    monkeypatch.setattr(ablation, "RULES", rules)
     monkeypatch.delenv("PALPATE_DATA", raising=False)
     file = tmp_path / "ablation.json"
     given = ["--draws", "1", "--files", "1", "--jobs", "1", "--json", str(file)]
     monkeypatch.setattr(sys, "argv", ["ablation.py", *given])
     monkeypatch.setattr(ablation, "CASES", {"each row 5 times": CASES["each row 5 times"]})
     main()
-    rules = json.loads(file.read_text())["results"]["rules"]
-    assert [each["rule"] for each in rules] == [rule.name for rule in RULES]
-    changes = {each["rule"]: each["changed"] for each in rules}
+    results = json.loads(file.read_text())["results"]["rules"]
+    assert [each["rule"] for each in results] == [rule.name for rule in rules]
+    changes = {each["rule"]: each["changed"] for each in results}
     assert changes["pruning"] == changes["repeated rows are dropped"] == 1
     table = capsys.readouterr().out
     assert "| pruning | 1 |" in table

@@ -37,7 +37,7 @@ TEST(EnergySearch, FindsFailuresAt95PercentOfTightBounds) {
         if (!line.tight) {
             continue;
         }
-        const std::size_t scenes = scenes_of_each_line(10);
+        const std::size_t scenes = scenes_of_each_line(4);
         std::size_t failures = 0;
         for (std::size_t index = 0; index < scenes; ++index) {
             failures += line.fails(scene_of(line, index), 0.95) ? 1 : 0;

@@ -547,7 +547,7 @@ TEST(GuardedAccount, NoMotionEmptiesTheTankOfACertifiedRendering) {
     test::Random random{31};
     double most = 0.0;
     std::map<std::string, int> scenes;
-    for (int k = 0; k < test::cases(400); ++k) {
+    for (int k = 0; k < test::cases(100); ++k) {
         test::Scene scene = test::random_certified_scene(random, 1.0 + 1e-9);
         scene.device.force_limit = std::exp(test::uniform(random, -2.0, 3.0));
         if (!certify(scene.model, scene.scheme, scene.device).certified()) {
@@ -799,7 +799,7 @@ double stored_span(const ForceModel& model, double limit) {
 TEST(LargestStoredEnergy, BoundsTheEnergyOfTheClippedForce) {
     test::Random random{12};
     double worst = 1.0;
-    for (int k = 0; k < test::cases(60); ++k) {
+    for (int k = 0; k < test::cases(20); ++k) {
         const ForceModel model = test::random_model(random, k % 2 == 0);
         const double limit = std::exp(test::uniform(random, -3.0, 2.0));
         const double span = stored_span(model, limit);

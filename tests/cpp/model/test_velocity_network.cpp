@@ -181,7 +181,7 @@ TEST(VelocityNetwork, HasTwoInputs) {
 
 TEST(VelocityNetwork, EnergyRangeContainsTheEnergyOfALimitedForce) {
     test::Random random{41};
-    for (int k = 0; k < test::cases(20); ++k) {
+    for (int k = 0; k < test::cases(6); ++k) {
         const VelocityNetwork force{random_force(random), box};
         const double limit = k % 2 == 0 ? 1e9 : test::uniform(random, 0.2, 2.0);
         const EnergyRange range = energy_range(force, limit);

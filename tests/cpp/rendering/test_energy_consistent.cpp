@@ -219,7 +219,7 @@ TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
     int most_without_tables = 0;
     int most_limited = 0;
     int limited = 0;
-    for (int k = 0; k < test::cases(40); ++k) {
+    for (int k = 0; k < test::cases(12); ++k) {
         const auto continuation = k % 2 == 0 ? Continuation::Free : Continuation::Linear;
         const WaveletNetwork object{test::random_network(random, static_cast<std::size_t>(1 + k % 12)),
                                     test::unit_domain(continuation, continuation)};
@@ -279,7 +279,7 @@ TEST(EnergyConsistent, SwitchedStepSatisfiesTheEnergyInequality) {
     RecordProperty("most_evaluations", most);
     RecordProperty("most_evaluations_without_tables", most_without_tables);
     RecordProperty("most_evaluations_limited", most_limited);
-    EXPECT_GT(limited, test::cases(40) * 30);
+    EXPECT_GT(limited, test::cases(12) * 30);
     EXPECT_LE(most, 48);
     EXPECT_LE(most_without_tables, 80);
     EXPECT_LE(most_limited, 80);

@@ -199,7 +199,7 @@ TEST(CertifiedSolver, HasTightCellsThatSatisfyItsCondition) {
 TEST(CertifiedSolver, HasTightCellsForPressReleaseAndSticking) {
     Random random{322};
     Tightness tightness;
-    for (int k = 0; k < cases(16); ++k) {
+    for (int k = 0; k < cases(6); ++k) {
         const HysteresisNetwork pair = random_pair(random, k);
         const double p = rising_slope(random, pair);
         const CertifiedSolver solver{pair, p};

@@ -123,7 +123,7 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
     long evaluations = 0;
     long sticking = 0;
     std::vector<std::size_t> cells;
-    for (int k = 0; k < cases(20); ++k) {
+    for (int k = 0; k < cases(10); ++k) {
         const auto continuation = k % 2 == 0 ? Continuation::Free : Continuation::Linear;
         Domain domain = test::unit_domain(continuation, continuation);
         if (k % 5 == 4) {
@@ -181,7 +181,7 @@ TEST(SlidingResolvent, EndsWithinFourEvaluationsNearAFold) {
             sticking += std::abs(x - state.play) < radius ? 2 : 0;
         }
     }
-    ASSERT_GT(steps, cases(14) * 1000);
+    ASSERT_GT(steps, cases(7) * 1000);
     EXPECT_GT(sticking, steps / 4);
     EXPECT_LT(sticking, steps * 3 / 4);
     std::sort(cells.begin(), cells.end());

@@ -400,7 +400,7 @@ TEST(ExplicitScheme, IsStableWithTheStiffestCouplingAndThenTheLeastDamping) {
     };
     test::Random random{23};
     int stable = 0;
-    for (int draw = 0; draw < test::cases(50); ++draw) {
+    for (int draw = 0; draw < test::cases(20); ++draw) {
         const ForceBounds bounds =
             slopes(-test::uniform(random, 0.0, 5.0), std::exp(test::uniform(random, 0.0, 5.0)));
         const DeviceProfile device = smooth(std::exp(test::uniform(random, -4.0, 0.0)));

@@ -29,7 +29,7 @@ COUNTS_PER_TURN = 65536
 
 
 def run_record(out: Path, *arguments: Any, device: Sequence[Any] = ()) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "palpate", "record", out, "--device", "usb", "--duration-s", 3]
+    command = [sys.executable, "-m", "palpate", "record", out, "--device", "usb", "--duration-s", 1.5]
     return emulated(*command, *arguments, device=device)
 
 
@@ -94,7 +94,7 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
     completed = run_record(recording_file, "--json", device=[*SPRING, "--trace", str(trace)])
     assert completed.returncode == 0, completed.stderr
     summary = json.loads(completed.stdout)
-    assert summary["recorded"] == summary["ticks"] == 3000
+    assert summary["recorded"] == summary["ticks"] == 1500
     # the motor of the device is never enabled: only the hand moves the handle
     assert not any(frame.enabled for frame in frames(trace))
     recording = read_recording(recording_file)
@@ -104,14 +104,14 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
     model.save(model_file)
 
     command = [PROGRAM, model_file, "--device", "usb", "--structure", "direct", "--uncertified"]
-    command = [*command, "--duration-s", 3, "--record", rendered_file]
+    command = [*command, "--duration-s", 1.5, "--record", rendered_file]
     completed = emulated(*command, device=["--trace", str(trace)])
     assert completed.returncode == 0, completed.stderr
     # After the start ramp the device receives a torque towards smaller positions, proportional to position.
     sent_frames = frames(trace)
     active = [index for index, frame in enumerate(sent_frames) if frame.torque != 0.0]
     pressed = [frame for frame in sent_frames[active[0] + 300 : active[-1]] if frame.position > 0.1]
-    assert len(pressed) > 500
+    assert len(pressed) > 250
     assert all(-4.0 < frame.torque / frame.position < -2.0 for frame in pressed)
     assert stiffness(identify(read_recording(rendered_file))) == pytest.approx(STIFFNESS, rel=0.02)
 
@@ -119,7 +119,7 @@ def test_a_recorded_spring_is_identified_and_rendered_with_the_same_stiffness_an
 @needs_emulation
 def test_a_probe_measures_the_stiffness_of_a_spring_without_a_hand(tmp_path: Path) -> None:
     out, trace = tmp_path / "a.csv", tmp_path / "t.csv"
-    probe = ["--probe", "--upper", 0.3, "--force-limit", 1.2, "--speed", 0.3]
+    probe = ["--probe", "--upper", 0.3, "--force-limit", 1.2, "--speed", 0.3, "--duration-s", 3]
     device_without_hand = [*SPRING, "--no-hand", "--no-transducer", "--trace", str(trace)]
     completed = run_record(out, *probe, device=device_without_hand)
     assert completed.returncode == 0, completed.stderr
@@ -173,7 +173,7 @@ def test_an_impossible_recording_is_refused_before_the_device_moves(
 @needs_emulation
 def test_rows_recorded_before_an_unplug_are_kept(tmp_path: Path) -> None:
     out, trace = tmp_path / "a.csv", tmp_path / "t.csv"
-    unplugged_device = [*SPRING, "--fault", "unplug@4000", "--trace", str(trace)]
+    unplugged_device = [*SPRING, "--fault", "unplug@1500", "--trace", str(trace)]
     completed = run_record(out, "--json", "--duration-s", "inf", device=unplugged_device)
     assert completed.returncode == 1
     assert "a fault of the device" in completed.stderr

@@ -13,12 +13,14 @@ import socket
 import subprocess
 import sys
 import time
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from conftest import sampled
 from control_program import (
     MODEL,
     PROGRAM,
@@ -157,11 +159,17 @@ def stop_with_ctrl_c(process: subprocess.Popen[str]) -> subprocess.CompletedProc
     return subprocess.CompletedProcess(process.args, process.returncode, output, messages)
 
 
-@pytest.mark.parametrize("force", [[], ["--force"]], ids=["plain", "force"])
-@pytest.mark.parametrize("second", ["palpate-control", "render", "record"])
-@pytest.mark.parametrize("first", ["palpate-control", "render"])
+@pytest.mark.parametrize(
+    ("first", "second", "force"),
+    sampled(
+        product(("palpate-control", "render"), ("palpate-control", "render", "record"), ("", "--force")),
+        ("palpate-control", "palpate-control", "--force"),
+        ("palpate-control", "render", ""),
+        ("render", "record", "--force"),
+    ),
+)
 def test_a_second_run_into_the_same_recording_is_refused_and_the_first_keeps_its_rows(
-    tmp_path: Path, first: str, second: str, force: list[str]
+    tmp_path: Path, first: str, second: str, force: str
 ) -> None:
     out = tmp_path / "rendered.csv"
     python = [sys.executable, "-m", "palpate"]
@@ -174,7 +182,7 @@ def test_a_second_run_into_the_same_recording_is_refused_and_the_first_keeps_its
     try:
         wait_for_rows(tmp_path / "rendered.csv.part", running, 500)
         running.send_signal(signal.SIGSTOP)
-        refused = run(*commands[second], "--duration-s", 0.5, *force)
+        refused = run(*commands[second], "--duration-s", 0.5, *force.split())
         assert refused.returncode == 2, refused.stderr
         assert "rendered.csv.part is being written by another run" in refused.stderr.splitlines()[-1]
         assert os.listdir(tmp_path) == ["rendered.csv.part"]

@@ -451,7 +451,7 @@ def test_a_device_that_does_not_answer_during_the_pushes_has_advice_on_the_conne
 @needs_emulation
 def test_a_check_without_pushes_never_enables_the_device(tmp_path: Path) -> None:
     trace = tmp_path / "trace.csv"
-    answer = run_check(device=["--spring", "3", "--reversed", "--trace", str(trace)])
+    answer = run_check(device=["--spring", "3", "--reversed", "--trace", str(trace)], seconds=2.0)
     _, findings = findings_of_answer(answer)
     assert findings["sign of the transducer"]["right"]
     assert findings["velocity"]["right"]

@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import subprocess
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from bench.portable.programs import BOARDS, compile_arm, missing, run_arm, run_here
 
 import palpate
+from conftest import sampled
 from exports import EXPORTED, KINDS, flags_of, header_of, random_model, tables_of
 from palpate._core.portable import ExportedModel
 from palpate._typing import Float2D
@@ -24,7 +26,12 @@ COMPILERS = {"gcc": "c99", "clang": "c99", "g++": "c++11", "clang++": "c++11"}
 
 CPU = Path("/proc/cpuinfo").read_text(encoding="utf-8") if Path("/proc/cpuinfo").exists() else ""
 
-CASES = [(kind, precision) for kind in KINDS for precision in ("single", "double")]
+CASES = sampled(
+    [(kind, precision) for kind in KINDS for precision in ("single", "double")],
+    *zip(KINDS, cycle(("single", "double"))),
+    ("predicted_hysteresis", "single"),
+)
+"""Kinds and precisions; `make test` runs each kind in one precision, and one kind in both."""
 
 VALUES = """\
 #include "knob.h"
@@ -130,8 +137,6 @@ def test_header_compiles_without_warnings_as_c99_and_cpp11(kind: str, precision:
 @pytest.mark.skipif(bool(missing()), reason="needs arm-none-eabi-gcc and qemu-system-arm")
 @pytest.mark.parametrize(("kind", "precision"), CASES)
 def test_cortex_m_gives_the_bits_of_this_computer(kind: str, precision: str, tmp_path: Path) -> None:
-    if SCALE == 1 and precision == "double" and kind not in ("massless", "hysteresis"):
-        pytest.skip("tested at a scale above 1")
     header = header_of(*tables_of(kind, precision=precision), tmp_path)
     here = run_here(EXPORTED, tmp_path, flags_of(header)).strip()
     cross = ["gcc", "clang"] if SCALE > 1 and shutil.which("clang") else ["gcc"]

@@ -27,10 +27,16 @@ MODELS = {
 }
 
 
-@pytest.fixture(params=MODELS)
+@pytest.fixture(scope="module", params=MODELS)
 def model(request: pytest.FixtureRequest) -> Model:
     made: Model = MODELS[request.param]()
     return made
+
+
+@pytest.fixture(scope="module")
+def file(model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Returns the FMU of the model, which the tests only read."""
+    return exported(model, tmp_path_factory.mktemp("fmu"))
 
 
 def exported(model: Model, folder: Path) -> Path:
@@ -74,12 +80,12 @@ def simulated(fmpy: Any, file: Path, positions: np.ndarray) -> tuple[np.ndarray,
     return np.asarray(found["position"]), np.asarray(found["force"])
 
 
-def test_force_is_that_of_the_model_to_1e_9(model: Model, tmp_path: Path, fmpy: Any) -> None:
+def test_force_is_that_of_the_model_to_1e_9(model: Model, file: Path, fmpy: Any) -> None:
     lower, upper = float(model.lower[0]), float(model.upper[0])
     beyond = 0.2 * (upper - lower)
     there = np.linspace(lower - beyond, upper + beyond, 301)
     back = there[::-1][:200]
-    positions, found = simulated(fmpy, exported(model, tmp_path), np.concatenate([there, back, back[::-1]]))
+    positions, found = simulated(fmpy, file, np.concatenate([there, back, back[::-1]]))
     expected = with_radius(model)
     before = np.concatenate([positions[:1], positions[:-1]])
     play = expected.play(before) if expected.hysteretic else None
@@ -87,10 +93,9 @@ def test_force_is_that_of_the_model_to_1e_9(model: Model, tmp_path: Path, fmpy: 
     assert np.max(np.abs(found - force)) <= 1e-9 * np.max(np.abs(force))
 
 
-def test_fmpy_finds_no_problem_and_all_functions(model: Model, tmp_path: Path, fmpy: Any) -> None:
+def test_fmpy_finds_no_problem_and_all_functions(file: Path, tmp_path: Path, fmpy: Any) -> None:
     from fmpy.validation import validate_fmu
 
-    file = exported(model, tmp_path)
     assert validate_fmu(str(file)) == []
     header = (Path(fmpy.__file__).parent / "c-code" / "fmi3Functions.h").read_text()
     standard = set(re.findall(r"^FMI3_Export \w+ +(\w+);", header, re.MULTILINE))
@@ -164,8 +169,8 @@ class Instance:
         return force
 
 
-def test_both_derivatives_are_the_slope_of_the_model(model: Model, tmp_path: Path, fmpy: Any) -> None:
-    instance = Instance(fmpy, exported(model, tmp_path))
+def test_both_derivatives_are_the_slope_of_the_model(model: Model, file: Path, fmpy: Any) -> None:
+    instance = Instance(fmpy, file)
     expected = with_radius(model)
     lower, upper = float(model.lower[0]), float(model.upper[0])
     position, force = instance.references["position"], instance.references["force"]

@@ -2,11 +2,13 @@
 """Rows that wait, or that move far from the contact, are not fitted: only the motion decides the model."""
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 import pytest
 
 import palpate
+from conftest import sampled
 from imperfect import Array, knob, loop, press_and_release, recorded
 from palpate.recording.contact import contact_at
 from palpate.recording.roles import Role, roles_of
@@ -123,19 +125,27 @@ def test_rows_that_are_held_out_keep_the_roles_of_the_whole_motion() -> None:
         assert different <= 1  # the contact is found from the rows of the part
 
 
-@pytest.mark.parametrize("at", [0, 150, 300], ids=["before", "turn", "behind"])
-def test_waiting_rows_change_neither_size_nor_verdict_of_the_model(at: int) -> None:
-    without = palpate.identify(recorded(*with_wait(0, at)))
-    for rows in (30, 300, 5000):
-        model = palpate.identify(recorded(*with_wait(rows, at)))
-        assert abs(model.n_wavelets - without.n_wavelets) <= 1
-        assert model.verdict.level == without.verdict.level
-        at_middle = np.array([2.0])
-        press = np.ones(1)
-        assert model.force(at_middle, direction=press) == pytest.approx(
-            without.force(at_middle, direction=press), rel=1e-3
-        )
-        assert f"of {300 + rows} rows are not fitted: " in str(model.notes["identification"])
+@pytest.fixture(scope="module")
+def without_wait() -> palpate.Model:
+    return palpate.identify(recorded(*with_wait(0, 0)))
+
+
+@pytest.mark.parametrize(
+    ("rows", "at"),  # before the strokes, at their turn, behind them
+    sampled(product((30, 300, 5000), (0, 150, 300)), (30, 0), (300, 300), (5000, 150)),
+)
+def test_waiting_rows_change_neither_size_nor_verdict_of_the_model(
+    without_wait: palpate.Model, rows: int, at: int
+) -> None:
+    model = palpate.identify(recorded(*with_wait(rows, at)))
+    assert abs(model.n_wavelets - without_wait.n_wavelets) <= 1
+    assert model.verdict.level == without_wait.verdict.level
+    at_middle = np.array([2.0])
+    press = np.ones(1)
+    assert model.force(at_middle, direction=press) == pytest.approx(
+        without_wait.force(at_middle, direction=press), rel=1e-3
+    )
+    assert f"of {300 + rows} rows are not fitted: " in str(model.notes["identification"])
 
 
 @pytest.mark.parametrize("held", [2, 4])

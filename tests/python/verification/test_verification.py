@@ -406,11 +406,11 @@ def test_rows_that_wait_are_compared_if_no_others_have_a_direction() -> None:
 
 
 def test_waits_of_a_model_with_memory_are_compared() -> None:
-    time = np.arange(6000) * 2e-3
+    time = np.arange(3000) * 4e-3
     x = np.interp(time, [0.0, 0.5, 4.5, 5.0, 6.0, 8.0, 12.0], [0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0])
     f = np.zeros(len(x))
     for row in range(1, len(x)):
-        f[row] = f[row - 1] * np.exp(-2e-3 / 0.5) + 3.0 * (x[row] - x[row - 1])
+        f[row] = f[row - 1] * np.exp(-4e-3 / 0.5) + 3.0 * (x[row] - x[row - 1])
     f += 2.0 * x + np.random.default_rng(0).normal(0.0, 1e-3, len(x))
     recording = Recording.from_arrays(x, f, time, units=RAD)
     model = identify(recording)

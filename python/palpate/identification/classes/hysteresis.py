@@ -9,8 +9,8 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from ...errors import InputError
 from ...verdict import usable
@@ -273,7 +273,7 @@ class PlaySearch:
         if lower >= upper:
             return strokes
         known = _thinned(self._of(upper).known)
-        found = minimize_scalar(
+        found = scipy.optimize.minimize_scalar(
             lambda log_radius: self._residual_squares(self._of(math.exp(log_radius)), basis, known),
             bounds=(math.log(lower), math.log(upper)),
             method="bounded",

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline
+import scipy
 
 from ..._core.model import ForceModel, wavelet_columns
 from ..._typing import Float1D, Float2D
@@ -145,7 +145,7 @@ def _larger(now: Choice, recorded: Recorded) -> Iterator[Choice]:
 def _splines(position: Float1D, count: int) -> Float2D:
     """Returns the columns (n, count) of cubic B-splines at positions (n,) in the unit box."""
     knots = np.r_[np.zeros(3), np.linspace(0.0, 1.0, count - 2), np.ones(3)]
-    return np.asarray(BSpline.design_matrix(position, knots, 3).toarray())
+    return np.asarray(scipy.interpolate.BSpline.design_matrix(position, knots, 3).toarray())
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, nnls
 
 from ..._core.model import ForceModel, stretches
 from ..._typing import Float1D, Float2D
@@ -216,7 +216,7 @@ class MemoryFit:
         def residual(vector: Float1D) -> Float1D:
             return self.residual(shape.at(vector))
 
-        found = least_squares(
+        found = scipy.optimize.least_squares(
             residual,
             start,
             bounds=(low, high),
@@ -281,4 +281,4 @@ def _nonnegative(columns: Float2D, target: Float1D) -> Float1D:
     table, right = triangle[:, :-1], triangle[:, -1]
     size = np.linalg.norm(table, axis=0)
     size[size == 0.0] = 1.0
-    return np.asarray(nnls(table / size, right)[0] / size)
+    return np.asarray(scipy.optimize.nnls(table / size, right)[0] / size)

@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from ..._typing import Float1D
 from ...model.band import BAND_LEVEL, Band
@@ -188,8 +188,8 @@ def _half_width(squares: Float1D, count: float, freedom: int, noise: float, rows
     square, level = float(squares.mean()), 0.5 + 0.5 * BAND_LEVEL
     noise = min(noise, square)
     shared = (square - noise) * (count + 1.0) / (count - 1.0)
-    by_row = stdtrit(np.count_nonzero(rows), level) * np.sqrt(noise)
-    return float(np.hypot(stdtrit(freedom, level) * np.sqrt(shared), by_row))
+    by_row = scipy.special.stdtrit(np.count_nonzero(rows), level) * np.sqrt(noise)
+    return float(np.hypot(scipy.special.stdtrit(freedom, level) * np.sqrt(shared), by_row))
 
 
 def row_noise(

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
-from scipy.spatial.distance import cdist
 
 from ..._typing import Float1D, Float2D
 from ...arguments import number_of
@@ -123,7 +122,7 @@ class _Neighbours:
             distinct = np.random.default_rng(0).choice(distinct, MOST_DISTANCES, replace=False)
         self._positions = distinct
         self._sorted = distinct[:, 0] if d == 1 else None
-        self._tree = cKDTree(distinct) if 1 < d <= MOST_TREE_INPUTS else None
+        self._tree = scipy.spatial.cKDTree(distinct) if 1 < d <= MOST_TREE_INPUTS else None
         self._size = len(distinct)
 
     def reach(self, places: Float2D, count: int) -> Float1D:
@@ -136,7 +135,7 @@ class _Neighbours:
         if self._tree is not None:
             return np.asarray(self._tree.query(places, k=[count])[0])[:, 0]
         if self._sorted is None:
-            square = cdist(places, self._positions, "sqeuclidean")
+            square = scipy.spatial.distance.cdist(places, self._positions, "sqeuclidean")
             return np.asarray(np.sqrt(np.partition(square, count - 1, axis=1)[:, count - 1]))
         # On a line the nearest positions are neighbours in order: test all windows of `count` positions at
         # the place.

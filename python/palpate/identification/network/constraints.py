@@ -15,9 +15,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, solve_triangular
-from scipy.optimize import isotonic_regression, nnls
 
 from ..._core.model import derivative_bounds, wavelet_columns, wavelet_slope_columns
 from ..._typing import Float1D, Float2D
@@ -262,15 +261,17 @@ def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, lim
     """
     start = free.coefficients.ravel()
     factors, norms = zip(*[factored(gram) for gram in free.grams], strict=True)
-    factor, norm = np.tril(block_diag(*factors)), np.concatenate(norms)
-    reach = solve_triangular(factor, (rows / norm).T, lower=True)
+    factor, norm = np.tril(scipy.linalg.block_diag(*factors)), np.concatenate(norms)
+    reach = scipy.linalg.solve_triangular(factor, (rows / norm).T, lower=True)
     missing = limits - rows @ start
     size = np.abs(missing).max()
     target = np.zeros(len(norm) + 1)
     target[-1] = 1.0
-    multipliers, _ = nnls(np.vstack([reach, missing / size]), target, maxiter=50 * len(limits) + 100)
+    multipliers, _ = scipy.optimize.nnls(
+        np.vstack([reach, missing / size]), target, maxiter=50 * len(limits) + 100
+    )
     share = max(1.0 - float(multipliers @ missing) / size, float(np.finfo(float).eps))
-    step = solve_triangular(factor, reach @ multipliers * (size / share), lower=True, trans="T")
+    step = scipy.linalg.solve_triangular(factor, reach @ multipliers * (size / share), lower=True, trans="T")
     return np.asarray(start + step / norm).reshape(free.coefficients.shape)
 
 
@@ -283,11 +284,11 @@ def slope_limited(grid: Float1D, force: Float1D, low: float, high: float) -> Flo
         start = current
         if np.isfinite(low):
             wanted = current + lower_memory
-            current = isotonic_regression(wanted - low * grid).x + low * grid
+            current = scipy.optimize.isotonic_regression(wanted - low * grid).x + low * grid
             lower_memory = wanted - current
         if np.isfinite(high):
             wanted = current + upper_memory
-            current = high * grid - isotonic_regression(high * grid - wanted).x
+            current = high * grid - scipy.optimize.isotonic_regression(high * grid - wanted).x
             upper_memory = wanted - current
         if np.abs(current - start).max() <= 1e-9 * np.ptp(force):
             break

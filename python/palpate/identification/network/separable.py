@@ -24,9 +24,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
-from scipy.optimize import Bounds, minimize
 
 from ..._core.model import wavelet_columns, wavelet_jacobian, wavelet_steps
 from ..._typing import Float1D, Float2D
@@ -44,7 +43,7 @@ def solve_gram(gram: Float2D, right: NDArray[np.float64]) -> NDArray[np.float64]
     """Solves a positive semidefinite linear system by a Cholesky factorisation on columns of unit norm."""
     factor, norm = factored(gram)
     columns = right.reshape(len(gram), -1) / norm[:, None]
-    solved, _ = dpotrs(factor, columns, lower=1)
+    solved, _ = scipy.linalg.lapack.dpotrs(factor, columns, lower=1)
     return np.asarray(solved / norm[:, None]).reshape(right.shape)
 
 
@@ -52,7 +51,7 @@ def half_solved(gram: Float2D, right: Float2D) -> Float2D:
     """Returns M @ right, where M' M is the inverse of the system matrix; inner products of results are those
     of projections."""
     factor, norm = factored(gram)
-    solved, _ = dtrtrs(factor, right / norm[:, None], lower=1)
+    solved, _ = scipy.linalg.lapack.dtrtrs(factor, right / norm[:, None], lower=1)
     return np.asarray(solved)
 
 
@@ -69,7 +68,7 @@ def factored(gram: Float2D) -> tuple[Float2D, Float1D]:
     unit, ridge = diagonal.copy(), RIDGE
     while True:
         diagonal[:] = unit + ridge
-        factor, failed = dpotrf(scaled, lower=1)
+        factor, failed = scipy.linalg.lapack.dpotrf(scaled, lower=1)
         if not failed:
             return factor, norm
         ridge *= 100.0
@@ -486,11 +485,11 @@ def _bounded_step(
     while True:
         damped = system.copy()
         np.einsum("ii->i", damped)[:] += step_damping * np.maximum(diagonal, floor)
-        factor, failed = dpotrf(damped, lower=1)
+        factor, failed = scipy.linalg.lapack.dpotrf(damped, lower=1)
         if not failed:
             break
         step_damping = 10.0 * step_damping + 1e-12
-    step[np.flatnonzero(used)[free]] = dpotrs(factor, gradient[free], lower=1)[0]
+    step[np.flatnonzero(used)[free]] = scipy.linalg.lapack.dpotrs(factor, gradient[free], lower=1)[0]
     return np.clip(step, -LONGEST_STEP, LONGEST_STEP)
 
 
@@ -562,12 +561,12 @@ def refine_all(problem: SeparableProblem, start: Solution, *, steps: int, tolera
         np.log(basis.alpha).ravel(),
         (basis.alpha * basis.beta).ravel(),
     ]
-    found = minimize(
+    found = scipy.optimize.minimize(
         objective,
         np.concatenate(begin),
         jac=True,
         method="L-BFGS-B",
-        bounds=Bounds(np.concatenate(low), np.concatenate(high)),
+        bounds=scipy.optimize.Bounds(np.concatenate(low), np.concatenate(high)),
         options={
             "maxiter": QUASI_NEWTON_STEPS * steps,
             "ftol": tolerance / problem.samples / QUASI_NEWTON_STEPS,

@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..._typing import Float1D
@@ -80,26 +81,27 @@ class Motion:
         limit = SMOOTH_NOISE * float(np.sqrt(np.mean(np.diff(x) ** 2)))
         if self.noise <= limit or not self.is_coarse:
             return 0
-        from scipy import signal  # takes half a second, and few recordings are coarse
 
         chosen = 0
         for half in HALF_WINDOWS:
             window = 2 * half + 1
             if (
                 2 * window > len(x)
-                or np.std(x - signal.savgol_filter(x, window, DEGREE)) > MOST_SMOOTHED * self.noise
+                or np.std(x - scipy.signal.savgol_filter(x, window, DEGREE)) > MOST_SMOOTHED * self.noise
             ):
                 break
             chosen = half
-            if self.noise * float(np.linalg.norm(signal.savgol_coeffs(window, DEGREE, deriv=1))) <= limit:
+            if (
+                self.noise * float(np.linalg.norm(scipy.signal.savgol_coeffs(window, DEGREE, deriv=1)))
+                <= limit
+            ):
                 break
         return chosen
 
     def _smoothed(self, derivative: int) -> Float1D:
-        from scipy import signal
 
         return np.asarray(
-            signal.savgol_filter(
+            scipy.signal.savgol_filter(
                 self.position, 2 * self._half_window + 1, DEGREE, deriv=derivative, delta=self.period
             )
         )

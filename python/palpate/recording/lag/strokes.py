@@ -20,8 +20,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.sparse import csr_array
+import scipy
 
 from ... import _core
 from ..._typing import Float1D, Float2D
@@ -155,7 +154,7 @@ class Strokes:
     def _design(self, late: float, radius: float, intervals: tuple[int, ...]) -> Any:
         """Returns the columns (n, p) of the regression."""
         x, factors, a = self._inputs(late, radius)
-        splines = [BSpline.design_matrix(x, knots, 3) for knots in self._knots(intervals)]
+        splines = [scipy.interpolate.BSpline.design_matrix(x, knots, 3) for knots in self._knots(intervals)]
         first = np.cumsum([0, *(spline.shape[1] for spline in splines)])
         # in every row four cubic splines of each kind are not 0
         values = [
@@ -165,7 +164,9 @@ class Strokes:
         table = np.column_stack([*values, a])
         places = np.column_stack([*columns, np.full(len(x), first[-1])])
         starts = table.shape[1] * np.arange(len(x) + 1)
-        return csr_array((table.ravel(), places.ravel(), starts), shape=(len(x), int(first[-1]) + 1))
+        return scipy.sparse.csr_array(
+            (table.ravel(), places.ravel(), starts), shape=(len(x), int(first[-1]) + 1)
+        )
 
     def _force_of(self, fit: _Fit, late: float, radius: float, intervals: tuple[int, ...]) -> Float1D:
         """Returns the force (n,) of fitted coefficients for another lag or play radius."""
@@ -173,7 +174,7 @@ class Strokes:
         total, first = a * fit.coefficients[-1], 0
         for factor, knots in zip(factors, self._knots(intervals), strict=True):
             count = len(knots) - 4
-            total += factor * BSpline(knots, fit.coefficients[first : first + count], 3)(x)
+            total += factor * scipy.interpolate.BSpline(knots, fit.coefficients[first : first + count], 3)(x)
             first += count
         return np.asarray(total)
 

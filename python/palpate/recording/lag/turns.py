@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import fdtri
 
 from ... import _core
 from ..._typing import Float1D, Float2D
@@ -81,7 +81,7 @@ def lag_of_turns(parts: Sequence[Motion]) -> ForceLag:
 
 def _f_quantile(freedom: float) -> float:
     """Returns the 95 % quantile of the F distribution with 1 and `freedom` degrees of freedom."""
-    return float(fdtri(1.0, freedom, 0.95))
+    return float(scipy.special.fdtri(1.0, freedom, 0.95))
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ TEST(FailureMaps, SpringJustAboveItsBoundOscillatesWithAHeavyHand) {
 // Compares a spring with the bound for every force whose slope lies between 0 and the stiffness of the spring: they
 // agree within 4 %.
 TEST(FailureMaps, PredictionFailsJustAboveItsBoundForEveryNumberOfSamplesAndDelay) {
-    const FailureMap map = prediction_map(test::cases(5));
+    const FailureMap map = prediction_map(test::cases(2));
     expect_between(ratios(map, 0, 2), 1.0, 1.04);
     EXPECT_LE(ratios(map, 0, 0).lower, 1.001);
     for (std::size_t delay = 0; delay <= 2; ++delay) {
@@ -79,7 +79,7 @@ TEST(FailureMaps, CouplingBoundsAreExactWithAndWithoutDelay) {
 
 // The bound of one branch counts its stiffness in full. A branch that relaxes within some samples has a margin.
 TEST(FailureMaps, MemoryBoundHoldsAndIsExactForSlowBranchesWithoutDelay) {
-    const FailureMap map = memory_map(test::cases(3));
+    const FailureMap map = memory_map(test::cases(2));
     EXPECT_GE(ratios(map, 0, 2).lower, 1.0);
     EXPECT_LE(map.lines[0].measured.back() / map.lines[0].theory.back(), 1.01);
 }

@@ -26,7 +26,7 @@ def sweep(n: int, seed: int, encoder_step: float = 0.0) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("n", "encoder_step"), [(50, 0.0), (300, 0.0), (3000, 7.7e-4)], ids=["n50", "n300", "n3000-encoder"]
+    ("n", "encoder_step"), [(50, 0.0), pytest.param(300, 0.0, marks=pytest.mark.full), (3000, 7.7e-4)]
 )
 def test_a_linear_spring_with_noise_needs_no_wavelet(n: int, encoder_step: float) -> None:
     """A linear spring is fitted with 0 wavelets in at least 19 of 20 draws (95 of 100), at any noise."""

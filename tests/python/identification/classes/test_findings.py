@@ -174,7 +174,7 @@ def test_shuffled_rows_lose_nothing() -> None:
     assert model.verdict.level == "good"
 
 
-@pytest.mark.parametrize("rows", [20, 45])
+@pytest.mark.parametrize("rows", [20, pytest.param(45, marks=pytest.mark.full)])
 def test_the_error_on_left_out_rows_is_not_below_that_between_few_rows(rows: int) -> None:
     """A model of few rows can have many parameters, if the rows determine them."""
     between = np.linspace(0.0, sweep(rows).max(), 2001)

@@ -34,7 +34,7 @@ def test_known_hysteresis_input_does_not_depend_on_earlier_motion() -> None:
 
 
 def test_a_motion_that_begins_in_the_middle_of_its_play_is_fitted_to_its_noise() -> None:
-    x = wandering(20_000, 1)
+    x = wandering(10_000, 1)
     side = state(x, 0.01, -0.6)
     noise = np.random.default_rng(2).normal(0.0, 0.005, len(x))
     force = np.tanh(6 * (x - 0.5)) + side * (0.2 + 0.1 * x) + noise

@@ -80,7 +80,18 @@ def test_straight_line_is_found_in_imperfect_rows(name: str) -> None:
     assert true_nrmse(model, line) < 0.01
 
 
-@pytest.mark.parametrize("name", IMPERFECT)
+@pytest.mark.parametrize(
+    "name",
+    sampled(
+        IMPERFECT,
+        *(
+            "rows five times",
+            "position and force held",
+            "noise of correlation 0.5",
+            "6-bit force, several strokes",
+        ),
+    ),
+)
 def test_wall_is_found_with_few_wavelets(name: str) -> None:
     model = identified(name, wall)
     assert 3 <= model.n_wavelets <= 8

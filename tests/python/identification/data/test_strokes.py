@@ -10,7 +10,6 @@ import pytest
 
 from any_input import SCALE
 from conftest import sampled
-from imperfect import loop, press_and_release, recorded
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate.cli.main import main
 from palpate.identification.data.strokes import strokes_of
@@ -255,10 +254,10 @@ def test_measured_files_of_one_stroke_each_are_not_taken_for_two_objects(data: P
 
 
 def test_the_order_of_rows_gives_the_same_model_with_and_without_time() -> None:
-    x = press_and_release(400)
-    f = loop(x) + np.random.default_rng(2).normal(0.0, 0.05, len(x))
-    ordered = identify(recorded(x, f), inputs=("position", "hysteresis"))
-    timed = identify(recorded(x, f, 1e-3 * np.arange(len(x))), inputs=("position", "hysteresis"))
+    whole = Recording.from_arrays(IN_AND_OUT, loop(), 1e-3 * np.arange(len(IN_AND_OUT)))
+    timed, ordered = (
+        identify(each, inputs=("position", "hysteresis")) for each in (whole, replace(whole, time=None))
+    )
     at, press = np.linspace(0.0, 4.0, 50), np.ones(50)
-    assert ordered.play_radius == timed.play_radius
-    assert (ordered.force(at, direction=press) == timed.force(at, direction=press)).all()
+    assert timed.play_radius == ordered.play_radius
+    assert (timed.force(at, direction=press) == ordered.force(at, direction=press)).all()
