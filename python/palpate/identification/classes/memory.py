@@ -17,7 +17,9 @@ from scipy.interpolate import BSpline
 from ..._core.model import ForceModel, wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
+from ...verdict import Finding, usable
 from ..data.limits import FORCE_RESOLUTION
+from ..data.roles import Role, roles_of
 from ..decision import Decision, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
@@ -340,6 +342,10 @@ def better_with_memory(
         n_parameters=n_parameters,
         rmse=error,
         nrmse=nrmse,
+        rmse_of_all=error,
+        left_out_nrmse=float(np.sqrt(held_out.mean())),
+        residuals=fit.n_rows,
+        findings=tuple(_undetermined(found, recordings)),
         path=found.path + network.path,
         decisions=(*found.decisions, decision),
         notes=(
@@ -348,6 +354,18 @@ def better_with_memory(
             f"found: {', '.join(f'{tau:.3g}' for tau in np.sort(np.exp(refined.log_tau)))} s.",
         ),
     )
+
+
+def _undetermined(found: FittedNetwork, recordings: Sequence[Recording]) -> Iterator[Finding]:
+    """Yields a finding if neither pauses nor different speeds show whether the force depends on time."""
+    for decision in found.decisions:
+        constant = decision.model_class == "damping" and decision.outcome == "not tested"
+        if constant and not any((roles_of(part) == Role.HOLD).any() for part in recordings):
+            yield usable(
+                "the rows do not show whether the force relaxes with time or depends on earlier motion, as "
+                f"friction and plasticity do: the tool never waits in contact, and {decision.reason}, or a "
+                "pause in contact"
+            )
 
 
 def _refused(found: FittedNetwork, reason: str) -> FittedNetwork:

@@ -180,8 +180,7 @@ class Velocity(ModelClass):
             return below
         over_both_inputs = [f"Over position and velocity: {decision}." for decision in both.report.decisions]
         report.notes += [*over_both_inputs, *both.report.notes]
-        report.findings = [*report.sign_findings, *both.report.findings]
-        report.sign_findings = both.report.sign_findings
+        report.findings += both.report.findings
         return both.best
 
 

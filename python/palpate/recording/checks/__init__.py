@@ -95,31 +95,31 @@ CHECKS = (
     Check(
         "changed force",
         changed_force,
-        "two objects or two zeros in one file, an object that settles",
+        "another object, zero, speed or depth from a row on, an object that settles",
         {"blocks": 32, "explained_share": 0.4, "distance_share": 0.1, "place_cells": 0.1},
     ),
 )
 """All checks, in the order of their findings. Each threshold is described in its function."""
 
 
-def quality_findings(recording: Recording, *, relaxes: bool = False) -> list[Finding]:
-    """Returns findings on a recording as it was read; empty without defects. The force of an object that
-    relaxes may change at the same position."""
+def quality_findings(recording: Recording, *, of_motion: bool = False) -> list[Finding]:
+    """Returns findings on a recording as it was read; empty without defects. If the model of the force
+    depends on time or velocity (`of_motion`), the force may change at the same position."""
     if len(recording) < MIN_ROWS:
         return []
-    checked = Checked(recording, relaxes)
+    checked = Checked(recording, of_motion)
     return [finding for check in CHECKS for finding in check.findings(checked, **check.thresholds)]
 
 
 def findings_of(
-    recordings: Sequence[Recording], side: Float1D | None = None, *, relaxes: bool = False
+    recordings: Sequence[Recording], side: Float1D | None = None, *, of_motion: bool = False
 ) -> list[Finding]:
     """Returns findings on each recording, with its name if there are several, and on all of them together.
 
     `side` (n,) is the direction of the rows of all recordings if they do not state it.
     """
     if len(recordings) == 1:
-        return quality_findings(recordings[0], relaxes=relaxes)
+        return quality_findings(recordings[0], of_motion=of_motion)
     names = [
         each.source.files[0] if each.source.files else f"recording {number}"
         for number, each in enumerate(recordings, 1)
@@ -127,6 +127,6 @@ def findings_of(
     found = [
         Finding(finding.level, f"{name}: {finding.sentence}")
         for name, recording in zip(names, recordings, strict=True)
-        for finding in quality_findings(recording, relaxes=relaxes)
+        for finding in quality_findings(recording, of_motion=of_motion)
     ]
     return found + scale_findings(recordings, side)

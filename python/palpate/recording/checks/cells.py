@@ -41,8 +41,8 @@ class Checked:
     """Recording to check, with the facts that several checks need."""
 
     recording: Recording
-    relaxes: bool = False
-    """True if the model has a memory: the force may change at the same position"""
+    of_motion: bool = False
+    """True if the model depends on time or velocity: the force may change at the same position"""
 
     @cached_property
     def lower(self) -> float:

@@ -127,8 +127,8 @@ def test_relaxation_is_named_and_gives_no_steep_slope() -> None:
     x, force, time = relaxation()
     assert palpate.identify(recorded(x, force, time)).fit.model_class == "memory"
     model = palpate.identify(recorded(x, force, time), inputs=("position",))
-    assert "in 2000 rows in which the tool waits, the force differs from the model" in str(model.verdict)
-    assert "changes with time at a constant position (relaxation, creep or drift)" in str(model.verdict)
+    assert "in 2000 rows that are not fitted (2000 wait in contact) the force differs" in str(model.verdict)
+    assert "(relaxation, creep or drift)" in str(model.verdict)
     assert model.slope_bounds is not None
     assert max(np.abs(model.slope_bounds)) < 200.0
 
@@ -144,7 +144,7 @@ def test_measured_relaxation_is_named(stretch: str) -> None:
     waits = model.notes["roles"]["wait in contact"]
     assert waits > 0.8 * len(recording)
     assert model.verdict.level == "usable"
-    assert f"{waits + model.notes['roles'].get('wait in air', 0)} rows in which the tool waits" in str(
+    assert f"{waits + model.notes['roles'].get('wait in air', 0)} rows that are not fitted" in str(
         model.verdict
     )
     assert "relaxation, creep or drift" in str(model.verdict)
