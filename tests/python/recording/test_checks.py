@@ -323,6 +323,28 @@ def test_rows_that_wait_do_not_hide_a_second_zero() -> None:
     assert len(zero_sentences(np.concatenate([np.zeros(3000), x]), np.concatenate([wait, f]))) == 1
 
 
+def slow_then_fast() -> palpate.Recording:
+    """Returns three slow cycles of a damped spring, then six cycles at four times the speed."""
+    knots = np.r_[np.arange(0.0, 24.1, 4.0), 24.0 + np.arange(1.0, 12.1)]
+    time = np.arange(0.0, knots[-1], 0.01)
+    x = np.interp(time, knots, 5e-3 * (np.arange(len(knots)) % 2))
+    f = 200.0 * x + 40.0 * np.gradient(x, time) + np.random.default_rng(0).normal(0.0, 3e-3, len(x))
+    return palpate.Recording.from_arrays(x, f, time, units={"position": "m", "force": "N"})
+
+
+def test_a_force_that_changes_with_the_speed_is_not_called_another_object() -> None:
+    recording = slow_then_fast()
+    (sentence,) = (each.sentence for each in quality_findings(recording) if "near row" in each.sentence)
+    assert "two objects" not in sentence
+    assert re.search(r"0.005 m at 0.0012\d* m/s before it, 0.005 m at 0.00\d+ m/s after it", sentence)
+
+
+def test_a_force_that_the_velocity_explains_has_not_changed() -> None:
+    model = palpate.identify(slow_then_fast())
+    assert model.damping is not None
+    assert model.verdict.level == "good"
+
+
 def test_each_check_has_its_own_function_and_uses_its_thresholds() -> None:
     assert len({check.defect for check in CHECKS}) == len({check.findings for check in CHECKS}) == len(CHECKS)
     for check in CHECKS:

@@ -56,24 +56,30 @@ def verdict_of(
     rows = (
         "rows that were left out of the fit" if largest > network.nrmse else "the rows of the identification"
     )
-    findings += error_findings(largest, rows, "" if findings else _unexplained(network, recordings))
+    cure = ""
+    if not network.findings:
+        timed = all(each.time is not None for each in recordings)
+        directed = all(each.direction is not None for each in recordings)
+        more = _more_inputs(timed, directed)
+        cure = f". The force has noise or depends on more than {_inputs(network)}: {more}"
+    findings += error_findings(largest, rows, cure)
     return Verdict(tuple(dict.fromkeys(findings)))
 
 
-def _unexplained(network: FittedNetwork, recordings: Sequence[Recording]) -> str:
-    """Returns the cure for a large error without another finding; it names only what is not recorded yet."""
-    inputs = [
-        *network.inputs,
-        *(["direction"] if network.weight_hysteresis is not None else []),
-        *(["velocity"] if network.damping is not None else []),
-    ]
-    missing = "further inputs"
-    if any(each.time is None for each in recordings):
-        missing = f"time or {missing}"
-    return (
-        f". The force has noise or depends on more than {' and '.join(inputs)}: record {missing} as columns, "
-        "and identify different objects or places separately"
+def _inputs(network: FittedNetwork) -> str:
+    """Returns what the force of a network depends on, in words."""
+    directed = ["direction"] if network.weight_hysteresis is not None else []
+    moving = ["velocity"] if network.damping is not None else []
+    return " and ".join([*network.inputs, *directed, *moving])
+
+
+def _more_inputs(timed: bool, directed: bool) -> str:
+    """Returns the cure for a force that depends on more than the inputs of the model; it names only columns
+    that are not recorded yet."""
+    missing = (
+        ["further inputs"] if timed else ["time", *([] if directed else ["direction"]), "further inputs"]
     )
+    return f"record {' or '.join(missing)} as columns, and identify different objects or places separately"
 
 
 def wait_findings(best: Candidate) -> list[Finding]:
@@ -146,7 +152,8 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
         return []
     stroke = "" if best.side is None else (" of the release" if worst >= PLACES else " of the press")
     middle, unit = (worst % PLACES + 0.5) / PLACES, data.force_unit
-    reason = "the force there depends on more than position and direction, or on earlier motion"
+    more = _more_inputs(bool(data.parts), data.side is not None)
+    reason = f"the force there depends on more than {_inputs(best.network)}, such as earlier motion: {more}"
     if best.side is not None and nonnegative:
         loop = (
             2.0 * best.parts_at(np.array([[middle]]))[1][0]

@@ -72,7 +72,7 @@ def changed_force(
         usable(
             f"near row {split} the force at the same position and stroke changes by "
             f"{recording.file_unit('force').text(distance)}, {distance / spread:.0%} of its spread. The tool "
-            f"reaches {parts} after it: if these are alike, the object or its zero changed, else the force "
+            f"reaches {parts} after it: if these are equal, the object or its zero changed, else the force "
             "may depend on speed or depth. Identify each part separately with "
             f"--rows 0:{split} and --rows {split}:{len(recording)}"
         )
