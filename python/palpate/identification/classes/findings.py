@@ -50,7 +50,7 @@ def verdict_of(
     network: FittedNetwork, recordings: Sequence[Recording], side: Float1D | None = None
 ) -> Verdict:
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
-    of_motion = network.damping is not None or "velocity" in network.inputs or network.memory is not None
+    of_motion = network.damping is not None or network.memory is not None
     findings = [*findings_of(recordings, side, of_motion=of_motion), *network.findings]
     largest = max(network.nrmse, network.left_out_nrmse)
     rows = (
@@ -70,7 +70,8 @@ def _inputs(network: FittedNetwork) -> str:
     """Returns what the force of a network depends on, in words."""
     directed = ["direction"] if network.weight_hysteresis is not None else []
     moving = ["velocity"] if network.damping is not None else []
-    return " and ".join([*network.inputs, *directed, *moving])
+    relaxing = ["time"] if network.memory is not None else []
+    return " and ".join([*network.inputs, *directed, *moving, *relaxing])
 
 
 def _more_inputs(timed: bool, directed: bool) -> str:
