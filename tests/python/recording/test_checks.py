@@ -73,16 +73,6 @@ def test_a_force_of_zero_before_the_contact_is_not_clipped() -> None:
     assert sentences(Rows(x, f, None, None, {"position": "m", "force": "N"})) == []
 
 
-def test_a_stuck_position_is_reported_with_its_rows() -> None:
-    rows = rows_of("loop")
-    x = rows.x.copy()
-    x[300:400] = x[300]
-    found = sentences(replace(rows, x=x))
-    (stuck,) = [sentence for sentence in found if "position is constant" in sentence]
-    assert "is constant in rows 300 to 399, then jumps by" in stuck
-    assert "--rows 0:300 or --rows 400:1600" in stuck
-
-
 def test_a_pause_before_a_reversal_is_not_a_clipped_position() -> None:
     t = np.linspace(0.0, 1.0, 500)
     x = np.r_[t**0.5, np.ones(60), 1.0 - t**2]
@@ -255,10 +245,10 @@ def held(share: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("share", [0.05, 0.4])
-def test_a_hold_in_which_the_force_relaxes_is_not_a_stuck_or_clipped_sensor(share: float) -> None:
+def test_a_hold_in_which_the_force_relaxes_is_not_a_clipped_sensor(share: float) -> None:
     x, f = held(share)
     found = sentences(Rows(x, f, None, None, {"position": "m", "force": "N"}))
-    assert not [sentence for sentence in found if "stuck" in sentence or "clipped" in sentence]
+    assert not [sentence for sentence in found if "clipped" in sentence]
 
 
 def contact(friction: float = 0.0, pull: float = 0.0, noise: float = 2e-3) -> tuple[np.ndarray, np.ndarray]:

@@ -19,7 +19,7 @@ from .gaps import position_gaps
 from .parts import changed_force
 from .ranges import implausible_range
 from .recordings import scale_findings
-from .sensors import clipped_force, repeated_samples, stuck_position
+from .sensors import clipped_force, repeated_samples
 from .signs import mirrored_stroke, moved_zero, reversed_sign
 
 if TYPE_CHECKING:
@@ -72,12 +72,6 @@ CHECKS = (
         clipped_force,
         "a force sensor or converter at the end of its range; rounding alone repeats a value at most 3 times",
         {"positions": 3, "ratio": 5.0, "near_share": 0.1, "contact_share": 0.2},
-    ),
-    Check(
-        "stuck position",
-        stuck_position,
-        "a position sensor that stops, then jumps to where the tool has gone",
-        {"ratio": 5.0, "jump_ratio": 5.0},
     ),
     Check(
         "repeated samples",

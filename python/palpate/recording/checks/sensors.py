@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors that are clipped, stuck, or slower than the recorder."""
+"""Sensors that are clipped, or slower than the recorder."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from ..._typing import Float1D
 from ...verdict import Finding, usable
 from ..motion import TURN_STEPS
-from .cells import Checked, inner_range
+from .cells import Checked
 
 
 def clipped_force(
@@ -49,42 +49,6 @@ def clipped_force(
                 )
             )
     return found
-
-
-def stuck_position(checked: Checked, *, ratio: float, jump_ratio: float) -> list[Finding]:
-    """Returns a finding on a position that is constant, and then jumps.
-
-    Parameters
-    ----------
-    ratio : float
-        Least ratio of the number of rows with the constant position to the median number of rows with one
-        position [-].
-    jump_ratio : float
-        Least jump over the median change of position [-].
-    """
-    x, f, unit = checked.recording.position, checked.recording.force, checked.recording.file_unit("position")
-    step = np.diff(x)
-    if not step.any():
-        return []
-    usual = float(np.median(np.abs(step[step != 0.0])))
-    edges = np.r_[0, np.flatnonzero(step != 0.0) + 1, len(x)]
-    lengths = np.diff(edges)
-    for k in np.flatnonzero(lengths >= ratio * float(np.median(lengths))).tolist():
-        start, stop = int(edges[k]), int(edges[k + 1])
-        jump = abs(float(x[stop] - x[stop - 1])) if stop < len(x) else 0.0
-        # After a hold the tool moves on from where it is; a stuck sensor jumps to where it has gone.
-        jump -= abs(float(x[stop + 1] - x[stop])) if stop + 1 < len(x) else 0.0
-        if jump > jump_ratio * usual:
-            return [
-                usable(
-                    f"the position is constant in rows {start} to {stop - 1}, then jumps by "
-                    f"{unit.text(jump)}, while the force changes by "
-                    f"{checked.recording.file_unit('force').text(inner_range(f[start:stop]))}: "
-                    "the position sensor was probably stuck; use the rows before or after with --rows "
-                    f"0:{start} or --rows {stop}:{len(x)}"
-                )
-            ]
-    return []
 
 
 def repeated_samples(checked: Checked, *, regular_share: float, change_ratio: float) -> list[Finding]:
