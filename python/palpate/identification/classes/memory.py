@@ -34,10 +34,6 @@ SPLINES = (4, 6, 8, 11, 15, 20, 28)
 """Numbers of B-splines of the force at rest that are tried while branches and ratio are chosen. Few rows of a
 relaxation test determine the force at rest between its positions."""
 
-SETTLED = 0.8
-"""RMS error with a new weight of the curvature, divided by the error before, above which the weight is
-kept [-]."""
-
 CURVE_POINTS = 257
 """Number of positions at which the force at rest is passed on to its identification."""
 
@@ -62,10 +58,6 @@ LEAST_CORRELATION = 0.1
 errors included. A branch decays by at most 40 % in a sample interval, because two intervals must resolve it.
 Branches that explain the share LEAST_GAIN of the squared error therefore give a correlation of at least
 0.15."""
-
-CONTACT_SHARE = 0.02
-"""Share of the force range below which a tool that can leave the object has left it, after it was in contact
-[-]."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +94,7 @@ def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
             now = trial.value(rows, criterion)
             if now < value:
                 value, best = now, trial
-        if best is current and current.rms() > SETTLED * expected:
+        if best is current:
             break
     if best.shape is None:
         return best
@@ -177,13 +169,8 @@ class Recorded:
     def _motion(self, part: Recording, step: int) -> Motion:
         assert part.time is not None
         time, position, force = part.time[::step], part.position[::step], part.force[::step]
-        used = np.ones(len(force), dtype=bool)
-        if self.contact:
-            level = CONTACT_SHARE * float(np.ptp(force))
-            touched = np.maximum.accumulate(force > 2.0 * level)
-            used = ~(touched & (force < level))
         box = np.clip((position - self.lower) / self.travel, 0.0, 1.0)
-        return Motion(time, box, force / self.spread, used)
+        return Motion(time, box, force / self.spread)
 
     @cached_property
     def log_tau(self) -> tuple[float, float]:
