@@ -38,6 +38,8 @@ from bench.studies import count, markdown_table, measured_data, write_results
 import palpate
 from palpate import InputError, Model, Recording
 from palpate.baselines import comparable
+from palpate.recording import checks
+from palpate.recording.checks import Check
 from palpate.recording.motion import strokes_from_order, velocity
 from palpate.verdict import Finding
 from palpate.verification.metrics import normalised, root_mean_square
@@ -184,6 +186,17 @@ def constant(function: str, name: str, value: float, place: str = "") -> Rule:
     return Rule(f"{name} {getattr(home, name):g}, not {value:g}", module, attribute, without)
 
 
+def without_check(check: Check) -> Rule:
+    """Returns the rule that a check of the recording is one of `CHECKS`."""
+    others = tuple(other for other in checks.CHECKS if other is not check)
+
+    def without(*given: Any, **named: Any) -> Any:
+        with patch.object(checks, "CHECKS", others):
+            return checks.findings_of(*given, **named)
+
+    return Rule(f"check: {check.defect}", f"{CLASSES}.findings", "findings_of", without)
+
+
 CHECKS = "recording.checks"
 
 DATA, CLASSES, SEARCH = (f"identification.{folder}" for folder in ("data", "classes", "search"))
@@ -217,7 +230,7 @@ RULES = (
     Rule("damping is fitted again", f"{CLASSES}.model_selection", "MOST_DYNAMIC_SELECTIONS", 1),
     Rule("spread of the speeds", f"{CLASSES}.dynamics", "LEAST_SPEED_SPREAD", 0.0),
     Rule("error on rows left out", f"{CLASSES}.findings", "left_out_nrmse", _zero),
-    Rule("checks of the recording", f"{CLASSES}.findings", "findings_of", _no_findings),
+    *map(without_check, checks.CHECKS),
     Rule("check of waits", f"{CLASSES}.findings", "wait_findings", _no_findings),
     Rule("check of places", f"{CLASSES}.findings", "place_findings", _no_findings),
     Rule("force near the recorded forces", f"{CLASSES}.class_selection", "FORCE_MARGIN", 1e9),

@@ -234,7 +234,7 @@ class Recording:
 
     @property
     def verdict(self) -> Verdict:
-        """Verdict on the quality of the recording: clipped or stuck sensors, gaps, wrong signs or units."""
+        """Verdict on the quality of the recording: clipped or slow sensors, gaps, wrong signs or units."""
         (kept,), *_ = informative([self])
         return Verdict(tuple(quality_findings(kept)))
 

@@ -192,18 +192,22 @@ class ClassSelection:
             f"error from {unit.interval(free.rmse, rmse)}."
         )
         nonnegative = self.options.hysteresis_nonnegative and free.strokes is not None
-        above = crossing(free.problem, free.solution) if nonnegative else None
-        if above is None:
+        if not nonnegative or not (above := self.above_press(free)):
             return note
-        lower, reach, position = float(self.data.lower[0]), float(self.data.reach[0]), self.data.position_unit
         late = ""
         if crosses_where_steep(free.problem, free.solution):
             late = " The force may be recorded late: try --force-late-s."
-        return (
-            f"{note} Without this constraint release is up to {unit.text(above.height)} above press at "
-            f"{position.interval(lower + reach * above.start, lower + reach * above.end)}; a passive "
-            f"object cannot do that.{late}"
-        )
+        return f"{note} Without this constraint {above}; a passive object cannot do that.{late}"
+
+    def above_press(self, free: Candidate) -> str:
+        """Returns how far release is above press in a candidate without constraints, and where; an empty text
+        if the difference is small."""
+        above = crossing(free.problem, free.solution)
+        if above is None:
+            return ""
+        lower, reach = float(self.data.lower[0]), float(self.data.reach[0])
+        places = self.data.position_unit.interval(lower + reach * above.start, lower + reach * above.end)
+        return f"release is up to {self.data.force_unit.text(above.height)} above press at {places}"
 
     def bounds(self, problem: SeparableProblem) -> list[Bound]:
         """Returns the constraints that the options require."""

@@ -12,6 +12,7 @@ from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.checks import findings_of
 from ...recording.motion import noise_band
+from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, FORCE_JND, Finding, Verdict, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import period_notes
@@ -28,13 +29,6 @@ deviation of the force [-]."""
 
 UNFIT_NRMSE = 0.5
 """NRMSE above which a model is unfit: it leaves a quarter of the force's variance unexplained [-]."""
-
-
-MORE_INPUTS = (
-    ". The force has noise or depends on more than the inputs: record time, direction or further inputs as "
-    "columns, and identify different objects or places separately"
-)
-"""Cure for a large error on the rows of the identification."""
 
 
 def error_findings(nrmse: float, rows: str, cure: str = "") -> list[Finding]:
@@ -56,24 +50,50 @@ def verdict_of(
     network: FittedNetwork, recordings: Sequence[Recording], side: Float1D | None = None
 ) -> Verdict:
     """Returns the verdict on an identified network; `side` (n,) is the direction of all rows."""
-    findings = [*findings_of(recordings, side, relaxes=network.memory is not None), *network.findings]
+    of_motion = network.damping is not None or network.memory is not None
+    findings = [*findings_of(recordings, side, of_motion=of_motion), *network.findings]
     largest = max(network.nrmse, network.left_out_nrmse)
     rows = (
         "rows that were left out of the fit" if largest > network.nrmse else "the rows of the identification"
     )
-    findings += error_findings(largest, rows, MORE_INPUTS)
+    cure = ""
+    if not network.findings:
+        timed = all(each.time is not None for each in recordings)
+        directed = all(each.direction is not None for each in recordings)
+        more = _more_inputs(timed, directed)
+        cure = f". The force has noise or depends on more than {_inputs(network)}: {more}"
+    findings += error_findings(largest, rows, cure)
     return Verdict(tuple(dict.fromkeys(findings)))
+
+
+def _inputs(network: FittedNetwork) -> str:
+    """Returns what the force of a network depends on, in words."""
+    directed = ["direction"] if network.weight_hysteresis is not None else []
+    moving = ["velocity"] if network.damping is not None else []
+    relaxing = ["time"] if network.memory is not None else []
+    return " and ".join([*network.inputs, *directed, *moving, *relaxing])
+
+
+def _more_inputs(timed: bool, directed: bool) -> str:
+    """Returns the cure for a force that depends on more than the inputs of the model; it names only columns
+    that are not recorded yet."""
+    missing = (
+        ["further inputs"] if timed else ["time", *([] if directed else ["direction"]), "further inputs"]
+    )
+    return f"record {' or '.join(missing)} as columns, and identify different objects or places separately"
 
 
 def wait_findings(best: Candidate) -> list[Finding]:
     """Returns a finding if the force at rows that are not fitted differs much from the model.
 
-    Between press and release any force is possible, and a position within its noise.
+    Between press and release any force is possible, and a position within its noise. Relaxation, creep and
+    drift are named only if the force changes after the first of successive rows.
     """
     data = best.data
-    if data.fitted.all() or best.error.spread == 0.0:
+    unused = np.flatnonzero(~data.fitted)
+    if not len(unused) or best.error.spread == 0.0:
         return []
-    box, force, band = data.box[~data.fitted], data.force[~data.fitted], noise_band(data.path[:, 0])
+    box, force, band = data.box[unused], data.force[unused], noise_band(data.path[:, 0])
     low, high = np.full(len(force), np.inf), np.full(len(force), -np.inf)
     for shift in (-band, 0.0, band):
         near = np.clip(box + shift, 0.0, 1.0)
@@ -83,12 +103,20 @@ def wait_findings(best: Candidate) -> list[Finding]:
     error = float(np.sqrt(np.mean(outside**2)))
     if error <= USABLE_NRMSE * best.error.spread:
         return []
+    begins = np.diff(unused, prepend=-2) > 1
+    change = float(np.sqrt(np.mean((force - force[begins][np.cumsum(begins) - 1]) ** 2)))
+    reason = f"from the first row of each wait on it changes by {data.force_unit.text(change)}"
+    if 2.0 * change > error:
+        record = "" if data.parts else "record time, so that a memory can be identified, or "
+        reason += (
+            " (relaxation, creep or drift), which a model of position does not show. Cure: "
+            f"{record}use the model only while the tool moves"
+        )
+    counts = counts_text(role_counts(data.roles[unused]))
     return [
         usable(
-            f"in {len(force)} rows in which the tool waits, the force differs from the model by "
-            f"{data.force_unit.text(error)} RMS: it changes with time at a constant position (relaxation, "
-            "creep or drift), which a model of position does not show. Cure: record time, so that a memory "
-            "can be identified, or use the model only while the tool moves"
+            f"in {len(force)} rows that are not fitted ({counts}) the force differs from the model by "
+            f"{data.force_unit.text(error)} RMS; {reason}"
         )
     ]
 
@@ -104,9 +132,9 @@ MOST_JND = 2.0
 """Mean residual of a place above which a hand feels a wrong force there [just noticeable differences]."""
 
 
-def place_findings(best: Candidate) -> list[Finding]:
+def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     """Returns a finding on the place at which the mean force of the rows differs most from the model, if a
-    hand feels the difference."""
+    hand feels the difference. `nonnegative` is True if the hysteresis h of the model must not be below 0."""
     rows = np.flatnonzero(best.error.weight > 0.0)
     if len(best.data.names) > 1 or not len(rows):
         return []
@@ -118,28 +146,48 @@ def place_findings(best: Candidate) -> list[Finding]:
         np.bincount(group, values, 2 * PLACES) / count for values in (residual, data.force[rows], residual**2)
     )
     error = np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count - 1, 1))
-    jnd = np.maximum(FORCE_JND * np.abs(force), FORCE_FLOOR * float(np.abs(data.force[rows]).max()) or 1.0)
+    jnd = np.maximum(FORCE_JND * np.abs(force), _floor(best) or 1.0)
     noticed = np.where(count > 2, (np.abs(mean) - PLACE_ERRORS * error) / jnd, 0.0)
     worst = int(np.argmax(noticed))
     if noticed[worst] <= MOST_JND:
         return []
     stroke = "" if best.side is None else (" of the release" if worst >= PLACES else " of the press")
-    at = float(data.lower[0] + data.reach[0] * (worst % PLACES + 0.5) / PLACES)
+    middle, unit = (worst % PLACES + 0.5) / PLACES, data.force_unit
+    more = _more_inputs(bool(data.parts), data.side is not None)
+    reason = f"the force there depends on more than {_inputs(best.network)}, such as earlier motion: {more}"
+    if best.side is not None and nonnegative:
+        loop = (
+            2.0 * best.parts_at(np.array([[middle]]))[1][0]
+            + mean[worst % PLACES]
+            - mean[worst % PLACES + PLACES]
+        )
+        if loop < 0.0:
+            reason = (
+                f"release is {unit.text(-float(loop))} above press, which the model excludes. If the force "
+                "was recorded late, give --force-late-s; for a latch or a stored spring, "
+                "--no-hysteresis-nonnegative"
+            )
     return [
         usable(
-            f"at {data.position_unit.text(at)}{stroke} the rows differ from the model by "
-            f"{data.force_unit.text(abs(float(mean[worst])))} on average, {noticed[worst]:.2g} just "
-            "noticeable differences: the force there depends on more than position and direction, or on "
-            "earlier motion"
+            f"at {data.position_unit.text(float(data.lower[0] + data.reach[0] * middle))}{stroke} the rows "
+            f"differ from the model by {unit.text(abs(float(mean[worst])))} on average, "
+            f"{noticed[worst]:.2g} just noticeable differences: {reason}"
         )
     ]
 
 
+def _floor(best: Candidate) -> float:
+    """Returns the smallest just noticeable difference of the force of the rows [force]."""
+    return FORCE_FLOOR * float(np.abs(best.data.force[best.error.weight > 0.0]).max(initial=0.0))
+
+
 def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     """Returns a finding if growth ended at max_wavelets although neighbouring residuals are still
-    correlated."""
+    correlated, and a hand feels the error."""
     limit = options.max_wavelets
     if best.stop_reason != "max_wavelets" or not best.problem.structured(best.solution):
+        return []
+    if best.error.rmse <= _floor(best) and not place_findings(best, nonnegative=False):
         return []
     return [
         usable(
@@ -161,7 +209,13 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         positions = data.lower[0] + data.reach[0] * data.path[:, 0]
         note, of_period = period_notes(positions, data.period, data.position_unit.si)
         notes, findings = [*notes, note], findings + of_period
-    findings += report.findings + limit_findings(best, options) + wait_findings(best) + place_findings(best)
+    findings += wait_findings(best)
+    # One cause of an error hides the others.
+    findings += (
+        report.findings
+        or limit_findings(best, options)
+        or place_findings(best, options.hysteresis_nonnegative)
+    )
     band, checked = band_with_check(best)
     below = options.below
     if below == "auto":

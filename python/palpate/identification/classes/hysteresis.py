@@ -25,7 +25,7 @@ from .findings import USABLE_NRMSE
 
 REPORTED_ERROR_RATIO = 2.0
 """Ratio of the RMS error with the constraint hysteresis h >= 0 to the RMS error without this constraint,
-above which a finding or a note names a cure [-]."""
+above which a finding names a cure [-]."""
 
 FIRST_MAX_WAVELETS = 4
 """Largest number of wavelets that a network with hysteresis has before the play radius is searched for the
@@ -197,9 +197,13 @@ class Hysteresis(ModelClass):
     def _report_sign(self, best: Candidate, kept: Candidate, free: Candidate) -> None:
         """Reports a cure if the constraint h >= 0 raises the error much: the opposite sign of a column, or no
         constraint."""
-        if kept.rmse <= REPORTED_ERROR_RATIO * free.rmse:
+        if (
+            kept.rmse <= REPORTED_ERROR_RATIO * free.rmse
+            or best.rmse <= USABLE_NRMSE * self._selection.spread
+        ):
             return
-        spread, report = self._selection.spread, self._selection.report
+        spread = self._selection.spread
+        where = self._selection.above_press(free) or "on a part of the loop"
         cost = f"NRMSE {kept.rmse / spread:.3g} with press >= release, {free.rmse / spread:.3g} without"
         turned = self._turned_rmse(free)
         if turned < math.sqrt(kept.rmse * free.rmse):
@@ -217,12 +221,8 @@ class Hysteresis(ModelClass):
                 f"the opposite sign of the recorded force does not help (NRMSE {turned / spread:.3g}). The "
                 "object may release stored energy, as a latch does: give --no-hysteresis-nonnegative"
             )
-        sentence = f"hysteresis gains energy on a part of the loop ({cost}); {cure}"
-        if best.rmse > USABLE_NRMSE * spread:
-            report.sign_findings.append(usable(sentence))
-            report.findings.append(usable(sentence))
-        else:
-            report.notes.append(sentence)
+        sentence = f"hysteresis gains energy: {where} ({cost}); {cure}"
+        self._selection.report.findings[:] = [usable(sentence)]
 
     def _turned_rmse(self, free: Candidate) -> float:
         """Returns the RMS error with the constraint h <= 0, which is h >= 0 for the opposite sign of the

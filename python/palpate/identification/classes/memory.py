@@ -18,6 +18,8 @@ from ..._core.model import ForceModel, wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording import Recording
 from ...recording.motion import FORCE_RESOLUTION
+from ...recording.roles import Role, roles_of
+from ...verdict import Finding, usable
 from ..decision import Decision, decided, lowered, squared_error_change
 from ..network.fitted import FittedMemory, FittedNetwork
 from ..options import IdentifyOptions
@@ -31,10 +33,6 @@ used."""
 SPLINES = (4, 6, 8, 11, 15, 20, 28)
 """Numbers of B-splines of the force at rest that are tried while branches and ratio are chosen. Few rows of a
 relaxation test determine the force at rest between its positions."""
-
-SETTLED = 0.8
-"""RMS error with a new weight of the curvature, divided by the error before, above which the weight is
-kept [-]."""
 
 CURVE_POINTS = 257
 """Number of positions at which the force at rest is passed on to its identification."""
@@ -60,10 +58,6 @@ LEAST_CORRELATION = 0.1
 errors included. A branch decays by at most 40 % in a sample interval, because two intervals must resolve it.
 Branches that explain the share LEAST_GAIN of the squared error therefore give a correlation of at least
 0.15."""
-
-CONTACT_SHARE = 0.02
-"""Share of the force range below which a tool that can leave the object has left it, after it was in contact
-[-]."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +94,7 @@ def grown(recorded: Recorded, options: IdentifyOptions) -> Choice:
             now = trial.value(rows, criterion)
             if now < value:
                 value, best = now, trial
-        if best is current and current.rms() > SETTLED * expected:
+        if best is current:
             break
     if best.shape is None:
         return best
@@ -175,13 +169,8 @@ class Recorded:
     def _motion(self, part: Recording, step: int) -> Motion:
         assert part.time is not None
         time, position, force = part.time[::step], part.position[::step], part.force[::step]
-        used = np.ones(len(force), dtype=bool)
-        if self.contact:
-            level = CONTACT_SHARE * float(np.ptp(force))
-            touched = np.maximum.accumulate(force > 2.0 * level)
-            used = ~(touched & (force < level))
         box = np.clip((position - self.lower) / self.travel, 0.0, 1.0)
-        return Motion(time, box, force / self.spread, used)
+        return Motion(time, box, force / self.spread)
 
     @cached_property
     def log_tau(self) -> tuple[float, float]:
@@ -340,6 +329,10 @@ def better_with_memory(
         n_parameters=n_parameters,
         rmse=error,
         nrmse=nrmse,
+        rmse_of_all=error,
+        left_out_nrmse=float(np.sqrt(held_out.mean())),
+        residuals=fit.n_rows,
+        findings=tuple(_undetermined(found, recordings)),
         path=found.path + network.path,
         decisions=(*found.decisions, decision),
         notes=(
@@ -348,6 +341,18 @@ def better_with_memory(
             f"found: {', '.join(f'{tau:.3g}' for tau in np.sort(np.exp(refined.log_tau)))} s.",
         ),
     )
+
+
+def _undetermined(found: FittedNetwork, recordings: Sequence[Recording]) -> Iterator[Finding]:
+    """Yields a finding if neither pauses nor different speeds show whether the force depends on time."""
+    for decision in found.decisions:
+        constant = decision.model_class == "damping" and decision.outcome == "not tested"
+        if constant and not any((roles_of(part) == Role.HOLD).any() for part in recordings):
+            yield usable(
+                "the rows do not show whether the force relaxes with time or depends on earlier motion, as "
+                f"friction and plasticity do: the tool never waits in contact, and {decision.reason}, or a "
+                "pause in contact"
+            )
 
 
 def _refused(found: FittedNetwork, reason: str) -> FittedNetwork:

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from ..._core.model import ForceModel, stretches
 from ..._typing import Float1D, Float2D
@@ -65,8 +64,6 @@ class Motion:
     time: Float1D
     position: Float1D
     force: Float1D
-    used: NDArray[np.bool_]
-    """(n,) False after the tool has left the object"""
 
 
 @dataclass(frozen=True)
@@ -164,8 +161,8 @@ class MemoryFit:
         self, motions: Sequence[Motion], resting: Resting, least: float, rms: float = np.inf
     ) -> None:
         self.motions, self.least = motions, least
-        columns = np.concatenate([resting(m.position[m.used]) for m in motions])
-        self._force = np.concatenate([m.force[m.used] for m in motions])
+        columns = np.concatenate([resting(m.position) for m in motions])
+        self._force = np.concatenate([m.force for m in motions])
         self.n_rows = len(self._force)
         bends = (
             np.diff(resting(np.linspace(0.0, 1.0, ROUGHNESS_POINTS)), 2, axis=0) * (ROUGHNESS_POINTS - 1) ** 2
@@ -185,18 +182,18 @@ class MemoryFit:
         return padded - self._space @ (self._space.T @ padded)
 
     def columns(self, shape: Shape) -> Float2D:
-        """Returns the force of each branch at stiffness 1, at the used rows of all motions."""
+        """Returns the force of each branch at stiffness 1, at the rows of all motions."""
         ratio = shape.ratio.network
         tau = np.exp(shape.log_tau)
         parts = []
         for motion in self.motions:
             coordinate = np.asarray(ratio.energy(motion.position))[:, None]
-            found = stretches(motion.time, coordinate, tau)[motion.used, 0]
-            parts.append(np.asarray(ratio.force(motion.position[motion.used]))[:, None] * found)
+            found = stretches(motion.time, coordinate, tau)[:, 0]
+            parts.append(np.asarray(ratio.force(motion.position))[:, None] * found)
         return np.concatenate(parts)
 
     def residual(self, shape: Shape) -> Float1D:
-        """Returns force minus fitted force at the used rows, then the weighted curvature of the fitted force
+        """Returns force minus fitted force at the rows, then the weighted curvature of the fitted force
         at rest."""
         free = self._free(self.columns(shape))
         return self._target - free @ _nonnegative(free, self._target)
@@ -237,7 +234,7 @@ class MemoryFit:
         return float(self._target @ self._target)
 
     def error(self, shape: Shape | None) -> Float1D:
-        """Returns force minus fitted force at the used rows; without branches for None."""
+        """Returns force minus fitted force at the rows; without branches for None."""
         return (self._target if shape is None else self.residual(shape))[: self.n_rows]
 
     def independent(self, shape: Shape | None) -> float:
@@ -263,9 +260,7 @@ class MemoryFit:
         """
         columns = np.concatenate([self._resting[: self.n_rows], self.columns(shape)], axis=1)
         columns /= np.linalg.norm(columns, axis=0) + np.finfo(float).tiny
-        section = np.concatenate(
-            [(np.arange(len(m.time)) // SECTION_ROWS % FOLDS)[m.used] for m in self.motions]
-        )
+        section = np.concatenate([np.arange(len(m.time)) // SECTION_ROWS % FOLDS for m in self.motions])
         residual = self.error(shape)
         errors = []
         for fold in np.unique(section):

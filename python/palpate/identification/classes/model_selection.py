@@ -26,9 +26,6 @@ from .repeatability import no_finer_than_repeats
 MOST_DYNAMIC_SELECTIONS = 2
 """Number of times that the model is selected again, each time with better values of damping and mass."""
 
-MOST_CORRELATION_ESTIMATES = 5
-"""Largest number of times that the correlation of the noise of successive rows is estimated."""
-
 LEAST_INDEPENDENT_SHARE = 0.02
 """Least share of the rows that count as independent if the noise of successive rows is correlated [-]. With a
 smaller share the residual is not noise but memory or drift."""
@@ -70,7 +67,7 @@ def correlated_noise(first: ClassSelection) -> ClassSelection:
     least = (FORCE_RESOLUTION * float(np.ptp(data.force))) ** 2 + np.finfo(float).tiny
     found = []
     current = first
-    for _ in range(MOST_CORRELATION_ESTIMATES):
+    while True:
         best, limits = current.best, current.data.limits
         residual = (data.force[rows] - best.force_at(rows))[used[rows]]
         found.append((innovation_deviance(residual, best.n_parameters, least), current))
@@ -180,8 +177,7 @@ class Velocity(ModelClass):
             return below
         over_both_inputs = [f"Over position and velocity: {decision}." for decision in both.report.decisions]
         report.notes += [*over_both_inputs, *both.report.notes]
-        report.findings = [*report.sign_findings, *both.report.findings]
-        report.sign_findings = both.report.sign_findings
+        report.findings += both.report.findings
         return both.best
 
 

@@ -333,8 +333,7 @@ class Report:
     notes: list[str] = field(default_factory=list)
     """Sentences on imposed constraints, with the rise of the error by them, and on unused rows"""
     findings: list[Finding] = field(default_factory=list)
-    sign_findings: list[Finding] = field(default_factory=list)
-    """Findings on a wrong sign of position or force"""
+    """Findings on a release force above the press force"""
 
     def replaces(self, other: Report, note: str) -> None:
         """Puts the tested networks of the replaced model selection `other`, and the reason for its
@@ -348,7 +347,7 @@ class Report:
         self.path += other.path
         self.decisions += other.decisions
         self.notes += [note, *other.notes]
-        self.findings, self.sign_findings = other.findings, other.sign_findings
+        self.findings = other.findings
 
 
 class Samples:

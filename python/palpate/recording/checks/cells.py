@@ -41,8 +41,8 @@ class Checked:
     """Recording to check, with the facts that several checks need."""
 
     recording: Recording
-    relaxes: bool = False
-    """True if the model has a memory: the force may change at the same position"""
+    of_motion: bool = False
+    """True if the model has damping or a memory: the force may change at the same position"""
 
     @cached_property
     def lower(self) -> float:
@@ -90,8 +90,6 @@ class CellRows:
     """(m,) mean force of the press, at m rising positions where both strokes have rows"""
     release: Float1D
     """(m,) mean force of the release at these positions"""
-    loop_error: Float1D
-    """(m,) standard error of each force difference in `loop`"""
 
     @property
     def loop(self) -> Float1D:
@@ -116,21 +114,19 @@ def cell_rows(recording: Recording) -> CellRows | None:
     used = np.maximum(count, 1)
     mean_x, mean_f = np.bincount(cell, x, 2 * cells) / used, np.bincount(cell, f, 2 * cells) / used
     residual = np.zeros_like(f)
-    curves: list[tuple[Float1D, Float1D, Float1D]] = []
+    curves: list[tuple[Float1D, Float1D]] = []
     for rows, of in ((~release, slice(0, cells)), (release, slice(cells, None))):
         compared = count[of] >= LEAST_COMPARED_ROWS
         curve = mean_x[of][compared], mean_f[of][compared]
         if compared.any():
             residual[rows] = f[rows] - np.interp(x[rows], *curve)
-        scatter = np.bincount(cell, residual**2, 2 * cells)[of][compared]
-        curves.append((*curve, np.sqrt(scatter) / count[of][compared]))
-    (press_x, press_f, press_error), (release_x, release_f, release_error) = curves
-    press, released, error = np.empty(0), np.empty(0), np.empty(0)
+        curves.append(curve)
+    (press_x, press_f), (release_x, release_f) = curves
+    press, released = np.empty(0), np.empty(0)
     if len(press_x) and len(release_x):
         shared = (release_x >= press_x[0]) & (release_x <= press_x[-1])
         press, released = np.interp(release_x, press_x, press_f)[shared], release_f[shared]
-        error = np.hypot(np.interp(release_x, press_x, press_error), release_error)[shared]
-    return CellRows(row, cell, place - at, residual, cells, press, released, error)
+    return CellRows(row, cell, place - at, residual, cells, press, released)
 
 
 def sides(recording: Recording) -> NDArray[np.int8]:

@@ -3,11 +3,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..._typing import Float1D, Float2D
 from ...verdict import Finding, usable
 from .cells import LEAST_COMPARED_ROWS, Checked
+
+if TYPE_CHECKING:
+    from ..recording import Recording
 
 
 def changed_force(
@@ -28,7 +34,7 @@ def changed_force(
         Largest distance of the mean positions of the parts in a position cell that is compared [cells].
     """
     recording, cells = checked.recording, checked.cells
-    if cells is None or checked.relaxes:
+    if cells is None or checked.of_motion:
         return []
     total, spread = float(np.sum(cells.residual**2)), float(np.std(recording.force))
     if not total > 0.0 or not spread > 0.0:
@@ -60,11 +66,24 @@ def changed_force(
     if explained[best] < explained_share * total or distance < distance_share * spread:
         return []
     split = (best + 1) * len(recording) // blocks
+    moving = np.split(cells.row, [np.searchsorted(cells.row, split)])
+    parts = " before it, ".join(_motion(recording, rows) for rows in moving)
     return [
         usable(
             f"near row {split} the force at the same position and stroke changes by "
-            f"{recording.file_unit('force').text(distance)}, {distance / spread:.0%} of its spread. The file "
-            "probably holds two objects or two zeros, or the object changed (drift, settling): identify "
-            f"each part separately with --rows 0:{split} and --rows {split}:{len(recording)}"
+            f"{recording.file_unit('force').text(distance)}, {distance / spread:.0%} of its spread. The tool "
+            f"reaches {parts} after it: if these are equal, the object or its zero changed, else the force "
+            "may depend on speed or depth. Identify each part separately with "
+            f"--rows 0:{split} and --rows {split}:{len(recording)}"
         )
     ]
+
+
+def _motion(recording: Recording, rows: NDArray[np.intp]) -> str:
+    """Returns the largest position of some rows and, with time, their median speed, as text."""
+    unit = recording.file_unit("position")
+    deepest = unit.text(float(recording.position[rows].max()))
+    if recording.time is None:
+        return deepest
+    speed = np.abs(np.gradient(recording.position, recording.time))[rows]
+    return f"{deepest} at {unit.text(float(np.median(speed)))}/s"

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -14,43 +15,40 @@ Bounds = tuple[float, float]
 
 
 def implausible_range(
-    checked: Checked,
-    *,
-    travels: Mapping[str, Bounds],
-    forces: Mapping[str, Bounds],
-    microscope_travel: float,
-    microscope_forces: Bounds,
+    checked: Checked, *, travels: Mapping[str, Bounds], microscope_travel: float, microscope_force: float
 ) -> list[Finding]:
-    """Returns findings on an implausible travel or force range. Unstated units are not checked.
+    """Returns findings on an implausible travel, and on a large force over a tiny travel. Unstated units are
+    not checked.
 
     Parameters
     ----------
-    travels, forces
-        Least and largest plausible range by unit: from a microscope tip to an arm or 50 revolutions.
+    travels
+        Least and largest plausible travel by unit: from a microscope tip to an arm or 50 revolutions.
     microscope_travel : float
         Travel below which the recording is taken to be from a force microscope [m].
-    microscope_forces : (float, float)
-        Least and largest plausible range of its force [N].
+    microscope_force : float
+        Largest plausible range of its force [N].
     """
-    recording = checked.recording
+    recording, travel = checked.recording, checked.travel
     position, force = recording.file_unit("position"), recording.file_unit("force")
-    microscope = position.si == "m" and force.si == "N" and checked.travel < microscope_travel
-    of_force = microscope_forces if microscope else forces.get(force.si)
-    if force.si == "N" and position.si != "m":
-        of_force = None
-    found = []
-    for role, value, unit, bounds in (
-        ("travel", checked.travel, position, travels.get(position.si)),
-        ("range of the force", float(np.ptp(recording.force)), force, of_force),
+    low, high = travels.get(position.si, (0.0, math.inf))
+    of_force = float(np.ptp(recording.force))
+    if 0.0 < travel < low or travel > high:
+        side, bound = ("below", low) if travel < low else ("above", high)
+        seen = f"travel is {position.text(travel)}, {side} {position.text(bound)}"
+    elif (
+        (position.si, force.si) == ("m", "N")
+        and 0.0 < travel < microscope_travel
+        and of_force > microscope_force
     ):
-        if bounds is None or value == 0.0 or bounds[0] <= value <= bounds[1]:
-            continue
-        side, bound = ("below", bounds[0]) if value < bounds[0] else ("above", bounds[1])
-        over = "" if role == "travel" else f" over a travel of {position.text(checked.travel)}"
-        found.append(
-            usable(
-                f"the {role} is {unit.text(value)}{over}, {side} {unit.text(bound)}: the unit of "
-                "position or force is probably wrong; name the right one with --units"
-            )
+        seen = (
+            f"range of the force is {force.text(of_force)} over a travel of {position.text(travel)}, above "
+            f"{force.text(microscope_force)}"
         )
-    return found
+    else:
+        return []
+    return [
+        usable(
+            f"the {seen}: the unit of position or force is probably wrong; name the right one with --units"
+        )
+    ]

@@ -51,9 +51,6 @@ LARGEST_EXPLAINED_DIFFERENCE = 0.1
 It is computed after the change of unit, and divided by the force's standard deviation.
 """
 
-ONE_STROKE_SHARE = 0.99
-"""A recording with at least this share of its moving rows in one direction holds only that stroke."""
-
 PRESS_ABOVE_SHARE = 0.9
 """Share of positions at which the press force must exceed the release force, for one object with hysteresis.
 
@@ -90,9 +87,7 @@ class _Strokes:
         """
         signs = sides(recording) if side is None else side
         into, out = signs > 0, signs < 0
-        moving = max(int(np.count_nonzero(into | out)), 1)
-        shares = float(np.count_nonzero(into)) / moving, float(np.count_nonzero(out)) / moving
-        direction = 1 if shares[0] >= ONE_STROKE_SHARE else -1 if shares[1] >= ONE_STROKE_SHARE else 0
+        direction = int(into.any()) - int(out.any())
         rows = {0: np.ones(len(recording), dtype=bool), 1: into, -1: out}
         return _Strokes(direction, {key: _curve(recording, at) for key, at in rows.items() if at.any()})
 

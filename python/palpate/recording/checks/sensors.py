@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors that are clipped, stuck, or slower than the recorder."""
+"""Sensors that are clipped, or slower than the recorder."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 from ..._typing import Float1D
 from ...verdict import Finding, usable
 from ..motion import TURN_STEPS
-from .cells import Checked, inner_range
+from .cells import Checked
 
 
 def clipped_force(
-    checked: Checked, *, rows: int, positions: int, ratio: float, near_share: float, contact_share: float
+    checked: Checked, *, positions: int, ratio: float, near_share: float, contact_share: float
 ) -> list[Finding]:
     """Returns findings on a largest or least force that occurs in many rows.
 
     Parameters
     ----------
-    rows, positions : int
-        Least number of rows with this force, and of their positions: a tool at rest has one.
+    positions : int
+        Least number of positions of the rows with this force: a tool at rest has one.
     ratio : float
         Least ratio of the rows with this force to those with any near force [-].
     near_share : float
@@ -34,7 +34,7 @@ def clipped_force(
     found = []
     for value, name in ((float(f.max()), "largest"), (float(f.min()), "least")):
         at = np.flatnonzero(f == value)
-        if abs(value) < contact_share * float(np.abs(f).max()) or len(at) < rows:
+        if abs(value) < contact_share * float(np.abs(f).max()):
             continue
         near = f[(np.abs(f - value) <= near_share * float(np.ptp(f))) & (f != value)]
         most_near = np.unique(near, return_counts=True)[1].max(initial=1)
@@ -51,53 +51,7 @@ def clipped_force(
     return found
 
 
-def stuck_position(
-    checked: Checked, *, rows: int, ratio: float, jump_ratio: float, force_share: float, noise_ratio: float
-) -> list[Finding]:
-    """Returns a finding on a position that is constant while the force changes, and then jumps.
-
-    Parameters
-    ----------
-    rows : int
-        Least number of rows with the constant position.
-    ratio : float
-        Least ratio of this number to the median number of rows with one position [-].
-    jump_ratio : float
-        Least jump over the median change of position [-].
-    force_share, noise_ratio : float
-        Least change of the force, over its range and over its noise [-].
-    """
-    x, f, unit = checked.recording.position, checked.recording.force, checked.recording.file_unit("position")
-    step = np.diff(x)
-    if not step.any():
-        return []
-    usual = float(np.median(np.abs(step[step != 0.0])))
-    noise = float(np.median(np.abs(np.diff(f)))) / 0.954
-    bound = max(force_share * float(np.ptp(f)), noise_ratio * noise)
-    edges = np.r_[0, np.flatnonzero(step != 0.0) + 1, len(x)]
-    lengths = np.diff(edges)
-    for k in np.flatnonzero(lengths >= max(float(rows), ratio * float(np.median(lengths)))).tolist():
-        start, stop = int(edges[k]), int(edges[k + 1])
-        jump = abs(float(x[stop] - x[stop - 1])) if stop < len(x) else 0.0
-        # After a hold the tool moves on from where it is; a stuck sensor jumps to where it has gone.
-        jump -= abs(float(x[stop + 1] - x[stop])) if stop + 1 < len(x) else 0.0
-        change = inner_range(f[start:stop])
-        if jump > jump_ratio * usual and change > bound:
-            return [
-                usable(
-                    f"the position is constant in rows {start} to {stop - 1}, then jumps by "
-                    f"{unit.text(jump)}, while the force changes by "
-                    f"{checked.recording.file_unit('force').text(change)}: "
-                    "the position sensor was probably stuck; use the rows before or after with --rows "
-                    f"0:{start} or --rows {stop}:{len(x)}"
-                )
-            ]
-    return []
-
-
-def repeated_samples(
-    checked: Checked, *, regular_share: float, change_ratio: float, change_share: float, pause_rows: int
-) -> list[Finding]:
+def repeated_samples(checked: Checked, *, regular_share: float, change_ratio: float) -> list[Finding]:
     """Returns findings if position or force changes only once in several rows: a repeated, slower sensor.
 
     If both columns repeat, rows repeat, which are used once.
@@ -108,16 +62,12 @@ def repeated_samples(
         Least share of the rows in runs of equal values whose length is a multiple of the commonest one [-].
     change_ratio : float
         Least ratio of the number of changes of the other column to that of the repeated column [-].
-    change_share : float
-        Least standard deviation of the change between two new forces, over that of the force [-].
-    pause_rows : int
-        A value that is constant in as many rows is a pause.
     """
     recording = checked.recording
     x, f, period = recording.position, recording.force, recording.sample_period
     rows = {
-        "position": _held_for(x, regular_share, pause_rows),
-        "force": _held_for(f, regular_share, pause_rows),
+        "position": _held_for(x, regular_share),
+        "force": _held_for(f, regular_share),
     }
     moved = np.abs(np.diff(x))[np.diff(x) != 0.0]
     if len(moved) and np.median(moved) <= TURN_STEPS * moved.min():
@@ -127,8 +77,6 @@ def repeated_samples(
     for name, other in (("force", "position"), ("position", "force")):
         count = rows[name]
         if count < 2 or count == rows[other] or changes[other] < change_ratio * changes[name]:
-            continue
-        if not np.std(f[count:] - f[:-count]) > change_share * np.std(f):
             continue
         lag, late = (count - 1) / 2.0, ""
         if name == "force" and period is not None:
@@ -143,10 +91,9 @@ def repeated_samples(
     return found
 
 
-def _held_for(values: Float1D, regular_share: float, pause_rows: int) -> int:
+def _held_for(values: Float1D, regular_share: float) -> int:
     """Returns the number of rows for which a column usually keeps one value; 1 if it is irregular."""
     lengths = np.diff(np.flatnonzero(np.diff(values)) + 1)
-    lengths = lengths[lengths < pause_rows]
     if len(lengths) < 4:
         return 1
     rows = np.bincount(lengths) * np.arange(lengths.max() + 1)

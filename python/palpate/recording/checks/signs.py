@@ -17,18 +17,15 @@ if TYPE_CHECKING:
     from ..recording import Recording
 
 
-def reversed_sign(
-    checked: Checked, *, same_sign_share: float, least_loop_share: float, least_loop_errors: float
-) -> list[Finding]:
+def reversed_sign(checked: Checked, *, same_sign_share: float, least_loop_share: float) -> list[Finding]:
     """Returns findings on a reversed direction, release force above press force, and falling force.
 
     Parameters
     ----------
     same_sign_share : float
         Share of the positions with the sign of the mean of press minus release force, for a hysteresis [-].
-    least_loop_share, least_loop_errors : float
-        Least mean of press minus release force, over the standard deviation of the force and over the
-        standard error of this mean [-].
+    least_loop_share : float
+        Least mean of press minus release force, over the standard deviation of the force [-].
     """
     recording = checked.recording
     signs = recording.direction
@@ -48,8 +45,7 @@ def reversed_sign(
     cells, is_loop, x, f = checked.cells, False, recording.position, recording.force
     if cells is not None and len(cells.loop) >= 4:
         mean = float(np.mean(cells.loop))
-        error = float(np.sqrt(np.mean(cells.loop_error**2) / len(cells.loop)))
-        large = abs(mean) > max(least_loop_errors * error, least_loop_share * float(np.std(f)))
+        large = abs(mean) > least_loop_share * float(np.std(f))
         is_loop = large and float(np.mean(np.sign(cells.loop) == np.sign(mean))) >= same_sign_share
     if is_loop and mean < 0.0:
         lag_s = _lag_of(recording, -mean)
@@ -60,7 +56,8 @@ def reversed_sign(
             usable(
                 f"on average the force on release is {recording.file_unit('force').text(-mean)} above that "
                 "on press; a passive object cannot do that. If a sign is reversed, give --negate force or "
-                f"--negate position{late}; for a latch or a stored spring, --no-hysteresis-nonnegative"
+                f"--negate position{late}; for a latch or a stored spring, --no-hysteresis-nonnegative; if "
+                "the zero of the force moved, record again"
             )
         ]
     if cells is not None:  # a wait repeats one position and its force

@@ -127,10 +127,42 @@ def test_relaxation_is_named_and_gives_no_steep_slope() -> None:
     x, force, time = relaxation()
     assert palpate.identify(recorded(x, force, time)).fit.model_class == "memory"
     model = palpate.identify(recorded(x, force, time), inputs=("position",))
-    assert "in 2000 rows in which the tool waits, the force differs from the model" in str(model.verdict)
-    assert "changes with time at a constant position (relaxation, creep or drift)" in str(model.verdict)
+    assert "in 2000 rows that are not fitted (2000 wait in contact) the force differs" in str(model.verdict)
+    assert "(relaxation, creep or drift)" in str(model.verdict)
     assert model.slope_bounds is not None
     assert max(np.abs(model.slope_bounds)) < 200.0
+
+
+def test_waits_in_which_the_force_is_constant_are_not_called_relaxation() -> None:
+    """Ten places of different stiffness are pressed and held in one file."""
+    random = np.random.default_rng(2)
+    press, stiffness = np.r_[np.linspace(0.0, 1.0, 100), np.ones(100)], random.uniform(0.6, 1.4, 10)
+    x = np.tile(np.r_[press, press[::-1]], 10)
+    force = x * np.repeat(stiffness, 400) + random.normal(0.0, 0.003, len(x))
+    for time in (None, 0.01 * np.arange(len(x))):
+        verdict = str(palpate.identify(recorded(x, force, time)).verdict)
+        assert "rows that are not fitted" in verdict
+        assert "relaxation" not in verdict
+
+
+def test_an_error_that_a_hand_does_not_feel_requires_no_more_wavelets() -> None:
+    x = sweep(2000)
+    rendered = palpate.identify(recorded(x, wall(x)), max_wavelets=4)
+    assert rendered.fit.stop_reason == "max_wavelets"
+    assert rendered.fit.nrmse < 0.01
+    assert rendered.verdict.level == "good"
+
+
+def test_release_above_press_at_a_place_is_not_called_another_input() -> None:
+    x = np.tile(np.r_[sweep(800), sweep(800)[::-1]], 3)
+    side = np.tile(np.repeat([1.0, -1.0], 800), 3)
+    above = 0.3 * np.exp(-(((x - 0.1) / 0.008) ** 2))
+    force = 2.0 * x + 0.02 * side + np.where(side < 0.0, above, 0.0) + 0.1 * noise(len(x))
+    recording = palpate.Recording.from_arrays(x, force, direction=side)
+    (reason,) = palpate.identify(recording).verdict.reasons
+    assert "release is 0.2" in reason
+    assert "--no-hysteresis-nonnegative" in reason
+    assert "depends on more" not in reason
 
 
 @pytest.mark.full
@@ -144,7 +176,7 @@ def test_measured_relaxation_is_named(stretch: str) -> None:
     waits = model.notes["roles"]["wait in contact"]
     assert waits > 0.8 * len(recording)
     assert model.verdict.level == "usable"
-    assert f"{waits + model.notes['roles'].get('wait in air', 0)} rows in which the tool waits" in str(
+    assert f"{waits + model.notes['roles'].get('wait in air', 0)} rows that are not fitted" in str(
         model.verdict
     )
     assert "relaxation, creep or drift" in str(model.verdict)

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter1d
 import palpate
 from conftest import sampled
 from palpate import Model, Recording
-from palpate._core.model import Memory, play
+from palpate._core.model import Memory, play, stretches
 from palpate.planning import hand_for, rig_for
 from palpate.planning.simulation import holding_hand
 
@@ -201,6 +201,40 @@ def test_small_forces_and_offsets_do_not_change_the_branches() -> None:
     # the band and its check belong to the model without memory
     assert model.band is None
     assert not any("left out of the fit" in note for note in model.notes["identification"])
+
+
+def test_a_tissue_that_a_hand_presses_and_leaves_gets_a_memory() -> None:
+    """The force is zero in air, and the tissue relaxes there as well."""
+    time = 0.01 * np.arange(2000)
+    speed = 1.0 + 0.4 * np.sin(0.5 * time)
+    depth = 0.48 - 0.52 * np.cos(2.0 * np.pi * 0.5 * 0.01 * np.cumsum(speed))
+    pressed = np.maximum(depth, 0.0)
+    elastic = pressed + 1.5 * pressed**2
+    relaxing = stretches(time, elastic[:, None], np.array([0.8]))[:, 0, 0]
+    force = np.where(depth > 0.0, np.maximum(elastic + 0.6 * relaxing, 0.0), 0.0)
+    model = palpate.identify(depth, with_noise(force, 0.005), time=time)
+    assert model.memory is not None
+    assert model.fit.nrmse < 0.05
+    assert model.verdict.level == "good"
+
+
+def test_plasticity_at_one_speed_is_not_stated_to_be_relaxation() -> None:
+    """Cycles of growing depth at one speed, without a pause: time and motion cannot be separated."""
+    turns = np.stack([np.zeros(7), np.linspace(0.3, 1.0, 7)], axis=1).ravel()
+    way = np.r_[0.0, np.cumsum(np.abs(np.diff(turns)))]
+    time = np.arange(0.0, way[-1], way[-1] / 3500)
+    x = np.interp(time, way, turns)
+    springs = sum((x - play(x, radius)) / radius for radius in (0.02, 0.05, 0.1, 0.2, 0.4))
+    force = with_noise(0.5 * x + 0.1 * springs, 0.003)
+    model = palpate.identify(x, force, time=time)
+    assert model.memory is not None
+    (reason,) = (each for each in model.verdict.reasons if "relaxes with time" in each)
+    assert "depends on earlier motion" in reason
+    assert "speed was nearly constant" in reason
+    assert reason.endswith("record slow and fast strokes, or a pause in contact")
+    # both errors are those of the recorded rows, not of the curve of the force at rest
+    assert model.notes["error_rows"] == len(x)
+    assert model.notes["left_out_nrmse"] < 1.5 * model.fit.nrmse
 
 
 def test_an_identified_memory_is_planned_saved_and_verified(tmp_path: Path) -> None:
