@@ -42,7 +42,7 @@ DIRECTION_CURE = (
 
 @dataclass(frozen=True)
 class Strokes:
-    """Directions of all rows of all recordings, as far as they are known."""
+    """Directions of the rows of all recordings, or why they are not known."""
 
     side: Float1D | None = None
     """(n,) +1 into the object, -1 out of it, 0 neither; None if the recordings do not state it"""
