@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <latch>
 #include <string>
 #include <thread>
 
@@ -130,10 +131,16 @@ TEST_F(GrowingFileTest, KeepsAnInterruptedRecordingIfTheRunIsRefused) {
     EXPECT_EQ(text("a.csv.part"), "cut off\n");
 }
 
-TEST_F(GrowingFileTest, RemovesAnEmptyPartOfAKilledRun) {
+TEST_F(GrowingFileTest, UsesAnEmptyPartWithoutAWriter) {
     put("a.csv.part", "");
+    const std::ifstream created{file("a.csv.part")};  // as another run that has not locked the file yet
+    struct stat before{};
+    struct stat after{};
+    ASSERT_EQ(stat(file("a.csv.part").c_str(), &before), 0);
     GrowingFile growing;
     ASSERT_EQ(growing.open(file("a.csv")), "");
+    ASSERT_EQ(stat(file("a.csv.part").c_str(), &after), 0);
+    EXPECT_EQ(before.st_ino, after.st_ino);
     EXPECT_EQ(growing.interrupted_name(), "");
     EXPECT_EQ(growing.finish(), "");
     EXPECT_FALSE(there("a.csv.1.part"));
@@ -143,8 +150,13 @@ TEST_F(GrowingFileTest, OfTwoRunsThatStartTogetherExactlyOneWrites) {
     for (int round = 0; round < 200; ++round) {
         std::array<GrowingFile, 2> runs;
         std::array<std::string, 2> reasons;
+        std::latch both{2};
         {
-            std::jthread other{[&] { reasons[1] = runs[1].open(file("a.csv")); }};
+            std::jthread other{[&] {
+                both.arrive_and_wait();
+                reasons[1] = runs[1].open(file("a.csv"));
+            }};
+            both.arrive_and_wait();
             reasons[0] = runs[0].open(file("a.csv"));
         }
         ASSERT_EQ((reasons[0].empty() ? 1 : 0) + (reasons[1].empty() ? 1 : 0), 1) << reasons[0] << reasons[1];

@@ -196,25 +196,54 @@ class GrowingFile {
 
   private:
     /// Creates and locks NAME.part. Returns the reason if that is not possible.
+    ///
+    /// The run that holds the lock of an empty file owns it, also if another run has just created the file.
     [[nodiscard]] std::string create_part() {
-        // Between two tries another run can finish its recording, or remove the file that it found empty.
+        // Between two tries another run can finish its recording, or rename an interrupted one.
         for (int tries = 3; tries > 0; --tries) {
-            descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-            if (descriptor_ >= 0) {
-                // On a file system without locks no other program writes the recording either, because of O_EXCL.
-                (void)::flock(descriptor_, LOCK_EX);
-                if (detail::is_path_of(part(), descriptor_)) {
-                    copy_mode();
-                    return "";
-                }
-                close();
-            } else if (errno != EEXIST) {
+            constexpr int flags = O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK;
+            descriptor_ = ::open(part().c_str(), O_WRONLY | O_CREAT | O_EXCL | flags, 0666);
+            const bool is_new = descriptor_ >= 0;
+            if (!is_new && errno != EEXIST) {
                 return name_ + " cannot be written: " + detail::reason_of(errno);
-            } else if (std::string reason = clear_interrupted(); !reason.empty()) {
+            }
+            for (const int access : {O_WRONLY, O_RDONLY}) {  // an interrupted recording can be read-only
+                descriptor_ = descriptor_ < 0 ? ::open(part().c_str(), access | flags) : descriptor_;
+            }
+            if (descriptor_ < 0 && errno != ENOENT) {
+                return part() + " cannot be replaced: " + detail::reason_of(errno);
+            }
+            std::string reason = descriptor_ < 0 ? "" : owned(is_new);
+            if (descriptor_ >= 0 || !reason.empty()) {
                 return reason;
             }
         }
         return name_ + " cannot be written: other runs create " + part() + " again and again";
+    }
+
+    /// Locks the open NAME.part. Closes it if it belongs to another run, and returns the reason, or if it has been
+    /// moved: an interrupted recording is renamed to a free name here.
+    [[nodiscard]] std::string owned(bool is_new) {
+        std::string reason;
+        struct stat about{};
+        // On a file system without locks no other program writes a new file either, because of O_EXCL.
+        if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0 && (errno == EWOULDBLOCK || !is_new)) {
+            reason =
+                errno == EWOULDBLOCK
+                    ? part() + " is being written by another run; choose another name, or wait for its end"
+                    : part() +
+                          " may belong to another run, because this file system has no locks; choose "
+                          "another name, or rename it";
+        } else if (detail::is_path_of(part(), descriptor_) && ::fstat(descriptor_, &about) == 0) {
+            if (about.st_size == 0 && S_ISREG(about.st_mode) &&
+                (::fcntl(descriptor_, F_GETFL) & O_ACCMODE) == O_WRONLY) {
+                copy_mode();
+                return "";
+            }
+            reason = rename_to_first_free_name();
+        }
+        close();
+        return reason;
     }
 
     /// Gives the new file the owner and the mode of the file that it will replace.
@@ -265,35 +294,6 @@ class GrowingFile {
     [[nodiscard]] static std::size_t whole_lines(std::string_view written) noexcept {
         const std::size_t end = written.rfind('\n');
         return end == std::string_view::npos ? 0 : end + 1;
-    }
-
-    /// Renames a NAME.part that no program is writing to a free name, or removes it if it is empty. Returns the reason
-    /// if NAME.part cannot be renamed or may belong to another run.
-    [[nodiscard]] std::string clear_interrupted() {
-        const int there = ::open(part().c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
-        if (there < 0) {
-            return errno == ENOENT ? "" : part() + " cannot be replaced: " + detail::reason_of(errno);
-        }
-        std::string reason;
-        struct stat about{};
-        if (::flock(there, LOCK_EX | LOCK_NB) != 0) {
-            reason =
-                errno == EWOULDBLOCK
-                    ? part() + " is being written by another run; choose another name, or wait for its end"
-                    : part() +
-                          " may belong to another run, because this file system has no locks; choose "
-                          "another name, or rename it";
-        } else if (detail::is_path_of(part(),
-                                      there)) {  // false: another run has just renamed NAME.part
-            if (::fstat(there, &about) == 0 && about.st_size == 0) {
-                // A run that has created the file and waits for its lock sees that the file is gone and tries again.
-                (void)::unlink(part().c_str());
-            } else {
-                reason = rename_to_first_free_name();
-            }
-        }
-        ::close(there);
-        return reason;
     }
 
     /// Renames NAME.part to the first free name of NAME.1.part, NAME.2.part, ... Returns the reason if that fails.
