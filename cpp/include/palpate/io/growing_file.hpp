@@ -207,13 +207,17 @@ class GrowingFile {
             if (!is_new && errno != EEXIST) {
                 return name_ + " cannot be written: " + detail::reason_of(errno);
             }
-            for (const int access : {O_WRONLY, O_RDONLY}) {  // an interrupted recording can be read-only
-                descriptor_ = descriptor_ < 0 ? ::open(part().c_str(), access | flags) : descriptor_;
+            if (!is_new) {
+                descriptor_ = ::open(part().c_str(), O_WRONLY | flags);
+            }
+            const bool is_writable = descriptor_ >= 0;
+            if (!is_writable) {  // an interrupted recording can be read-only
+                descriptor_ = ::open(part().c_str(), O_RDONLY | flags);
             }
             if (descriptor_ < 0 && errno != ENOENT) {
                 return part() + " cannot be replaced: " + detail::reason_of(errno);
             }
-            std::string reason = descriptor_ < 0 ? "" : owned(is_new);
+            std::string reason = descriptor_ < 0 ? "" : owned(is_new, is_writable);
             if (descriptor_ >= 0 || !reason.empty()) {
                 return reason;
             }
@@ -223,7 +227,7 @@ class GrowingFile {
 
     /// Locks the open NAME.part. Closes it if it belongs to another run, and returns the reason, or if it has been
     /// moved: an interrupted recording is renamed to a free name here.
-    [[nodiscard]] std::string owned(bool is_new) {
+    [[nodiscard]] std::string owned(bool is_new, bool is_writable) {
         std::string reason;
         struct stat about{};
         // On a file system without locks no other program writes a new file either, because of O_EXCL.
@@ -235,8 +239,7 @@ class GrowingFile {
                           " may belong to another run, because this file system has no locks; choose "
                           "another name, or rename it";
         } else if (detail::is_path_of(part(), descriptor_) && ::fstat(descriptor_, &about) == 0) {
-            if (about.st_size == 0 && S_ISREG(about.st_mode) &&
-                (::fcntl(descriptor_, F_GETFL) & O_ACCMODE) == O_WRONLY) {
+            if (is_writable && about.st_size == 0 && S_ISREG(about.st_mode)) {
                 copy_mode();
                 return "";
             }
