@@ -289,5 +289,5 @@ def test_a_printed_model_states_its_verdict_first() -> None:
     lines = str(unsorted_model).splitlines()
     assert lines[0] == "verdict: usable"
     assert lines[1].startswith("  the NRMSE on rows that were left out of the fit is")
-    assert "record time, direction" in lines[1]
+    assert "record time or direction" in lines[1]
     assert unsorted_model.verdict.level == "usable"
