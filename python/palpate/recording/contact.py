@@ -50,6 +50,7 @@ def contact_at(position: Float1D, force: Float1D) -> float:
     contact = float(position[order[first + int(np.argmax(met))]])
     # There is no air if the force changes along it, or may change as much as behind it.
     x = position[order[:of_air]] - position[order[:of_air]].mean()
-    significant = SIGNIFICANT_STANDARD_ERRORS * noise * math.sqrt(x @ x)
-    behind = 0.5 * (x @ x) * float(np.abs(force - air[apart[0]]).max()) / (float(position.max()) - contact)
-    return contact if abs(x @ force[:of_air]) < min(significant, behind) else float(position.min())
+    trend, squared = float(np.abs(x @ force[:of_air])), float(x @ x)
+    behind, rise = float(position.max()) - contact, float(np.abs(force - air[apart[0]]).max())
+    is_air = trend < SIGNIFICANT_STANDARD_ERRORS * noise * math.sqrt(squared)
+    return contact if is_air and trend * behind < 0.5 * squared * rise else float(position.min())

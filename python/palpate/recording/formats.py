@@ -357,7 +357,6 @@ def _numpy(path: Path) -> Table:
 
 def _matlab(path: Path) -> Table:
     """Returns the vectors of a .mat file by name, fields of a structure included."""
-
     with readable(path, "MATLAB (.mat)"):
         stream: Any = io.BytesIO(_inflated(path))
         try:

@@ -96,6 +96,12 @@ def test_the_contact_is_where_the_force_leaves_its_noise() -> None:
     assert contact_at(x, np.full(len(x), 3.0)) == x[0]
 
 
+def test_a_contact_at_the_largest_position_is_found() -> None:
+    x = np.append(np.linspace(0.0, 4.0, 1000), np.full(40, 4.0))
+    f = np.append(np.zeros(1000), np.full(40, 5.0))
+    assert contact_at(x, f) == 4.0
+
+
 @pytest.mark.parametrize("rows", [10, 8, 7])
 def test_few_rows_all_move(rows: int) -> None:
     x = np.linspace(0.0, 1.0, rows)

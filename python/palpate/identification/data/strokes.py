@@ -45,9 +45,9 @@ class Strokes:
     """Directions of the rows of all recordings, or why they are not known."""
 
     side: Float1D | None = None
-    """(n,) +1 into the object, -1 out of it, 0 neither; None if the recordings do not state it"""
+    """(n,) +1 into the object, -1 out of it, 0 neither; None if it is not known, or only by `order`"""
     order: Float1D | None = None
-    """(n,) the same from the order of rows; None if `side` is known or the order shows no strokes"""
+    """(n,) the same of rows in the order of a motion; None if `side` is known or if there are no strokes"""
     in_order: bool = False
     """True if a play operator can follow the rows, which are in the order of a motion"""
     notes: tuple[str, ...] = ()
@@ -70,12 +70,12 @@ def strokes_of(recordings: Sequence[Recording]) -> Strokes:
     stated = stated_strokes(recordings)
     if stated.side is not None:
         return stated
-    found = [ordered_strokes(recording) for recording in recordings]
+    ordered = [ordered_strokes(recording) for recording in recordings]
     if stated.in_order:
-        return replace(stated, order=_all_of(found))
+        return replace(stated, order=_all_of(ordered))
     found = [
         direction if recording.direction is None else recording.direction
-        for recording, direction in zip(recordings, found, strict=True)
+        for recording, direction in zip(recordings, ordered, strict=True)
     ]
     known = [direction for direction in found if direction is not None]
     if len(known) < len(found):
@@ -87,6 +87,8 @@ def strokes_of(recordings: Sequence[Recording]) -> Strokes:
     if len(recordings) > 1:
         note += f" in {len(recordings)} recordings, " + _ways(recordings, known)
     if (side > 0).any() and (side < 0).any():
+        if _all_of(ordered) is None:  # the rows with a stated direction are in another order
+            return Strokes(side, notes=(f"{note}.",))
         return Strokes(order=side, in_order=True, notes=(f"{note}.",))
     press = _press(recordings)
     if press is None:

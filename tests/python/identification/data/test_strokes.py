@@ -261,3 +261,13 @@ def test_the_order_of_rows_gives_the_same_model_with_and_without_time() -> None:
     at, press = np.linspace(0.0, 4.0, 50), np.ones(50)
     assert timed.play_radius == ordered.play_radius
     assert (timed.force(at, direction=press) == ordered.force(at, direction=press)).all()
+
+
+def test_rows_with_a_stated_direction_in_another_order_are_not_followed_by_a_play_operator() -> None:
+    ordered = Recording.from_arrays(IN_AND_OUT, loop())
+    mixed = np.random.default_rng(0).permutation(len(IN_AND_OUT))
+    stated = Recording.from_arrays(IN_AND_OUT[mixed], loop()[mixed], direction=SIDE[mixed])
+    found = strokes_of([ordered, stated])
+    assert not found.in_order
+    assert found.side is not None
+    assert (found.side[len(IN_AND_OUT) :] == SIDE[mixed]).all()
