@@ -17,6 +17,7 @@ from ...verdict import FORCE_FLOOR, FORCE_JND, Finding, Verdict, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import period_notes
 from ..decision import latest
+from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate
@@ -181,6 +182,20 @@ def _floor(best: Candidate) -> float:
     return FORCE_FLOOR * float(np.abs(best.data.force[best.error.weight > 0.0]).max(initial=0.0))
 
 
+def _first_contact(best: Candidate, near_zero: float) -> float:
+    """Returns the position [box] at which the domain of a force that the tool can leave starts: 0, or the end
+    of a pull that no row shows. Between few rows before the contact a network can pull; its continuation
+    does not."""
+    data = best.data
+    pressed = data.box[data.fitted & (data.force > near_zero), 0]
+    position = np.linspace(0.0, float(pressed.min(initial=1.0)), COMPARED_POSITIONS)
+    middle, half = best.parts_at(position[:, None])
+    least = middle - np.abs(half)
+    if least.min() >= -_floor(best):
+        return 0.0
+    return float(position[min(int(np.flatnonzero(least < 0.0)[-1]) + 1, COMPARED_POSITIONS - 1)])
+
+
 def limit_findings(best: Candidate, options: IdentifyOptions) -> list[Finding]:
     """Returns a finding if growth ended at max_wavelets although neighbouring residuals are still
     correlated, and a hand feels the error."""
@@ -217,15 +232,18 @@ def identified(selection: ClassSelection) -> FittedNetwork:
         or place_findings(best, options.hysteresis_nonnegative)
     )
     band, checked = band_with_check(best)
-    below = options.below
+    below, lower = options.below, network.lower
     if below == "auto":
         force = data.force[data.reported]
         near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(force)))
-        pulls = float(np.partition(force, 1)[1]) < -near_zero  # in more than one row
-        below = "free" if single and data.period is None and not pulls else "linear"
+        leaves = single and data.period is None and not data.pulls(near_zero)
+        below = "free" if leaves else "linear"
+        if leaves:
+            lower = lower + data.reach[0] * _first_contact(best, near_zero)
     return replace(
         network,
         below=below,
+        lower=lower,
         rmse=error.rmse,
         nrmse=error.nrmse,
         rmse_of_all=best.error_on(None).rmse,

@@ -112,6 +112,20 @@ def test_a_force_within_the_recorded_ones_gives_no_finding() -> None:
     assert not any("between the rows" in reason for reason in model.verdict.reasons)
 
 
+def test_a_force_that_pulls_in_no_row_does_not_pull_between_them() -> None:
+    x = np.r_[-8e-5, np.linspace(0.0, 3e-3, 120)]
+    x = np.r_[x, x[::-1]]
+    side, share = np.repeat([1.0, -1.0], 121), np.maximum(x, 0.0) / 3e-3
+    button = (6.0 + 0.3 * side) * (1.0 - np.exp(-share / 0.02)) + 3.0 * share
+    click = 3.0 * np.exp(-(((share - 0.4) / 0.05) ** 2))
+    force = button - click + np.random.default_rng(3).normal(0.0, 0.03, len(x))
+    model = palpate.identify(palpate.Recording.from_arrays(x, force, direction=side))
+    before = np.linspace(-1e-4, 0.0, 101)
+    press, release = (model.force(before, direction=np.full(101, side)) for side in (1.0, -1.0))
+    assert min(press.min(), release.min()) > -0.1  # -1.01 N without the rule
+    assert model.force(-8e-5, direction=1.0) == pytest.approx(0.0, abs=0.05)
+
+
 DATA = Path(os.environ.get("PALPATE_DATA", "../shared/data"))
 
 
