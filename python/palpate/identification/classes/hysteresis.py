@@ -81,15 +81,19 @@ class Hysteresis(ModelClass):
         if data.side is not None:
             return self._of(below, HysteresisInput.of_strokes(data.side))
         play, of_order, basis = PlaySearch(selection.samples, selection.options), None, below.solution.basis
+        start = dict(selection.start_basis)
         if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()):
             # The direction can also change at once at a turn. Its wavelets show the radius better than those
             # without hysteresis.
             of_order = self._of(below, HysteresisInput(data.order, data.order != 0.0))
             basis = of_order.solution.basis
+            # Its wavelets would fit the rows after a turn at any radius.
+            selection.start_basis = start
         before, strokes = list(report.decisions), play.best_of_options(basis)
         of_play = None if strokes is None else self._of(below, strokes, play)
         if of_order is not None and (of_play is None or self._fits_better(of_order, of_play)):
             report.decisions[:] = before
+            selection.start_basis[self.name] = of_order.solution.basis
             return of_order
         if of_play is not None:
             return of_play
