@@ -74,6 +74,22 @@ class Verdict:
             )
         )
 
+    def require_use(self, name: str, better: str, *, accepted: bool) -> Verdict:
+        """Returns this verdict of a result that is going to be used. A "no" is refused, or if it is accepted
+        it becomes "usable". `better` is the cure, a sentence without its full stop.
+
+        Raises
+        ------
+        InputError
+            The verdict is "no" and is not accepted.
+        """
+        if self.level == "no" and not accepted:
+            raise InputError(
+                f"the verdict of {name} is no: {self.reasons[0]}. {better}, or give --accept-model to use "
+                "this one"
+            )
+        return self.accepted() if self.level == "no" else self
+
     def record(self) -> list[dict[str, str]]:
         """Returns the findings of the verdict as they are written to a model file."""
         return [{"level": finding.level, "sentence": finding.sentence} for finding in self.findings]

@@ -240,11 +240,16 @@ def _result(
 def _summary(
     plan: Plan, certificate: Certificate, device: DeviceProfile, written: Path | None
 ) -> dict[str, str]:
-    """Returns the summary of a plan: structure, needed device properties and certificate, one line each."""
-    rows = plan.summary()
+    """Returns the summary of a plan: structure, needed device properties and certificate, one line each.
+
+    After the verdict no it has only what fails."""
+    rows, refused = plan.summary(), plan.verdict.level == "no"
+    if refused and certificate.certified:
+        del rows["certificate"]
     _, damping, force = mechanical_units(device.position_unit)
     units = {"b": ("device damping", damping), "f_c": ("device friction", force)}
-    lines = () if certificate.refused else certificate.inequalities
+    lines = [] if certificate.refused else certificate.inequalities
+    lines = [line for line in lines if not (refused and line.holds)]
     # Of several inequalities on one device property, the last one, with the least margin, is printed.
     for line in sorted(lines, key=lambda each: -each.margin):
         name, unit = units.get(line.formula.split(" ")[0], ("", ""))
@@ -253,7 +258,7 @@ def _summary(
             rows[name] = f"{number(line.left)} {sign} needed {number(line.right)} {unit}: {judged}"
     if written is not None:
         rows["written"] = str(written)
-    elif plan.verdict.level == "no":
+    elif refused:
         rows["written"] = "nothing, because the verdict is no"
     else:
         rows["written"] = "nothing; -o OUT.json writes model and plan"

@@ -4,21 +4,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from .. import _core
 from .._core.device import DeviceProfile
 from .._core.model import fingerprint
 from .._core.portable import ExportCheck, ExportedModel, profile_checksum
-from .._core.rendering import Scheme
+from .._core.rendering import Scheme, default_play_radius
 from .._core.stability import Certificate, Inequality, with_force_error
 from ..errors import InputError, command_word
 from ..model import Model
 from ..planning import Plan, describe, mechanical_units
 from ..planning.plan import require_force
 from ..recording.units import unit_of
-from ..verdict import Finding, Verdict, no, usable
+from ..verdict import GOOD, Finding, Verdict, no, usable
 from .request import Request
 
 RANDOM_COUNTS = 20_000
@@ -41,6 +41,10 @@ class Exported:
     """Certificate of the plan, with the errors of the program as errors of the force"""
     units: tuple[str, str]
     """Units of position and force"""
+    plan: Plan | None = None
+    """Plan of the program, whose force error adds to the errors of the tables"""
+    of_plan: Verdict = GOOD
+    """Verdict of the plan"""
 
     @classmethod
     def of(cls, request: Request) -> Exported:
@@ -56,13 +60,22 @@ class Exported:
         model = request.model
         require_force(model)
         plan = None if model.plan is None else Plan.of(model)
+        of_plan = (
+            GOOD
+            if plan is None
+            else plan.verdict.require_use(
+                "the plan", "Plan the model for another device", accepted=request.accept_model
+            )
+        )
         certificate = None if plan is None else plan.certificate
         _require_certificate(certificate, request)
         device = None if certificate is None else certificate.device
         rendered = model if plan is None else plan.rendered
-        scheme = Scheme(structure="direct") if plan is None else plan.scheme
+        encoder_step = _encoder_step(device, request)
+        direct = Scheme(structure="direct", play_radius=default_play_radius(model, encoder_step))
+        scheme = direct if plan is None else plan.scheme
         numbers = {
-            "encoder_step": _encoder_step(device, request),
+            "encoder_step": encoder_step,
             "force_limit": _force_limit(device, request),
             "period_s": 0.0 if device is None else device.period_s,
         }
@@ -84,6 +97,8 @@ class Exported:
             fingerprint(rendered),
             certificate,
             units_of(model),
+            plan,
+            of_plan,
         )
 
     @property
@@ -139,8 +154,9 @@ class Exported:
 
     @property
     def verdict(self) -> Verdict:
-        """ "no" if a difference to the core exceeds its bound, usable without a certificate, else good."""
-        findings: list[Finding] = []
+        """ "no" if a difference to the core exceeds its bound, usable without a certificate, else that of the
+        plan."""
+        findings: list[Finding] = list(self.of_plan.findings)
         if not self.check.passed:
             worst = max(self.check.force, self.check.slope, self.check.energy, self.check.step)
             findings.append(
@@ -184,6 +200,11 @@ class Exported:
         )
 
     @property
+    def play_radius_text(self) -> str:
+        """Play radius of the hysteresis."""
+        return f"{self.model.play_radius:.4g} {self.position_unit}"
+
+    @property
     def limit_text(self) -> str:
         """Largest force of a step."""
         limit = self.model.force_limit
@@ -193,11 +214,13 @@ class Exported:
         """Returns the proved bounds of the errors for display, by name."""
         model = self.model
         return {
+            **({} if self.plan is None else {"error of plan": self.plan.force_error_text}),
             "force error": self.error_text(model.force_error, model.largest_force, self.force_unit),
             "slope error": self.error_text(model.slope_error, model.largest_slope, self.slope_unit),
             "step error": self.step_error_text(),
             **({"device friction": self.friction_text} if self.has_certificate else {}),
             "force limit": self.limit_text,
+            **({"play radius": self.play_radius_text} if self.model.hysteretic else {}),
         }
 
     def definitions(self) -> dict[str, str]:
@@ -217,6 +240,7 @@ class Exported:
             "rate_hz": self.rate_hz,
             "profile": self.profile,
             "fingerprint": self.fingerprint,
+            "plan_force_error": None if self.plan is None else asdict(self.plan.force_error),
             "force_error": model.force_error,
             "force_error_share": _share(model.force_error, model.largest_force),
             "slope_error": model.slope_error,
@@ -259,6 +283,14 @@ class Exported:
             f"Position for each count: {model.encoder_step:.9g} {self.position_unit}.\n"
             f"Force limit: {self.limit_text}.",
             self.certificate_text,
+            *(
+                []
+                if self.plan is None
+                else [
+                    "Force error of the plan for a hand at rest, in addition to the bounds below: "
+                    f"{self.plan.force_error_text}."
+                ]
+            ),
             "Proved bounds of the difference to the model inside its domain. They hold with and without "
             "contraction of products and sums (-ffp-contract).\n"
             f"force  {self.error_text(model.force_error, model.largest_force, self.force_unit)}\n"

@@ -255,15 +255,11 @@ class Model(ForceModel):
         InputError
             The verdict of the model is "no".
         """
-        if self.verdict.level != "no":
+        verdict = self.verdict.require_use(str(name), "Identify a better model", accepted=accepted)
+        if verdict == self.verdict:
             return self
-        if not accepted:
-            raise InputError(
-                f"the verdict of {name} is no: {self.verdict.reasons[0]}. Identify a better model, or give "
-                "--accept-model to use this one"
-            )
         content = self.to_dict()
-        content["notes"] = {**content["notes"], "verdict": self.verdict.accepted().record()}
+        content["notes"] = {**content["notes"], "verdict": verdict.record()}
         return Model.from_dict(content)
 
     @property

@@ -123,6 +123,17 @@ class Plan:
         return static_force_error(self.model, self.rendered, self.scheme)
 
     @property
+    def force_error_text(self) -> str:
+        """Largest force error, its place and its share of the force range, and the RMS value."""
+        error, units = self.force_error, self.model.units
+        if not error.largest:
+            return "none"
+        unit = units["force"] or "in the model's unit"
+        place = "" if error.at is None else f" at {error.at:.3g} {units['position'] or ''}".rstrip()
+        share = f"{_percent(error.share)} of the range"
+        return f"{error.largest:.3g} {unit}{place}, {share}; RMS {error.rms:.3g} {unit}"
+
+    @property
     def verdict(self) -> Verdict:
         """Verdict on the plan: on its certificate and its force error.
 
@@ -214,19 +225,12 @@ class Plan:
     def summary(self) -> dict[str, str]:
         """Returns the main properties of a plan with a certificate for display, by name."""
         assert self.certificate is not None
-        error, certificate = self.force_error, self.certificate
-        rows = {"structure": self.description}
-        unit = self.model.units["force"] or "in the model's unit"
+        certificate, rows = self.certificate, {"structure": self.description}
         slope, steepest = self.slopes_behind_coupling
         if slope < steepest:
             stiffness = self._units()["stiffness"]
             rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {slope:.4g}{stiffness}"
-        rows["force error"] = (
-            f"up to {error.largest:.4g} {unit}, {_percent(error.share)} of the force range; RMS "
-            f"{error.rms:.4g} {unit}"
-            if error.largest
-            else "none"
-        )
+        rows["force error"] = self.force_error_text
         rows["certificate"] = _CERTIFICATE[certificate.verdict]
         if not certificate.refused:
             rows["certificate"] += f", for up to {1e3 * certificate.longest_period_s:.4g} ms between samples"
@@ -409,6 +413,8 @@ class StaticForceError:
     """Largest force error divided by the range of the identified force [-]"""
     rms_share: float
     """RMS force error divided by the population standard deviation of the identified force [-]"""
+    at: float | None = None
+    """Position of the largest force error [m or rad]; None without a force error"""
 
 
 def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Scheme) -> StaticForceError:
@@ -430,7 +436,11 @@ def static_force_error(identified: ForceModel, rendered: ForceModel, scheme: Sch
     error = _at_rest(rendered, scheme, x) - wanted
     largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))
     return StaticForceError(
-        largest, rms, _share(largest, float(np.ptp(wanted)), wanted), _share(rms, float(wanted.std()), wanted)
+        largest,
+        rms,
+        _share(largest, float(np.ptp(wanted)), wanted),
+        _share(rms, float(wanted.std()), wanted),
+        float(x[np.abs(error).max(axis=0).argmax()]) if largest else None,
     )
 
 

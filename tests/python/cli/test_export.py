@@ -4,7 +4,7 @@
 import json
 import re
 import shlex
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,12 @@ import pytest
 import palpate
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import DeviceProfile, Model, Scheme
+from palpate._core.rendering import default_play_radius
 from palpate._core.stability import certify
 from palpate.cli.main import main
 from palpate.export import exported
 from palpate.model import model_file
+from palpate.planning import Plan
 
 
 @pytest.fixture
@@ -133,6 +135,47 @@ def test_every_header_limits_its_force(
         assert not header.exists()
     assert main(["export", str(planned), "--c", "-o", str(header)]) == 0
     assert macro(header.read_text(encoding="utf-8"), "knob_FORCE_LIMIT") == 5.0
+
+
+MODELS = Path(__file__).parents[2] / "models" / "good"
+
+
+def test_the_force_error_of_the_plan_stands_beside_that_of_the_program(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, header = MODELS / "plan_network_hysteresis.json", tmp_path / "limited.h"
+    error = Plan.of(palpate.load_model(model)).force_error
+    result = exported_json(capsys, "export", model, "--c", "-o", header)
+    assert result["plan_force_error"] == asdict(error)
+    assert "3.55 % of the force range" in str(result["verdict"])
+    text = "0.0547 N at 0.367 m, 3.55 % of the range; RMS 0.0497 N"
+    assert text in " ".join(header.read_text(encoding="utf-8").replace(" * ", " ").split())
+    identified, rendered = palpate.load_model(model), Plan.of(palpate.load_model(model)).rendered
+    change = max(
+        abs(rendered.force(error.at, direction=side) - identified.force(error.at, direction=side))
+        for side in (1.0, -1.0)
+    )
+    assert change == pytest.approx(error.largest)
+
+
+def test_a_plan_with_the_verdict_no_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model, header = MODELS / "certificate_stable.json", tmp_path / "soft.h"
+    assert main(["export", str(model), "--c", "--uncertified", "-o", str(header)]) == 2
+    refusal = capsys.readouterr().err
+    assert "the verdict of the plan is no: the force error is up to 0.586 N*m" in refusal
+    assert "Plan the model for another device, or give --accept-model" in refusal
+    assert not header.exists()
+
+
+def test_hysteresis_without_a_play_radius_is_exported_with_the_default_of_simulate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, header = MODELS / "hysteresis.json", tmp_path / "loop.h"
+    arguments = ["--uncertified", "--encoder-step", "1e-4", "--force-limit", "5"]
+    assert main(["export", str(model), "--c", "-o", str(header), *arguments]) == 0
+    radius = default_play_radius(palpate.load_model(model), 1e-4)
+    assert f"play radius  {radius:.4g} m\n" in capsys.readouterr().out
+    assert f"#define loop_PLAY_RADIUS {radius:g} " in header.read_text(encoding="utf-8")
 
 
 def friction_at_its_bound(model: Model, reserve: float, **changes: Any) -> DeviceProfile:

@@ -303,8 +303,10 @@ def better_with_memory(
         memory=recorded.memory(refined, stiffness),
         below="free" if recorded.contact else "linear",
     )
-    error = _error(network, recordings)
-    if recorded.contact and (other := _error(linear := replace(network, below="linear"), recordings)) < error:
+    error, findings = _error(network, recordings), list(_undetermined(found, recordings))
+    linear = replace(network, below="linear")
+    if recorded.contact and options.below == "auto" and (other := _error(linear, recordings)) < error:
+        findings.append(_pulls(recordings[0], recorded, other, error))
         network, error = linear, other
     nrmse = error / recorded.spread
     held_out = fit.held_out_errors(refined)
@@ -332,7 +334,7 @@ def better_with_memory(
         rmse_of_all=error,
         left_out_nrmse=float(np.sqrt(held_out.mean())),
         residuals=fit.n_rows,
-        findings=tuple(_undetermined(found, recordings)),
+        findings=tuple(findings),
         path=found.path + network.path,
         decisions=(*found.decisions, decision),
         notes=(
@@ -340,6 +342,17 @@ def better_with_memory(
             f"Time constants between {shortest:.2g} and {longest:.2g} s are resolved by the recordings; "
             f"found: {', '.join(f'{tau:.3g}' for tau in np.sort(np.exp(refined.log_tau)))} s.",
         ),
+    )
+
+
+def _pulls(recording: Recording, recorded: Recorded, linear: float, free: float) -> Finding:
+    """Returns the finding that the model pulls the tool where the object does not. `linear` and `free` are
+    the RMS errors of both continuations."""
+    position, force = recording.file_unit("position"), recording.file_unit("force")
+    return usable(
+        f"below {position.text(recorded.lower)} the model pulls the tool, which no row shows; do not retract "
+        f"further. With --below free it does not pull, and the RMS error is {force.text(free)} in place of "
+        f"{force.text(linear)}"
     )
 
 

@@ -215,7 +215,13 @@ def test_a_tissue_that_a_hand_presses_and_leaves_gets_a_memory() -> None:
     model = palpate.identify(depth, with_noise(force, 0.005), time=time)
     assert model.memory is not None
     assert model.fit.nrmse < 0.05
-    assert model.verdict.level == "good"
+    # A force that ends where the tool leaves would forget its branches there.
+    assert model.verdict.level == "usable"
+    assert "the model pulls the tool, which no row shows" in str(model.verdict)
+    assert len(model.verdict.reasons) == 1
+    free = palpate.identify(depth, with_noise(force, 0.005), time=time, below="free")
+    assert free.below == "free"
+    assert "pulls" not in str(free.verdict)
 
 
 def test_plasticity_at_one_speed_is_not_stated_to_be_relaxation() -> None:
