@@ -232,6 +232,7 @@ RULES = (
     Rule("error on rows left out", f"{CLASSES}.findings", "left_out_nrmse", _zero),
     *map(without_check, checks.CHECKS),
     Rule("check of waits", f"{CLASSES}.findings", "wait_findings", _no_findings),
+    Rule("check of drift", f"{CLASSES}.findings", "drift_findings", _no_findings),
     Rule("check of places", f"{CLASSES}.findings", "place_findings", _no_findings),
     Rule("force near the recorded forces", f"{CLASSES}.class_selection", "FORCE_MARGIN", 1e9),
     Rule("force may exceed the recorded forces", f"{CLASSES}.class_selection", "FORCE_MARGIN", 0.0),

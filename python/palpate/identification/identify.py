@@ -319,14 +319,13 @@ def _fitted(rows: Rows, options: IdentifyOptions) -> FittedNetwork:
     if found.weight_hysteresis is not None:
         return found
     # hysteresis was refused, so rows without a direction need not be left out
-    every_row = replace(rows, side=None, starts=None, parts=(), decisions=(), notes=(), findings=())
+    every_row = replace(rows, side=None, starts=None, parts=(), decisions=(), notes=())
     again = identified(select(every_row, options))
     return replace(
         again,
         path=found.path + again.path,
         decisions=latest(found.decisions + again.decisions)[0],
         notes=found.notes + again.notes,
-        findings=found.findings + again.findings,
     )
 
 

@@ -140,7 +140,7 @@ def test_every_header_limits_its_force(
 MODELS = Path(__file__).parents[2] / "models" / "good"
 
 
-def test_the_force_error_of_the_plan_stands_beside_that_of_the_program(
+def test_the_force_error_of_the_plan_is_written_with_that_of_the_program(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model, header = MODELS / "plan_network_hysteresis.json", tmp_path / "limited.h"

@@ -11,7 +11,7 @@ import numpy as np
 from ..._typing import Float1D
 from ...recording import Recording
 from ...recording.checks import findings_of
-from ...recording.motion import noise_band
+from ...recording.motion import noise_band, strokes_from_order
 from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, FORCE_JND, Finding, Verdict, no, usable
 from ..data.limits import neighbour_correlation
@@ -177,6 +177,43 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     ]
 
 
+def drift_findings(best: Candidate) -> list[Finding]:
+    """Returns a finding if the residual changes over the recording by more than a just noticeable difference,
+    between strokes in the same direction over the same place. One press and release cannot show this."""
+    data, direction = best.data, strokes_from_order(best.data.path[:, 0])
+    if len(data.names) > 1 or data.repeats is not None or direction is None:
+        return []
+    rows = np.flatnonzero((best.error.weight > 0.0) & (direction != 0))
+    stroke = np.cumsum(np.diff(direction[rows], prepend=0) != 0)
+    middle = (np.bincount(stroke, rows) / np.maximum(np.bincount(stroke), 1))[stroke] / len(data.force)
+    place = np.minimum((data.box[rows, 0] * PLACES).astype(np.intp), PLACES - 1)
+    group = place + PLACES * (direction[rows] < 0)
+
+    def within(values: Float1D) -> Float1D:
+        """Returns the values minus their mean in each place and direction."""
+        mean = np.bincount(group, values) / np.maximum(np.bincount(group), 1)
+        return np.asarray(values - mean[group])
+
+    moment, residual = within(middle), within(best.residual[rows])
+    if not (squares := float(moment @ moment)) > np.finfo(float).eps * len(rows):
+        return []
+    change = float(moment @ residual) / squares
+    noise = residual - change * moment
+    independent = max(1.0, len(rows) * (1.0 - max(neighbour_correlation(noise), 0.0)))
+    error = float(np.sqrt(noise @ noise / squares / independent))
+    excess, least = abs(change) - PLACE_ERRORS * error, _floor(best)
+    if excess <= least:
+        return []
+    return [
+        usable(
+            "from the first row to the last the force at the same position and stroke "
+            f"{'rises' if change > 0.0 else 'falls'} by {data.force_unit.text(abs(change))}, "
+            f"{excess / least:.2g} just noticeable differences: the zero of the force or the object changed. "
+            "Let both warm up, and do not set the force to zero during the recording"
+        )
+    ]
+
+
 def _floor(best: Candidate) -> float:
     """Returns the smallest just noticeable difference of the force of the rows [force]."""
     return FORCE_FLOOR * float(np.abs(best.data.force[best.error.weight > 0.0]).max(initial=0.0))
@@ -229,6 +266,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     findings += (
         report.findings
         or limit_findings(best, options)
+        or drift_findings(best)
         or place_findings(best, options.hysteresis_nonnegative)
     )
     band, checked = band_with_check(best)

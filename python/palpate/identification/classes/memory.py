@@ -47,8 +47,9 @@ GRID_PER_DECADE = 3
 """Number of time constants in a decade that are tried for a new branch."""
 
 RESOLVED_RATIO = 1.5
-"""Least ratio of the largest time constant to the smallest one that the recordings resolve [-]. Faster
-branches cannot be distinguished from damping."""
+"""Least ratio of the largest time constant to the smallest one that the recordings resolve, and of the
+duration to the smallest time constant [-]. Faster branches cannot be distinguished from damping, slower ones
+from a zero that drifts."""
 
 LEAST_NRMSE = 0.005
 """NRMSE of the model without memory below which a memory is not tested [-]."""
@@ -294,6 +295,10 @@ def better_with_memory(
     shortest, longest = np.exp(recorded.log_tau)
     if np.exp(refined.log_tau.max()) < RESOLVED_RATIO * shortest:
         return _refused(found, f"the branches relax within {shortest:.2g} s, which the rows do not resolve")
+    if np.exp(refined.log_tau.min()) > longest / RESOLVED_RATIO:
+        return _refused(
+            found, f"the branches relax over {longest:.2g} s, as a zero that drifts during the recording"
+        )
     coefficients, stiffness = fit.solved(refined)
     network = replace(
         at_rest,

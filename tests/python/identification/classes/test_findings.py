@@ -126,6 +126,32 @@ def test_a_force_that_pulls_in_no_row_does_not_pull_between_them() -> None:
     assert model.force(-8e-5, direction=1.0) == pytest.approx(0.0, abs=0.05)
 
 
+def cycles(count: int, drift: float, side: bool = False) -> palpate.Recording:
+    """Returns presses and releases of a wall, with a zero that moves evenly by `drift`."""
+    x = np.tile(np.r_[np.linspace(0.0, 1.0, 150), np.linspace(1.0, 0.0, 150)], count)
+    force = (
+        2.0 * x + 20.0 * np.maximum(x - 0.7, 0.0) ** 2 + np.random.default_rng(8).normal(0.0, 0.02, len(x))
+    )
+    force += drift * np.linspace(0.0, 1.0, len(x))
+    direction = np.tile(np.repeat([1.0, 0.0, -1.0], [149, 2, 149]), count) if side else None
+    return palpate.Recording.from_arrays(x, force, time=0.01 * np.arange(len(x)), direction=direction)
+
+
+@pytest.mark.parametrize("side", [False, True])
+def test_a_zero_that_moves_during_the_recording_is_named_once(side: bool) -> None:
+    reasons = palpate.identify(cycles(3, -0.3, side)).verdict.reasons
+    moved = [reason for reason in reasons if "the zero of the force or the object changed" in reason]
+    assert len(moved) == 1
+    assert "stroke falls by 0.3" in moved[0] or "stroke falls by 0.29" in moved[0]
+
+
+@pytest.mark.parametrize(("count", "drift"), [(3, 0.0), (3, 0.02), (1, 0.3)])
+def test_a_zero_that_cannot_be_felt_to_move_gives_no_finding(count: int, drift: float) -> None:
+    """One press and release cannot show the movement, and 0.02 is below a just noticeable difference."""
+    verdict = str(palpate.identify(cycles(count, drift)).verdict)
+    assert "the zero of the force or the object changed" not in verdict
+
+
 DATA = Path(os.environ.get("PALPATE_DATA", "../shared/data"))
 
 
