@@ -465,14 +465,15 @@ class Judge:
         """Returns the decrease of the criterion from the simpler candidate `below` to the more complex
         candidate `above`, on the rows that both candidates can use.
 
-        If the noise is larger where two single-valued candidates differ, the decrease of the error counts
-        less. The residuals of a hysteresis are not noise, because its reversals are not fitted exactly.
+        If the noise is larger where two single-valued candidates over one position differ, the decrease of
+        the error counts less. The residuals of a hysteresis are not noise, because its reversals are not
+        fitted exactly, and those over several inputs contain what the rows between the wavelets show.
         """
         if self.criterion in ON_HELD_OUT_ROWS:
             return below.criterion(self.criterion) - above.criterion(self.criterion)
         weight = above.error_on(above.data.weight).weight
         falls = below.on_rows(self.criterion, weight) - above.on_rows(self.criterion, weight)
-        if above.strokes is not None:
+        if above.strokes is not None or above.problem.dimension > 1:
             return falls
         penalty, n = CRITERIA[self.criterion], above.problem.independent
         cost = penalty(n, above.n_parameters) - penalty(n, below.n_parameters)
