@@ -14,6 +14,7 @@ from .._typing import Float1D, Float2D
 from ..errors import InputError
 from ..recording import Recording
 from ..recording.motion import velocity
+from ..recording.roles import Role, roles_of
 from ..verification.metrics import normalised, root_mean_square
 from .methods import (
     Estimator,
@@ -119,8 +120,9 @@ def _has_strokes(recording: Recording) -> bool:
 
 def _columns(recording: Recording, strokes: bool) -> tuple[Float2D, NDArray[np.bool_]]:
     """Returns the inputs of the baselines as columns (position; velocity, acceleration and stroke if known),
-    and the usable rows."""
-    columns, rows = [recording.position], np.ones(len(recording), dtype=np.bool_)
+    and the usable rows: those in which the tool moves near the object, to which a model is fitted too."""
+    columns = [recording.position]
+    rows = roles_of(recording, float(recording.position.max())) == Role.MOVING
     if recording.time is not None:
         try:
             speed, known = velocity(recording)
