@@ -193,6 +193,16 @@ def test_waits_do_not_decide_whether_the_force_falls_with_position() -> None:
     assert not [each for each in quality_findings(recording) if "falls with position" in each.sentence]
 
 
+def test_the_rate_of_the_rows_does_not_decide_whether_the_force_falls() -> None:
+    """A tester stores many rows where the force changes: in the rise and in the release at the largest x."""
+    time = np.r_[np.arange(0.0, 5.0, 0.01), np.arange(5.0, 25.0, 0.4), np.arange(25.0, 30.0, 0.01)]
+    x = np.round(np.interp(time, [0.0, 5.0, 25.0, 30.0], [0.0, 0.05, 0.3, 0.25]), 5)
+    force = np.where(time < 25.0, 1.0 - np.exp(-x / 0.015), 1.0 - 20.0 * (0.3 - x))
+    force += np.random.default_rng(2).normal(0.0, 1e-3, len(time))
+    recording = palpate.Recording.from_arrays(x, force, time=time)
+    assert not [each for each in quality_findings(recording) if "falls with position" in each.sentence]
+
+
 def test_findings_on_several_recordings_name_the_recording() -> None:
     first, second = rows_of("P1", 0), rows_of("P1", 1)
     assert only_sentence(first, replace(second, f=np.minimum(second.f, 8.0))).startswith(

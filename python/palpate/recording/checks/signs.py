@@ -60,11 +60,12 @@ def reversed_sign(checked: Checked, *, same_sign_share: float, least_loop_share:
                 "the zero of the force moved, record again"
             )
         ]
-    if cells is not None:  # a wait repeats one position and its force
-        x, f = x[cells.row], f[cells.row]
     if is_loop or not (np.ptp(f) > 0.0 and np.ptp(x) > 0.0):
         return []
-    return [usable(sentence) for sentence in mirror_notes(float(np.corrcoef(x, f)[0, 1]))]
+    # Each row counts by the way of the tool there, so that neither a wait nor the rate of the rows decides.
+    (xx, xf), (_, ff) = np.cov(x, f, aweights=np.abs(np.gradient(x)))
+    correlation = float(xf / np.sqrt(xx * ff)) if xx * ff > 0.0 else 0.0
+    return [usable(sentence) for sentence in mirror_notes(correlation)]
 
 
 def _lag_of(recording: Recording, gap: float) -> float:
