@@ -204,7 +204,7 @@ DATA, CLASSES, SEARCH = (f"identification.{folder}" for folder in ("data", "clas
 RULES = (
     Rule("rows that wait are not fitted", "recording.roles", "waits", _no_waits),
     Rule("approach is not fitted", "recording.roles", "contact_at", lambda x, f: float(x.min())),
-    Rule("wrong readings are dropped", "recording.roles", "wrong_readings", lambda _, x, *__: _none(x)),
+    Rule("wrong readings are dropped", "recording.roles", "wrong_readings", _no_wrong_readings),
     Rule("period is found", "identification.identify", "period_of", _nothing),
     Rule(
         "repeated rows are dropped",

@@ -242,7 +242,8 @@ def _summary(
 ) -> dict[str, str]:
     """Returns the summary of a plan: structure, needed device properties and certificate, one line each.
 
-    After the verdict no it has only what fails."""
+    After the verdict no it has only what fails.
+    """
     rows, refused = plan.summary(), plan.verdict.level == "no"
     if refused and certificate.certified:
         del rows["certificate"]

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..._typing import Float1D
+from ..._typing import Float1D, Float2D
 from ...recording import Recording
 from ...recording.checks import findings_of
 from ...recording.motion import noise_band, strokes_from_order
@@ -133,6 +135,12 @@ MOST_JND = 2.0
 """Mean residual of a place above which a hand feels a wrong force there [just noticeable differences]."""
 
 
+def _places(box: Float2D, side: NDArray[Any] | None) -> NDArray[np.intp]:
+    """Returns the number of the place and the direction (n,) of positions (n, d) in the unit box."""
+    place = np.minimum((box[:, 0] * PLACES).astype(np.intp), PLACES - 1)
+    return place if side is None else place + PLACES * (side < 0)
+
+
 def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     """Returns a finding on the place at which the mean force of the rows differs most from the model, if a
     hand feels the difference. `nonnegative` is True if the hysteresis h of the model must not be below 0."""
@@ -140,8 +148,7 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     if len(best.data.names) > 1 or not len(rows):
         return []
     data, residual = best.data, best.residual[rows]
-    place = np.minimum((data.box[rows, 0] * PLACES).astype(np.intp), PLACES - 1)
-    group = place if best.side is None else place + PLACES * (best.side[rows] < 0.0)
+    group = _places(data.box[rows], None if best.side is None else best.side[rows])
     count = np.maximum(np.bincount(group, minlength=2 * PLACES), 1)
     mean, force, square = (
         np.bincount(group, values, 2 * PLACES) / count for values in (residual, data.force[rows], residual**2)
@@ -186,8 +193,7 @@ def drift_findings(best: Candidate) -> list[Finding]:
     rows = np.flatnonzero((best.error.weight > 0.0) & (direction != 0))
     stroke = np.cumsum(np.diff(direction[rows], prepend=0) != 0)
     middle = (np.bincount(stroke, rows) / np.maximum(np.bincount(stroke), 1))[stroke] / len(data.force)
-    place = np.minimum((data.box[rows, 0] * PLACES).astype(np.intp), PLACES - 1)
-    group = place + PLACES * (direction[rows] < 0)
+    group = _places(data.box[rows], direction[rows])
 
     def within(values: Float1D) -> Float1D:
         """Returns the values minus their mean in each place and direction."""
@@ -274,7 +280,8 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     if below == "auto":
         force = data.force[data.reported]
         near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(force)))
-        leaves = single and data.period is None and not data.pulls(near_zero)
+        pulls = float(np.partition(force, 1)[1]) < -near_zero  # in more than one row
+        leaves = single and data.period is None and not pulls
         below = "free" if leaves else "linear"
         if leaves:
             lower = lower + data.reach[0] * _first_contact(best, near_zero)

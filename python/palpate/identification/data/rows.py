@@ -136,11 +136,6 @@ class Rows:
         """(n,) True for the rows that show the force law; the others belong to the motion only."""
         return np.asarray(self.roles == Role.MOVING)
 
-    def pulls(self, near_zero: float) -> bool:
-        """Returns True if the object pulls the tool by more than `near_zero` [force] in more than one row."""
-        force = self.force[self.reported]
-        return len(force) > 1 and float(np.partition(force, 1)[1]) < -near_zero
-
     @property
     def reported(self) -> NDArray[np.bool_]:
         """(n,) True for rows that are used for the reported error."""
