@@ -12,7 +12,7 @@ import re
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -22,7 +22,8 @@ import pandas as pd
 from ..errors import InputError
 from .dialect import HEAD_BYTES, not_csv, recognise, refuse_marks
 from .files import CELL_BYTES, require_memory
-from .table import MISSING, Cells, LongTable, parse_with, to_numbers
+from .looks import LOOK_ROWS, Look
+from .table import MISSING, Cells, LongTable, to_numbers
 
 _CHUNK_CELLS = 1 << 22
 """Number of cells of a CSV file that are read at a time, to limit the use of memory."""
@@ -37,9 +38,6 @@ _EXACT_OPTIONS: dict[str, Any] = (
 
 _TRAILING_COLUMN = "\n"
 """Name of the empty column if each row ends with a separator. A header cannot contain it."""
-
-_EXAMINED_ROWS = 1000
-"""Rows that are examined for text columns before the fast reader starts."""
 
 _BLOCK_BYTES = 1 << 22
 """Number of bytes that are read at a time to count rows."""
@@ -109,7 +107,7 @@ class CsvFile(LongTable):
         self.names = self._dialect.names
         self.metadata = self._dialect.metadata
         self.notes = self._dialect.notes
-        self.text_names, self.steady_names = self._examine_first_rows()
+        self.looks = self._look_at_first_rows()
 
     def _leave_out_torn_line(self) -> None:
         with self._path.open("rb") as stream:
@@ -167,27 +165,17 @@ class CsvFile(LongTable):
             line += len(row)
             row.clear()
 
-    def _examine_first_rows(self) -> tuple[set[str], set[str]]:
-        """Returns the columns that hold text, and those with only one or two values, in the first rows."""
-        text: set[str] = set()
-        values: dict[str, set[str]] = {name: set() for name in self.names}
+    def _look_at_first_rows(self) -> dict[str, Look]:
+        """Describes the columns by their first rows."""
+        cells: dict[str, list[str]] = {name: [] for name in self.names}
         columns = len(self.names) + self._dialect.trailing
         with self._lines() as lines:
-            for row, (line, cells) in enumerate(self._rows(lines)):
-                if len(cells) > columns:
-                    raise self._too_many_cells(line, len(cells))
-                for name, cell in zip(self.names, cells, strict=False):
-                    if len(values[name]) < 3:
-                        values[name].add(cell)
-                    if name not in text and not self._numeric(cell):
-                        text.add(name)
-                if row == _EXAMINED_ROWS:
-                    break
-        return text, {name for name, found in values.items() if len(found) < 3}
-
-    def _numeric(self, cell: str) -> bool:
-        text = cell.strip()
-        return text in MISSING or parse_with(text, self._dialect.decimal) is not None
+            for line, row in islice(self._rows(lines), LOOK_ROWS):
+                if len(row) > columns:
+                    raise self._too_many_cells(line, len(row))
+                for name, cell in zip(self.names, row, strict=False):
+                    cells[name].append(cell)
+        return {name: Look.of(found, self._dialect.decimal) for name, found in cells.items()}
 
     def _first_too_wide(self) -> InputError:
         columns = len(self.names) + self._dialect.trailing

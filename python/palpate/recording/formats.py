@@ -24,6 +24,7 @@ from ..errors import InputError, escaped, listed, shortened
 from .csv_file import CsvFile
 from .excel_file import read_excel
 from .files import CELL_BYTES, MEMORY_LIMIT, readable, require_memory
+from .looks import Look
 from .mcap_file import read_mcap
 from .memory_table import MemoryTable, import_library
 from .table import Cells, LongTable, Table, to_numbers
@@ -110,8 +111,8 @@ class ParquetFile(LongTable):
             schema = footer.schema_arrow
             self._stored = tuple(str(name) for name in schema.names)
             self.names = tuple(map(escaped, self._stored))
-            self.text_names = {
-                name
+            self.looks = {
+                name: Look(text=True)
                 for name, field in zip(self.names, schema, strict=True)
                 if str(getattr(field.type, "value_type", field.type)) in _ARROW_TEXT
             }

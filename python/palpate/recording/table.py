@@ -7,7 +7,8 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol, TypeAlias
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,9 @@ from numpy.typing import NDArray
 
 from ..arguments import shown
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from .looks import Look
 
 Cells: TypeAlias = NDArray[Any]
 """(n,) float64 for numbers (NaN for a cell without a number), (n,) object of str for text"""
@@ -37,10 +41,13 @@ class Table(ABC):
     """Number of lines (0 or 1) at the end of the file that are ignored because they are incomplete"""
     notes: Sequence[str] = ()
     """Differences of the file from a plain table, as parts of one sentence"""
-    text_names: Collection[str] = ()
-    """Columns that are known to hold text before the rows are read"""
-    steady_names: Collection[str] = ()
-    """Columns that have only one or two distinct values in the first rows of the table"""
+    looks: Mapping[str, Look] = MappingProxyType({})
+    """First rows of each column; a column without a look is taken to hold numbers"""
+
+    @property
+    def text_names(self) -> set[str]:
+        """Columns that hold text in the first rows."""
+        return {name for name, look in self.looks.items() if look.text}
 
     @abstractmethod
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..._typing import Float1D
-from ...verdict import Finding
+from ...verdict import Finding, usable
 from ..conversion import MIN_ROWS
 from .cells import Checked
 from .gaps import position_gaps
@@ -38,7 +38,19 @@ class Check:
     thresholds: Mapping[str, Any]
 
 
+def unread_time(checked: Checked) -> list[Finding]:
+    """Returns a finding if the file has a column of times that was not read."""
+    sentence = checked.recording.unread_time
+    return [usable(sentence)] if sentence else []
+
+
 CHECKS = (
+    Check(
+        "time that is not read",
+        unread_time,
+        "a unit of time that is not known, a clock without fractions of a second",
+        {},
+    ),
     Check(
         "wrong unit",
         implausible_range,
