@@ -30,7 +30,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 PATH = FileName(path_type=Path)
 
 READING_NAMES = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows",
-                 "zero", "force_late_s", "invalid")  # fmt: skip
+                 "zero", "force_late_s", "invalid", "columns", "decimal")  # fmt: skip
 """Arguments of `read_recording` that are also options of the command line."""
 
 _SCHEME = Scheme()
@@ -162,6 +162,14 @@ _READING = options(
     expert_option(
         "--force-late-s", metavar="SECONDS", callback=_lag, default="0.0", help=_about("force_late_s")
     ),
+    expert_option(
+        "--columns",
+        metavar="NAME,NAME,...",
+        default="",
+        callback=lambda ctx, param, value: tuple(filter(None, value.split(","))),
+        help=_about("columns"),
+    ),
+    expert_option("--decimal", type=click.Choice([".", ","]), default=None, help=_about("decimal")),
     _column("--time", help=_about("time")),
     _column("--direction", help=_about("direction")),
     expert_option("--negate", metavar="COLUMN", multiple=True, help=f"{_about('negate')} Repeatable."),

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -56,6 +57,12 @@ _SETPOINT = re.compile(r"(^|_)(cmd|command(ed)?|target|set|setpoint|desired|ref|
 
 _EPOCH_S = (946_684_800.0, 4_102_444_800.0)
 """Seconds from 1970 to 2000 and to 2100. Times since 1970 between both have only one plausible unit."""
+
+_USUAL_UNITS = {"m": ("mm", "m", "um"), "rad": ("rad", "deg"), "N*m": ("Nm",)}
+"""Units that a message suggests, by the SI unit."""
+
+_USUAL_TRAVELS = {"m": (1e-4, 0.5), "rad": (0.0, 4.0 * math.pi)}
+"""Travels by which a message chooses among the usual units."""
 
 UNIT_TO_FILL_IN = "UNIT"
 """Word in a suggested option that the user replaces: palpate never guesses a unit against a column name."""
@@ -444,10 +451,13 @@ def _likely_unit(role: Role, column: Column, known: Collection[str]) -> str:
 
     `known` holds the SI units of the other columns.
     """
-    named = column.named
+    named, travel = column.named, column.look.largest - column.look.least
     possible = [si for si in role.si_units if named is None or si in named] or list(role.si_units)
     lawful = [si for si in possible if any({si, other} == set(law) for law in LAWS for other in known)]
-    return {"m": "mm", "N*m": "Nm"}.get(first := (lawful or possible)[0], first)
+    likely = (lawful or possible)[0]
+    units = _USUAL_UNITS.get(likely, (likely,))
+    low, high = _USUAL_TRAVELS.get(likely, (0.0, math.inf))
+    return next((unit for unit in units if low <= travel * UNITS[unit].factor <= high), units[0])
 
 
 def _unread_time(names: Sequence[str], request: _Request) -> Column | None:

@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from .dialect import HEAD_BYTES, not_csv, recognise, refuse_marks
+from .dialect import HEAD_BYTES, NOT_STATED, Stated, cells_of_lines, not_csv, recognise, refuse_marks
 from .files import CELL_BYTES, require_memory
 from .looks import LOOK_ROWS, Look
 from .table import MISSING, Cells, LongTable, to_numbers
@@ -95,7 +95,7 @@ class CsvFile(LongTable):
     A name that ends in ``.part`` is an incomplete recording: its last line is ignored if it has no line feed.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, stated: Stated = NOT_STATED) -> None:
         self._path = path
         self._size = path.stat().st_size
         self.torn = 0
@@ -103,7 +103,7 @@ class CsvFile(LongTable):
             self._leave_out_torn_line()
         with self._bytes() as stream:
             head = stream.read(HEAD_BYTES)
-        self._dialect = recognise(str(path), head, len(head) == self._size)
+        self._dialect = recognise(str(path), head, len(head) == self._size, stated)
         self.names = self._dialect.names
         self.metadata = self._dialect.metadata
         self.notes = self._dialect.notes
@@ -159,7 +159,7 @@ class CsvFile(LongTable):
                 yield each
 
         line = self._dialect.lines_before + 1
-        for cells in csv.reader(noted(), delimiter=self._dialect.separator):
+        for cells in cells_of_lines(noted(), self._dialect.separator):
             if len(row) > 1 or row[0].strip(blank):
                 yield line, cells
             line += len(row)
@@ -175,7 +175,7 @@ class CsvFile(LongTable):
                     raise self._too_many_cells(line, len(row))
                 for name, cell in zip(self.names, row, strict=False):
                     cells[name].append(cell)
-        return {name: Look.of(found, self._dialect.decimal) for name, found in cells.items()}
+        return {name: Look.of(found, self._dialect.marks) for name, found in cells.items()}
 
     def _first_too_wide(self) -> InputError:
         columns = len(self.names) + self._dialect.trailing
@@ -237,13 +237,18 @@ class CsvFile(LongTable):
         for chunk in self._chunks(dict.fromkeys(self.names, "str")):
             for name in set(self.names) - text_names - found:
                 cells = chunk[name]
-                if self._dialect.decimal == ",":
+                if self._dialect.marks.startswith(","):
                     cells = cells.str.replace(",", ".")
                 if pd.to_numeric(cells[~cells.isin(MISSING)], errors="coerce").isna().any():
                     found.add(name)
         return found
 
     def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
+        if self._dialect.separator == " ":
+            raise InputError(
+                f"{self._path} is separated by spaces, which cannot be read part by part; separate its "
+                "columns by commas, semicolons or tabs"
+            )
         if not self._dialect.single_bytes:
             encoding = self._dialect.encoding.upper().replace("16-", "16")  # for iconv
             raise InputError(
@@ -293,10 +298,10 @@ class CsvFile(LongTable):
         return self._to_numbers(name, cells.to_numpy(dtype=object))
 
     def _to_numbers(self, name: str, cells: Cells) -> Cells:
-        numbers = to_numbers(cells, self._dialect.decimal)
+        numbers = to_numbers(cells, self._dialect.marks)
         others = cells[np.isnan(numbers)]
         where = f"{self._path}: column {name}"
-        refuse_marks(where, others, self._dialect.decimal, self._dialect.separator)
+        refuse_marks(where, others, self._dialect.marks)
         return numbers
 
     def rows_before(self, part: tuple[int, int]) -> int:
@@ -321,8 +326,8 @@ class CsvFile(LongTable):
                 pd.read_csv(
                     stream,
                     encoding=self._dialect.encoding,
-                    sep=self._dialect.separator,
-                    decimal=self._dialect.decimal,
+                    sep=r"\s+" if self._dialect.separator == " " else self._dialect.separator,
+                    decimal=self._dialect.marks[0],
                     header=None,
                     names=[*self.names, *trailing],
                     usecols=None if columns is None else [*columns, *trailing],

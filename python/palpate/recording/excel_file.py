@@ -62,11 +62,11 @@ def read_excel(path: Path, members: Iterable[tuple[str, bytes]], openpyxl: Any) 
         raise InputError(
             f"{path}, row {longer[0]}: {len(rows[longer[0]])} cells, but the header names {named} columns"
         )
-    header, header_notes = with_checked_names(f"{path}, row {numbers[header.row]}", header)
+    header, header_notes = with_checked_names(f"{path}, row {numbers[header.row or 0]}", header)
     numbers, values = numbers[header.first :], values[header.first :]
     decimal = "."
     if header.numbers:
-        decimal = decimal_mark(f"{path}, row {numbers[0]}", texts[header.first :], ";")
+        decimal = decimal_mark(f"{path}, row {numbers[0]}", texts[header.first :])
     columns = {
         name: cells_of([row[k] if k < len(row) else None for row in values], decimal)
         for k, name in enumerate(header.names)

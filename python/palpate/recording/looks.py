@@ -111,3 +111,42 @@ def _of_day(texts: pd.Series[str]) -> pd.Series[float]:
     minutes = texts.str.extract(rf"^{_MINUTES.pattern}$").astype(float)
     seconds = 3600.0 * hours[0] + 60.0 * hours[1] + hours[2]
     return seconds.fillna(60.0 * minutes[0] + minutes[1])
+
+
+def cure_of_header(rows: Sequence[Sequence[str]]) -> str:
+    """Describes the columns of a table without a header by its first rows, and returns the option that names
+    them.
+
+    A column that rises in every row beside two others is the time. Of the others, the position is the one
+    that turns less often.
+    """
+    columns = [
+        np.array([np.nan if (value := parse_with(cell, ".,")) is None else value for cell in column])
+        for column in zip(*rows, strict=True)
+    ]
+    described = [f"{k}: {_described(values)}" for k, values in enumerate(columns, 1)]
+    turns = {k: _turns(values) for k, values in enumerate(columns) if np.ptp(values) > 0.0}
+    time = next((k for k, count in turns.items() if count == 0 and len(turns) > 2), None)
+    others = sorted((k for k in turns if k != time), key=turns.__getitem__)[:2]
+    if len(others) < 2:
+        return f"The columns are {', '.join(described)}"
+    roles = {others[0]: ("position_mm", "the position in mm"), others[1]: ("force_N", "the force in N")}
+    if time is not None:
+        roles[time] = ("time_s", "the time in s")
+    assumed = " and ".join(f"column {k + 1} is {roles[k][1]}" for k in sorted(roles))
+    names = ",".join(roles.get(k, (f"column_{k + 1}", ""))[0] for k in range(len(columns)))
+    return f"The columns are {', '.join(described)}. If {assumed}, add: --columns {names}"
+
+
+def _turns(values: Float1D) -> int:
+    """Returns how often a column changes the sense in which it changes."""
+    steps = np.sign(np.diff(values))
+    steps = steps[steps != 0]
+    return int(np.count_nonzero(np.diff(steps)))
+
+
+def _described(values: Float1D) -> str:
+    if np.isnan(values).any():
+        return "text"
+    rises = " (rises in every row)" if (np.diff(values) > 0).all() else ""
+    return f"{values.min():.4g} to {values.max():.4g}{rises}"

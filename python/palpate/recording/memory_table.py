@@ -62,7 +62,7 @@ class MemoryTable(Table):
                 cells = np.array([_as_text(cell) for cell in cells], dtype=object)
             elif name in numbers and cells.dtype == object:
                 found = to_numbers(cells, self._decimal)
-                refuse_marks(f"{self._path}: column {name}", cells[np.isnan(found)], self._decimal, ";")
+                refuse_marks(f"{self._path}: column {name}", cells[np.isnan(found)], self._decimal)
                 cells = found
             columns[name] = cells
         return columns

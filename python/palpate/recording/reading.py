@@ -17,6 +17,7 @@ from .._typing import Float1D, Int8Vector
 from ..arguments import path_of, shown
 from ..errors import InputError
 from .conversion import Conversion, Source, converted
+from .dialect import Stated
 from .files import require_file, sha256_of_file, unchanged
 from .formats import open_table
 from .recording import Recording
@@ -40,6 +41,8 @@ def read_recording(
     direction: str | None = None,
     inputs: Sequence[str] = (),
     units: Mapping[str, str] | None = None,
+    columns: Sequence[str] = (),
+    decimal: Literal[".", ","] | None = None,
     torque_constant: float | None = None,
     negate: Sequence[str] = (),
     rows: tuple[int | None, int | None] | None = None,
@@ -74,6 +77,10 @@ def read_recording(
     units : mapping of str to str, optional
         Unit of a column whose name has none. It replaces the unit in the name. The key is the column's name,
         or "position", "force" or "time" if that column is also named.
+    columns : sequence of str
+        Names of all columns of a text file without a header, with their units (``time_s``, ``position_mm``).
+    decimal : {".", ","}, optional
+        Decimal mark of a text file; the other mark then separates thousands. By default it is recognised.
     torque_constant : float, optional
         Torque per current [N*m/A]; converts a force column from A to N*m. By default a current remains in A.
     negate : sequence of str
@@ -103,12 +110,14 @@ def read_recording(
         One sentence that names the file, the line or column, and the value.
     """
     file = path_of("path", path)
+    if decimal not in (None, ".", ","):
+        raise InputError(f"decimal is {decimal!r}; it must be '.' or ','")
     if invalid not in ("refuse", "drop"):
         raise InputError(f"invalid is {invalid!r}; it must be 'refuse' or 'drop'")
     require_file(file)
     with unchanged(file):
         fields = converted(
-            open_table(file),
+            open_table(file, Stated(tuple(columns), decimal)),
             str(file),
             file=file,
             position=position,
@@ -236,6 +245,8 @@ class LongRecording:
     """Description of a long file from :func:`open_long_recording`, small enough to send to workers."""
 
     path: Path
+    stated: Stated
+    """What the caller states about the file"""
     conversion: Conversion
     """Conversion of the columns position, force and direction to SI values"""
     has_time: bool
@@ -270,7 +281,7 @@ class LongRecording:
         InputError
             A row has no finite number or no known direction, and rows may not be dropped.
         """
-        table = _require_long_table(open_table(self.path), self.path)
+        table = _require_long_table(open_table(self.path, self.stated), self.path)
         conversion = self.conversion
         for first, cells in table.blocks(part, BLOCK_ROWS, numbers=conversion.numbers, text=conversion.text):
             check, directions = conversion.checked(_PartPlaces(table, part), cells, first)
@@ -283,7 +294,7 @@ class LongRecording:
 
     def places(self) -> Places:
         """Returns the line numbers and cell texts of the rows of the file, for messages."""
-        return open_table(self.path)
+        return open_table(self.path, self.stated)
 
 
 class _PartPlaces:
@@ -307,6 +318,8 @@ def open_long_recording(
     time: str | None = None,
     direction: str | None = None,
     units: Mapping[str, str] | None = None,
+    columns: Sequence[str] = (),
+    decimal: Literal[".", ","] | None = None,
     negate: tuple[str, ...] = (),
     invalid: Literal["refuse", "drop"] = "refuse",
     part_rows: int = PART_ROWS,
@@ -320,7 +333,8 @@ def open_long_recording(
     """
     file = Path(path)
     require_file(file)
-    table = open_table(file)
+    stated = Stated(tuple(columns), decimal)
+    table = open_table(file, stated)
     conversion = Conversion.of(
         table,
         str(file),
@@ -340,6 +354,7 @@ def open_long_recording(
     rows, parts = _require_long_table(table, file).parts(part_rows)
     return LongRecording(
         path=file,
+        stated=stated,
         conversion=conversion,
         has_time=has_time,
         parts=tuple(parts),

@@ -99,22 +99,48 @@ def parse_number(text: str) -> float | None:
         return None
 
 
-def parse_with(text: str, decimal: str) -> float | None:
-    """Returns the number in a cell with this decimal mark, or None."""
-    if decimal == ".":
-        return parse_number(text)
-    return None if "." in text or text.count(",") > 1 else parse_number(text.replace(",", "."))
+_GROUPED = re.compile(
+    r"\s*([-+]?\d{1,3}(?:(?P<group>[.,'’ \u00a0\u202f])\d{3})(?:(?P=group)\d{3})*)"
+    r"(?:(?P<decimal>[.,])(\d*))?\s*"
+)
+"""Number whose digits are in groups of three."""
+
+
+def parse_with(text: str, marks: str) -> float | None:
+    """Returns the number in a cell, or None.
+
+    Parameters
+    ----------
+    text : str
+    marks : str
+        The decimal mark, "." or ",", and behind it the mark between thousands if it is known. A cell with
+        both marks, several groups of thousands, or an apostrophe or space between them, needs no known mark.
+    """
+    decimal = marks[:1] or "."
+    number = (
+        text if decimal == "." else text.replace(",", ".") if "." not in text and text.count(",") < 2 else ""
+    )
+    if (value := parse_number(number)) is not None:
+        return value
+    if not (found := _GROUPED.fullmatch(text)):
+        return None
+    whole, group, mark, fraction = found.groups()
+    is_known = mark == decimal or whole.count(group) > 1 or group in marks[1:]
+    known = group not in ".," or (group != decimal and is_known)
+    if not known or mark not in (None, decimal):
+        return None
+    return parse_number(whole.replace(group, "") + "." + (fraction or ""))
 
 
 MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "#N/A", "n/a", "NULL", "null", "None")
 """Texts that mean a missing value in a column of numbers."""
 
 
-def to_numbers(cells: Cells, decimal: str = ".") -> NDArray[np.float64]:
+def to_numbers(cells: Cells, marks: str = ".") -> NDArray[np.float64]:
     """Converts strings to numbers; NaN for a cell without a number."""
 
     def number(cell: Any) -> float:
-        value = parse_with(cell, decimal) if isinstance(cell, str) else cell
+        value = parse_with(cell, marks) if isinstance(cell, str) else cell
         return np.nan if value is None else value
 
     return np.fromiter(map(number, cells), dtype=np.float64, count=len(cells))

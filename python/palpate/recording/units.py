@@ -124,7 +124,7 @@ _WORDS = {
     "A": "amp ampere",
     "mA": "milliamp milliampere",
     "s": "sec second sek sekunde",
-    "ms": "msec millisecond",
+    "ms": "msec millisecond milli",
     "us": "usec microsecond",
     "ns": "nsec nanosecond",
     "min": "minute",
@@ -253,9 +253,12 @@ def parse_name(column: str) -> ColumnName:
 
     The unit is in brackets at the end (``Force [gf]``, ``Force (mN)``), or follows the last comma (``force,
     N``), one slash (``Force / N``), the word in (``Weg in mm``), or the last underscore or space
-    (``force_N``, ``Load N``). Without a unit the stem is the whole name. A unit that contradicts the rest of
+    (``force_N``, ``Load N``), or is the whole name (``grams``). Without a unit the stem is the whole name. A unit that contradicts the rest of
     the name is none: ``Load_A`` is not a current, ``Work [Nm]`` not a torque.
     """
+    whole = _simple(column.strip()) if len(column.strip()) > 1 else None
+    if whole is not None and whole.si != "count":
+        return ColumnName(column, whole)  # the name is a unit: `grams`, `mm`
     stem, text, mark = _place_of_unit(column)
     unit = unit_of(text) if stem else None
     named = quantity_of(stem)
