@@ -461,13 +461,17 @@ def _likely_unit(role: Role, column: Column, known: Collection[str]) -> str:
 
 
 def _unread_time(names: Sequence[str], request: _Request) -> Column | None:
-    """Returns a column that has the name of a time but no known unit, and is therefore not used as time."""
+    """Returns a column that is probably a time but has no known unit, and is therefore not used as time.
+
+    Its name is that of a time, or names no quantity while its values rise in every row by more than a count.
+    """
     used = {*request.roles.values(), *request.inputs}
     columns = _with_units(names, request, {})
-    times = (
-        each for each in columns if each.unit is None and "s" in (each.named or ()) and not each.look.steady
-    )
-    return next((each for each in times if each.name not in used), None)
+    unread = [
+        each for each in columns if each.unit is None and each.name not in used and not each.look.steady
+    ]
+    rising = (each for each in unread if each.named is None and each.look.rises and not each.look.counter)
+    return next((each for each in unread if "s" in (each.named or ())), next(rising, None))
 
 
 def _time_options(column: Column) -> list[str]:

@@ -7,7 +7,6 @@ import codecs
 import csv
 import io
 import re
-import sys
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -136,8 +135,8 @@ def recognise(file: str, head: bytes, whole: bool, stated: Stated = NOT_STATED) 
     if found.sample and stated.decimal is None:
         marks = decimal_mark(f"{file}, line {spans[header.first][0] + 1}", found.sample)
     last = header.row if header.units_row is None else header.units_row
-    if last is None or _is_comment(lines[before]):
-        lines_before = spans[header.first][0]  # other comments can stand between header and data
+    if last is None or header.units_row is not None or _is_comment(lines[before]):
+        lines_before = spans[header.first][0]  # comments can stand between units and data
     else:
         lines_before = spans[last][1] + 1
     notes = []
@@ -238,17 +237,15 @@ def _header(file: str, lines: list[str], names: tuple[str, ...]) -> _Candidate:
             continue
         spans, rows = _rows(file, plain, separator)
         header = find_header(rows, names)
-        if header is None and not names:
+        if header is None:
             without_header = max(
                 without_header, _first_data(rows), key=lambda each: len(each[0]) if each else 0
             )
+        if header is None and not names:
             # Some programs write the header as a comment, as numpy.savetxt does.
             cells = len(without_header[0]) if without_header else 0
-            above = [
-                each
-                for each in _comments_above(lines, plain[0][0])
-                if _cell_count(file, each, separator) == cells
-            ]
+            comments = _comments_above(lines, plain[0][0])
+            above = [each for each in comments if _cell_count(file, each, separator) == cells]
             if above:
                 spans, rows = _rows(file, [*above, *plain], separator)
                 header = find_header(rows)
@@ -256,8 +253,8 @@ def _header(file: str, lines: list[str], names: tuple[str, ...]) -> _Candidate:
             best = _Candidate(header, separator, spans, rows[header.first :])
     if best is not None:
         return best
-    if names:
-        raise InputError(f"{file} has no {len(names)} columns of numbers, which --columns names")
+    if names and without_header:
+        raise InputError(f"{file} has {len(without_header[0])} columns, but --columns names {len(names)}")
     if without_header:
         raise InputError(f"{file} has no header. {cure_of_header(without_header)}")
     separator = max(SEPARATORS, key=lambda each: len(_rows(file, plain[:1], each)[1][0]))
@@ -351,8 +348,10 @@ def find_header(rows: Sequence[Row], stated: tuple[str, ...] = ()) -> Header | N
     such rows the one above a row of units is chosen, else the one with the most units in its names, then the
     lowest one.
     """
-    widths = (len(stated), len(stated) + 1) if stated else range(LEAST_NUMBERS, sys.maxsize)
-    first = next((k for k in range(len(rows)) if len(rows[k]) in widths and _starts_data(rows, k)), None)
+    starts = (k for k in range(len(rows)) if _starts_data(rows, k))
+    if stated:
+        starts = (k for k in starts if len(_without_empty_end(rows[k])) == len(stated))
+    first = next(starts, None)
     if first is None:
         return None
     cells = len(rows[first])
@@ -366,9 +365,9 @@ def find_header(rows: Sequence[Row], stated: tuple[str, ...] = ()) -> Header | N
     candidates = [k for k in range(above, first) if not any(map(is_number, rows[k][:cells]))]
     if not candidates:
         return None
-    units_row = candidates[-1] if len(candidates) > 1 and _is_units(rows[candidates[-1]]) else None
+    units_row = max((k for k in candidates[1:] if _is_units(rows[k])), default=None)
     if units_row is not None:
-        row = candidates[-2]
+        row = candidates[candidates.index(units_row) - 1]
     else:
         row = max(candidates, key=lambda k: (sum(split_name(name)[1] is not None for name in rows[k]), k))
     names = [escaped(name.strip()) for name in rows[row]]
@@ -380,6 +379,10 @@ def find_header(rows: Sequence[Row], stated: tuple[str, ...] = ()) -> Header | N
         names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=False)]
     found = Header(row, tuple(names), first, units_row, numbers=numbers)
     return _without_trailing(found, rows[first : first + LEAST_CONSECUTIVE_ROWS])
+
+
+def _without_empty_end(row: Row) -> Row:
+    return row if row[-1].strip() else row[:-1]
 
 
 def first_row_as_header(rows: Sequence[Row]) -> Header:
@@ -429,13 +432,9 @@ def decimal_mark(where: str, rows: Sequence[Row]) -> str:
         A comma may be a decimal comma or a thousands separator, or both marks occur as decimal marks.
     """
     cells = [cell.strip() for row in rows for cell in row]
-    both = {
-        _MARKS.sub("", cell)[-1:] for cell in cells if is_number(cell) and len(set(_MARKS.sub("", cell))) > 1
-    }
-    if len(both) == 1 and all(
-        parse_with(cell, "".join(both)) is not None or not is_number(cell) for cell in cells
-    ):
-        decimal = both.pop()
+    proven = {_proven_mark(_MARKS.sub("", cell)) for cell in cells if is_number(cell)} - {""}
+    if len(proven) == 1:
+        decimal = proven.pop()
         return decimal + _OTHER[decimal]
     commas = [cell for cell in cells if parse_number(cell) is None and parse_with(cell, ",") is not None]
     if not commas:
@@ -446,6 +445,15 @@ def decimal_mark(where: str, rows: Sequence[Row]) -> str:
     if points is None:
         raise _unknown_mark(f"{where} holds {commas[0]!r}, and three digits follow every comma", ",.")
     raise _unknown_mark(f"{where} holds {commas[0]!r}, and {points!r} has a decimal point", ".")
+
+
+def _proven_mark(marks: str) -> str:
+    """Returns the decimal mark of a number by its points and commas: a mark between thousands may repeat and
+    stands before the decimal mark. Empty if these marks do not determine it.
+    """
+    if len(marks) < 2:
+        return ""
+    return marks[-1] if len(set(marks)) > 1 else _OTHER[marks[0]]
 
 
 def refuse_marks(where: str, cells: Iterable[object], marks: str) -> None:

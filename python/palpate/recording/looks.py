@@ -38,6 +38,8 @@ class Look:
     """True if the column has only one or two distinct values"""
     counter: bool = False
     """True if the column numbers the rows: each value is the one before plus one"""
+    rises: bool = False
+    """True if every value is larger than the one before"""
     least: float = np.nan
     largest: float = np.nan
     example: str = ""
@@ -68,6 +70,7 @@ class Look:
             clock=clock and not np.isnan(clock_seconds(np.array(texts, dtype=object))).any(),
             steady=len(set(words)) < 3,
             counter=len(finite) == len(values) > 2 and bool((np.diff(finite) == 1.0).all()),
+            rises=len(finite) == len(values) > 2 and bool((np.diff(finite) > 0.0).all()),
             least=float(finite.min()) if finite.size else np.nan,
             largest=float(finite.max()) if finite.size else np.nan,
             example=texts[0] if texts else "",

@@ -253,17 +253,19 @@ def parse_name(column: str) -> ColumnName:
 
     The unit is in brackets at the end (``Force [gf]``, ``Force (mN)``), or follows the last comma (``force,
     N``), one slash (``Force / N``), the word in (``Weg in mm``), or the last underscore or space
-    (``force_N``, ``Load N``), or is the whole name (``grams``). Without a unit the stem is the whole name. A unit that contradicts the rest of
-    the name is none: ``Load_A`` is not a current, ``Work [Nm]`` not a torque.
+    (``force_N``, ``Load N``), or is the whole name (``grams``). Without a unit
+    the stem is the whole name. A unit that contradicts the rest of the name is none: ``Load_A`` is not a
+    current, ``Work [Nm]`` not a torque.
     """
     whole = _simple(column.strip()) if len(column.strip()) > 1 else None
-    if whole is not None and whole.si != "count":
+    if whole is not None and column.strip().lower() not in ("count", "counts"):
         return ColumnName(column, whole)  # the name is a unit: `grams`, `mm`
     stem, text, mark = _place_of_unit(column)
     unit = unit_of(text) if stem else None
     named = quantity_of(stem)
     if unit is not None and unit.si in COLUMN_SUFFIX:
-        fits = unit.si in named if named is not None else not _needs_name(text, mark)
+        explicit = mark not in ("_", " ") and named != set() and unit.si != "count"
+        fits = explicit or unit.si in named if named is not None else not _needs_name(text, mark)
         if fits:
             return ColumnName(stem, unit)
     certain = mark not in ("_", " ") or (unit is not None and (len(text) > 1 or unit.si not in COLUMN_SUFFIX))

@@ -49,7 +49,7 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
         "depth_mm\n1\n2\n",
         {},
         "press.csv, line 1: there is one column (depth_mm); a recording needs a position and a force, "
-        "separated by commas, semicolons or tabs",
+        "separated by commas, semicolons, tabs or spaces",
     ),
     "direction is the position": (
         lines(HEADER, rows()),
