@@ -104,6 +104,13 @@ def _row_range(
         raise click.BadParameter(message, ctx, param) from None
 
 
+def _zero(
+    ctx: click.Context, param: click.Parameter, value: str | None
+) -> tuple[int | None, int | None] | str | None:
+    """Parses START:STOP, or the word air."""
+    return value if value == "air" else _row_range(ctx, param, value)
+
+
 def _lag(ctx: click.Context, param: click.Parameter, value: str) -> float | str:
     """Parses a number of seconds, or the word auto."""
     try:
@@ -181,7 +188,7 @@ _READING = options(
         help=_about("torque_constant"),
     ),
     _rows("--rows", help=_about("rows")),
-    _rows("--zero", help=_about("zero")),
+    _rows("--zero", metavar="START:STOP|air", callback=_zero, help=_about("zero")),
     expert_option(
         "--invalid", type=click.Choice(["refuse", "drop"]), default="refuse", help=_about("invalid")
     ),

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
 from .columns import Choice, Column, choose_columns
+from .contact import air_rows
 from .files import Layout, sha256_of_file
 from .looks import clock_seconds
 from .rows import RowCheck
@@ -274,7 +275,7 @@ def converted(
     file: Path | None = None,
     direction: str | None,
     rows: Range | None = None,
-    zero: Range | None = None,
+    zero: Range | Literal["air"] | None = None,
     torque_constant: float | None = None,
     **options: Any,
 ) -> dict[str, Any]:
@@ -329,16 +330,21 @@ def converted(
         f, units["force"], file_units["force"] = f * torque_constant, "N*m", UNITS["Nm"]
         names["force"] = _torque_text(choice.force.name, torque_constant)
     if zero is not None:
-        first, last = _row_range(name, zero, total)
-        numbers = np.arange(start, stop)[check.kept]
-        without_contact = (numbers >= first) & (numbers < last)
-        if not without_contact.any():
-            raise InputError(f"{name}: --zero {first}:{last} contains no row that is used")
+        if zero == "air":
+            without_contact, where = air_rows(x, f), "the rows before the contact"
+            if not without_contact.any():
+                raise InputError(
+                    f"{name}: --zero air finds no rows before the contact; name them: START:STOP"
+                )
+        else:
+            first, last = _row_range(name, zero, total)
+            numbers = np.arange(start, stop)[check.kept]
+            without_contact, where = (numbers >= first) & (numbers < last), f"rows {first} to {last - 1}"
+            if not without_contact.any():
+                raise InputError(f"{name}: --zero {first}:{last} contains no row that is used")
         offset = float(np.mean(f[without_contact]))
         f = f - offset
-        notes.append(
-            f"{offset:.6g} {units['force']}, the mean force of rows {first} to {last - 1}, is subtracted"
-        )
+        notes.append(f"{offset:.6g} {units['force']}, the mean force of {where}, is subtracted")
     _require_enough(name, choice.position, x, check.notes)
     time = None if choice.time is None else conversion.si(choice.time, cells)
     inputs = [conversion.si(column, cells) for column in choice.inputs]

@@ -277,7 +277,9 @@ def _cell_count(file: str, line: tuple[int, str], separator: str) -> int:
 def _first_data(rows: Sequence[list[str]]) -> list[list[str]]:
     """Returns the rows of data of a table without a header; empty if it has none."""
     first = next((k for k in range(len(rows)) if _starts_data(rows, k)), None)
-    return [] if first is None else [row for row in rows[first:] if len(row) == len(rows[first])]
+    if first is None or any(len(row) == len(rows[first]) and not _is_data(row) for row in rows[:first]):
+        return []
+    return [row for row in rows[first:] if len(row) == len(rows[first])]
 
 
 def _is_comment(line: str) -> bool:
@@ -431,11 +433,11 @@ def decimal_mark(where: str, rows: Sequence[Row]) -> str:
     InputError
         A comma may be a decimal comma or a thousands separator, or both marks occur as decimal marks.
     """
-    cells = [cell.strip() for row in rows for cell in row]
-    proven = {_proven_mark(_MARKS.sub("", cell)) for cell in cells if is_number(cell)} - {""}
-    if len(proven) == 1:
-        decimal = proven.pop()
-        return decimal + _OTHER[decimal]
+    cells = [cell.strip() for row in rows for cell in row if is_number(cell)]
+    for decimal in {_proven_mark(_MARKS.sub("", cell)) for cell in cells} - {""}:
+        marks = decimal + _OTHER[decimal]
+        if all(parse_with(cell, marks) is not None for cell in cells):
+            return marks
     commas = [cell for cell in cells if parse_number(cell) is None and parse_with(cell, ",") is not None]
     if not commas:
         return "."

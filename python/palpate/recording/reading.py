@@ -46,7 +46,7 @@ def read_recording(
     torque_constant: float | None = None,
     negate: Sequence[str] = (),
     rows: tuple[int | None, int | None] | None = None,
-    zero: tuple[int | None, int | None] | None = None,
+    zero: tuple[int | None, int | None] | Literal["air"] | None = None,
     force_late_s: float | Literal["auto"] = 0.0,
     invalid: Literal["refuse", "drop"] = "refuse",
 ) -> Recording:
@@ -87,8 +87,9 @@ def read_recording(
         Invert the sign of position, force or a column. A column is given by its name and must be used.
     rows : (start, stop), optional
         Use only these rows, counted from 0. The range excludes stop; None leaves an end open.
-    zero : (start, stop), optional
-        Rows without contact; their mean force is subtracted. The range is counted as `rows`.
+    zero : (start, stop) or "air", optional
+        Rows without contact; their mean force is subtracted. The range is counted as `rows`; "air" are the
+        rows before the contact.
     force_late_s : float or "auto"
         Delay of the recorded force [s], or auto; needs time. Every force is moved to its position, for
         example if the converter of a load cell averages. "auto" finds the delay in the recording

@@ -20,7 +20,7 @@ from .parts import changed_force
 from .ranges import implausible_range
 from .recordings import scale_findings
 from .sensors import clipped_force, repeated_samples
-from .signs import mirrored_stroke, moved_zero, reversed_sign
+from .signs import force_without_contact, mirrored_stroke, moved_zero, reversed_sign
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -78,6 +78,12 @@ CHECKS = (
         moved_zero,
         "a tare between press and release; no release of 56 measured switches and domes ends so low",
         {"shift_share": 0.02, "range_share": 0.2, "rows": 5},
+    ),
+    Check(
+        "force without contact",
+        force_without_contact,
+        "a sensor that was not set to zero",
+        {},
     ),
     Check(
         "clipped force",
