@@ -368,7 +368,7 @@ def test_a_force_before_the_contact_is_named_with_the_option_that_removes_it(tmp
     assert "the force before the contact is 0.80" in finding.sentence
     assert finding.sentence.endswith("add --zero air")
     path = tmp_path / "press.csv"
-    in_air(0.8).to_csv(path)
+    in_air(0.8).write(path)
     zeroed = read_recording(path, zero="air")
     assert not zeroed.verdict.findings
     np.testing.assert_allclose(zeroed.force, in_air(0.0).force, atol=0.002)
@@ -377,7 +377,7 @@ def test_a_force_before_the_contact_is_named_with_the_option_that_removes_it(tmp
 def test_a_sensor_without_rows_before_the_contact_cannot_be_zeroed_by_them(tmp_path: Path) -> None:
     position = np.linspace(0.0, 4e-3, 100)
     path = tmp_path / "press.csv"
-    Recording.from_arrays(position, 2e3 * position, units={"position": "m", "force": "N"}).to_csv(path)
+    Recording.from_arrays(position, 2e3 * position, units={"position": "m", "force": "N"}).write(path)
     with pytest.raises(InputError, match="--zero air finds no rows before the contact"):
         read_recording(path, zero="air")
 
