@@ -46,7 +46,7 @@ TIME = Role("time", TIME_UNITS, ("time", "timestamp", "t"))
 ROLES = (POSITION, FORCE, TIME)
 
 LAWS = (("m", "N"), ("rad", "N*m"))
-"""SI units of position and force between which an object has a law. A count or a current can stand for
+"""SI units of position and force between which an object has a law. A count or a current can be
 either."""
 
 DIRECTION_NAMES = ("direction", "segment")

@@ -136,7 +136,7 @@ def recognise(file: str, head: bytes, whole: bool, stated: Stated = NOT_STATED) 
         marks = decimal_mark(f"{file}, line {spans[header.first][0] + 1}", found.sample)
     last = header.row if header.units_row is None else header.units_row
     if last is None or header.units_row is not None or _is_comment(lines[before]):
-        lines_before = spans[header.first][0]  # comments can stand between units and data
+        lines_before = spans[header.first][0]  # comments can be between units and data
     else:
         lines_before = spans[last][1] + 1
     notes = []
@@ -451,7 +451,7 @@ def decimal_mark(where: str, rows: Sequence[Row]) -> str:
 
 def _proven_mark(marks: str) -> str:
     """Returns the decimal mark of a number by its points and commas: a mark between thousands may repeat and
-    stands before the decimal mark. Empty if these marks do not determine it.
+    is before the decimal mark. Empty if these marks do not determine it.
     """
     if len(marks) < 2:
         return ""

@@ -120,7 +120,7 @@ def cure_of_header(rows: Sequence[Sequence[str]]) -> str:
     """Describes the columns of a table without a header by its first rows, and returns the option that names
     them.
 
-    A column that rises in every row beside two others is the time. Of the others, the position is the one
+    If there are three columns that change, one that rises in every row is the time. Of the others, the position is the one
     that turns less often.
     """
     columns = [

@@ -87,7 +87,7 @@ _FACTORS: dict[str, dict[str, float]] = {
 UNITS: dict[str, Unit] = {
     symbol: Unit(symbol, si, factor) for si, symbols in _FACTORS.items() for symbol, factor in symbols.items()
 }
-"""All units with a symbol of their own; :func:`unit_of` also reads products such as ``in-lb``. No units
+"""All units except products; :func:`unit_of` also reads products such as ``in-lb``. No units
 library is used: it would read `Nm` as nanometre and `g` as a mass."""
 
 POSITION_UNITS = ("m", "rad", "count")
@@ -191,7 +191,7 @@ def unit_of(symbol: str) -> Unit | None:
 
 
 def _simple(text: str) -> Unit | None:
-    """Returns the unit that is no product, or None."""
+    """Returns the unit if it is not a product, or None."""
     if text in UNITS:
         return UNITS[text]
     if text == "Grad":  # the German noun; `grad` is a gon in other languages

@@ -276,7 +276,7 @@ def grouped_whole_numbers(p: Press) -> str:
     )
 
 
-def counter_beside_travel(p: Press) -> str:
+def counter_and_travel(p: Press) -> str:
     return "row_count,travel,force_N\n" + table(p.number, p.position_mm, p.force_N)
 
 
@@ -334,7 +334,7 @@ TEXT: dict[Callable[[Press], str], str] = {
     settings_in_the_header: "utf-8",
     grouped_german: "utf-8",
     grouped_whole_numbers: "utf-8",
-    counter_beside_travel: "utf-8",
+    counter_and_travel: "utf-8",
     channels_with_letters: "utf-8",
     one_axis_of_three: "utf-8",
     unread_cells: "utf-8",
@@ -354,7 +354,7 @@ WITHOUT_TIME = {
         setpoint_first,
     ),
     *(force_gauge_with_stress, settings_in_the_header, grouped_german, grouped_whole_numbers),
-    *(counter_beside_travel, channels_with_letters, one_axis_of_three),
+    *(counter_and_travel, channels_with_letters, one_axis_of_three),
 }
 """Files that contain no time."""
 

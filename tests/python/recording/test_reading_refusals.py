@@ -235,7 +235,7 @@ def test_ambiguous_commas_are_refused_with_both_cures(csv_file: Write) -> None:
     assert read_recording(path, decimal=".").force[1] == 2500.0
 
 
-def test_a_comma_beside_a_decimal_point_is_refused_unless_the_mark_is_stated(csv_file: Write) -> None:
+def test_a_comma_in_a_file_with_decimal_points_is_refused_unless_the_mark_is_stated(csv_file: Write) -> None:
     path = csv_file("depth_mm,force_N", [f'{k}.5,"{k},500"' for k in range(1, 13)])
     assert cures_of_marks(path) == ["."]
     assert read_recording(path, decimal=".").force[1] == 2500.0

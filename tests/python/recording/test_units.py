@@ -148,7 +148,7 @@ def test_the_unit_of_a_name_is_read_in_each_notation(name: str, stem: str, symbo
 
 
 @pytest.mark.parametrize("symbol", ["nM", "NM", "mn", "grad", "raw", "hh:mm:ss", "-", "", ".", "lbx"])
-def test_a_text_with_several_meanings_or_none_is_no_unit(symbol: str) -> None:
+def test_a_text_with_several_meanings_or_none_is_not_read(symbol: str) -> None:
     assert unit_of(symbol) is None
 
 
