@@ -279,6 +279,10 @@ def converted(
         )
     choice = conversion.choice
     notes = [*choice.notes, *(["1 torn line at the end is left out"] if table.torn else [])]
+    if choice.time is not None and table.starts:
+        cells[choice.time.name], moved = _continued(cells[choice.time.name], table.starts)
+        if moved:
+            notes.append("the time of each block continues after a pause as long as the longest block")
     total = len(cells[choice.position.name])
     start, stop = _row_range(name, rows, total)
     all_cells = cells
@@ -339,6 +343,23 @@ def converted(
         "file_units": file_units,
         "part_of": _motion(conversion, all_cells, start + np.flatnonzero(check.kept)) if is_part else None,
     }
+
+
+def _continued(time: Float1D, starts: Sequence[int]) -> tuple[Float1D, bool]:
+    """Returns the time (n,) of blocks, each after the one before it, and True if a block was moved.
+
+    The pause between two blocks is not recorded: it is the duration of the longest block.
+    """
+    blocks = np.split(time, starts)
+    pause = max(float(np.nanmax(each) - np.nanmin(each)) for each in blocks)
+    end, moved = -np.inf, False
+    for k, block in enumerate(blocks):
+        finite = block[np.isfinite(block)]
+        if len(finite) and finite[0] <= end:
+            blocks[k] = block + (end + pause - finite[0])
+            finite, moved = finite + (end + pause - finite[0]), True
+        end = finite[-1] if len(finite) else end
+    return np.concatenate(blocks), moved
 
 
 def digest_of(*arrays: NDArray[Any] | None) -> str:

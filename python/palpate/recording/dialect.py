@@ -32,7 +32,7 @@ _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
 
-RECORDING_FORMATS = "CSV, Parquet, Excel (.xlsx), NumPy (.npz), MATLAB (.mat) or MCAP"
+RECORDING_FORMATS = "CSV, Parquet, a workbook (.xlsx, .xls, .ods), NumPy (.npz), MATLAB (.mat) or MCAP"
 
 Row = Sequence[str]
 
@@ -93,13 +93,7 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
     InputError
         The bytes are not text, no header with usable names is found, or the decimal mark is ambiguous.
     """
-    mark, encoding = _encoding(head)
-    text = _decoded(file, head[mark:], encoding, whole)
-    if encoding == "utf-8" and text is None:
-        encoding = "latin-1"
-        text = _decoded(file, head[mark:], encoding, whole)
-    if text is None or _is_binary(text):
-        raise not_text(file)
+    mark, encoding, text = _text_of(file, head, whole)
     if text.lstrip().startswith("{") or file.endswith(".json"):
         raise _json_refusal(file, text)
     lines = list(io.StringIO(text, newline=""))
@@ -140,6 +134,45 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
     )
 
 
+def read_rows(file: str, content: bytes) -> tuple[str, dict[int, list[str | None]], set[int]]:
+    """Splits a text file into its cells.
+
+    Returns
+    -------
+    separator : str
+    rows : dict
+        Cells by the number of the line; empty cells are None, empty rows and cells at the end are left out.
+    behind_empty : set of int
+        Numbers of the lines behind an empty row.
+
+    Raises
+    ------
+    InputError
+        The bytes are not text, or a quotation mark is missing.
+    """
+    lines = list(io.StringIO(_text_of(file, content, True)[2], newline=""))
+    separator = _header(file, lines).separator
+    reader = csv.reader(
+        (line.lstrip("# \t") if _is_comment(line) else line for line in lines), delimiter=separator
+    )
+    rows: dict[int, list[str | None]] = {}
+    behind_empty = set()
+    line, is_empty = 1, False
+    try:
+        for cells in reader:
+            filled = [cell if cell.strip() else None for cell in cells]
+            while filled and filled[-1] is None:
+                filled.pop()
+            if filled:
+                rows[line] = filled
+            if filled and is_empty:
+                behind_empty.add(line)
+            line, is_empty = reader.line_num + 1, not filled
+    except csv.Error as error:
+        raise not_csv(file, error) from None
+    return separator, rows, behind_empty
+
+
 def not_csv(file: str, error: csv.Error) -> InputError:
     """Returns the error for text that cannot be split into cells."""
     return InputError(f"{file} is not CSV: {error}; a closing quotation mark is probably missing")
@@ -148,6 +181,18 @@ def not_csv(file: str, error: csv.Error) -> InputError:
 def not_text(file: str) -> InputError:
     """Returns the error for a file that is neither text nor of another known format."""
     return InputError(f"{file} is not text; a recording is {RECORDING_FORMATS}")
+
+
+def _text_of(file: str, head: bytes, whole: bool) -> tuple[int, str, str]:
+    """Returns length of the byte order mark, encoding and text of the first bytes of a file."""
+    mark, encoding = _encoding(head)
+    text = _decoded(file, head[mark:], encoding, whole)
+    if encoding == "utf-8" and text is None:
+        encoding = "latin-1"
+        text = _decoded(file, head[mark:], encoding, whole)
+    if text is None or _is_binary(text):
+        raise not_text(file)
+    return mark, encoding, text
 
 
 def _encoding(head: bytes) -> tuple[int, str]:
@@ -283,7 +328,7 @@ def find_header(rows: Sequence[Row]) -> Header | None:
     above = first
     while above > 0 and _may_be_header(rows, above - 1, first) and not _is_data(rows[above - 1]):
         above -= 1
-    candidates = [k for k in range(above, first) if not any(map(_is_number, rows[k]))]
+    candidates = [k for k in range(above, first) if not any(map(is_number, rows[k]))]
     if not candidates:
         return None
     units_row = candidates[-1] if len(candidates) > 1 and _is_units(rows[candidates[-1]]) else None
@@ -296,7 +341,7 @@ def find_header(rows: Sequence[Row]) -> Header | None:
     if units_row is not None:
         units = [escaped(_without_brackets(unit)) for unit in rows[units_row]] + [""] * len(names)
         names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=False)]
-    numbers = sum(_is_number(cell) for cell in rows[first])
+    numbers = sum(is_number(cell) for cell in rows[first])
     found = Header(row, tuple(names), first, units_row, numbers=numbers)
     return _without_trailing(found, rows[first : first + LEAST_CONSECUTIVE_ROWS])
 
@@ -397,7 +442,8 @@ def _sed_command(mark: str, separator: str, by: str) -> str:
     return f"sed -E '{script}' OLD.csv > NEW.csv"
 
 
-def _is_number(cell: str) -> bool:
+def is_number(cell: str) -> bool:
+    """Returns True for a number with any decimal mark and thousands separators."""
     text = cell.strip()
     return (
         parse_number(text) is not None
@@ -407,7 +453,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _is_data(row: Row) -> bool:
-    numbers = sum(_is_number(cell) or cell.strip() in MISSING[1:] for cell in row)
+    numbers = sum(is_number(cell) or cell.strip() in MISSING[1:] for cell in row)
     return numbers >= LEAST_NUMBERS
 
 
@@ -439,7 +485,7 @@ def _without_brackets(unit: str) -> str:
 def _is_units(row: Row) -> bool:
     stated = [_without_brackets(cell) for cell in row if _without_brackets(cell) not in ("", "-")]
     known = sum(unit_of(text) is not None for text in stated)
-    return known > 0 and 2 * known >= len(stated) and not any(map(_is_number, stated))
+    return known > 0 and 2 * known >= len(stated) and not any(map(is_number, stated))
 
 
 def _without_trailing(header: Header, data: Sequence[Row]) -> Header:

@@ -41,6 +41,8 @@ class Table(ABC):
     """Columns that are known to hold text before the rows are read"""
     steady_names: Collection[str] = ()
     """Columns that have only one or two distinct values in the first rows of the table"""
+    starts: Sequence[int] = ()
+    """Rows at which a further block of the file begins, whose time can begin again"""
 
     @abstractmethod
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
