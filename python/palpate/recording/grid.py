@@ -127,6 +127,14 @@ class Block:
         """Returns the text in a row above the header, counted from the header."""
         return _line(self.above[rows][slice(*self.span)])
 
+    @property
+    def rows_above(self) -> list[str]:
+        """Place and text of the rows between the table before and the header."""
+        first = self.header_row - len(self.above)
+        return [
+            f"{self.place(first + k)}, {shortened(_line(row))}" for k, row in enumerate(reversed(self.above))
+        ]
+
     def place(self, row: int) -> str:
         """Returns the place of a row of the grid in the file: "row 12"."""
         return f"{self.grid.word} {self.grid.numbers[row]}"
@@ -240,10 +248,13 @@ def _bands(grid: Grid) -> list[_Band]:
     bands: list[_Band] = []
     after_data = 0
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        header = _header_of(grid, after_data, start, stop)
+        header, row = _header_of(grid, after_data, start, stop), start
         if header is not None:
             row = after_data + header.row
-            same = bool(bands) and header.names == bands[-1].header.names
+        elif bands and min(stop - start, after_data - bands[-1].first) >= MIN_ROWS:
+            header = bands[-1].header if _is_title(grid.kinds[after_data:start]) else None
+        if header is not None:
+            same = bool(bands) and row < start and header.names == bands[-1].header.names
             if not bands or same or not grid.follows[after_data : row + 1].all():
                 above = after_data
                 while bands and above < row and grid.follows[above] and _begins_with_reading(grid, above):
@@ -253,6 +264,11 @@ def _bands(grid: Grid) -> list[_Band]:
                 bands.append(_Band(header, above if bands else 0, row, start, len(grid.rows)))
         after_data = stop
     return bands
+
+
+def _is_title(kinds: NDArray[np.int8]) -> bool:
+    """Returns True for rows with one text each."""
+    return bool(len(kinds)) and bool((kinds.sum(axis=1) == TEXT).all())
 
 
 def _begins_with_reading(grid: Grid, row: int) -> bool:
@@ -285,7 +301,7 @@ def _header_of(grid: Grid, above: int, start: int, stop: int) -> Header | None:
 def _side_by_side(grid: Grid, band: _Band) -> list[Block]:
     """Returns the tables below one header: several if its names repeat."""
     names, kinds = band.header.names, grid.kinds[band.first : band.stop]
-    full, filled = _full_columns(kinds), kinds.any(axis=0)
+    full, filled = _full_columns(kinds), np.count_nonzero(kinds, axis=0)
     last = max(full, default=0)
     columns = [k for k, name in enumerate(names) if (filled[k] or k < last if name else k in full)]
     groups = _repeated(names, columns)
@@ -304,7 +320,7 @@ def _side_by_side(grid: Grid, band: _Band) -> list[Block]:
         found.append(replace(block, unused=_below(block, held[len(used) :])))
     last_row = max((int(each.rows[-1]) for each in found if len(each.rows)), default=0)
     beside = grid.kinds[: last_row + 1].copy()
-    beside[:, columns] = EMPTY
+    beside[:, np.array(columns)] = EMPTY
     beside[: band.row] = beside[band.row + 1 : band.first] = EMPTY
     rows, places_beside = np.nonzero(beside)
     if len(rows):
@@ -321,9 +337,11 @@ def _below(block: Block, rows: NDArray[np.intp]) -> tuple[str, ...]:
     """Returns a sentence on the rows below a table, which are not used; none without such rows."""
     if not len(rows):
         return ()
-    first, last = block.place(rows[0]), block.grid.numbers[rows[-1]]
-    more = f" to {last}" if len(rows) > 1 else ""
-    return (f"not used: {first}{more} below the table ({shortened(_line(block.grid.rows[rows[0]]))})",)
+    text = shortened(_line(block.grid.rows[rows[0]]))
+    where = block.place(rows[0])
+    if len(rows) > 1:
+        where = f"{block.grid.word}s {block.grid.numbers[rows[0]]} to {block.grid.numbers[rows[-1]]}"
+    return (f"not used: {where} below the table ({text})",)
 
 
 def _repeated(names: Sequence[str], columns: Sequence[int]) -> list[list[int]]:

@@ -54,7 +54,8 @@ class Part:
         return name in (self.name, self.group, escaped(self.block.grid.name), self.block.title)
 
     def __str__(self) -> str:
-        return f"{shortened(self.name)} ({self.rows} rows)"
+        kind = "" if self.group else "part "
+        return f"{kind}{shortened(self.name)} ({self.rows} row{'s' * (self.rows != 1)})"
 
 
 class SeveralPartsError(InputError):
@@ -98,7 +99,7 @@ def _named(grids: Sequence[Grid]) -> list[Part]:
     blocks = [block for grid in grids for block in tables_of(grid) or [whole_grid(grid)]]
     sheets = [escaped(block.grid.name) if len(grids) > 1 else "" for block in blocks]
     groups = [
-        ", ".join(filter(None, (sheet, block.title))) for sheet, block in zip(sheets, blocks, strict=True)
+        ": ".join(filter(None, (sheet, block.title))) for sheet, block in zip(sheets, blocks, strict=True)
     ]
     counts, reached, parts = Counter(groups), Counter[str](), []
     for block, group in zip(blocks, groups, strict=True):
@@ -147,7 +148,7 @@ def read_part(
             files=tuple(f"{path}, part {each}" for each in names),
             sha256=" ".join(hashlib.sha256(f"{source.sha256} {each}".encode()).hexdigest() for each in names),
         )
-    fields["notes"] = (*fields["notes"], *_notes(parts, chosen))
+    fields["notes"] = (*fields["notes"], *_notes(parts, chosen, wanted))
     return fields
 
 
@@ -185,7 +186,7 @@ def _chosen(
         raise SeveralPartsError(
             f"{path} holds {len(same)} recordings: {listed_parts}. "
             f"For example, add: {_options(parts, same[0])}",
-            candidates,
+            parts,
         )
     return series[longest]
 
@@ -251,17 +252,22 @@ def _place_notes(parts: Sequence[Part], chosen: Sequence[Part]) -> list[str]:
     notes = []
     if hidden or len({each.block.grid.name for each in parts}) > 1:
         notes.append(f"{hidden}sheet {shortened(grid.name)}")
-    if chosen[0].block.title:
-        notes.append(f"part {shortened(chosen[0].block.title)}")
+    if chosen[0].block.title or (not notes and len(_series(parts)) > 1):
+        notes.append(f"part {shortened(chosen[0].block.title or chosen[0].name)}")
     return notes
 
 
-def _notes(parts: Sequence[Part], chosen: Sequence[Part]) -> list[str]:
-    """Returns sentences on joined blocks and on what was not used."""
+def _notes(parts: Sequence[Part], chosen: Sequence[Part], wanted: PartNames | None) -> list[str]:
+    """Returns sentences on joined blocks and on what was not used, except parts that were not wanted."""
     notes = [] if len(chosen) == 1 else [f"{len(chosen)} blocks are read as strokes of one recording"]
+    between = [each for part in chosen[1:] for each in part.block.rows_above]
+    if between:
+        count = f"{len(between)} row{'s' * (len(between) > 1)}"
+        notes.append(f"not used: {count} between the blocks (first: {between[0]})")
     notes += dict.fromkeys(each for part in chosen for each in part.block.unused)
-    if others := [str(each) for each in parts if each not in chosen]:
+    others = [str(each) for each in parts if each not in chosen]
+    if others and wanted is None:
         notes.append(f"not used: {listed(others)}; --part NAME reads another part")
-    elif len(chosen) > 1:
+    elif len(chosen) > 1 and not others:
         notes[0] += f"; --part {command_word(chosen[0].name)} reads one of them"
     return notes

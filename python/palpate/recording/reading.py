@@ -166,7 +166,8 @@ def _fields(file: Path, part: PartNames | None, options: dict[str, Any]) -> dict
     parts: list[Part] = []
     with suppress(InputError):
         parts = parts_of_text(file)
-    if len(parts) > 1:
+    has_notes = any(each.block.unused and each.block.too_wide is None for each in parts)
+    if len(parts) > 1 or (refusal is not None and has_notes):
         return read_part(file, parts, part, options)
     if refusal is not None:
         raise refusal
