@@ -31,11 +31,12 @@ def main(library_folder: str, path: str, memory_bytes: str) -> int:
 
     own_pages = int(Path("/proc/self/statm").read_text().split()[0])
     limit = own_pages * resource.getpagesize() + int(memory_bytes)
+    _, highest = resource.getrlimit(resource.RLIMIT_AS)
+    limit = limit if highest == resource.RLIM_INFINITY else min(limit, highest)
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
-        with open(path, "rb") as stream:  # a file without a name: its content decides on the format
-            book = CalamineWorkbook.from_filelike(stream)
+        book = _opened(CalamineWorkbook, path)
         sheets = []
         for each in book.sheets_metadata:
             if each.typ == SheetTypeEnum.WorkSheet:
@@ -48,6 +49,18 @@ def main(library_folder: str, path: str, memory_bytes: str) -> int:
         sys.stderr.write(f"{error}" or type(error).__name__)
         return 1
     return 0
+
+
+def _opened(library: Any, path: str) -> Any:
+    """Opens a workbook in the format of its suffix, else in that of its content."""
+    try:
+        return library.from_path(path)
+    except Exception as error:
+        try:
+            with open(path, "rb") as stream:
+                return library.from_filelike(stream)
+        except Exception:
+            raise error from None
 
 
 def _filled_rows(sheet: Any) -> dict[int, list[Any]]:
