@@ -161,7 +161,6 @@ _READING = options(
     ),
     expert_option(
         "--part",
-        group="Input",
         metavar="NAME",
         multiple=True,
         callback=lambda ctx, param, names: names or None,

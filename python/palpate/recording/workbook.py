@@ -66,7 +66,7 @@ def read_sheets(path: Path) -> list[Grid]:
         message = done.stderr.decode(errors="replace")
         if done.returncode == MEMORY_STATUS or any(each in message for each in _MEMORY_MESSAGES):
             raise TooLargeError(
-                f"{path} needs more than {files.MEMORY_LIMIT / 2**30:.3g} GiB of memory: it is damaged, or it has "
-                "cells far below or beside the table; delete these cells"
+                f"{path} needs more than {files.MEMORY_LIMIT / 2**30:.3g} GiB of memory: it is damaged, or "
+                "it has cells far below or beside the table; delete these cells"
             )
         raise ValueError(message if done.returncode == 1 else "the library that reads it crashed")
