@@ -7,6 +7,7 @@ import hashlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -279,10 +280,13 @@ def converted(
         )
     choice = conversion.choice
     notes = [*choice.notes, *(["1 torn line at the end is left out"] if table.torn else [])]
-    if choice.time is not None and table.starts:
-        cells[choice.time.name], moved = _continued(cells[choice.time.name], table.starts)
-        if moved:
-            notes.append("the time of each block continues after a pause as long as the longest block")
+    if choice.time is not None:
+        cells[choice.time.name], begun = _continued(cells[choice.time.name], table.starts)
+        if begun:
+            notes.append(
+                f"the time begins again in {table.place(begun[0])}; it continues after a pause as long as the "
+                f"longest block, and --rows 0:{begun[0]} reads the first one"
+            )
     total = len(cells[choice.position.name])
     start, stop = _row_range(name, rows, total)
     all_cells = cells
@@ -345,21 +349,29 @@ def converted(
     }
 
 
-def _continued(time: Float1D, starts: Sequence[int]) -> tuple[Float1D, bool]:
-    """Returns the time (n,) of blocks, each after the one before it, and True if a block was moved.
+def _continued(time: Float1D, starts: Sequence[int]) -> tuple[Float1D, list[int]]:
+    """Returns a time (n,) that continues where the recorded one begins again, and the rows in which it does.
 
-    The pause between two blocks is not recorded: it is the duration of the longest block.
+    It begins again at the start of a block of the file, or if it returns to the first time of at least
+    `MIN_ROWS` rows, within one step, and goes on in usual steps. The pause before is not recorded: it is the
+    duration of the longest block.
     """
-    blocks = np.split(time, starts)
-    pause = max(float(np.nanmax(each) - np.nanmin(each)) for each in blocks)
-    end, moved = -np.inf, False
-    for k, block in enumerate(blocks):
-        finite = block[np.isfinite(block)]
-        if len(finite) and finite[0] <= end:
-            blocks[k] = block + (end + pause - finite[0])
-            finite, moved = finite + (end + pause - finite[0]), True
-        end = finite[-1] if len(finite) else end
-    return np.concatenate(blocks), moved
+    edges = [0]
+    for row in (np.flatnonzero(np.diff(time) <= 0.0) + 1).tolist():
+        first = edges[-1]
+        is_block = row in starts
+        if not is_block and min(row - first, len(time) - row) >= MIN_ROWS:
+            returned = abs(time[row] - time[first]) <= time[first + 1] - time[first] > 0.0
+            is_block = returned and time[row + 1] - time[row] <= np.diff(time[first:row]).max()
+        if is_block:
+            edges.append(row)
+    if len(edges) == 1:
+        return time, []
+    blocks = np.split(time, edges[1:])
+    pause = max(float(np.nanmax(block) - np.nanmin(block)) for block in blocks)
+    for before, block in pairwise(blocks):
+        block += before[-1] + pause - block[0]
+    return np.concatenate(blocks), edges[1:]
 
 
 def digest_of(*arrays: NDArray[Any] | None) -> str:

@@ -198,7 +198,30 @@ def test_the_time_of_a_block_continues_after_the_longest_block(tmp_path: Path) -
     recording = read_recording(text_file(tmp_path / "a.csv", blocks("empty rows", 3)))
     assert recording.time is not None
     np.testing.assert_allclose(recording.time[[0, 39, 40, 79, 80]], [0.0, 0.39, 0.78, 1.17, 1.56])
-    assert "the time of each block continues after a pause as long as the longest block" in recording.notes
+    assert (
+        "the time begins again in line 43; it continues after a pause as long as the longest block, and "
+        "--rows 0:40 reads the first one"
+    ) in recording.notes
+    assert_same_rows(read_recording(tmp_path / "a.csv", rows=(0, 40)), clean(tmp_path, indent(0)))
+
+
+def test_a_time_that_begins_again_within_a_table_continues(tmp_path: Path) -> None:
+    for suffix in (".csv", ".xlsx"):
+        path = any_file(tmp_path / f"a{suffix}", [HEADER, *indent(0), *indent(1), *indent(2)])
+        recording = read_recording(path)
+        assert_same_rows(recording, clean(tmp_path, indent(0), indent(1), indent(2)))
+        assert recording.time is not None
+        np.testing.assert_allclose(recording.time[[0, 39, 40, 79, 80]], [0.0, 0.39, 0.78, 1.17, 1.56])
+
+
+@pytest.mark.parametrize(("row", "time"), [(20, 0.0), (20, 0.15), (35, 0.0)], ids=["jump", "back", "late"])
+def test_a_single_time_that_does_not_increase_is_refused(tmp_path: Path, row: int, time: float) -> None:
+    rows = indent(0)
+    rows[row][0] = time
+    sentence = refusal(text_file(tmp_path / "a.csv", [HEADER, *rows]))
+    assert (
+        f"line {row + 2}: column Time (s) holds '{time}', must be later than the time before it" in sentence
+    )
 
 
 def test_the_time_of_blocks_is_kept_if_it_increases(tmp_path: Path) -> None:
@@ -206,7 +229,7 @@ def test_the_time_of_blocks_is_kept_if_it_increases(tmp_path: Path) -> None:
     recording = read_recording(text_file(tmp_path / "a.csv", [HEADER, *indent(0), [], *later]))
     assert recording.time is not None
     assert recording.time[40] == 5.0
-    assert not any("continues" in note for note in recording.notes)
+    assert not any("begins again" in note for note in recording.notes)
 
 
 @pytest.mark.parametrize("suffix", ALL)
