@@ -284,8 +284,8 @@ def converted(
         cells[choice.time.name], begun = _continued(cells[choice.time.name], table.starts)
         if begun:
             notes.append(
-                f"the time begins again in {table.place(begun[0])}; it continues after a pause as long as the "
-                f"longest block, and --rows 0:{begun[0]} reads the first one"
+                f"the time begins again in {table.place(begun[0])}; it continues after a pause as long as "
+                f"the longest block, and --rows 0:{begun[0]} reads the first one"
             )
     total = len(cells[choice.position.name])
     start, stop = _row_range(name, rows, total)

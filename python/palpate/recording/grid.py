@@ -107,9 +107,9 @@ class Block:
     rows: NDArray[np.intp]
     """Index of each row (n,) among the rows of the grid"""
     unused: tuple[str, ...] = ()
-    """Sentences on cells below and beside the table, which are not used"""
+    """Sentences on cells below and next to the table, which are not used"""
     too_wide: int | None = None
-    """Index of the first row of a text file with a cell beside the table"""
+    """Index of the first row of a text file with a cell next to the table"""
     title: str = ""
     """Text above the header that distinguishes the table from others with the same columns"""
 
@@ -120,7 +120,7 @@ class Block:
 
     @property
     def series(self) -> tuple[str, tuple[str, ...], tuple[int, ...], str]:
-        """Key that is the same for blocks without names of their own: strokes of one recording."""
+        """Key that is the same for blocks without separate names: strokes of one recording."""
         return self.grid.name, self.names, self.columns, self.title
 
     def text_above(self, rows: int) -> str:
@@ -279,7 +279,7 @@ def _begins_with_reading(grid: Grid, row: int) -> bool:
 def _header_of(grid: Grid, above: int, start: int, stop: int) -> Header | None:
     """Returns the header in the rows above rows of data, or None.
 
-    A number above a column that is mostly empty stands beside the header.
+    A number above a column that is mostly empty is not part of it.
     """
     if stop - start < LEAST_CONSECUTIVE_ROWS:
         return None
@@ -319,13 +319,13 @@ def _side_by_side(grid: Grid, band: _Band) -> list[Block]:
         block = Block(grid, header, band.row, places, span, above, used)
         found.append(replace(block, unused=_below(block, held[len(used) :])))
     last_row = max((int(each.rows[-1]) for each in found if len(each.rows)), default=0)
-    beside = grid.kinds[: last_row + 1].copy()
-    beside[:, np.array(columns)] = EMPTY
-    beside[: band.row] = beside[band.row + 1 : band.first] = EMPTY
-    rows, places_beside = np.nonzero(beside)
+    outside = grid.kinds[: last_row + 1].copy()
+    outside[:, np.array(columns)] = EMPTY
+    outside[: band.row] = outside[band.row + 1 : band.first] = EMPTY
+    rows, places_outside = np.nonzero(outside)
     if len(rows):
-        cells = f"{len(rows)} cell{'s' * (len(rows) > 1)} beside the table"
-        text = shortened(_text(grid.rows[rows[0]][places_beside[0]]))
+        cells = f"{len(rows)} cell{'s' * (len(rows) > 1)} next to the table"
+        text = shortened(_text(grid.rows[rows[0]][places_outside[0]]))
         note = f"not used: {cells} (first: {found[0].place(rows[0])}, {text})"
         data = rows[rows > band.row]
         too_wide = int(data[0]) if grid.separator and len(data) else None

@@ -2,7 +2,7 @@
 """Choice of the part of a file that is read: a sheet, one of several specimens, or blocks of rows.
 
 A file with several recordings says so by names: those of its sheets, or a title above each header. Blocks
-without names of their own are strokes of one recording. A recording is a table in which position and force
+without separate names are strokes of one recording. A recording is a table in which position and force
 can be chosen. If there are several kinds of such tables, the longest one is a recording, and so are all
 others of its kind.
 """

@@ -67,6 +67,6 @@ def read_sheets(path: Path) -> list[Grid]:
         if done.returncode == MEMORY_STATUS or any(each in message for each in _MEMORY_MESSAGES):
             raise TooLargeError(
                 f"{path} needs more than {files.MEMORY_LIMIT / 2**30:.3g} GiB of memory: it is damaged, or "
-                "it has cells far below or beside the table; delete these cells"
+                "it has cells far below or right of the table; delete these cells"
             )
         raise ValueError(message if done.returncode == 1 else "the library that reads it crashed")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program that reads the cells of a workbook in a process of its own and writes them to its output.
+"""Program that reads the cells of a workbook in a separate process and writes them to its output.
 
 The library ends its process if a workbook needs more memory than there is. The arguments are the folder of
 python_calamine, the workbook, and the largest memory for its cells [bytes].

@@ -51,7 +51,7 @@ def follow(path: Path, sentence: str, capsys: pytest.CaptureFixture[str]) -> Rec
     return recording
 
 
-def beside(*tables: Rows) -> list[list[Any]]:
+def side_by_side(*tables: Rows) -> list[list[Any]]:
     """Returns the rows of tables side by side, with an empty column between them."""
     height = max(map(len, tables))
     rows = []
@@ -134,7 +134,7 @@ def test_specimens_side_by_side_are_chosen_by_the_title_above_their_columns(
 ) -> None:
     first = [["Specimen A"], ["Time", "Travel", "Force"], ["s", "mm", "N"], *indent(0)]
     second = [["Specimen B"], ["Time", "Travel", "Force"], ["s", "mm", "N"], *indent(1, 30)]
-    path = any_file(tmp_path / f"a{suffix}", [["Report", 7], [], *beside(first, second)])
+    path = any_file(tmp_path / f"a{suffix}", [["Report", 7], [], *side_by_side(first, second)])
     sentence = refusal(path)
     assert sentence.startswith(f"a{suffix} holds 2 recordings: Specimen A (40 rows), Specimen B (30 rows). ")
     assert_same_rows(follow(path, sentence, capsys), clean(tmp_path, indent(0)))
@@ -166,7 +166,7 @@ def test_a_column_that_occurs_twice_in_one_table_is_refused(tmp_path: Path) -> N
 
 
 def blocks(kind: str, count: int) -> list[list[Any]]:
-    """Returns indents below one another, each with its own time from 0 on."""
+    """Returns indents below one another, with times that all begin at 0."""
     rows: list[list[Any]] = [HEADER]
     for k in range(count):
         if kind == "repeated headers" and k:
@@ -181,7 +181,7 @@ def blocks(kind: str, count: int) -> list[list[Any]]:
 
 @pytest.mark.parametrize("suffix", ALL)
 @pytest.mark.parametrize("kind", ["empty rows", "repeated headers", "titles below the header"])
-def test_blocks_without_a_name_of_their_own_are_strokes_of_one_recording(
+def test_blocks_without_separate_names_are_strokes_of_one_recording(
     tmp_path: Path, suffix: str, kind: str
 ) -> None:
     path = any_file(tmp_path / f"a{suffix}", blocks(kind, 10))
@@ -275,13 +275,13 @@ def test_calculations_below_a_table_are_named_and_not_used(
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_notes_beside_a_table_are_named_and_not_used(tmp_path: Path, suffix: str) -> None:
+def test_notes_next_to_a_table_are_named_and_not_used(tmp_path: Path, suffix: str) -> None:
     rows: list[list[Any]] = [HEADER, *indent(0)]
     rows[0] = [*rows[0], None, "Fmax", 2.2]
     rows[5] = [*rows[5], None, None, "saturated?"]
     recording = read_recording(workbook(tmp_path / f"a{suffix}", {"Data": rows}))
     assert_same_rows(recording, clean(tmp_path, indent(0)))
-    assert "not used: 3 cells beside the table (first: row 1, Fmax)" in recording.notes
+    assert "not used: 3 cells next to the table (first: row 1, Fmax)" in recording.notes
     assert not recording.columns
 
 

@@ -71,7 +71,7 @@ def test_cells_that_only_have_a_format_have_no_effect(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("blank", sampled([" ", "\n\t", "\xa0"], " ", "\xa0"))
-def test_a_blank_cell_below_and_beside_the_table_has_no_effect(tmp_path: Path, blank: str) -> None:
+def test_a_blank_cell_below_and_right_of_the_table_has_no_effect(tmp_path: Path, blank: str) -> None:
     plain = read_recording(workbook(tmp_path / "a.xlsx", ("run", "visible", rows())))
     stray = read_recording(with_cell(tmp_path / "a.xlsx", 5000, 300, blank))
     assert (stray.force == plain.force).all()
@@ -105,7 +105,7 @@ def test_a_cell_in_the_last_row_and_column_is_refused_before_memory_is_used(
 ) -> None:
     """The library would hold all cells up to the last one."""
     path = workbook(tmp_path / "a.xlsx", ("run", "visible", rows()))
-    sentence = "a.xlsx needs more than 4 GiB of memory: it is damaged, or it has cells far below or beside"
+    sentence = "a.xlsx needs more than 4 GiB of memory: it is damaged, or it has cells far below or right of"
     assert refusal(with_cell(path, *LAST_CELL, value)).startswith(sentence)
 
 
