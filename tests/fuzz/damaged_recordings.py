@@ -121,6 +121,16 @@ def _xlsx() -> list[bytes]:
     return [stream.getvalue()]
 
 
+def _workbook(suffix: str) -> list[bytes]:
+    sys.path.append(str(ROOT / "tests" / "python"))
+    from workbooks import workbook
+
+    columns = arrays()
+    rows = [list(columns), *zip(*(np.asarray(cells).tolist() for cells in columns.values()), strict=True)]
+    with tempfile.TemporaryDirectory() as folder:
+        return [workbook(Path(folder) / f"a{suffix}", {"run": rows}).read_bytes()]
+
+
 def _parquet(checksums: bool, **options: Any) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as parquet
@@ -252,6 +262,9 @@ KINDS = {
     "parquet, plain": Kind("parquet", lambda: _parquet_files(False), one_bit, False),
     "xlsx": Kind("xlsx", _xlsx, one_bit),
     "xlsx, cut": Kind("xlsx", _xlsx, cut),
+    "ods": Kind("ods", lambda: _workbook(".ods"), one_bit),
+    "xls": Kind("xls", lambda: _workbook(".xls"), some_bytes, False),
+    "xls, cut": Kind("xls", lambda: _workbook(".xls"), cut, False),
     "npz": Kind("npz", _npz, one_bit),
     "npz, cut": Kind("npz", _npz, cut),
 }

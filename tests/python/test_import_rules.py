@@ -18,7 +18,7 @@ IMPORTED_LATE = {
     "joblib",
     "distributed",
     "pyarrow",
-    "openpyxl",
+    "python_calamine",
     "mcap",
     "bokeh",
     "jinja2",

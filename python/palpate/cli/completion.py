@@ -15,7 +15,7 @@ SHELLS = ("bash", "zsh", "fish")
 _VARIABLE = "_PALPATE_COMPLETE"
 """Environment variable with which the script in the shell requests completions."""
 
-RECORDINGS = (".csv", ".part", ".parquet", ".xlsx", ".npz", ".mat", ".mcap")
+RECORDINGS = (".csv", ".part", ".parquet", ".xlsx", ".xls", ".ods", ".npz", ".mat", ".mcap")
 """Suffixes of the files that can be recordings."""
 
 FIGURES = (".png", ".pdf", ".svg")

@@ -274,8 +274,8 @@ def identify(
 ) -> None:
     """Identify a model of force over position from recordings.
 
-    RECORDING: CSV, Parquet, Excel, .npz, .mat or MCAP, with the unit in each column name: position_rad,
-    "Force [gf]", "Force / N". The simplest model that fits is taken.
+    RECORDING: CSV, Parquet, .xlsx, .xls, .ods, .npz, .mat or MCAP, with the unit in each column name:
+    position_rad, "Force [gf]", "Force / N". The simplest model that fits is taken.
     """
     require_model_name(output)
     require_writable(output, plot, inputs=recording_files)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,12 @@ from ..errors import listed
 from ..recording import Recording
 from ..recording.checks import quality_findings
 from ..recording.motion import GAP_RATIO, ordered_strokes
+from ..recording.parts import Part, SeveralPartsError
 from ..recording.roles import counts_text, informative, role_counts, roles_of
 from ..verdict import Verdict
 from .exit_status import end_with, finishing
 from .figures import FrameFigure, drawing, picture_frame, picture_recording
-from .printing import number, print_json, print_numbers, print_paragraph, print_verdict
+from .printing import number, print_json, print_numbers, print_paragraph, print_table, print_verdict
 from .verb import ReadingOptions
 
 _MODEL_START = b"{"
@@ -44,7 +46,12 @@ def show_recording(
     as_json: bool,
 ) -> None:
     """Prints a recording, its verdict first, and draws its views."""
-    recording = reading.read(file)
+    try:
+        recording = reading.read(file)
+    except SeveralPartsError as error:
+        if not as_json:
+            _print_parts(error.parts)
+        raise
     (kept,), _, dropped = informative([recording])
     verdict = Verdict(tuple(quality_findings(kept)))
     strokes, roles = _strokes(recording), role_counts(roles_of(kept)) | dropped
@@ -66,6 +73,12 @@ def show_recording(
             for note in notes:
                 print_paragraph(note, indent="  ")
         end_with(verdict)
+
+
+def _print_parts(parts: Sequence[Part]) -> None:
+    """Prints the parts of a file of which none was chosen."""
+    rows = [(each.name, str(number), str(each.rows)) for number, each in enumerate(parts, 1)]
+    print_table(("part", "number", "rows"), rows)
 
 
 def _strokes(recording: Recording) -> dict[str, int] | None:

@@ -30,7 +30,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 PATH = FileName(path_type=Path)
 
 READING_NAMES = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows",
-                 "zero", "force_late_s", "invalid", "columns", "decimal")  # fmt: skip
+                 "zero", "force_late_s", "invalid", "columns", "decimal", "part")  # fmt: skip
 """Arguments of `read_recording` that are also options of the command line."""
 
 _SCHEME = Scheme()
@@ -165,6 +165,13 @@ _READING = options(
         callback=_names_and_units,
         multiple=True,
         help=_about("units"),
+    ),
+    expert_option(
+        "--part",
+        metavar="NAME",
+        multiple=True,
+        callback=lambda ctx, param, names: names or None,
+        help=f"{_about('part')} Repeatable.",
     ),
     expert_option(
         "--force-late-s", metavar="SECONDS", callback=_lag, default="0.0", help=_about("force_late_s")

@@ -7,6 +7,7 @@ import hashlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -306,6 +307,13 @@ def converted(
         )
     choice = conversion.choice
     notes = [*choice.notes, *(["1 torn line at the end is left out"] if table.torn else [])]
+    if choice.time is not None:
+        cells[choice.time.name], begun = _continued(cells[choice.time.name], table.starts)
+        if begun:
+            notes.append(
+                f"the time begins again in {table.place(begun[0])}; it continues after a pause as long as "
+                f"the longest block, and --rows 0:{begun[0]} reads the first one"
+            )
     total = len(cells[choice.position.name])
     start, stop = _row_range(name, rows, total)
     all_cells = cells
@@ -372,6 +380,31 @@ def converted(
         "unread_time": choice.unread_time,
         "part_of": _motion(conversion, all_cells, start + np.flatnonzero(check.kept)) if is_part else None,
     }
+
+
+def _continued(time: Float1D, starts: Sequence[int]) -> tuple[Float1D, list[int]]:
+    """Returns a time (n,) that continues where the recorded one begins again, and the rows in which it does.
+
+    It begins again at the start of a block of the file, or if it returns to the first time of at least
+    `MIN_ROWS` rows, within one step, and goes on in usual steps. The pause before is not recorded: it is the
+    duration of the longest block.
+    """
+    edges = [0]
+    for row in (np.flatnonzero(np.diff(time) <= 0.0) + 1).tolist():
+        first = edges[-1]
+        is_block = row in starts
+        if not is_block and min(row - first, len(time) - row) >= MIN_ROWS:
+            returned = abs(time[row] - time[first]) <= time[first + 1] - time[first] > 0.0
+            is_block = returned and time[row + 1] - time[row] <= np.diff(time[first:row]).max()
+        if is_block:
+            edges.append(row)
+    if len(edges) == 1:
+        return time, []
+    blocks = np.split(time, edges[1:])
+    pause = max(float(np.nanmax(block) - np.nanmin(block)) for block in blocks)
+    for before, block in pairwise(blocks):
+        block += before[-1] + pause - block[0]
+    return np.concatenate(blocks), edges[1:]
 
 
 def digest_of(*arrays: NDArray[Any] | None) -> str:

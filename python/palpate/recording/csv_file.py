@@ -45,6 +45,9 @@ _BLOCK_BYTES = 1 << 22
 _BLANK_LINE = re.compile(rb"\n[ \t\r\n]")
 """Start of a line that may be blank."""
 
+_EMPTY_ROW = re.compile(rb"\n[ \t\r]*\n[ \t\r]*[^ \t\r\n]")
+"""Empty row between two rows."""
+
 _CLOSING_QUOTE = re.compile(rb'(?:[^"]|"")*"(?!")')
 """Pattern of the text of a quoted cell up to and including its closing quotation mark."""
 
@@ -99,6 +102,8 @@ class CsvFile(LongTable):
         self._path = path
         self._size = path.stat().st_size
         self.torn = 0
+        self.has_empty_rows = False
+        """True if :meth:`read` found an empty row between two rows"""
         if path.suffix == ".part":
             self._leave_out_torn_line()
         with self._bytes() as stream:
@@ -204,8 +209,11 @@ class CsvFile(LongTable):
 
     def _least_memory(self) -> int:
         """Returns the memory for all cells without the words in them [bytes]."""
+        lines = 0
         with self._bytes(self._dialect.start) as stream:
-            lines = sum(block.count(b"\n") for block in iter(lambda: stream.read(_BLOCK_BYTES), b""))
+            for block in iter(lambda: stream.read(_BLOCK_BYTES), b""):
+                lines += block.count(b"\n")
+                self.has_empty_rows |= _EMPTY_ROW.search(block) is not None
         return CELL_BYTES * lines * len(self.names)
 
     def _read(self, as_text: set[str], numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:

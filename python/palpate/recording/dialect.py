@@ -35,7 +35,7 @@ _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
 
-RECORDING_FORMATS = "CSV, Parquet, Excel (.xlsx), NumPy (.npz), MATLAB (.mat) or MCAP"
+RECORDING_FORMATS = "CSV, Parquet, a workbook (.xlsx, .xls, .ods), NumPy (.npz), MATLAB (.mat) or MCAP"
 
 Row = Sequence[str]
 
@@ -50,6 +50,9 @@ _MARKS = re.compile(r"[^.,]")
 
 _OTHER = {".": ",", ",": "."}
 """Mark between thousands by the decimal mark."""
+
+_OTHER_SEPARATOR = re.compile(r"[\t;]|,(?!\d)|(?<!\d),")
+"""Separator other than a space; a comma between digits may be a decimal comma."""
 
 _COMMENT_START = re.compile(r"[#\s]*((columns|fields|names|header|units)\s*[:=]\s*)?", re.IGNORECASE)
 """Start of a comment that holds a header."""
@@ -115,13 +118,7 @@ def recognise(file: str, head: bytes, whole: bool, stated: Stated = NOT_STATED) 
     InputError
         The bytes are not text, no header with usable names is found, or the decimal mark is ambiguous.
     """
-    mark, encoding = _encoding(head)
-    text = _decoded(file, head[mark:], encoding, whole)
-    if encoding == "utf-8" and text is None:
-        encoding = "latin-1"
-        text = _decoded(file, head[mark:], encoding, whole)
-    if text is None or _is_binary(text):
-        raise not_text(file)
+    mark, encoding, text = _text_of(file, head, whole)
     if text.lstrip().startswith("{") or file.endswith(".json"):
         raise _json_refusal(file, text)
     lines = list(io.StringIO(text, newline=""))
@@ -129,13 +126,13 @@ def recognise(file: str, head: bytes, whole: bool, stated: Stated = NOT_STATED) 
         lines.pop()  # the bytes read so far may end inside a line
     found = _header(file, lines, stated.columns)
     separator, spans, row = found.separator, found.spans, found.header.row
-    before, header_line = spans[found.header.first if row is None else row]
+    before, header_line = spans[row]
     header, header_notes = with_checked_names(f"{file}, line {header_line + 1}", found.header)
-    marks = "." if stated.decimal is None else stated.decimal + _OTHER[stated.decimal]
+    marks = marks_of(stated.decimal)
     if found.sample and stated.decimal is None:
         marks = decimal_mark(f"{file}, line {spans[header.first][0] + 1}", found.sample)
     last = header.row if header.units_row is None else header.units_row
-    if last is None or header.units_row is not None or _is_comment(lines[before]):
+    if header.stated or header.units_row is not None or _is_comment(lines[before]):
         lines_before = spans[header.first][0]  # comments can be between units and data
     else:
         lines_before = spans[last][1] + 1
@@ -148,9 +145,9 @@ def recognise(file: str, head: bytes, whole: bool, stated: Stated = NOT_STATED) 
         notes.append("decimal comma")
     preamble = sum(1 for line in lines[:before] if line.strip() and not _is_comment(line))
     if preamble:
-        place = "data" if row is None else "header"
+        place = "data" if header.stated else "header"
         notes.append(f"{preamble} line{'s' * (preamble > 1)} before the {place} in line {before + 1}")
-    if row is None:
+    if header.stated:
         notes.append("the column names are stated")
     elif _is_comment(lines[before]):
         notes.append(f"header in the comment in line {before + 1}")
@@ -169,6 +166,44 @@ def recognise(file: str, head: bytes, whole: bool, stated: Stated = NOT_STATED) 
     )
 
 
+def read_rows(file: str, content: bytes) -> tuple[str, dict[int, list[str | None]], set[int]]:
+    """Splits a text file into its cells.
+
+    Returns
+    -------
+    separator : str
+    rows : dict
+        Cells by the number of the line; empty cells are None, empty rows and cells at the end are left out.
+    behind_empty : set of int
+        Numbers of the lines behind an empty row.
+
+    Raises
+    ------
+    InputError
+        The bytes are not text, or a quotation mark is missing.
+    """
+    lines = list(io.StringIO(_text_of(file, content, True)[2], newline=""))
+    separator = _header(file, lines, ()).separator
+    without_marks = (_COMMENT_START.sub("", line, count=1) if _is_comment(line) else line for line in lines)
+    reader = cells_of_lines(without_marks, separator)
+    rows: dict[int, list[str | None]] = {}
+    behind_empty = set()
+    line, is_empty = 1, False
+    try:
+        for cells in reader:
+            filled = [cell if cell.strip() else None for cell in cells]
+            while filled and filled[-1] is None:
+                filled.pop()
+            if filled:
+                rows[line] = filled
+            if filled and is_empty:
+                behind_empty.add(line)
+            line, is_empty = reader.line_num + 1, not filled
+    except csv.Error as error:
+        raise not_csv(file, error) from None
+    return separator, rows, behind_empty
+
+
 def not_csv(file: str, error: csv.Error) -> InputError:
     """Returns the error for text that cannot be split into cells."""
     return InputError(f"{file} is not CSV: {error}; a closing quotation mark is probably missing")
@@ -177,6 +212,18 @@ def not_csv(file: str, error: csv.Error) -> InputError:
 def not_text(file: str) -> InputError:
     """Returns the error for a file that is neither text nor of another known format."""
     return InputError(f"{file} is not text; a recording is {RECORDING_FORMATS}")
+
+
+def _text_of(file: str, head: bytes, whole: bool) -> tuple[int, str, str]:
+    """Returns length of the byte order mark, encoding and text of the first bytes of a file."""
+    mark, encoding = _encoding(head)
+    text = _decoded(file, head[mark:], encoding, whole)
+    if encoding == "utf-8" and text is None:
+        encoding = "latin-1"
+        text = _decoded(file, head[mark:], encoding, whole)
+    if text is None or _is_binary(text):
+        raise not_text(file)
+    return mark, encoding, text
 
 
 def _encoding(head: bytes) -> tuple[int, str]:
@@ -234,6 +281,8 @@ def _header(file: str, lines: list[str], names: tuple[str, ...]) -> _Candidate:
     without_header: list[list[str]] = []
     for separator in SEPARATORS:
         if not any(separator in line.strip() for _, line in plain):
+            continue
+        if separator == " " and any(_OTHER_SEPARATOR.search(line) for _, line in plain):
             continue
         spans, rows = _rows(file, plain, separator)
         header = find_header(rows, names)
@@ -328,8 +377,7 @@ def _metadata(lines: list[str], separator: str) -> Iterator[tuple[str, str]]:
 class Header:
     """Header of a table: its column names, and the indices of the rows with names, units and first data."""
 
-    row: int | None
-    """Index of the row with the names; None if the caller states them"""
+    row: int
     names: tuple[str, ...]
     """Column names. Control characters are escaped; a unit from a line of units is added in brackets."""
     first: int
@@ -339,6 +387,8 @@ class Header:
     """True if each row ends with a separator; the last column then has no name and is ignored"""
     numbers: int = 0
     """Number of columns that hold numbers in the first row of data"""
+    stated: bool = False
+    """True if the caller states the names; `row` is then the first row of data"""
 
 
 def find_header(rows: Sequence[Row], stated: tuple[str, ...] = ()) -> Header | None:
@@ -360,7 +410,9 @@ def find_header(rows: Sequence[Row], stated: tuple[str, ...] = ()) -> Header | N
     numbers = sum(is_number(cell) for cell in rows[first])
     if stated:
         names = [*stated, *[""] * (cells - len(stated))]
-        return _without_trailing(Header(None, tuple(names), first, numbers=numbers), rows[first : first + 3])
+        return _without_trailing(
+            Header(first, tuple(names), first, numbers=numbers, stated=True), rows[first : first + 3]
+        )
     above = first
     while above > 0 and _may_be_header(rows, above - 1, first) and not _is_data(rows[above - 1][:cells]):
         above -= 1
@@ -456,6 +508,12 @@ def _proven_mark(marks: str) -> str:
     if len(marks) < 2:
         return ""
     return marks[-1] if len(set(marks)) > 1 else _OTHER[marks[0]]
+
+
+def marks_of(decimal: str | None) -> str:
+    """Returns the stated decimal mark and the other mark, which then separates thousands; "." if none is
+    stated."""
+    return "." if decimal is None else decimal + _OTHER[decimal]
 
 
 def refuse_marks(where: str, cells: Iterable[object], marks: str) -> None:

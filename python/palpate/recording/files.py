@@ -14,7 +14,9 @@ import json
 import os
 import secrets
 import stat
+import struct
 import time
+import zipfile
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -31,6 +33,9 @@ _BLOCK_BYTES = 1 << 20
 
 MEMORY_LIMIT = 4 << 30
 """Largest memory for the content of a recording file [bytes]: 10^8 rows of 5 columns."""
+
+_ZIP_END_BYTES = 22 + 0xFFFF
+"""Largest number of bytes of the record that ends a zip archive and states the number of members."""
 
 _TICK_S = 0.01
 """Longest tick of the clock that dates changes of files [s]: Linux with 100 Hz."""
@@ -88,6 +93,26 @@ def require_memory(path: Path | str, needed: float) -> None:
             f"{MEMORY_LIMIT / 2**30:.3g} GiB; remove rows or columns. palpate identify reads longer CSV and "
             "Parquet files part by part"
         )
+
+
+def zip_members(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Yields names and contents of the members of a zip archive, after checking their checksums.
+
+    Raises
+    ------
+    ValueError
+        The archive is damaged, or a member is missing.
+    """
+    with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
+        members = archive.infolist()
+        require_memory(path, sum(each.file_size for each in members))
+        stream.seek(max(0, path.stat().st_size - _ZIP_END_BYTES))
+        end = stream.read()
+        (count,) = struct.unpack_from("<H", end, end.rfind(b"PK\5\6") + 10)
+        if count != min(len(members), 0xFFFF):
+            raise ValueError(f"its directory names {len(members)} of {count} members")
+        for each in members:
+            yield each.filename, archive.read(each)
 
 
 @contextmanager

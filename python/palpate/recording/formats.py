@@ -8,7 +8,6 @@ import io
 import math
 import struct
 import sys
-import zipfile
 import zlib
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -23,12 +22,12 @@ import scipy
 from ..errors import InputError, escaped, listed, shortened
 from .csv_file import CsvFile
 from .dialect import NOT_STATED, Stated
-from .excel_file import read_excel
-from .files import CELL_BYTES, MEMORY_LIMIT, readable, require_memory
+from .files import CELL_BYTES, MEMORY_LIMIT, readable, require_memory, zip_members
 from .looks import Look
 from .mcap_file import read_mcap
 from .memory_table import MemoryTable, import_library
 from .table import Cells, LongTable, Table, to_numbers
+from .workbook import is_workbook
 
 _BUFFER_BYTES = 1 << 20
 """Number of bytes of each Parquet column that are read at once, before they are needed."""
@@ -41,9 +40,6 @@ _ARROW_SCHEMA_BYTES = b"/////"
 
 _ARROW_TEXT = ("string", "large_string", "binary", "large_binary")
 """Names of the types of text in Arrow; a file without the logical type of its columns stores bytes."""
-
-_ZIP_END_BYTES = 22 + 0xFFFF
-"""Largest number of bytes of the record that ends a zip archive and states the number of members."""
 
 _MATLAB_HEADER_BYTES = 128
 """Number of bytes before the first data element of a MATLAB file."""
@@ -68,7 +64,7 @@ _COMPLEX_FLAG = 1 << 11
 
 
 def open_table(path: Path, stated: Stated = NOT_STATED) -> Table:
-    """Opens a recording as a table of columns; the suffix of its name gives the format.
+    """Opens a recording, except a workbook, as a table of columns; the suffix of its name gives the format.
 
     Raises
     ------
@@ -86,14 +82,17 @@ def open_table(path: Path, stated: Stated = NOT_STATED) -> Table:
 
 def is_read_in_parts(path: Path) -> bool:
     """Returns True for a CSV or Parquet file, which may be larger than memory."""
-    return _reader_of(path) in (CsvFile, ParquetFile)
+    return _reader_of(path) in (CsvFile, ParquetFile) and not is_workbook(path)
+
+
+def is_text(path: Path) -> bool:
+    """Returns True for a complete text file."""
+    return _reader_of(path) is CsvFile and path.suffix != ".part" and not is_workbook(path)
 
 
 def _reader_of(path: Path) -> Callable[[Path], Table]:
     readers: dict[str, Callable[[Path], Table]] = {
         ".parquet": ParquetFile,
-        ".xlsx": _excel,
-        ".xlsm": _excel,
         ".npz": _numpy,
         ".mat": _matlab,
         ".mcap": read_mcap,
@@ -327,38 +326,12 @@ def _as_objects(values: Cells) -> Cells:
     return np.array([_cell_text(value) for value in values], dtype=object)
 
 
-def _excel(path: Path) -> Table:
-    """Returns a sheet of a workbook."""
-    openpyxl = import_library("openpyxl", path, "an Excel file", "excel")
-    return read_excel(path, _members(path), openpyxl)
-
-
-def _members(path: Path) -> Iterator[tuple[str, bytes]]:
-    """Yields names and contents of the members of a zip archive, after checking their checksums.
-
-    Raises
-    ------
-    ValueError
-        The archive is damaged, or a member is missing.
-    """
-    with path.open("rb") as stream, zipfile.ZipFile(stream) as archive:
-        members = archive.infolist()
-        require_memory(path, sum(each.file_size for each in members))
-        stream.seek(max(0, path.stat().st_size - _ZIP_END_BYTES))
-        end = stream.read()
-        (count,) = struct.unpack_from("<H", end, end.rfind(b"PK\5\6") + 10)
-        if count != min(len(members), 0xFFFF):
-            raise ValueError(f"its directory names {len(members)} of {count} members")
-        for each in members:
-            yield each.filename, archive.read(each)
-
-
 def _numpy(path: Path) -> Table:
     """Returns the arrays of an .npz file by name."""
     with readable(path, "NumPy (.npz)"):
         arrays = {
             name.removesuffix(".npy"): np.load(io.BytesIO(content), allow_pickle=False)
-            for name, content in _members(path)
+            for name, content in zip_members(path)
         }
     return _table_of_arrays(path, arrays)
 

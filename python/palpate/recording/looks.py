@@ -120,8 +120,8 @@ def cure_of_header(rows: Sequence[Sequence[str]]) -> str:
     """Describes the columns of a table without a header by its first rows, and returns the option that names
     them.
 
-    If there are three columns that change, one that rises in every row is the time. Of the others, the position is the one
-    that turns less often.
+    If there are three columns that change, one that rises in every row is the time. Of the others, the
+    position is the one that turns less often.
     """
     columns = [
         np.array([np.nan if (value := parse_with(cell, ".,")) is None else value for cell in column])

@@ -27,7 +27,7 @@ class MemoryTable(Table):
     metadata : mapping, optional
     notes : sequence of str, optional
         Statements on how the file was read, as parts of one sentence.
-    first : (str, int or sequence of int), optional
+    first : (str, int or sequence), optional
         Word for a row, and number of the first row or of each row, for the sentences.
     decimal : str
         Decimal mark of numbers that are stored as text.
@@ -39,7 +39,7 @@ class MemoryTable(Table):
         columns: Mapping[str, Cells],
         metadata: Mapping[str, str] | None = None,
         notes: Sequence[str] = (),
-        first: tuple[str, int | Sequence[int]] = ("row", 0),
+        first: tuple[str, int | Sequence[int | str]] = ("row", 0),
         decimal: str = ".",
     ) -> None:
         self._path, self._columns, self._first, self._decimal = path, dict(columns), first, decimal

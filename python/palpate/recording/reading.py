@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -17,13 +18,16 @@ from .._typing import Float1D, Int8Vector
 from ..arguments import path_of, shown
 from ..errors import InputError
 from .conversion import Conversion, Source, converted
+from .csv_file import CsvFile
 from .dialect import Stated
-from .files import require_file, sha256_of_file, unchanged
-from .formats import open_table
+from .files import TooLargeError, require_file, sha256_of_file, unchanged
+from .formats import is_read_in_parts, is_text, open_table
+from .parts import Part, PartNames, parts_of_text, parts_of_workbook, read_part
 from .recording import Recording
 from .rows import LeftOut
-from .table import LongTable, Places, Table
+from .table import LongTable, Places
 from .units import Unit
+from .workbook import is_workbook
 
 RecordingLike: TypeAlias = Recording | str | os.PathLike[str] | pd.DataFrame
 """A recording, or data that can be read as one."""
@@ -49,6 +53,7 @@ def read_recording(
     zero: tuple[int | None, int | None] | Literal["air"] | None = None,
     force_late_s: float | Literal["auto"] = 0.0,
     invalid: Literal["refuse", "drop"] = "refuse",
+    part: PartNames | None = None,
 ) -> Recording:
     """Reads a recording from a file.
 
@@ -60,8 +65,8 @@ def read_recording(
     ----------
     path : path
         CSV (separated by commas, semicolons or tabs); an incomplete ``.part`` file, whose torn last line is
-        ignored and counted; ``.parquet`` (needs pyarrow), ``.xlsx`` (openpyxl), ``.npz``, ``.mat``, or
-        ``.mcap`` with JSON messages (mcap).
+        ignored and counted; ``.parquet`` (needs pyarrow), a workbook ``.xlsx``, ``.xls`` or ``.ods``
+        (python-calamine), ``.npz``, ``.mat``, or ``.mcap`` with JSON messages (mcap).
     position : str, optional
         Column of the position; else chosen by unit. If several columns are possible, the error names them.
     force : str, optional
@@ -97,6 +102,10 @@ def read_recording(
     invalid : {"refuse", "drop"}
         Refuse the file, or drop rows without a number. An infinite number, a missing direction, or a time
         that does not increase is treated in the same way. The error names the row; dropped rows are counted.
+    part : str, int or sequence, optional
+        Sheet, specimen or block of rows to read, by its name or its number from 1. Several are joined as
+        strokes of one recording. By default the longest table with a position and a force is read. A file
+        with several such recordings is refused; the error names them.
 
     Returns
     -------
@@ -116,23 +125,21 @@ def read_recording(
     if invalid not in ("refuse", "drop"):
         raise InputError(f"invalid is {invalid!r}; it must be 'refuse' or 'drop'")
     require_file(file)
+    options: dict[str, Any] = {
+        "position": position,
+        "force": force,
+        "time": time,
+        "direction": direction,
+        "inputs": inputs,
+        "units": units,
+        "torque_constant": torque_constant,
+        "negate": negate,
+        "rows": rows,
+        "zero": zero,
+        "drop": invalid == "drop",
+    }
     with unchanged(file):
-        fields = converted(
-            open_table(file, Stated(tuple(columns), decimal)),
-            str(file),
-            file=file,
-            position=position,
-            force=force,
-            time=time,
-            direction=direction,
-            inputs=inputs,
-            units=units,
-            torque_constant=torque_constant,
-            negate=negate,
-            rows=rows,
-            zero=zero,
-            drop=invalid == "drop",
-        )
+        fields = _fields(file, part, Stated(tuple(columns), decimal), options)
     recording = Recording(**fields)
     if not force_late_s:
         return recording
@@ -140,6 +147,43 @@ def read_recording(
         return recording.with_force_earlier(force_late_s)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def _fields(file: Path, part: PartNames | None, stated: Stated, options: dict[str, Any]) -> dict[str, Any]:
+    """Returns the fields of the recording in a file, or in a part of it.
+
+    A text file is first read as one table, which is fast. It is divided into its parts if this is refused, or
+    if it has empty rows, unless its column names are stated.
+    """
+    if stated.columns and (part is not None or is_workbook(file)):
+        raise InputError(f"{file}: --columns names the columns of a text file without parts; leave it out")
+    if is_workbook(file):
+        return read_part(file, parts_of_workbook(file, stated), part, options)
+    if part is not None:
+        if not is_text(file):
+            raise InputError(f"{file} has one part only; leave out --part")
+        return read_part(file, parts_of_text(file, stated), part, options)
+    refusal: InputError | None = None
+    fields: dict[str, Any] = {}
+    try:
+        table = open_table(file, stated)
+        fields = converted(table, str(file), file=file, **options)
+        has_dropped = options["drop"] and fields["source"].rows < fields["source"].file_rows
+        if stated.columns or not (isinstance(table, CsvFile) and (table.has_empty_rows or has_dropped)):
+            return fields
+    except InputError as error:
+        if stated.columns or not is_text(file) or isinstance(error, TooLargeError):
+            raise
+        refusal = error
+    parts: list[Part] = []
+    with suppress(InputError):
+        parts = parts_of_text(file, stated)
+    has_notes = any(each.block.unused and each.block.too_wide is None for each in parts)
+    if len(parts) > 1 or (refusal is not None and has_notes):
+        return read_part(file, parts, part, options)
+    if refusal is not None:
+        raise refusal
+    return fields
 
 
 def recording_from(
@@ -282,7 +326,7 @@ class LongRecording:
         InputError
             A row has no finite number or no known direction, and rows may not be dropped.
         """
-        table = _require_long_table(open_table(self.path, self.stated), self.path)
+        table = _long_table(self.path, self.stated)
         conversion = self.conversion
         for first, cells in table.blocks(part, BLOCK_ROWS, numbers=conversion.numbers, text=conversion.text):
             check, directions = conversion.checked(_PartPlaces(table, part), cells, first)
@@ -334,8 +378,13 @@ def open_long_recording(
     """
     file = Path(path)
     require_file(file)
+    if not is_read_in_parts(file):
+        raise InputError(
+            f"{file} cannot be read part by part; leave out --out-of-core, --jobs and --scheduler, or "
+            "convert the file to CSV or Parquet"
+        )
     stated = Stated(tuple(columns), decimal)
-    table = open_table(file, stated)
+    table = _long_table(file, stated)
     conversion = Conversion.of(
         table,
         str(file),
@@ -352,7 +401,7 @@ def open_long_recording(
     notes = conversion.note(dialect=table.notes), *conversion.choice.notes
     has_time = conversion.choice.time is not None
     conversion = replace(conversion, choice=replace(conversion.choice, time=None, inputs=()))
-    rows, parts = _require_long_table(table, file).parts(part_rows)
+    rows, parts = table.parts(part_rows)
     return LongRecording(
         path=file,
         stated=stated,
@@ -365,10 +414,7 @@ def open_long_recording(
     )
 
 
-def _require_long_table(table: Table, file: Path) -> LongTable:
-    if not isinstance(table, LongTable):
-        raise InputError(
-            f"{file} cannot be read part by part; leave out --out-of-core, --jobs and --scheduler, or "
-            "convert the file to CSV or Parquet"
-        )
+def _long_table(file: Path, stated: Stated) -> LongTable:
+    table = open_table(file, stated)
+    assert isinstance(table, LongTable)
     return table

@@ -43,6 +43,8 @@ class Table(ABC):
     """Differences of the file from a plain table, as parts of one sentence"""
     looks: Mapping[str, Look] = MappingProxyType({})
     """First rows of each column; a column without a look is taken to hold numbers"""
+    starts: Sequence[int] = ()
+    """Rows at which a further block of the file begins, whose time can begin again"""
 
     @property
     def text_names(self) -> set[str]:

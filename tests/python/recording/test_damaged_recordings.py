@@ -188,7 +188,7 @@ def test_a_damaged_end_of_a_sheet_is_refused(tmp_path: Path) -> None:
     changed[place] ^= 1
     path.write_bytes(changed)
     sentence = "Bad CRC-32 for file 'xl/worksheets/sheet1.xml'"
-    assert refusal(path) == f"a.xlsx is not readable as Excel (.xlsx): {sentence}"
+    assert refusal(path) == f"a.xlsx is not readable as a workbook: {sentence}"
 
 
 @pytest.mark.parametrize("suffix", ["npz", "xlsx"])

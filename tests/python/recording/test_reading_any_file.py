@@ -16,6 +16,7 @@ from scipy.io import savemat
 from any_input import SCALE, cases, is_one_sentence
 from palpate import InputError, Recording, read_recording
 from palpate.recording import sample_recording
+from workbooks import SUFFIXES, workbook
 
 MOST_CALLS = 1_000_000
 """A file of a few kilobytes that needs more function calls is a hang; most need less than 20 000."""
@@ -220,7 +221,8 @@ def valid(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     frame = pd.DataFrame({"position_mm": 1e3 * recording.position, "force_N": recording.force})[:60]
     frame.to_csv(folder / "a.csv", index=False)
     frame.to_parquet(folder / "a.parquet")
-    frame.to_excel(folder / "a.xlsx", index=False)
+    for suffix in SUFFIXES:
+        workbook(folder / f"a{suffix}", {"run": [list(frame), *frame.to_numpy().tolist()]})
     arrays = {name: frame[name].to_numpy() for name in frame}
     np.savez(folder / "a.npz", **arrays)
     savemat(folder / "a.mat", arrays)
@@ -228,7 +230,7 @@ def valid(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return {path.suffix: path.read_bytes() for path in folder.iterdir()}
 
 
-FORMATS = [".csv", ".parquet", ".xlsx", ".npz", ".mat", ".mcap"]
+FORMATS = [".csv", ".parquet", ".xlsx", ".npz", ".mat", ".mcap", ".xls", ".ods"]
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

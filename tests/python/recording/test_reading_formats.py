@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Excel, NumPy, MATLAB and MCAP files are read like CSV, and refusals name broken Parquet files."""
+"""Workbooks, NumPy, MATLAB and MCAP files are read like CSV, and refusals name broken Parquet files."""
 
 import contextlib
 import importlib
@@ -207,8 +207,8 @@ def test_a_damaged_matlab_file_is_refused_with_the_byte(
     [
         (
             "xlsx",
-            "openpyxl",
-            "a.xlsx is an Excel file, which needs openpyxl: install it with pip install 'palpate[excel]'",
+            "python_calamine",
+            "a.xlsx is a workbook, which needs python_calamine: install it with pip install 'palpate[excel]'",
         ),
         (
             "mcap",

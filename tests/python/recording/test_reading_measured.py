@@ -160,11 +160,13 @@ def test_a_table_of_text_is_refused(data: Path) -> None:
     assert sentence.endswith("A recording needs two columns of numbers, a position and a force")
 
 
-def test_time_that_restarts_is_refused_with_its_line(data: Path) -> None:
+def test_a_time_that_restarts_is_read_as_two_blocks_with_a_pause(data: Path) -> None:
     options = {
         name: value
         for name, value in options_of("sysid_benchmarks/cascaded_tanks.csv").items()
         if name != "rows"
     }
-    sentence = refusal(data / "sysid_benchmarks/cascaded_tanks.csv", **options)
-    assert sentence.startswith("cascaded_tanks.csv, line 1026: column time_s holds '0', must be later than")
+    recording = read_recording(data / "sysid_benchmarks/cascaded_tanks.csv", **options)  # type: ignore[arg-type]
+    assert recording.time is not None
+    assert recording.time[1024] - recording.time[1023] == recording.time[1023]
+    assert any("begins again in line 1026" in note for note in recording.notes)

@@ -155,7 +155,7 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
     assert refusal(tmp_path / "folder.csv") == "folder.csv is a folder, not a file"
 
 
-FORMATS = "a recording is CSV, Parquet, Excel (.xlsx), NumPy (.npz), MATLAB (.mat) or MCAP"
+FORMATS = "a recording is CSV, Parquet, a workbook (.xlsx, .xls, .ods), NumPy (.npz), MATLAB (.mat) or MCAP"
 
 
 def test_a_file_that_is_not_text_is_refused(tmp_path: Path) -> None:
