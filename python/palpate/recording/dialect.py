@@ -10,7 +10,7 @@ import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any
 
@@ -125,6 +125,8 @@ def recognise(file: str, head: bytes, whole: bool, stated: Stated = NOT_STATED) 
     if not whole and len(lines) > 1:
         lines.pop()  # the bytes read so far may end inside a line
     found = _header(file, lines, stated.columns)
+    if found.without_header:
+        raise InputError(f"{file} has no header. {cure_of_header(found.without_header)}")
     separator, spans, row = found.separator, found.spans, found.header.row
     before, header_line = spans[row]
     header, header_notes = with_checked_names(f"{file}, line {header_line + 1}", found.header)
@@ -266,6 +268,8 @@ class _Candidate:
     """First and last line in the file of each row, counted from 0"""
     sample: list[list[str]]
     """First rows of data; empty if no row holds numbers"""
+    without_header: list[list[str]] = field(default_factory=list)
+    """First rows of data of a table without a header, which the first row replaces"""
 
 
 def _header(file: str, lines: list[str], names: tuple[str, ...]) -> _Candidate:
@@ -304,11 +308,11 @@ def _header(file: str, lines: list[str], names: tuple[str, ...]) -> _Candidate:
         return best
     if names and without_header:
         raise InputError(f"{file} has {len(without_header[0])} columns, but --columns names {len(names)}")
-    if without_header:
-        raise InputError(f"{file} has no header. {cure_of_header(without_header)}")
-    separator = max(SEPARATORS, key=lambda each: len(_rows(file, plain[:1], each)[1][0]))
+    separator = max(",;\t", key=lambda each: len(_rows(file, plain[:1], each)[1][0]))
+    if without_header and len(_rows(file, plain[:1], separator)[1][0]) == 1:
+        separator = " "
     spans, rows = _rows(file, plain, separator)
-    return _Candidate(first_row_as_header(rows), separator, spans, [])
+    return _Candidate(first_row_as_header(rows), separator, spans, [], without_header)
 
 
 def _comments_above(lines: list[str], first: int) -> list[tuple[int, str]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -40,6 +41,9 @@ Row: TypeAlias = Sequence[Cell]
 
 EMPTY, TEXT, READING = 0, 1, 2
 """Kinds of cells; a reading is a number, a time or a word that means a missing number."""
+
+_KINDS = {type(None): EMPTY, str: TEXT, bool: TEXT, int: READING, float: READING, tuple: READING}
+"""Kind of a cell by its type; text can also be a reading."""
 
 _DECIMAL_ROWS = 200
 """Number of first rows of a table from which the decimal mark of numbers stored as text is recognised."""
@@ -79,9 +83,13 @@ class Grid:
     @cached_property
     def kinds(self) -> NDArray[np.int8]:
         """Kind of each cell (n, columns): EMPTY, TEXT or READING."""
-        kinds = np.zeros((len(self.rows), max(map(len, self.rows), default=0)), dtype=np.int8)
-        for row, cells in zip(kinds, self.rows, strict=True):
-            row[: len(cells)] = [READING if type(cell) is float else _kind(cell) for cell in cells]
+        lengths = np.array([len(row) for row in self.rows], dtype=np.intp)
+        cells = list(chain.from_iterable(self.rows))
+        found = np.fromiter(map(_KINDS.__getitem__, map(type, cells)), dtype=np.int8, count=len(cells))
+        for k in np.flatnonzero(found == TEXT).tolist():
+            found[k] = _kind(cells[k])
+        kinds = np.zeros((len(lengths), lengths.max(initial=0)), dtype=np.int8)
+        kinds[np.arange(kinds.shape[1]) < lengths[:, np.newaxis]] = found
         return kinds
 
     @cached_property
@@ -191,8 +199,9 @@ def joined_table(path: Path, name: str, blocks: Sequence[Block], most_rows: int 
         marks = decimal_mark(f"{name}, {word} {places[0]}", texts)
     columns = {}
     for column_name, column in zip(header.names, values, strict=True):
-        if any(isinstance(cell, tuple) for cell in column):
+        if tuple in map(type, column):
             column_name, column = _in_seconds(where, column_name, column)
+            notes = [*notes, "times to a millisecond"]
         columns[column_name] = _cells(column, marks)
     if not all(block.grid.follows[block.rows[1:]].all() for block in blocks):
         notes = [*notes, "empty rows are left out"]
@@ -407,11 +416,9 @@ def _metadata(block: Block) -> dict[str, str]:
 
 
 def _kind(cell: Cell) -> int:
-    if isinstance(cell, str):
-        return READING if is_number(cell) or cell.strip() in MISSING[1:] else TEXT
-    if cell is None:
-        return EMPTY
-    return TEXT if isinstance(cell, bool) else READING
+    if isinstance(cell, str) and (is_number(cell) or cell.strip() in MISSING[1:]):
+        return READING
+    return _KINDS[type(cell)]
 
 
 def _text(cell: Cell) -> str:
@@ -434,11 +441,11 @@ def _padded(texts: Sequence[list[str]]) -> list[list[str]]:
 
 
 def _cells(values: Sequence[Cell], marks: str) -> Cells:
-    if any(isinstance(cell, (str, bool, tuple)) for cell in values):
-        values = [
-            _text(cell).replace(".", marks[0]) if isinstance(cell, float) else _text(cell) for cell in values
-        ]
-    return cells_of(values, marks)
+    """Returns the cells of a column as numbers, or as text if one cell is text."""
+    if {*map(type, values)} <= {type(None), int, float}:
+        return np.array(values, dtype=np.float64)
+    texts = [_text(cell).replace(".", marks[0]) if type(cell) is float else _text(cell) for cell in values]
+    return cells_of(texts, marks)
 
 
 def _in_seconds(where: str, name: str, values: Sequence[Cell]) -> tuple[str, list[Cell]]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import marshal
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -59,7 +60,9 @@ def read_sheets(path: Path) -> list[Grid]:
         if _starts_with(path, _ZIP_START):
             for _ in zip_members(path):  # checks the checksums
                 pass
-        done = subprocess.run(command, capture_output=True, check=False)
+        # A trace of the stack allocates memory: after the limit is reached, the process would wait forever.
+        environment = {**os.environ, "RUST_BACKTRACE": "0"}
+        done = subprocess.run(command, capture_output=True, check=False, env=environment)
         if done.returncode == 0:
             sheets: list[tuple[str, bool, dict[int, list[Any]]]] = marshal.loads(done.stdout)
             return [Grid(name, rows, visible=visible) for name, visible, rows in sheets if rows]

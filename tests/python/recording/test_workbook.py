@@ -113,6 +113,8 @@ def test_a_cell_in_the_last_row_and_column_is_refused_before_memory_is_used(
 def test_a_small_file_with_repeated_cells_is_read_or_refused_within_the_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows_repeated: int, columns_repeated: int
 ) -> None:
+    """A trace of the stack would wait forever for memory."""
+    monkeypatch.setenv("RUST_BACKTRACE", "1")
     monkeypatch.setattr("palpate.recording.files.MEMORY_LIMIT", 64 << 20)
     cell = (
         f"<table:table-cell office:value-type='float' office:value='1' "
@@ -132,6 +134,7 @@ def test_times_are_read_in_seconds(tmp_path: Path, suffix: str) -> None:
     recording = read_recording(any_file(tmp_path / f"a{suffix}", [header, *cells]))
     assert recording.time is not None
     np.testing.assert_allclose(recording.time, [60 * (k // 4) + k + 0.5 for k in range(20)], rtol=1e-12)
+    assert recording.notes[0].endswith("read as: times to a millisecond")
 
 
 def test_dates_are_read_in_seconds(tmp_path: Path) -> None:
