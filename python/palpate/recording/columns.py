@@ -21,7 +21,6 @@ from .units import (
     parse_name,
     quantity_of,
     stem_key,
-    symbols_of,
     unit_of,
 )
 
@@ -34,15 +33,20 @@ class Role:
     si_units: tuple[str, ...]
     preferred_stems: tuple[str, ...]
     """Column names (without unit) to prefer, in this order, if several columns could have the role."""
+    examples: str
+    """Some of its units, for messages"""
 
 
 POSITION = Role(
     "position",
     POSITION_UNITS,
     ("position", "displacement", "depth", "angle", "indentation", "tip_position", "height"),
+    "mm, in or deg",
 )
-FORCE = Role("force", FORCE_UNITS, ("force", "torque", "normal_force", "hold_current", "current"))
-TIME = Role("time", TIME_UNITS, ("time", "timestamp", "t"))
+FORCE = Role(
+    "force", FORCE_UNITS, ("force", "torque", "normal_force", "hold_current", "current"), "N, gf or N*m"
+)
+TIME = Role("time", TIME_UNITS, ("time", "timestamp", "t"), "s or ms")
 ROLES = (POSITION, FORCE, TIME)
 
 LAWS = (("m", "N"), ("rad", "N*m"))
@@ -328,7 +332,7 @@ def _choose(
         candidates = numbers or [each for each in candidates if not each.look.steady]
     if not candidates:
         if role is not TIME:
-            problems[role.name] = f"no column name has a unit of {role.name} ({symbols_of(role.si_units)})"
+            problems[role.name] = f"no column name has a unit of {role.name} such as {role.examples}"
         return None
     best = _best(candidates, notes)
     if len(best) == 1 and len(best[0]) == 1:
@@ -373,13 +377,12 @@ def _prefer_si(same_stem: list[Column], notes: list[str]) -> list[Column]:
 
 
 def _require_unit(role: Role, column: Column, problems: dict[str, str]) -> None:
-    allowed = symbols_of(role.si_units)
     if column.unit is None:
-        problems[role.name] = f"column {shortened(column.name)} has no known unit ({allowed})"
+        problems[role.name] = f"column {shortened(column.name)} has no known unit such as {role.examples}"
     elif column.unit.si not in role.si_units:
         problems[role.name] = (
             f"column {shortened(column.name)} is in {column.unit.symbol}, "
-            f"which is not a unit of {role.name} ({allowed})"
+            f"which is not a unit of {role.name} such as {role.examples}"
         )
 
 
