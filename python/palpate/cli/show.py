@@ -12,6 +12,7 @@ from click.core import ParameterSource
 from ..errors import InputError
 from ..model import Model, load_model
 from ..planning import Plan
+from ..recording.units import Unit
 from ..verdict import GOOD, Verdict, usable
 from ..verification import Stroke, compare
 from .exit_status import end_with, finishing
@@ -179,7 +180,8 @@ def _compare(
 ) -> None:
     """Prints the largest force difference of two models, and a verdict on both models and the difference."""
     strokes = compare(model, other)
-    verdict = model.verdict + other.verdict + _noticed(strokes)
+    position, force = (Unit.of_si(model.units[role]) for role in ("position", "force"))
+    verdict = model.verdict + other.verdict + _noticed(strokes, position, force)
     with drawing() as write_figures:
         if plot is not None:
             from ..plotting import draw_two_models
@@ -191,24 +193,44 @@ def _compare(
     with finishing():
         write_figures()
         if as_json:
-            largest = {stroke.name or "both": stroke.worst for stroke in strokes}
-            files = {"model": str(model_file), "beside": str(other_file)}
-            print_json({**files, "verdict": str(verdict), "worst_jnd": largest})
+            print_json(
+                {
+                    "model": str(model_file),
+                    "beside": str(other_file),
+                    "verdict": str(verdict),
+                    **{
+                        name: {stroke.name or "both": getattr(stroke, name) for stroke in strokes}
+                        for name in ("worst", "worst_difference", "worst_position", "felt_share")
+                    },
+                }
+            )
         else:
             print_verdict(verdict)
             print_table(
-                ("stroke", "largest force difference, in just noticeable differences"),
-                [(stroke.name or "both", number(stroke.worst)) for stroke in strokes],
+                ("stroke", "largest difference", "at", "in JND", "felt on"),
+                [
+                    (
+                        each.name or "both",
+                        force.text(each.worst_difference),
+                        position.text(each.worst_position),
+                        number(each.worst),
+                        f"{each.felt_share:.0%}",
+                    )
+                    for each in strokes
+                ],
             )
         end_with(verdict)
 
 
-def _noticed(strokes: tuple[Stroke, ...]) -> Verdict:
+def _noticed(strokes: tuple[Stroke, ...], position: Unit, force: Unit) -> Verdict:
     """Returns a finding if a hand notices the difference between two models."""
-    worst = max(stroke.worst for stroke in strokes)
-    if worst <= 1.0:
+    worst = max(strokes, key=lambda each: each.worst)
+    if worst.worst <= 1.0:
         return GOOD
+    stroke = f" of the {worst.name}" if worst.name else ""
     sentence = (
-        f"a hand notices the difference of the models: up to {number(worst)} just noticeable differences"
+        f"a hand notices the difference of the models on {worst.felt_share:.0%} of the travel{stroke}: up to "
+        f"{number(worst.worst)} just noticeable differences, {force.text(worst.worst_difference)} at "
+        f"{position.text(worst.worst_position)}"
     )
     return Verdict((usable(sentence),))

@@ -148,7 +148,26 @@ class Stroke:
     def worst(self) -> float:
         """Largest force difference divided by the just noticeable difference [-]; below 1 a hand cannot feel
         the difference."""
-        return float(np.max(np.abs(self.second - self.first) / self.perceptible))
+        return float(np.max(self._noticed))
+
+    @property
+    def worst_position(self) -> float:
+        """Position of this difference [m or rad]"""
+        return float(self.position[np.argmax(self._noticed)])
+
+    @property
+    def worst_difference(self) -> float:
+        """This difference, second minus first force [N or N*m]"""
+        return float((self.second - self.first)[np.argmax(self._noticed)])
+
+    @property
+    def felt_share(self) -> float:
+        """Share of the travel on which a hand feels the difference [-]"""
+        return float(np.mean(self._noticed > 1.0))
+
+    @property
+    def _noticed(self) -> Float1D:
+        return np.abs(self.second - self.first) / self.perceptible
 
 
 def compare(first: Model, second: Model) -> tuple[Stroke, ...]:
