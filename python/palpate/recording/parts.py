@@ -10,6 +10,7 @@ others of its kind.
 from __future__ import annotations
 
 import hashlib
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +20,7 @@ from typing import Any, TypeAlias
 from ..arguments import shown
 from ..errors import InputError, command_word, did_you_mean, escaped, listed, shortened
 from .conversion import MIN_ROWS, Conversion, converted
-from .dialect import read_rows
+from .dialect import HEAD_BYTES, read_rows
 from .files import require_memory
 from .grid import Block, Grid, joined_table, tables_of, whole_grid
 from .memory_table import STEADY_ROWS
@@ -30,6 +31,9 @@ PartNames: TypeAlias = str | int | Sequence[str | int]
 
 _TEXT_CELL_BYTES = 100
 """Memory of a cell of a text file that is split into cells [bytes]."""
+
+_OTHER_ROW = re.compile(rb"\n[ \t;,\"]*(?:\r?\n|[^-+.,;\"\d\s])")
+"""Row of a text file that is empty or begins with a word, so that it can be between two tables."""
 
 _COLUMN_OPTIONS = ("position", "force", "time", "direction", "inputs", "units", "negate", "drop")
 """Arguments of `read_recording` with which columns are chosen."""
@@ -74,7 +78,26 @@ def parts_of_text(path: Path) -> list[Part]:
     InputError
         The file is not text, or too large.
     """
+    return _parts_of(path, path.read_bytes())
+
+
+def several_parts_of_text(path: Path) -> list[Part]:
+    """Returns the tables in a text file; none if it is long and clearly has one table only.
+
+    Raises
+    ------
+    InputError
+        The file is not text, or too large.
+    """
     content = path.read_bytes()
+    if len(content) > HEAD_BYTES:
+        head = content[: content.rfind(b"\n", 0, HEAD_BYTES) + 1]
+        if len(_parts_of(path, head)) < 2 and not _OTHER_ROW.search(content, max(len(head) - 1, 0)):
+            return []
+    return _parts_of(path, content)
+
+
+def _parts_of(path: Path, content: bytes) -> list[Part]:
     require_memory(path, _TEXT_CELL_BYTES * sum(map(content.count, (b"\n", b",", b";", b"\t"))))
     separator, rows, behind_empty = read_rows(str(path), content)
     require_memory(path, len(rows) * max(map(len, rows.values()), default=0))

@@ -224,6 +224,18 @@ def test_a_single_time_that_does_not_increase_is_refused(tmp_path: Path, row: in
     )
 
 
+def test_a_clock_that_is_set_back_is_refused(tmp_path: Path) -> None:
+    rows = [[row[0] - 0.05 * (k >= 20), *row[1:]] for k, row in enumerate(indent(0))]
+    assert "line 22: column Time (s) holds" in refusal(text_file(tmp_path / "a.csv", [HEADER, *rows]))
+
+
+def test_dropped_rows_do_not_join_specimens(tmp_path: Path) -> None:
+    rows = [row for k in range(3) for row in ([f"Specimen {k}"], HEADER, *indent(k))]
+    assert "holds 3 recordings: Specimen 0 (40 rows)" in refusal(
+        text_file(tmp_path / "a.csv", rows), invalid="drop"
+    )
+
+
 def test_the_time_of_blocks_is_kept_if_it_increases(tmp_path: Path) -> None:
     later = [[row[0] + 5.0, *row[1:]] for row in indent(1)]
     recording = read_recording(text_file(tmp_path / "a.csv", [HEADER, *indent(0), [], *later]))
