@@ -165,7 +165,7 @@ def read_part(
             raise InputError(f"{error} {_options(parts, chosen)}") from None
         raise
     if len(_series(parts)) > 1:
-        source, names = fields["source"], list(dict.fromkeys(each.group or each.name for each in chosen))
+        source, names = fields["source"], _names(parts, chosen)
         fields["source"] = replace(
             source,
             files=tuple(f"{path}, part {each}" for each in names),
@@ -189,6 +189,8 @@ def _chosen(
     candidates = list(parts)
     if wanted is not None:
         names = [wanted] if isinstance(wanted, (str, int)) else list(wanted)
+        if not names:
+            raise InputError("part is empty; give the name or the number of a part")
         candidates = list(dict.fromkeys(part for each in names for part in _selected(path, parts, each)))
         if len(names) > 1:
             other = next((each for each in candidates if each.block.names != candidates[0].block.names), None)
@@ -219,7 +221,7 @@ def _selected(path: Path, parts: Sequence[Part], wanted: object) -> list[Part]:
     if isinstance(wanted, bool) or not isinstance(wanted, (str, int)):
         raise InputError(f"part is {shown(wanted)}; it must be the name or the number of a part, or a list")
     text = str(wanted)
-    found = [part for part in parts if part.has(text)]
+    found = [part for part in parts if text and part.has(text)]
     if not found and text.isdecimal() and 1 <= int(text) <= len(parts):
         found = [parts[int(text) - 1]]
     if not found:
@@ -246,20 +248,24 @@ def _rows(parts: Sequence[Part]) -> int:
     return sum(each.rows for each in parts)
 
 
+def _names(parts: Sequence[Part], chosen: Sequence[Part]) -> list[str]:
+    """Returns the names of parts: that of a table if all its blocks are chosen and nothing else has it."""
+    whole = {
+        group
+        for group in {each.group for each in chosen} - {""}
+        if len(_series([each for each in parts if each.group == group])) == 1
+        and all(each in chosen for each in parts if each.group == group)
+    }
+    return list(dict.fromkeys(each.group if each.group in whole else each.name for each in chosen))
+
+
 def _label(parts: Sequence[Part], chosen: Sequence[Part]) -> str:
-    """Returns the name of parts: that of their sheet or table, if it has no others."""
-    group = chosen[0].group
-    if group and all(each in chosen for each in parts if each.group == group):
-        return shortened(group)
-    return listed(each.name for each in chosen)
+    return listed(_names(parts, chosen))
 
 
 def _options(parts: Sequence[Part], chosen: Sequence[Part]) -> str:
     """Returns the options that choose parts."""
-    group = chosen[0].group
-    whole = group and all(each in chosen for each in parts if each.group == group)
-    names = [group] if whole else [each.name for each in chosen]
-    return " ".join(f"--part {command_word(each)}" for each in names)
+    return " ".join(f"--part {command_word(each)}" for each in _names(parts, chosen))
 
 
 def _name_of(path: Path, parts: Sequence[Part], chosen: Sequence[Part]) -> str:
