@@ -44,6 +44,8 @@ def options_in(sentence: str, given: dict[str, object] | None = None) -> dict[st
             units = options.get("units", {})
             assert isinstance(units, dict)
             options["units"] = {**units, column: symbol}
+        elif option == "--columns":
+            options["columns"] = value.split(",")
         else:
             options[option.removeprefix("--")] = value
     return options

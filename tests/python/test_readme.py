@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from control_program import PROGRAM, needs_program
+from control_program import needs_program
 from palpate import _core
 
 ROOT = Path(__file__).parents[2]
@@ -60,21 +60,16 @@ def test_the_cpp_snippet_prints_the_numbers_of_the_python_snippet(
     assert last_lines[0] == last_lines[1]
 
 
-PROGRAMS = {
-    "palpate": Path(sysconfig.get_path("scripts")) / "palpate",
-    "build/control/palpate-control": PROGRAM,
-}
-"""Paths of the programs that the commands in the README call."""
+PALPATE = Path(sysconfig.get_path("scripts")) / "palpate"
 
 
-@needs_program
 @pytest.mark.full
 def test_all_commands_except_make_run_in_their_order(folder: Path) -> None:
     commands = [arguments for arguments in shell_commands() if arguments[0] != "make"]
-    assert {arguments[0] for arguments in commands} == set(PROGRAMS)
+    assert {arguments[0] for arguments in commands} == {"palpate"}
     for arguments in commands:
         completed = subprocess.run(
-            [PROGRAMS[arguments[0]], *arguments[1:]],
+            [PALPATE, *arguments[1:]],
             cwd=folder,
             capture_output=True,
             text=True,
@@ -106,6 +101,11 @@ def test_the_first_screen_shows_both_commands() -> None:
     first_screen = "\n".join(README.splitlines()[:40])
     assert "make demo" in first_screen
     assert "make test" in first_screen
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.split()) <= 450
+    assert len(re.findall(r"\]\(", README)) <= 10
 
 
 def test_the_table_of_statuses_equals_the_statuses_of_the_core() -> None:

@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -203,13 +203,18 @@ def picture_verification(
         if recording.direction is not None
     ]
     all_directed = len(directions) == len(verified)
-    one_curve = (not model.hysteretic or all_directed) and model.memory is None
-    recording = Recording.from_arrays(
+    one_curve = (not model.hysteretic or all_directed) and model.memory is None and not model.of_velocity
+    drawn = Recording.from_arrays(
         np.concatenate([recording.position[verification.rows] for recording, verification in verified]),
         np.concatenate([recording.force[verification.rows] for recording, verification in verified]),
         direction=np.concatenate(directions) if all_directed else None,
         units=verified[0][0].units,
     )
+    if model.period is not None:
+        drawn = replace(
+            drawn, position=model.lower[0] + np.mod(drawn.position - model.lower[0], model.period)
+        )
+    recording = replace(drawn, file_units=verified[0][0].file_units)
     modelled = np.concatenate([verification.force for _, verification in verified])
     bands = [verification.band for _, verification in verified]
     band = None if model.band is None else np.concatenate([each for each in bands if each is not None])
@@ -251,8 +256,8 @@ def picture_recording(path: Path, recording: Recording) -> tuple[str, ...]:
     title = f"{source_name(recording.source.files)}: {len(recording)} rows"
     with _written(path, (_PAGE_INCHES, 5.2), title=title) as figure:
         axes = figure.subplot_mosaic(
-            [["history", "history", "position"], ["spectrum", "short-time", "wavelet"]],
-            height_ratios=(1.0, 1.6),
+            [["position", "position", "history"], ["spectrum", "short-time", "wavelet"]],
+            height_ratios=(1.6, 1.0),
         )
         draw_views(axes, recording, history)
     return history.notes
@@ -339,12 +344,17 @@ def picture_structures(path: Path, rows: Sequence[Comparison], force_unit: str, 
 
 
 def picture_path(path: Path, model: Model) -> None:
-    """Draws error and criterion of each compared network; the horizontal axis is the number of wavelets."""
-    from ..plotting import draw_path
+    """Draws the force of a model, and below it error and criterion of each compared network over the number
+    of wavelets."""
+    from ..plotting import draw_model, draw_path
 
     if not model.path:
         raise InputError("the model file lists no networks that identification compared: identify again")
     fit = model.fit
     title = f"{source_name(model.data.files)}\n{fit.n_wavelets} wavelets, NRMSE {number(fit.nrmse)}"
-    with figure_file(path, height_inches=4.0, rows=(1.4, 1.0), title=title) as (error, criterion):
+    with _written(path, (_COLUMN_INCHES, 6.0), title=title) as figure:
+        force, error, criterion = figure.subplots(3, 1, gridspec_kw={"height_ratios": (1.6, 1.4, 1.0)})
+        draw_model(force, model)
         draw_path(error, criterion, model.path, model.units["force"])
+        error.sharex(criterion)
+        error.tick_params(labelbottom=False)

@@ -68,7 +68,17 @@ from .verb import (
     verbose_option,
 )
 
-_READ_BY_PARTS = ("position", "force", "time", "direction", "units", "negate", "invalid")
+_READ_BY_PARTS = (
+    "position",
+    "force",
+    "time",
+    "direction",
+    "units",
+    "columns",
+    "decimal",
+    "negate",
+    "invalid",
+)
 """Arguments of `read_recording` that can be used if a file is too large for memory and is read in parts."""
 
 

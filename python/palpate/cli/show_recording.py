@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import listed
 from ..recording import Recording
 from ..recording.checks import quality_findings
 from ..recording.motion import GAP_RATIO, ordered_strokes
@@ -91,35 +92,40 @@ def _strokes(recording: Recording) -> dict[str, int] | None:
 
 
 def _summary(recording: Recording, strokes: dict[str, int] | None, roles: dict[str, int]) -> dict[str, str]:
-    """Returns the properties of a recording for display, by name, in the units of the file."""
+    """Explains a recording in five lines: rows, columns, ranges, strokes, and what is missing for what."""
     position, force = recording.file_unit("position"), recording.file_unit("force")
-    others = [*recording.input_names, *recording.columns]
-    rows = {
-        "rows": str(len(recording)),
-        "columns": ", ".join(f"{role} {name!r}" for role, name in recording.source.columns.items()),
-        "others": ", ".join(others),
-        "position": position.interval(recording.position.min(), recording.position.max()),
-        "force": force.interval(recording.force.min(), recording.force.max()),
-        "time": _time_text(recording),
-    }
+    file_rows = recording.source.file_rows or len(recording)
+    columns = ", ".join(f"{role} {name!r}" for role, name in recording.source.columns.items())
+    ranges = [
+        f"position {position.interval(recording.position.min(), recording.position.max())}",
+        f"force {force.interval(recording.force.min(), recording.force.max())}",
+        *_time_text(recording),
+    ]
     if strokes is None:
-        rows["strokes"] = "not known: neither a direction column nor the order of the rows shows them"
+        stroke_text = "not known: neither a direction column nor the order of the rows shows them"
     else:
         source = "the order of the rows" if recording.direction is None else "the direction column"
-        rows["strokes"] = f"{strokes['press']} press, {strokes['release']} release, from {source}"
-    rows["roles"] = counts_text(roles)
-    return {name: value for name, value in rows.items() if value}
+        stroke_text = f"{strokes['press']} press, {strokes['release']} release, from {source}"
+    missing = ["no time, so no velocity, damping, memory or lag"] if recording.time is None else []
+    missing += ["no direction, so no hysteresis"] if strokes is None else []
+    return {
+        "rows": f"{len(recording)} of {file_rows} in the file: {counts_text(roles)}",
+        "columns": columns + (f"; not used: {listed(recording.columns)}" if recording.columns else ""),
+        "ranges": ", ".join(ranges),
+        "strokes": stroke_text,
+        "missing": "; ".join(missing) or "nothing",
+    }
 
 
-def _time_text(recording: Recording) -> str:
-    """Returns duration, rate and gaps of a recording in words."""
+def _time_text(recording: Recording) -> list[str]:
+    """Returns duration, rate and gaps of a recording in words, if it has time."""
     time, period = recording.time, recording.sample_period
     if time is None or period is None:
-        return "no column of time: no rate, no velocity"
+        return []
     steps = np.diff(time)
     gaps = int(np.sum(steps > GAP_RATIO * period))
-    text = f"{number(time[-1] - time[0])} s at {number(1.0 / period)} Hz, {gaps} gap{'s' * (gaps != 1)}"
-    return f"{text}, steps from {number(steps.min())} s to {number(steps.max())} s"
+    text = f"time {number(time[-1] - time[0])} s at {number(1.0 / period)} Hz, {gaps} gap{'s' * (gaps != 1)}"
+    return [text if gaps == 0 else f"{text} of up to {number(steps.max())} s"]
 
 
 def _record(file: Path, recording: Recording, strokes: dict[str, int] | None) -> dict[str, Any]:

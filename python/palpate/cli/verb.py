@@ -30,7 +30,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 PATH = FileName(path_type=Path)
 
 READING_NAMES = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows",
-                 "zero", "force_late_s", "invalid", "part")  # fmt: skip
+                 "zero", "force_late_s", "invalid", "columns", "decimal", "part")  # fmt: skip
 """Arguments of `read_recording` that are also options of the command line."""
 
 _SCHEME = Scheme()
@@ -104,6 +104,13 @@ def _row_range(
         raise click.BadParameter(message, ctx, param) from None
 
 
+def _zero(
+    ctx: click.Context, param: click.Parameter, value: str | None
+) -> tuple[int | None, int | None] | str | None:
+    """Parses START:STOP, or the word air."""
+    return value if value == "air" else _row_range(ctx, param, value)
+
+
 def _lag(ctx: click.Context, param: click.Parameter, value: str) -> float | str:
     """Parses a number of seconds, or the word auto."""
     try:
@@ -169,6 +176,14 @@ _READING = options(
     expert_option(
         "--force-late-s", metavar="SECONDS", callback=_lag, default="0.0", help=_about("force_late_s")
     ),
+    expert_option(
+        "--columns",
+        metavar="NAME,NAME,...",
+        default="",
+        callback=lambda ctx, param, value: tuple(filter(None, value.split(","))),
+        help=_about("columns"),
+    ),
+    expert_option("--decimal", type=click.Choice([".", ","]), default=None, help=_about("decimal")),
     _column("--time", help=_about("time")),
     _column("--direction", help=_about("direction")),
     expert_option("--negate", metavar="COLUMN", multiple=True, help=f"{_about('negate')} Repeatable."),
@@ -180,7 +195,7 @@ _READING = options(
         help=_about("torque_constant"),
     ),
     _rows("--rows", help=_about("rows")),
-    _rows("--zero", help=_about("zero")),
+    _rows("--zero", metavar="START:STOP|air", callback=_zero, help=_about("zero")),
     expert_option(
         "--invalid", type=click.Choice(["refuse", "drop"]), default="refuse", help=_about("invalid")
     ),

@@ -84,6 +84,8 @@ def identify_files(
     time: str | None = None,
     direction: str | None = None,
     units: dict[str, str] | None = None,
+    columns: Sequence[str] = (),
+    decimal: Literal[".", ","] | None = None,
     negate: Sequence[str] = (),
     invalid: Literal["refuse", "drop"] = "refuse",
     **options: Any,
@@ -107,7 +109,7 @@ def identify_files(
         Called with (parts read, parts in all).
     part_rows : int
         Approximate number of rows that a worker reads at a time.
-    position, force, time, direction, units, negate, invalid
+    position, force, time, direction, units, columns, decimal, negate, invalid
         As in :func:`palpate.read_recording`.
     **options
         Fields of :class:`IdentifyOptions`.
@@ -137,6 +139,8 @@ def identify_files(
             time=time,
             direction=direction,
             units=units,
+            columns=columns,
+            decimal=decimal,
             negate=tuple(negate),
             invalid=invalid,
             part_rows=part_rows,

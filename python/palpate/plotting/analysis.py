@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import LogNorm
@@ -29,7 +30,14 @@ SHOWN_POWER_RANGE = 1e8
 
 def axis_scale(history: History) -> Scale:
     """Returns the unit in which the axis of a history is drawn."""
-    return scale_for(history.unit, history.at) if history.axis == "position" else Scale(1.0, history.unit)
+    if history.axis != "position":
+        return Scale(1.0, history.unit)
+    return scale_for(history.unit, history.at, of_file=history.file_units.get("position"))
+
+
+def force_scale(history: History, force_unit: str, *forces: npt.ArrayLike) -> Scale:
+    """Returns the unit in which forces or amplitudes of a history are drawn."""
+    return scale_for(force_unit, *forces, of_file=history.file_units.get("force"))
 
 
 def draw_force_history(axes: Axes, history: History, force_unit: str) -> None:
@@ -44,7 +52,7 @@ def draw_force_history(axes: Axes, history: History, force_unit: str) -> None:
     force_unit : str
         SI unit of the force.
     """
-    x, y = axis_scale(history), scale_for(force_unit, history.force)
+    x, y = axis_scale(history), force_scale(history, force_unit, history.force)
     axes.plot(*thinned(history.at * x.factor, history.force * y.factor), color="black", linewidth=0.7)
     _shade_gaps(axes, history, x)
     axes.set_xlim(history.at[0] * x.factor, history.at[-1] * x.factor)
@@ -65,7 +73,7 @@ def draw_spectrum(axes: Axes, history: History, force_unit: str) -> None:
         SI unit of the force.
     """
     frequency, power = power_spectrum(history)
-    y = scale_for(force_unit, np.sqrt(power))
+    y = force_scale(history, force_unit, np.sqrt(power))
     x = axis_scale(history)
     shown = power[1:] * y.factor**2
     axes.plot(shown, frequency[1:] / x.factor, color="black", linewidth=0.7)
@@ -100,7 +108,7 @@ def draw_transform(axes: Axes, plane: Plane, history: History, force_unit: str) 
         The drawn amplitudes, for a colour bar.
     """
     x = axis_scale(history)
-    y = scale_for(force_unit, plane.value)
+    y = force_scale(history, force_unit, plane.value)
     at, value = _fewer_columns(plane.at * x.factor, np.abs(plane.value) * y.factor)
     most = float(value.max())
     short_time = plane.window is not None
@@ -123,9 +131,9 @@ def draw_transform(axes: Axes, plane: Plane, history: History, force_unit: str) 
     return mesh
 
 
-def amplitude_label(plane: Plane, force_unit: str) -> str:
+def amplitude_label(plane: Plane, history: History, force_unit: str) -> str:
     """Returns the label of the colour bar of a transform: amplitude and unit."""
-    return scale_for(force_unit, plane.value).label("amplitude")
+    return force_scale(history, force_unit, plane.value).label("amplitude")
 
 
 def draw_views(axes: Mapping[str, Axes], recording: Recording, history: History) -> None:
@@ -148,7 +156,7 @@ def draw_views(axes: Mapping[str, Axes], recording: Recording, history: History)
     for name, plane in planes.items():
         mesh = draw_transform(axes[name], plane, history, unit)
         bar = axes[name].figure.colorbar(mesh, ax=axes[name], location="bottom", aspect=30.0)
-        bar.set_label(amplitude_label(plane, unit))
+        bar.set_label(amplitude_label(plane, history, unit))
         bar.minorticks_off()
     x = axis_scale(history)
     window = planes["short-time"].window or 0.0

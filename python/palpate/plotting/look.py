@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from .._typing import Float1D
 from ..arguments import instance_of
 from ..errors import InputError
+from ..recording import Recording
+from ..recording.units import Unit
 
 MOST_POINTS = 6000
 """Largest number of drawn points; more are indistinguishable at the width of a column."""
@@ -64,8 +66,9 @@ class Scale:
         return label(name, self.unit)
 
 
-def scale_for(unit: str, *values: npt.ArrayLike) -> Scale:
-    """Chooses the SI prefix with which the largest of the values is at least 0.1 and less than 1000.
+def scale_for(unit: str, *values: npt.ArrayLike, of_file: Unit | None = None) -> Scale:
+    """Chooses the unit of the file, or else the SI prefix with which the largest of the values is at least
+    0.1 and less than 1000.
 
     Parameters
     ----------
@@ -73,7 +76,11 @@ def scale_for(unit: str, *values: npt.ArrayLike) -> Scale:
         SI unit of the values. Counts, and values without a known unit, are not scaled.
     *values : array_like
         All values on one axis.
+    of_file : Unit, optional
+        Unit of the values in their file.
     """
+    if of_file is not None and of_file.factor != 1.0:
+        return Scale(1.0 / of_file.factor, of_file.symbol)
     flat = np.concatenate([np.ravel(np.asarray(each, dtype=np.float64)) for each in values])
     finite = np.abs(flat[np.isfinite(flat)])
     largest = float(finite.max()) if len(finite) else 0.0
@@ -93,7 +100,7 @@ _SCALES: WeakKeyDictionary[Axis, tuple[str, Scale]] = WeakKeyDictionary()
 """SI unit and scale of the curves on each axis on which something was drawn."""
 
 
-def scale_on(axis: Axis, unit: str, *values: npt.ArrayLike) -> Scale:
+def scale_on(axis: Axis, unit: str, *values: npt.ArrayLike, of_file: Unit | None = None) -> Scale:
     """Returns the scale of the curves that are already on an axis; for an empty axis as `scale_for` does.
 
     Raises
@@ -101,10 +108,19 @@ def scale_on(axis: Axis, unit: str, *values: npt.ArrayLike) -> Scale:
     InputError
         The curves that are already on the axis have another unit.
     """
-    drawn, scale = _SCALES.setdefault(axis, (unit, scale_for(unit, *values)))
+    drawn, scale = _SCALES.setdefault(axis, (unit, scale_for(unit, *values, of_file=of_file)))
     if unit and drawn and unit != drawn:
         raise InputError(f"ax already shows values in {drawn}, and these are in {unit}: use other axes")
     return scale
+
+
+def scales_of(axes: Axes, recording: Recording, *forces: npt.ArrayLike) -> tuple[Scale, Scale]:
+    """Returns the scales of position and of forces of a recording, in the units of its file."""
+    units, of_file = recording.units, recording.file_units
+    return (
+        scale_on(axes.xaxis, units["position"], recording.position, of_file=of_file.get("position")),
+        scale_on(axes.yaxis, units["force"], *forces, of_file=of_file.get("force")),
+    )
 
 
 def legend_above(axes: Axes) -> None:

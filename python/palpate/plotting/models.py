@@ -16,13 +16,37 @@ from ..model import Model
 from ..model.model_display import force_curves
 from ..recording import Recording
 from ..verification import Stroke
-from .look import dots_of, grid, legend_above, of_stroke, plain_decades, scale_for, scale_on, strokes, thinned
+from .look import (
+    MOST_POINTS,
+    dots_of,
+    grid,
+    legend_above,
+    of_stroke,
+    plain_decades,
+    scale_for,
+    scale_on,
+    scales_of,
+    strokes,
+    thinned,
+)
 
 _LINES = {"press": "solid", "release": (0, (4, 2)), "": "solid"}
 """Line style of each stroke."""
 
 _CURVE: dict[str, Any] = {"color": "black", "linewidth": 1.1}
 """Look of a model's curve, except the line style of its stroke."""
+
+_MODEL_DOTS: dict[str, Any] = {
+    "color": "black",
+    "linestyle": "none",
+    "marker": "x",
+    "markersize": 2.0,
+    "markeredgewidth": 0.4,
+}
+"""Look of the force of a model that is not a curve over position."""
+
+MOST_DOTS = 600
+"""Largest number of rows at which the force of such a model is drawn; more would cover the recording."""
 
 BAND_LABEL = "95 % of a further recording"
 """Name of the band of a model in a legend."""
@@ -60,7 +84,7 @@ def draw_measured_and_modelled(
         The model's force at each row of the recording [N*m or N].
     one_curve : bool
         True: the model's force is one curve for each stroke, drawn over increasing position. False: it
-        depends on the previous motion and is drawn in the order of the recording.
+        depends on more than the position and is drawn as dots.
     seen : str
         Name of the recorded force.
     standard_error : (n,) array, optional
@@ -87,8 +111,7 @@ def draw_forces(
         As in :func:`draw_measured_and_modelled`.
     """
     by_stroke = strokes(recording.direction, len(recording))
-    x = scale_on(axes.xaxis, recording.units["position"], recording.position)
-    y = scale_on(axes.yaxis, recording.units["force"], recording.force, modelled)
+    x, y = scales_of(axes, recording, recording.force, modelled)
     for name, rows in by_stroke:
         position, force = thinned(recording.position[rows] * x.factor, recording.force[rows] * y.factor)
         axes.plot(position, force, **dots_of(name), color="0.65", markersize=2.2, label=of_stroke(seen, name))
@@ -97,12 +120,11 @@ def draw_forces(
         if one_curve:
             order = np.argsort(position, kind="stable")
             position, curve = position[order], curve[order]
-        axes.plot(
-            *thinned(position * x.factor, curve * y.factor),
-            **_CURVE,
-            linestyle=_LINES[name],
-            label=of_stroke("model", name),
+        look = _CURVE | {"linestyle": _LINES[name]} if one_curve else _MODEL_DOTS
+        at, modelled_force = thinned(
+            position * x.factor, curve * y.factor, most=MOST_POINTS if one_curve else MOST_DOTS
         )
+        axes.plot(at, modelled_force, **look, label=of_stroke("model", name))
     axes.set_xlabel(x.label("position"))
     axes.set_ylabel(y.label("force"))
     legend_above(axes)
@@ -127,8 +149,7 @@ def draw_residual(
     """
     residual = recording.force - modelled
     by_stroke = strokes(recording.direction, len(recording))
-    x = scale_on(axes.xaxis, recording.units["position"], recording.position)
-    z = scale_on(axes.yaxis, recording.units["force"], residual)
+    x, z = scales_of(axes, recording, residual)
     if band is not None:
         order = np.argsort(recording.position, kind="stable")
         at, half = recording.position[order] * x.factor, band[order] * z.factor

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from ..recording import Recording
 from ..recording.roles import ROLE_NAMES, Role, roles_of
-from .look import dots_of, legend_above, of_stroke, scale_on, strokes, thinned
+from .look import dots_of, legend_above, of_stroke, scales_of, strokes, thinned
 
 
 def draw_recording(axes: Axes, recording: Recording) -> None:
@@ -22,8 +22,7 @@ def draw_recording(axes: Axes, recording: Recording) -> None:
         The recording.
     """
     seen = "simulated" if "simulated" in recording.metadata else "recorded"
-    x = scale_on(axes.xaxis, recording.units["position"], recording.position)
-    y = scale_on(axes.yaxis, recording.units["force"], recording.force)
+    x, y = scales_of(axes, recording, recording.force)
     role = roles_of(recording, float(recording.position.max()))
     drawn = [
         (

@@ -7,7 +7,8 @@ is the force over the position of the longest press stroke, or over the row numb
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -18,6 +19,7 @@ from ..errors import InputError
 from ..recording import Recording
 from ..recording.conversion import MIN_ROWS
 from ..recording.motion import GAP_RATIO, LARGEST_STEP_DEVIATION, ordered_strokes
+from ..recording.units import Unit
 
 MOST_SAMPLES = 2**20
 """Largest number of samples of a history; a longer recording gets a longer step."""
@@ -64,6 +66,8 @@ class History:
     """Start and end of each interval without rows, in which the force is interpolated [unit]"""
     notes: tuple[str, ...] = ()
     """Sentences about the choice of the axis and interpolated samples"""
+    file_units: Mapping[str, Unit] = field(default_factory=dict)
+    """Units of "position" and "force" in the file; a missing one is chosen by the values"""
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,10 @@ def history_of(recording: Recording) -> History:
     InputError
         The recording has too few rows.
     """
+    return replace(_history(recording), file_units=recording.file_units)
+
+
+def _history(recording: Recording) -> History:
     if len(recording) < MIN_ROWS:
         raise InputError(f"the recording has {len(recording)} rows; its transforms need at least {MIN_ROWS}")
     if recording.time is not None:

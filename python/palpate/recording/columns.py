@@ -4,19 +4,23 @@
 from __future__ import annotations
 
 import difflib
+import math
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..errors import InputError, command_word, did_you_mean, listed, nearest_name, shortened
+from .looks import NO_LOOK, Look
 from .units import (
+    CLOCK,
     FORCE_UNITS,
     POSITION_UNITS,
     TIME_UNITS,
     UNITS,
     Unit,
-    split_name,
+    parse_name,
+    quantity_of,
     stem_key,
-    symbols_of,
     unit_of,
 )
 
@@ -29,38 +33,43 @@ class Role:
     si_units: tuple[str, ...]
     preferred_stems: tuple[str, ...]
     """Column names (without unit) to prefer, in this order, if several columns could have the role."""
-    example: str
-    """Unit in the option that an error message suggests for a column of unknown unit."""
-    words: tuple[str, ...]
-    """Parts of column names by which an error message suggests one of the columns without a unit."""
+    examples: str
+    """Some of its units, for messages"""
 
 
 POSITION = Role(
     "position",
     POSITION_UNITS,
     ("position", "displacement", "depth", "angle", "indentation", "tip_position", "height"),
-    "mm",
-    ("pos", "disp", "depth", "angle", "indent", "height", "travel", "stroke", "compr", "exten", "deflec"),
+    "mm, in or deg",
 )
 FORCE = Role(
-    "force",
-    FORCE_UNITS,
-    ("force", "torque", "normal_force", "hold_current", "current"),
-    "N",
-    ("force", "torque", "load", "current", "moment"),
+    "force", FORCE_UNITS, ("force", "torque", "normal_force", "hold_current", "current"), "N, gf or N*m"
 )
-TIME = Role("time", TIME_UNITS, ("time", "timestamp", "t"), "s", ("time",))
+TIME = Role("time", TIME_UNITS, ("time", "timestamp", "t"), "s or ms")
 ROLES = (POSITION, FORCE, TIME)
+
+LAWS = (("m", "N"), ("rad", "N*m"))
+"""SI units of position and force between which an object has a law. A count or a current can be
+either."""
 
 DIRECTION_NAMES = ("direction", "segment")
 """Names of columns that are read as the direction of the stroke if the caller names no such column."""
 
+_SETPOINT = re.compile(r"(^|_)(cmd|command(ed)?|target|set|setpoint|desired|ref|reference|demand|soll)(_|$)")
+"""Words of a column that holds what a controller requires, not what was measured."""
 
-_UNLIKELY_STEMS = (*TIME.preferred_stems, *DIRECTION_NAMES, "unnamed", "index", "sample", "id")
-"""Stems of column names that an error message suggests as position or force only after all other columns."""
+_EPOCH_S = (946_684_800.0, 4_102_444_800.0)
+"""Seconds from 1970 to 2000 and to 2100. Times since 1970 between both have only one plausible unit."""
 
-_LIKELY_UNITS = {"angle": "rad", "torque": "Nm", "moment": "Nm", "current": "A"}
-"""Unit that an error message suggests for a column without a unit, by a part of the column's name."""
+_USUAL_UNITS = {"m": ("mm", "m", "um"), "rad": ("rad", "deg"), "N*m": ("Nm",)}
+"""Units that a message suggests, by the SI unit."""
+
+_USUAL_TRAVELS = {"m": (1e-4, 0.5), "rad": (0.0, 4.0 * math.pi)}
+"""Travels by which a message chooses among the usual units."""
+
+UNIT_TO_FILL_IN = "UNIT"
+"""Word in a suggested option that the user replaces: palpate never guesses a unit against a column name."""
 
 LONGEST_CURE = 1000
 """Largest length of the options that an error message suggests [characters].
@@ -78,6 +87,14 @@ class Column:
     name: str
     stem: str
     unit: Unit | None
+    stated: str = ""
+    """Text in the place of a unit in the name that is not read as one"""
+    look: Look = NO_LOOK
+
+    @property
+    def named(self) -> set[str] | None:
+        """SI units of the quantity that the name states, or None."""
+        return quantity_of(self.stem)
 
 
 @dataclass(frozen=True)
@@ -90,6 +107,8 @@ class Choice:
     direction: str | None
     inputs: tuple[Column, ...]
     notes: tuple[str, ...] = field(default=())
+    unread_time: str = ""
+    """Sentence on a column of times that is not read, with the cure; empty if there is none"""
 
 
 @dataclass(frozen=True)
@@ -100,6 +119,7 @@ class _Request:
     direction: str | None
     inputs: tuple[str, ...]
     units: Mapping[str, str]
+    looks: Mapping[str, Look]
 
 
 def choose_columns(
@@ -113,16 +133,15 @@ def choose_columns(
     inputs: Sequence[str] = (),
     units: Mapping[str, str] | None = None,
     unstated: Collection[str] = (),
-    text: Collection[str] = (),
-    steady: Collection[str] = (),
+    looks: Mapping[str, Look] | None = None,
 ) -> Choice:
-    """Chooses the columns of a recording by their names alone.
+    """Chooses the columns of a recording by their names and units.
 
-    The rules for position and force apply in this order: (1) A named column wins. (2) If one stem occurs in
-    several units, the SI unit wins over a converted one, and both win over counts. (3) A single candidate is
-    chosen. (4) The first stem of the role's list that only one candidate has is chosen. (5) The file is
-    refused. The message names all problems and one set of options that solves them. Time follows the same
-    rules, but is optional.
+    The rules for position and force apply in this order: (1) A named column wins. (2) Columns between whose
+    units no object has a law are left out. (3) If one stem occurs in several units, the SI unit wins over a
+    converted one, and both win over counts. (4) A single candidate is chosen. (5) The first stem of the
+    role's list that only one candidate has is chosen. (6) The file is refused. The message names all problems
+    and one set of options that solves them. Time follows the same rules, but is optional.
 
     Parameters
     ----------
@@ -136,10 +155,8 @@ def choose_columns(
         Units of columns, by column name or by the role ("position", "force", "time"); wins over the name.
     unstated : collection of str
         Columns that the file declares to be in SI without the unit.
-    text : collection of str
-        Columns that are known to hold text; a cure does not name them.
-    steady : collection of str
-        Columns with one or two values at the start of the file; a cure names them last.
+    looks : mapping of str to Look, optional
+        First rows of the columns.
 
     Raises
     ------
@@ -147,19 +164,23 @@ def choose_columns(
         A named column or unit does not exist, or no rule chooses.
     """
     roles = {"position": position, "force": force, "time": time}
-    request = _Request(roles, direction, tuple(inputs), dict(units or {}))
+    request = _Request(roles, direction, tuple(inputs), dict(units or {}), dict(looks or {}))
     choice, problems = _attempt(names, request, unstated)
-    if choice is not None:
-        unitless_time = None if choice.time is not None else _time_without_unit(names, request, text)
-        if unitless_time is None:
-            return choice
-        added = " ".join(_time_options(unitless_time))
-        note = f"column {shortened(unitless_time)} has no unit and is not used; if it is in s, add: {added}"
-        return replace(choice, notes=(*choice.notes, note))
-    message = "; ".join(problems.values())
-    if "no column" in message:
-        message += f". The columns are {listed(names)}"
-    raise InputError(f"{file}: {message}{_cure(names, request, unstated, text, steady, problems)}")
+    if choice is None:
+        message = "; ".join(problems.values())
+        if "no column" in message:
+            message += f". The columns are {listed(names)}"
+        raise InputError(f"{file}: {message}{_cure(names, request, unstated, problems)}")
+    if choice.time is not None or (time_column := _unread_time(names, request)) is None:
+        return choice
+    reason = f"holds {time_column.look.example!r}" if time_column.look.text else "has no known unit"
+    cure = _time_options(time_column)
+    condition = "if it is in s, add" if not time_column.stated else f"replace {UNIT_TO_FILL_IN} and add"
+    return replace(
+        choice,
+        unread_time=f"column {shortened(time_column.name)} {reason} and is not read as time, so damping and "
+        "memory are not tested" + ("" if time_column.look.text else f"; {condition}: {' '.join(cure)}"),
+    )
 
 
 def _attempt(
@@ -177,13 +198,23 @@ def _attempt(
     columns = _with_units(names, request, problems)
     notes: list[str] = []
     chosen: dict[str, Column | None] = {}
+    lawful = _lawful(columns, request.roles)
     for role in ROLES:
         if role.name not in problems:
-            chosen[role.name] = _choose(role, columns, request.roles[role.name], unstated, notes, problems)
+            chosen[role.name] = _choose(role, lawful, request.roles[role.name], unstated, notes, problems)
     position_column, force_column = chosen.get("position"), chosen.get("force")
     if position_column is not None and force_column is not None and position_column.name == force_column.name:
         both = f"column {shortened(force_column.name)} cannot be both the position and the force"
         problems.setdefault("force", both)
+    elif (
+        position_column is not None
+        and force_column is not None
+        and not _is_law(position_column, force_column)
+    ):
+        problems["law"] = (
+            f"{shortened(position_column.name)} and {shortened(force_column.name)}: a force needs a position "
+            "in m or mm, and a torque an angle; multiply the force by its lever arm, or use other columns"
+        )
     if problems or position_column is None or force_column is None:
         return None, problems
     notes += _unit_notes(each for each in chosen.values() if each is not None)
@@ -218,23 +249,68 @@ def _with_units(names: Sequence[str], request: _Request, problems: dict[str, str
             stated[column] = unit
     columns = []
     for name in names:
-        stem, unit = split_name(name)
-        if name.endswith("_in") and f"{stem}_out" in names:
-            stem, unit = name, None  # the ending "_in" means input, not inches
-        columns.append(Column(name, stem, stated.get(name, unit)))
+        look = request.looks.get(name, NO_LOOK)
+        parts = parse_name(name)
+        unit = stated.get(name) or (CLOCK if look.clock else parts.unit or _epoch_unit(parts.stem, look))
+        if name.endswith("_in") and name not in stated and f"{parts.stem}_out" in names:
+            parts, unit = replace(parts, stem=name), None  # the ending "_in" means input, not inches
+        columns.append(Column(name, parts.stem, unit, parts.stated, look))
     return columns
 
 
+def _epoch_unit(stem: str, look: Look) -> Unit | None:
+    """Returns the unit of a column of times since 1970 whose name states none; None for other columns."""
+    first, last = _EPOCH_S
+    if "s" in (quantity_of(stem) or ()):
+        for symbol in ("s", "ms", "us", "ns"):
+            factor = UNITS[symbol].factor
+            if first <= look.least * factor and look.largest * factor <= last:
+                return UNITS[symbol]
+    return None
+
+
+def _lawful(columns: Sequence[Column], roles: Mapping[str, str | None]) -> list[Column]:
+    """Returns the columns without those that have no law with any candidate of the other role.
+
+    Columns that the caller names stay.
+    """
+    named = set(roles.values())
+    of_role = {
+        role: [each for each in columns if each.name == roles[role.name]]
+        or [each for each in columns if each.unit is not None and each.unit.si in role.si_units]
+        for role in (POSITION, FORCE)
+    }
+    pairs = [(one, other) for one in of_role[POSITION] for other in of_role[FORCE] if _is_law(one, other)]
+    if not pairs:
+        return list(columns)
+    pairs = [pair for pair in pairs if _units_of(*pair) in LAWS] or pairs
+    candidates = {each.name for role in of_role.values() for each in role}
+    kept = {each.name for pair in pairs for each in pair} | named
+    return [each for each in columns if each.name in kept or each.name not in candidates]
+
+
+def _is_law(position: Column, force: Column) -> bool:
+    """Returns False if no object has a law between the units of two columns; True if one is not known."""
+    of_position, of_force = _units_of(position, force)
+    return of_position in ("", "count") or of_force in ("", "A") or (of_position, of_force) in LAWS
+
+
+def _units_of(position: Column, force: Column) -> tuple[str, str]:
+    return position.unit.si if position.unit else "", force.unit.si if force.unit else ""
+
+
 def _unit_notes(columns: Iterable[Column]) -> list[str]:
-    """Returns a sentence for each column that is read in another unit than that in its name."""
-    return [
-        f"{column.name} is read in {column.unit.symbol}, although its name states {named.symbol}"
-        for column in columns
-        if column.unit is not None
-        and (named := split_name(column.name)[1]) is not None
-        and named != column.unit
-        and column.stem != column.name
-    ]
+    """Returns a sentence for each column that is read in another unit than its name states literally."""
+    notes = []
+    for column in columns:
+        named, read = parse_name(column.name).unit, column.unit
+        if read is None or column.stem == column.name:
+            continue
+        if named is not None and named != read:
+            notes.append(f"{column.name} is read in {read.symbol}, although its name states {named.symbol}")
+        elif read.symbol not in column.name.replace("·", "*") and read.si == "N":
+            notes.append(f"{column.name} is read in {read.symbol}")
+    return notes
 
 
 def _choose(
@@ -251,9 +327,12 @@ def _choose(
             _require_unit(role, column, problems)
         return column
     candidates = [column for column in columns if column.unit is not None and column.unit.si in role.si_units]
+    if role is TIME:
+        numbers = [each for each in candidates if each.unit is not CLOCK]
+        candidates = numbers or [each for each in candidates if not each.look.steady]
     if not candidates:
         if role is not TIME:
-            problems[role.name] = f"no column name has a unit of {role.name} ({symbols_of(role.si_units)})"
+            problems[role.name] = f"no column name has a unit of {role.name} such as {role.examples}"
         return None
     best = _best(candidates, notes)
     if len(best) == 1 and len(best[0]) == 1:
@@ -298,107 +377,130 @@ def _prefer_si(same_stem: list[Column], notes: list[str]) -> list[Column]:
 
 
 def _require_unit(role: Role, column: Column, problems: dict[str, str]) -> None:
-    allowed = symbols_of(role.si_units)
     if column.unit is None:
-        problems[role.name] = f"column {shortened(column.name)} has no known unit ({allowed})"
+        problems[role.name] = f"column {shortened(column.name)} has no known unit such as {role.examples}"
     elif column.unit.si not in role.si_units:
         problems[role.name] = (
             f"column {shortened(column.name)} is in {column.unit.symbol}, "
-            f"which is not a unit of {role.name} ({allowed})"
+            f"which is not a unit of {role.name} such as {role.examples}"
         )
 
 
 def _cure(
-    names: Sequence[str],
-    request: _Request,
-    unstated: Collection[str],
-    text: Collection[str],
-    steady: Collection[str],
-    problems: Mapping[str, str],
+    names: Sequence[str], request: _Request, unstated: Collection[str], problems: Mapping[str, str]
 ) -> str:
-    """Returns the options that make a refused file readable, after checking that they choose all columns."""
+    """Returns the options that make a refused file readable, after checking that they choose all columns.
+
+    A unit is assumed only for a column whose name states none. Where a name states something that is not a
+    unit of the role, the user fills in the unit.
+    """
     no_cure = ". A recording needs two columns of numbers, a position and a force"
     roles, units, direction = dict(request.roles), dict(request.units), request.direction
     inputs = tuple(name for name in request.inputs if name in names)
     assumed: list[str] = []
     added: list[str] = []
-    for key in list(units):
-        if f"units {key}" in problems and (key in names or key in roles):
-            units[key] = difflib.get_close_matches(units[key], UNITS, 1, 0.0)[0]
-            added.append(f"--units {command_word(f'{key}={units[key]}')}")
-        elif f"units {key}" in problems:
-            del units[key]
+    if any(f"units {key}" in problems and key in names for key in units):
+        return ""  # the user names a unit that is not known, and the message lists the known ones
+    units = {key: unit for key, unit in units.items() if f"units {key}" not in problems}
     if "direction" in problems:
         direction = next(iter(difflib.get_close_matches(str(direction), names, 1, 0.0)), None)
         added.append(f"--direction {command_word(str(direction))}")
     columns = _with_units(names, replace(request, units=units), {})
+    fill_in = False
     for role in (role for role in ROLES if role.name in problems):
         others = {name for other, name in roles.items() if other != role.name}
         named_column = roles[role.name]
-        if (
-            named_column in names
-            and named_column not in others
-            and f"column {named_column} has no known unit" in problems[role.name]
-        ):
-            suggestion: Column | None = next(column for column in columns if column.name == named_column)
-        else:
-            left_out = {*others, *text, *DIRECTION_NAMES}
-            candidates = [each for each in columns if each.name not in left_out]
-            misspelt = None if named_column is None else nearest_name(named_column, names)
-            suggestion = next((each for each in candidates if each.name == misspelt), None)
-            suggestion = suggestion or _suggested(role, candidates, steady)
+        candidates = [
+            each
+            for each in columns
+            if each.name not in {*others, *DIRECTION_NAMES} and (not each.look.text or each.unit is CLOCK)
+        ]
+        wanted = None if named_column is None else nearest_name(named_column, names)
+        suggestion = next((each for each in candidates if each.name in (named_column, wanted)), None)
+        if suggestion is None or (named_column in names and "known unit" not in problems[role.name]):
+            suggestion = _suggested(role, candidates)
         if suggestion is None:
             return no_cure
         if suggestion.name != named_column:
             added.append(f"--{role.name} {command_word(suggestion.name)}")
         roles[role.name] = suggestion.name
         if role.name not in units and (suggestion.unit is None or suggestion.unit.si not in role.si_units):
-            stem = stem_key(suggestion.stem)
-            unit = next((unit for word, unit in _LIKELY_UNITS.items() if word in stem), role.example)
-            units[suggestion.name] = unit if UNITS[unit].si in role.si_units else role.example
-            added.append(f"--units {command_word(f'{suggestion.name}={units[suggestion.name]}')}")
-            assumed.append(f"{shortened(suggestion.name)} is in {units[suggestion.name]}")
-    choice, _ = _attempt(names, _Request(roles, direction, inputs, units), unstated)
-    if (
-        choice is not None
-        and choice.time is None
-        and (unitless_time := _time_without_unit(names, request, text))
-    ):
-        added += _time_options(unitless_time)
-        assumed.append(f"{shortened(unitless_time)} is in s")
+            chosen = [
+                each.unit.si for each in columns if each.unit is not None and each.name in roles.values()
+            ]
+            unit = _likely_unit(role, suggestion, [*chosen, *(UNITS[each].si for each in units.values())])
+            units[suggestion.name] = unit
+            shown = UNIT_TO_FILL_IN if suggestion.stated else unit
+            fill_in = fill_in or bool(suggestion.stated)
+            added.append(f"--units {command_word(f'{suggestion.name}={shown}')}")
+            if not suggestion.stated:
+                assumed.append(f"{shortened(suggestion.name)} is in {unit}")
+    choice, _ = _attempt(names, _Request(roles, direction, inputs, units, request.looks), unstated)
+    time_column = None if choice is None or choice.time is not None else _unread_time(names, request)
+    if time_column is not None and not time_column.look.text and not time_column.stated:
+        added += _time_options(time_column)
+        assumed.append(f"{shortened(time_column.name)} is in s")
     options = " ".join(added)
     if choice is None or not added or len(options) > LONGEST_CURE:
-        return no_cure
-    condition = f"If {' and '.join(assumed)}, " if assumed else "For example, "
-    return f". {condition}add: {options}"
+        return "" if "law" in problems else no_cure
+    condition = f"If {' and '.join(assumed)}, add" if assumed else "For example, add"
+    if fill_in:
+        condition += f", with the unit in place of {UNIT_TO_FILL_IN}"
+    return f". {condition}: {options}"
 
 
-def _time_without_unit(names: Sequence[str], request: _Request, text: Collection[str]) -> str | None:
-    """Returns a column that has the name of a time but no unit, and is therefore not used as time."""
-    used = {*request.roles.values(), *request.inputs, *text}
-    times = (name for name in names if stem_key(name) in TIME.preferred_stems and name not in used)
-    return next(times, None)
+def _likely_unit(role: Role, column: Column, known: Collection[str]) -> str:
+    """Returns the unit that a message suggests for a column whose name states no unit.
+
+    `known` holds the SI units of the other columns.
+    """
+    named, travel = column.named, column.look.largest - column.look.least
+    possible = [si for si in role.si_units if named is None or si in named] or list(role.si_units)
+    lawful = [si for si in possible if any({si, other} == set(law) for law in LAWS for other in known)]
+    likely = (lawful or possible)[0]
+    units = _USUAL_UNITS.get(likely, (likely,))
+    low, high = _USUAL_TRAVELS.get(likely, (0.0, math.inf))
+    return next((unit for unit in units if low <= travel * UNITS[unit].factor <= high), units[0])
 
 
-def _time_options(name: str) -> list[str]:
-    return [f"--time {command_word(name)}", f"--units {command_word(f'{name}=s')}"]
+def _unread_time(names: Sequence[str], request: _Request) -> Column | None:
+    """Returns a column that is probably a time but has no known unit, and is therefore not used as time.
+
+    Its name is that of a time, or names no quantity while its values rise in every row by more than a count.
+    """
+    used = {*request.roles.values(), *request.inputs}
+    columns = _with_units(names, request, {})
+    unread = [
+        each for each in columns if each.unit is None and each.name not in used and not each.look.steady
+    ]
+    rising = (each for each in unread if each.named is None and each.look.rises and not each.look.counter)
+    return next((each for each in unread if "s" in (each.named or ())), next(rising, None))
 
 
-def _suggested(role: Role, columns: Sequence[Column], steady: Collection[str]) -> Column | None:
-    """Returns the column that an error message suggests: one with a unit of the role, else the likeliest."""
-    fitting = [column for column in columns if column.unit is not None and column.unit.si in role.si_units]
-    if fitting:
-        return _best(fitting, [])[0][0]
-    words_of_other_roles = [word for other in ROLES if other is not role for word in other.words]
+def _time_options(column: Column) -> list[str]:
+    unit = UNIT_TO_FILL_IN if column.stated else "s"
+    return [f"--time {command_word(column.name)}", f"--units {command_word(f'{column.name}={unit}')}"]
+
+
+def _suggested(role: Role, columns: Sequence[Column]) -> Column | None:
+    """Returns the column that an error message suggests: one with a unit of the role, else the likeliest.
+
+    Columns that name another quantity, or state a unit of one, are never suggested.
+    """
 
     def rank(column: Column) -> tuple[bool, ...]:
-        stem = stem_key(column.stem)
         return (
-            stem not in role.preferred_stems,
-            stem in _UNLIKELY_STEMS,
-            column.name in steady,
-            not any(word in stem for word in role.words),
-            any(word in stem for word in words_of_other_roles),
+            not (column.unit is not None and column.unit.si in role.si_units),
+            column.look.steady,
+            column.look.counter,
+            _SETPOINT.search(stem_key(column.stem)) is not None,
+            column.named is None,
         )
 
-    return min((column for column in columns if column.unit is None), key=rank, default=None)
+    fitting = [
+        column
+        for column in columns
+        if (column.unit.si in role.si_units if column.unit is not None else unit_of(column.stated) is None)
+        and (column.named is None or column.named & set(role.si_units))
+    ]
+    return min(fitting, key=rank, default=None)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._typing import Float1D
 from .motion import (
@@ -14,7 +15,16 @@ from .motion import (
     SIGNIFICANT_STANDARD_ERRORS,
     noise_of,
     resolution_of,
+    waits,
 )
+
+
+def air_rows(position: Float1D, force: Float1D) -> NDArray[np.bool_]:
+    """Returns True (n,) for rows before the contact of the tool; positions and forces (n,) are in recorded
+    order."""
+    waiting = waits(position)
+    moving = np.ones(len(position), dtype=np.bool_) if waiting is None or waiting.all() else ~waiting
+    return np.asarray(position < contact_at(position[moving], force[moving]))
 
 
 @np.errstate(over="ignore")  # huge forces are refused later

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 from .._typing import Float1D, Int8Vector
 from ..errors import InputError
 from .columns import Choice, Column, choose_columns
+from .contact import air_rows
 from .files import Layout, sha256_of_file
+from .looks import clock_seconds
 from .rows import RowCheck
 from .table import Cells, Places, Table, parse_number, to_numbers
-from .units import COLUMN_SUFFIX, UNITS, UNSTATED_UNIT, Unit
+from .units import CLOCK, COLUMN_SUFFIX, UNITS, UNSTATED_UNIT, Unit
 
 UNSTATED = ""
 """Unit symbol of an array given without a unit: an SI unit, but it is not known which one."""
@@ -101,6 +103,8 @@ class Conversion:
     drop: bool
     """True: rows that cannot be used are dropped and counted. False: the first such row refuses the table."""
     metadata: Mapping[str, str]
+    time_is_named: bool = False
+    """True if the caller names the column of the time"""
 
     @staticmethod
     def of(
@@ -129,8 +133,7 @@ class Conversion:
             inputs=tuple(inputs) or layout.inputs,
             units=units,
             unstated=layout.roles.values(),
-            text=table.text_names,
-            steady=table.steady_names,
+            looks=table.looks,
         )
         status = layout.roles.get("status")
         if status is not None and status not in table.names:
@@ -145,7 +148,9 @@ class Conversion:
                     f"({', '.join(sorted(used))})"
                 )
         negated_columns = frozenset(column for column in negated if negated.count(column) % 2)
-        conversion = Conversion(name, choice, choice.direction, status, negated_columns, drop, metadata)
+        conversion = Conversion(
+            name, choice, choice.direction, status, negated_columns, drop, metadata, time is not None
+        )
         for column in conversion.text:
             if column in conversion.numbers:
                 role = "direction" if column == choice.direction else "status"
@@ -163,13 +168,35 @@ class Conversion:
 
     @property
     def numbers(self) -> list[str]:
-        """Names of the columns with numbers."""
+        """Names of the columns that are converted to numbers."""
         return [column.name for column in self.columns]
 
     @property
     def text(self) -> list[str]:
         """Names of the columns with words."""
         return [name for name in (self.direction, self.status) if name is not None]
+
+    def read(self, table: Table) -> tuple[Conversion, dict[str, Cells]]:
+        """Returns all cells, with clock times in seconds.
+
+        A clock that the caller does not name and that repeats a time is not read; the returned conversion
+        then has no time.
+        """
+        clock = self.choice.time if self.choice.time and self.choice.time.unit is CLOCK else None
+        numbers = [name for name in self.numbers if clock is None or name != clock.name]
+        cells = table.read(numbers=numbers, text=[*self.text, *([clock.name] if clock else [])])
+        if clock is None:
+            return self, cells
+        seconds = clock_seconds(cells[clock.name])
+        cells[clock.name] = seconds
+        steps = np.diff(seconds[np.isfinite(seconds)])
+        if self.time_is_named or (steps > 0).all():
+            return self, cells
+        sentence = (
+            f"column {clock.name} repeats a time, so it is not read as time, and damping and memory are not "
+            "tested; record fractions of a second, or state the rate by a column of times in s"
+        )
+        return replace(self, choice=replace(self.choice, time=None, unread_time=sentence)), cells
 
     @property
     def units(self) -> dict[str, str]:
@@ -249,7 +276,7 @@ def converted(
     file: Path | None = None,
     direction: str | None,
     rows: Range | None = None,
-    zero: Range | None = None,
+    zero: Range | Literal["air"] | None = None,
     torque_constant: float | None = None,
     **options: Any,
 ) -> dict[str, Any]:
@@ -266,7 +293,7 @@ def converted(
         Those of `read_recording`.
     """
     conversion = Conversion.of(table, name, direction=direction, **options)
-    cells = table.read(numbers=conversion.numbers, text=conversion.text)
+    conversion, cells = conversion.read(table)
     direction_column = conversion.direction
     if (
         direction_column == "segment"
@@ -311,16 +338,21 @@ def converted(
         f, units["force"], file_units["force"] = f * torque_constant, "N*m", UNITS["Nm"]
         names["force"] = _torque_text(choice.force.name, torque_constant)
     if zero is not None:
-        first, last = _row_range(name, zero, total)
-        numbers = np.arange(start, stop)[check.kept]
-        without_contact = (numbers >= first) & (numbers < last)
-        if not without_contact.any():
-            raise InputError(f"{name}: --zero {first}:{last} contains no row that is used")
+        if zero == "air":
+            without_contact, where = air_rows(x, f), "the rows before the contact"
+            if not without_contact.any():
+                raise InputError(
+                    f"{name}: --zero air finds no rows before the contact; name them: START:STOP"
+                )
+        else:
+            first, last = _row_range(name, zero, total)
+            numbers = np.arange(start, stop)[check.kept]
+            without_contact, where = (numbers >= first) & (numbers < last), f"rows {first} to {last - 1}"
+            if not without_contact.any():
+                raise InputError(f"{name}: --zero {first}:{last} contains no row that is used")
         offset = float(np.mean(f[without_contact]))
         f = f - offset
-        notes.append(
-            f"{offset:.6g} {units['force']}, the mean force of rows {first} to {last - 1}, is subtracted"
-        )
+        notes.append(f"{offset:.6g} {units['force']}, the mean force of {where}, is subtracted")
     _require_enough(name, choice.position, x, check.notes)
     time = None if choice.time is None else conversion.si(choice.time, cells)
     inputs = [conversion.si(column, cells) for column in choice.inputs]
@@ -345,6 +377,7 @@ def converted(
         ),
         "notes": (conversion.note(torque_constant, table.notes), *notes, *_sign_notes(x, f, directions)),
         "file_units": file_units,
+        "unread_time": choice.unread_time,
         "part_of": _motion(conversion, all_cells, start + np.flatnonzero(check.kept)) if is_part else None,
     }
 

@@ -12,7 +12,7 @@ import re
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -20,9 +20,10 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from .dialect import HEAD_BYTES, not_csv, recognise, refuse_marks
+from .dialect import HEAD_BYTES, NOT_STATED, Stated, cells_of_lines, not_csv, recognise, refuse_marks
 from .files import CELL_BYTES, require_memory
-from .table import MISSING, Cells, LongTable, parse_with, to_numbers
+from .looks import LOOK_ROWS, Look
+from .table import MISSING, Cells, LongTable, to_numbers
 
 _CHUNK_CELLS = 1 << 22
 """Number of cells of a CSV file that are read at a time, to limit the use of memory."""
@@ -37,9 +38,6 @@ _EXACT_OPTIONS: dict[str, Any] = (
 
 _TRAILING_COLUMN = "\n"
 """Name of the empty column if each row ends with a separator. A header cannot contain it."""
-
-_EXAMINED_ROWS = 1000
-"""Rows that are examined for text columns before the fast reader starts."""
 
 _BLOCK_BYTES = 1 << 22
 """Number of bytes that are read at a time to count rows."""
@@ -100,7 +98,7 @@ class CsvFile(LongTable):
     A name that ends in ``.part`` is an incomplete recording: its last line is ignored if it has no line feed.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, stated: Stated = NOT_STATED) -> None:
         self._path = path
         self._size = path.stat().st_size
         self.torn = 0
@@ -110,11 +108,11 @@ class CsvFile(LongTable):
             self._leave_out_torn_line()
         with self._bytes() as stream:
             head = stream.read(HEAD_BYTES)
-        self._dialect = recognise(str(path), head, len(head) == self._size)
+        self._dialect = recognise(str(path), head, len(head) == self._size, stated)
         self.names = self._dialect.names
         self.metadata = self._dialect.metadata
         self.notes = self._dialect.notes
-        self.text_names, self.steady_names = self._examine_first_rows()
+        self.looks = self._look_at_first_rows()
 
     def _leave_out_torn_line(self) -> None:
         with self._path.open("rb") as stream:
@@ -166,33 +164,23 @@ class CsvFile(LongTable):
                 yield each
 
         line = self._dialect.lines_before + 1
-        for cells in csv.reader(noted(), delimiter=self._dialect.separator):
+        for cells in cells_of_lines(noted(), self._dialect.separator):
             if len(row) > 1 or row[0].strip(blank):
                 yield line, cells
             line += len(row)
             row.clear()
 
-    def _examine_first_rows(self) -> tuple[set[str], set[str]]:
-        """Returns the columns that hold text, and those with only one or two values, in the first rows."""
-        text: set[str] = set()
-        values: dict[str, set[str]] = {name: set() for name in self.names}
+    def _look_at_first_rows(self) -> dict[str, Look]:
+        """Describes the columns by their first rows."""
+        cells: dict[str, list[str]] = {name: [] for name in self.names}
         columns = len(self.names) + self._dialect.trailing
         with self._lines() as lines:
-            for row, (line, cells) in enumerate(self._rows(lines)):
-                if len(cells) > columns:
-                    raise self._too_many_cells(line, len(cells))
-                for name, cell in zip(self.names, cells, strict=False):
-                    if len(values[name]) < 3:
-                        values[name].add(cell)
-                    if name not in text and not self._numeric(cell):
-                        text.add(name)
-                if row == _EXAMINED_ROWS:
-                    break
-        return text, {name for name, found in values.items() if len(found) < 3}
-
-    def _numeric(self, cell: str) -> bool:
-        text = cell.strip()
-        return text in MISSING or parse_with(text, self._dialect.decimal) is not None
+            for line, row in islice(self._rows(lines), LOOK_ROWS):
+                if len(row) > columns:
+                    raise self._too_many_cells(line, len(row))
+                for name, cell in zip(self.names, row, strict=False):
+                    cells[name].append(cell)
+        return {name: Look.of(found, self._dialect.marks) for name, found in cells.items()}
 
     def _first_too_wide(self) -> InputError:
         columns = len(self.names) + self._dialect.trailing
@@ -257,13 +245,18 @@ class CsvFile(LongTable):
         for chunk in self._chunks(dict.fromkeys(self.names, "str")):
             for name in set(self.names) - text_names - found:
                 cells = chunk[name]
-                if self._dialect.decimal == ",":
+                if self._dialect.marks.startswith(","):
                     cells = cells.str.replace(",", ".")
                 if pd.to_numeric(cells[~cells.isin(MISSING)], errors="coerce").isna().any():
                     found.add(name)
         return found
 
     def parts(self, rows: int) -> tuple[int, list[tuple[int, int]]]:
+        if self._dialect.separator == " ":
+            raise InputError(
+                f"{self._path} is separated by spaces, which cannot be read part by part; separate its "
+                "columns by commas, semicolons or tabs"
+            )
         if not self._dialect.single_bytes:
             encoding = self._dialect.encoding.upper().replace("16-", "16")  # for iconv
             raise InputError(
@@ -313,10 +306,10 @@ class CsvFile(LongTable):
         return self._to_numbers(name, cells.to_numpy(dtype=object))
 
     def _to_numbers(self, name: str, cells: Cells) -> Cells:
-        numbers = to_numbers(cells, self._dialect.decimal)
+        numbers = to_numbers(cells, self._dialect.marks)
         others = cells[np.isnan(numbers)]
         where = f"{self._path}: column {name}"
-        refuse_marks(where, others, self._dialect.decimal, self._dialect.separator)
+        refuse_marks(where, others, self._dialect.marks)
         return numbers
 
     def rows_before(self, part: tuple[int, int]) -> int:
@@ -341,8 +334,8 @@ class CsvFile(LongTable):
                 pd.read_csv(
                     stream,
                     encoding=self._dialect.encoding,
-                    sep=self._dialect.separator,
-                    decimal=self._dialect.decimal,
+                    sep=r"\s+" if self._dialect.separator == " " else self._dialect.separator,
+                    decimal=self._dialect.marks[0],
                     header=None,
                     names=[*self.names, *trailing],
                     usecols=None if columns is None else [*columns, *trailing],

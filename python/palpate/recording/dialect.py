@@ -10,10 +10,12 @@ import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
+from typing import Any
 
 from ..errors import InputError, escaped, listed, shortened
+from .looks import cure_of_header
 from .table import MISSING, parse_number, parse_with
 from .units import split_name, unit_of
 
@@ -23,8 +25,9 @@ HEAD_BYTES = 1 << 20
 HEAD_LINES = 1000
 """Number of lines, without comments, from which separator and decimal mark are recognised."""
 
-SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
-"""Separators by preference: a comma may be a decimal comma, but a tab is always a separator."""
+SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space"}
+"""Separators by preference: a comma may be a decimal comma, but a tab is always a separator. Several spaces
+separate like one."""
 
 _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -42,11 +45,17 @@ LEAST_NUMBERS = 2
 LEAST_CONSECUTIVE_ROWS = 3
 """Least number of consecutive rows of numbers that mark the data of a table; all rows of a shorter table."""
 
-THOUSANDS_SEPARATED = re.compile(
-    r"[-+]?(\d{1,3}(,\d{3})+\.\d*|\d{1,3}(\.\d{3})+,\d*|\d{1,3}(,\d{3}){2,}|\d{1,3}(\.\d{3}){2,}"
-    r"|\d{1,3}(['’ \u00a0\u202f]\d{3})+([.,]\d*)?)"
-)
-"""Number with thousands separators, with any decimal mark."""
+_MARKS = re.compile(r"[^.,]")
+"""Every character that is neither a decimal point nor a comma."""
+
+_OTHER = {".": ",", ",": "."}
+"""Mark between thousands by the decimal mark."""
+
+_OTHER_SEPARATOR = re.compile(r"[\t;]|,(?!\d)|(?<!\d),")
+"""Separator other than a space; a comma between digits may be a decimal comma."""
+
+_COMMENT_START = re.compile(r"[#\s]*((columns|fields|names|header|units)\s*[:=]\s*)?", re.IGNORECASE)
+"""Start of a comment that holds a header."""
 
 AMBIGUOUS_COMMA = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 """Number with one comma that may be a decimal comma or a thousands separator."""
@@ -58,7 +67,8 @@ class Dialect:
 
     encoding: str
     separator: str
-    decimal: str
+    marks: str
+    """Decimal mark, and behind it the mark between thousands if it is known"""
     names: tuple[str, ...]
     metadata: dict[str, str]
     start: int
@@ -76,7 +86,20 @@ class Dialect:
         return not self.encoding.startswith("utf-16")
 
 
-def recognise(file: str, head: bytes, whole: bool) -> Dialect:
+@dataclass(frozen=True)
+class Stated:
+    """What the caller states about a table that does not state it itself."""
+
+    columns: tuple[str, ...] = ()
+    """Column names of a table without a header; empty if the table has one"""
+    decimal: str | None = None
+    """Decimal mark, "." or ","; the other mark then separates thousands. None: recognised"""
+
+
+NOT_STATED = Stated()
+
+
+def recognise(file: str, head: bytes, whole: bool, stated: Stated = NOT_STATED) -> Dialect:
     """Recognises the dialect of a text file.
 
     Parameters
@@ -87,6 +110,8 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
         The first bytes of the file.
     whole : bool
         True if these are all of its bytes.
+    stated : Stated
+        What the caller states about the file.
 
     Raises
     ------
@@ -99,32 +124,41 @@ def recognise(file: str, head: bytes, whole: bool) -> Dialect:
     lines = list(io.StringIO(text, newline=""))
     if not whole and len(lines) > 1:
         lines.pop()  # the bytes read so far may end inside a line
-    found = _header(file, lines)
-    separator, spans = found.separator, found.spans
-    before, header_line = spans[found.header.row]
+    found = _header(file, lines, stated.columns)
+    if found.without_header:
+        raise InputError(f"{file} has no header. {cure_of_header(found.without_header)}")
+    separator, spans, row = found.separator, found.spans, found.header.row
+    before, header_line = spans[row]
     header, header_notes = with_checked_names(f"{file}, line {header_line + 1}", found.header)
-    decimal = "."
-    if found.sample:
-        decimal = decimal_mark(f"{file}, line {spans[header.first][0] + 1}", found.sample, separator)
-    lines_before = spans[header.row if header.units_row is None else header.units_row][1] + 1
+    marks = marks_of(stated.decimal)
+    if found.sample and stated.decimal is None:
+        marks = decimal_mark(f"{file}, line {spans[header.first][0] + 1}", found.sample)
+    last = header.row if header.units_row is None else header.units_row
+    if header.stated or header.units_row is not None or _is_comment(lines[before]):
+        lines_before = spans[header.first][0]  # comments can be between units and data
+    else:
+        lines_before = spans[last][1] + 1
     notes = []
     if encoding != "utf-8":
         notes.append({"latin-1": "Latin-1"}.get(encoding, encoding.upper()))
     if separator != ",":
         notes.append(f"separated by {SEPARATORS[separator]}s")
-    if decimal == ",":
+    if marks.startswith(","):
         notes.append("decimal comma")
     preamble = sum(1 for line in lines[:before] if line.strip() and not _is_comment(line))
     if preamble:
-        notes.append(f"{preamble} line{'s' * (preamble > 1)} before the header in line {before + 1}")
-    if _is_comment(lines[before]):
+        place = "data" if header.stated else "header"
+        notes.append(f"{preamble} line{'s' * (preamble > 1)} before the {place} in line {before + 1}")
+    if header.stated:
+        notes.append("the column names are stated")
+    elif _is_comment(lines[before]):
         notes.append(f"header in the comment in line {before + 1}")
     if header.units_row is not None:
         notes.append(f"units in line {spans[header.units_row][0] + 1}")
     return Dialect(
         encoding=encoding,
         separator=separator,
-        decimal=decimal,
+        marks=marks,
         names=header.names,
         metadata=dict(_metadata(lines[:before], separator)),
         start=mark + len("".join(lines[:lines_before]).encode(encoding)),
@@ -151,10 +185,9 @@ def read_rows(file: str, content: bytes) -> tuple[str, dict[int, list[str | None
         The bytes are not text, or a quotation mark is missing.
     """
     lines = list(io.StringIO(_text_of(file, content, True)[2], newline=""))
-    separator = _header(file, lines).separator
-    reader = csv.reader(
-        (line.lstrip("# \t") if _is_comment(line) else line for line in lines), delimiter=separator
-    )
+    separator = _header(file, lines, ()).separator
+    without_marks = (_COMMENT_START.sub("", line, count=1) if _is_comment(line) else line for line in lines)
+    reader = cells_of_lines(without_marks, separator)
     rows: dict[int, list[str | None]] = {}
     behind_empty = set()
     line, is_empty = 1, False
@@ -235,32 +268,71 @@ class _Candidate:
     """First and last line in the file of each row, counted from 0"""
     sample: list[list[str]]
     """First rows of data; empty if no row holds numbers"""
+    without_header: list[list[str]] = field(default_factory=list)
+    """First rows of data of a table without a header, which the first row replaces"""
 
 
-def _header(file: str, lines: list[str]) -> _Candidate:
-    """Returns the header with the separator that gives most columns of numbers."""
+def _header(file: str, lines: list[str], names: tuple[str, ...]) -> _Candidate:
+    """Returns the header with the separator that gives most columns of numbers.
+
+    `names` are those that the caller states for a file without a header.
+    """
     with_text = ((k, line) for k, line in enumerate(lines) if line.strip() and not _is_comment(line))
     plain = list(islice(with_text, HEAD_LINES))
     if not plain:
         raise InputError(f"{file} has no header: the first line must name the columns")
     best: _Candidate | None = None
+    without_header: list[list[str]] = []
     for separator in SEPARATORS:
-        if not any(separator in line for _, line in plain):
+        if not any(separator in line.strip() for _, line in plain):
+            continue
+        if separator == " " and any(_OTHER_SEPARATOR.search(line) for _, line in plain):
             continue
         spans, rows = _rows(file, plain, separator)
-        header = find_header(rows)
-        above = plain[0][0] - 1
-        if header is None and above >= 0 and _is_comment(lines[above]):
-            # `numpy.savetxt` writes its header as a comment.
-            spans, rows = _rows(file, [(above, lines[above].lstrip("# \t")), *plain], separator)
-            header = find_header(rows)
+        header = find_header(rows, names)
+        if header is None:
+            without_header = max(
+                without_header, _first_data(rows), key=lambda each: len(each[0]) if each else 0
+            )
+        if header is None and not names:
+            # Some programs write the header as a comment, as numpy.savetxt does.
+            cells = len(without_header[0]) if without_header else 0
+            comments = _comments_above(lines, plain[0][0])
+            above = [each for each in comments if _cell_count(file, each, separator) == cells]
+            if above:
+                spans, rows = _rows(file, [*above, *plain], separator)
+                header = find_header(rows)
         if header is not None and (best is None or header.numbers > best.header.numbers):
             best = _Candidate(header, separator, spans, rows[header.first :])
     if best is not None:
         return best
+    if names and without_header:
+        raise InputError(f"{file} has {len(without_header[0])} columns, but --columns names {len(names)}")
     separator = max(",;\t", key=lambda each: len(_rows(file, plain[:1], each)[1][0]))
+    if without_header and len(_rows(file, plain[:1], separator)[1][0]) == 1:
+        separator = " "
     spans, rows = _rows(file, plain, separator)
-    return _Candidate(first_row_as_header(rows), separator, spans, [])
+    return _Candidate(first_row_as_header(rows), separator, spans, [], without_header)
+
+
+def _comments_above(lines: list[str], first: int) -> list[tuple[int, str]]:
+    """Returns number and text of the comments directly above a line."""
+    start = first
+    while start > 0 and _is_comment(lines[start - 1]):
+        start -= 1
+    return [(k, _COMMENT_START.sub("", lines[k], count=1)) for k in range(start, first)]
+
+
+def _cell_count(file: str, line: tuple[int, str], separator: str) -> int:
+    return max(map(len, _rows(file, [line], separator)[1]), default=0)
+
+
+def _first_data(rows: Sequence[list[str]]) -> list[list[str]]:
+    """Returns the rows of data of a table without a header; empty if it has none."""
+    first = next((k for k in range(len(rows)) if _starts_data(rows, k)), None)
+    if first is None or any(len(row) == len(rows[first]) and not _is_data(row) for row in rows[:first]):
+        return []
+    return [row for row in rows[first:] if len(row) == len(rows[first])]
 
 
 def _is_comment(line: str) -> bool:
@@ -272,7 +344,7 @@ def _rows(
 ) -> tuple[list[tuple[int, int]], list[list[str]]]:
     """Returns, for each row, the indices of its first and last line in the file, and its cells."""
     spans, rows = [], []
-    reader = csv.reader((line for _, line in plain), delimiter=separator)
+    reader = cells_of_lines((line for _, line in plain), separator)
     first_line = 0
     try:
         for cells in reader:
@@ -282,6 +354,13 @@ def _rows(
     except csv.Error as error:
         raise not_csv(file, error) from None
     return spans, rows
+
+
+def cells_of_lines(lines: Iterable[str], separator: str) -> Any:
+    """Returns a csv reader of lines; several spaces separate like one."""
+    if separator == " ":
+        return csv.reader((" ".join(line.split()) for line in lines), delimiter=" ")
+    return csv.reader(lines, delimiter=separator)
 
 
 def _metadata(lines: list[str], separator: str) -> Iterator[tuple[str, str]]:
@@ -312,38 +391,56 @@ class Header:
     """True if each row ends with a separator; the last column then has no name and is ignored"""
     numbers: int = 0
     """Number of columns that hold numbers in the first row of data"""
+    stated: bool = False
+    """True if the caller states the names; `row` is then the first row of data"""
 
 
-def find_header(rows: Sequence[Row]) -> Header | None:
+def find_header(rows: Sequence[Row], stated: tuple[str, ...] = ()) -> Header | None:
     """Finds the header above the first run of rows with two or more numbers, or None without one.
+
+    If the names are stated, the run begins with a row of as many cells, and no header is searched.
 
     The header is a row above the run without numbers for which :func:`_may_be_header` is true. Of several
     such rows the one above a row of units is chosen, else the one with the most units in its names, then the
     lowest one.
     """
-    first = next((k for k in range(len(rows)) if _starts_data(rows, k)), None)
+    starts = (k for k in range(len(rows)) if _starts_data(rows, k))
+    if stated:
+        starts = (k for k in starts if len(_without_empty_end(rows[k])) == len(stated))
+    first = next(starts, None)
     if first is None:
         return None
     cells = len(rows[first])
+    numbers = sum(is_number(cell) for cell in rows[first])
+    if stated:
+        names = [*stated, *[""] * (cells - len(stated))]
+        return _without_trailing(
+            Header(first, tuple(names), first, numbers=numbers, stated=True), rows[first : first + 3]
+        )
     above = first
-    while above > 0 and _may_be_header(rows, above - 1, first) and not _is_data(rows[above - 1]):
+    while above > 0 and _may_be_header(rows, above - 1, first) and not _is_data(rows[above - 1][:cells]):
         above -= 1
-    candidates = [k for k in range(above, first) if not any(map(is_number, rows[k]))]
+    candidates = [k for k in range(above, first) if not any(map(is_number, rows[k][:cells]))]
     if not candidates:
         return None
-    units_row = candidates[-1] if len(candidates) > 1 and _is_units(rows[candidates[-1]]) else None
+    units_row = max((k for k in candidates[1:] if _is_units(rows[k])), default=None)
     if units_row is not None:
-        row = candidates[-2]
+        row = candidates[candidates.index(units_row) - 1]
     else:
         row = max(candidates, key=lambda k: (sum(split_name(name)[1] is not None for name in rows[k]), k))
     names = [escaped(name.strip()) for name in rows[row]]
+    if any(map(is_number, names)):  # behind the names of the columns, a header can hold settings
+        names = names[:cells]
     names += [""] * (cells - len(names))
     if units_row is not None:
         units = [escaped(_without_brackets(unit)) for unit in rows[units_row]] + [""] * len(names)
         names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=False)]
-    numbers = sum(is_number(cell) for cell in rows[first])
     found = Header(row, tuple(names), first, units_row, numbers=numbers)
     return _without_trailing(found, rows[first : first + LEAST_CONSECUTIVE_ROWS])
+
+
+def _without_empty_end(row: Row) -> Row:
+    return row if row[-1].strip() else row[:-1]
 
 
 def first_row_as_header(rows: Sequence[Row]) -> Header:
@@ -379,77 +476,81 @@ def with_checked_names(where: str, header: Header) -> tuple[Header, list[str]]:
     if len(names) == 1:
         raise InputError(
             f"{where}: there is one column ({shortened(names[0])}); a recording needs a position and a "
-            "force, separated by commas, semicolons or tabs"
+            "force, separated by commas, semicolons, tabs or spaces"
         )
     return replace(header, names=tuple(names)), notes
 
 
-def decimal_mark(where: str, rows: Sequence[Row], separator: str) -> str:
-    """Returns the decimal mark of rows of data, "." or ",".
+def decimal_mark(where: str, rows: Sequence[Row]) -> str:
+    """Returns the decimal mark of rows of data, "." or ",", and behind it the mark between thousands, if any.
 
     Raises
     ------
     InputError
-        A comma may be a decimal comma or a thousands separator, or both marks occur.
+        A comma may be a decimal comma or a thousands separator, or both marks occur as decimal marks.
     """
-    cells = [cell.strip() for row in rows for cell in row]
+    cells = [cell.strip() for row in rows for cell in row if is_number(cell)]
+    for decimal in {_proven_mark(_MARKS.sub("", cell)) for cell in cells} - {""}:
+        marks = decimal + _OTHER[decimal]
+        if all(parse_with(cell, marks) is not None for cell in cells):
+            return marks
     commas = [cell for cell in cells if parse_number(cell) is None and parse_with(cell, ",") is not None]
     if not commas:
         return "."
     points = next((cell for cell in cells if "." in cell and parse_number(cell) is not None), None)
     if points is None and not all(AMBIGUOUS_COMMA.fullmatch(cell) for cell in commas):
         return ","
-    other = f"{points!r} has a decimal point" if points else "three digits follow every comma"
-    raise _ambiguous_comma(f"{where} holds {commas[0]!r}, and {other}", separator)
+    if points is None:
+        raise _unknown_mark(f"{where} holds {commas[0]!r}, and three digits follow every comma", ",.")
+    raise _unknown_mark(f"{where} holds {commas[0]!r}, and {points!r} has a decimal point", ".")
 
 
-def refuse_marks(where: str, cells: Iterable[object], decimal: str, separator: str) -> None:
+def _proven_mark(marks: str) -> str:
+    """Returns the decimal mark of a number by its points and commas: a mark between thousands may repeat and
+    is before the decimal mark. Empty if these marks do not determine it.
+    """
+    if len(marks) < 2:
+        return ""
+    return marks[-1] if len(set(marks)) > 1 else _OTHER[marks[0]]
+
+
+def marks_of(decimal: str | None) -> str:
+    """Returns the stated decimal mark and the other mark, which then separates thousands; "." if none is
+    stated."""
+    return "." if decimal is None else decimal + _OTHER[decimal]
+
+
+def refuse_marks(where: str, cells: Iterable[object], marks: str) -> None:
     """Refuses numbers whose decimal or thousands marks differ from those in the first rows of the file.
 
     Raises
     ------
     InputError
-        A cell has thousands separators, or a comma in a file with decimal points. The message contains a
-        command that changes them.
+        A cell is a number with marks that the first rows do not have. The message names the option that
+        states the decimal mark.
     """
     for cell in dict.fromkeys(str(cell).strip() for cell in cells):
-        if THOUSANDS_SEPARATED.fullmatch(cell):
-            mark = re.findall(r"[^\d+-]", cell)[0]
-            raise InputError(
-                f"{where} holds {cell!r}, which has thousands separators; export the file without them, "
-                f"or remove them: {_sed_command(mark, separator, '')}"
-            )
-        if decimal == "." and "," in cell and parse_with(cell, ",") is not None:
-            raise _ambiguous_comma(f"{where} holds {cell!r}, and the first rows have no comma", separator)
+        if is_number(cell) and parse_number(cell) is None:
+            finding = f"{where} holds {cell!r}, and the decimal mark of the first rows is {marks[0]!r}"
+            candidates = "," if marks[0] == "," else ",."
+            possible = [mark for mark in candidates if parse_with(cell, mark + _OTHER[mark]) is not None]
+            if not possible:
+                raise InputError(f"{finding}: export the file again without a mark between thousands")
+            raise _unknown_mark(finding, possible)
 
 
-def _ambiguous_comma(finding: str, separator: str) -> InputError:
-    points, nothing = (_sed_command(",", separator, by) for by in (".", ""))
-    return InputError(
-        f"{finding}: the comma may be a decimal comma or a thousands separator. If it is a decimal comma, "
-        f"write points: {points}; if it is a thousands separator, remove it: {nothing}"
-    )
-
-
-def _sed_command(mark: str, separator: str, by: str) -> str:
-    """Returns a sed command that replaces a mark between digits; in comma-separated files only in quotes."""
-    escaped = {".": "[.]", "'": "\\x27"}.get(mark, mark)
-    digits = "[0-9]" if by else "[0-9]{3}"
-    if mark == separator:
-        script = f':a;s/("[^"{mark}]*[0-9]){escaped}({digits}[^"]*")/\\1{by}\\2/;ta'
-    else:
-        script = f":a;s/([0-9]){escaped}({digits})/\\1{by}\\2/;ta"
-    return f"sed -E '{script}' OLD.csv > NEW.csv"
+def _unknown_mark(finding: str, possible: Iterable[str]) -> InputError:
+    """Returns the refusal of a number whose decimal mark is not known, with the options that state it."""
+    uses = {
+        ",": "if the comma is the decimal mark, add: --decimal ','",
+        ".": "if the point is the decimal mark, add: --decimal .",
+    }
+    return InputError(f"{finding}: {'; '.join(uses[mark] for mark in possible)}")
 
 
 def is_number(cell: str) -> bool:
-    """Returns True for a number with any decimal mark and thousands separators."""
-    text = cell.strip()
-    return (
-        parse_number(text) is not None
-        or parse_with(text, ",") is not None
-        or THOUSANDS_SEPARATED.fullmatch(text) is not None
-    )
+    """Returns True if a cell is a number with any decimal mark and any mark between thousands."""
+    return any(parse_with(cell.strip(), marks) is not None for marks in (".,", ",."))
 
 
 def _is_data(row: Row) -> bool:

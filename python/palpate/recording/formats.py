@@ -21,7 +21,9 @@ import scipy
 
 from ..errors import InputError, escaped, listed, shortened
 from .csv_file import CsvFile
+from .dialect import NOT_STATED, Stated
 from .files import CELL_BYTES, MEMORY_LIMIT, readable, require_memory, zip_members
+from .looks import Look
 from .mcap_file import read_mcap
 from .memory_table import MemoryTable, import_library
 from .table import Cells, LongTable, Table, to_numbers
@@ -61,15 +63,21 @@ _COMPLEX_FLAG = 1 << 11
 """Bit of the flags of a MATLAB array that marks complex numbers."""
 
 
-def open_table(path: Path) -> Table:
+def open_table(path: Path, stated: Stated = NOT_STATED) -> Table:
     """Opens a recording, except a workbook, as a table of columns; the suffix of its name gives the format.
 
     Raises
     ------
     InputError
-        The file does not have that format, or the library that reads it is not installed.
+        The file does not have that format, the library that reads it is not installed, or something is stated
+        that a file of this format contains itself.
     """
-    return _reader_of(path)(path)
+    reader = _reader_of(path)
+    if reader is CsvFile:
+        return CsvFile(path, stated)
+    if stated != NOT_STATED:
+        raise InputError(f"{path} is not a text file; --columns and --decimal are for text files only")
+    return reader(path)
 
 
 def is_read_in_parts(path: Path) -> bool:
@@ -109,8 +117,8 @@ class ParquetFile(LongTable):
             schema = footer.schema_arrow
             self._stored = tuple(str(name) for name in schema.names)
             self.names = tuple(map(escaped, self._stored))
-            self.text_names = {
-                name
+            self.looks = {
+                name: Look(text=True)
                 for name, field in zip(self.names, schema, strict=True)
                 if str(getattr(field.type, "value_type", field.type)) in _ARROW_TEXT
             }

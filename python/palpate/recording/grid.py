@@ -27,6 +27,7 @@ from .dialect import (
     find_header,
     first_row_as_header,
     is_number,
+    marks_of,
     with_checked_names,
 )
 from .memory_table import MemoryTable, cells_of
@@ -62,6 +63,8 @@ class Grid:
     """Separator of the cells of a text file; empty for a sheet"""
     behind_empty: frozenset[int] = frozenset()
     """Numbers of the rows of a text file that follow an empty row"""
+    decimal: str | None = None
+    """Decimal mark of numbers in texts if the caller states it"""
 
     @property
     def word(self) -> str:
@@ -190,24 +193,24 @@ def joined_table(path: Path, name: str, blocks: Sequence[Block], most_rows: int 
             column += [row[place] if place < len(row) else None for row in cells]
         numbers = block.grid.numbers[rows].tolist()
         places += [f"{number} of {block.grid.name}" for number in numbers] if several_grids else numbers
-    decimal = "."
-    if places:
+    marks = marks_of(first.grid.decimal)
+    if places and first.grid.decimal is None:
         heads = zip(*(column[:_HEAD_ROWS] for column in values), strict=True)
         texts = [[cell for cell in row if isinstance(cell, str)] for row in heads]
-        decimal = decimal_mark(f"{name}, {word} {places[0]}", texts, first.grid.separator or ";")
+        marks = decimal_mark(f"{name}, {word} {places[0]}", texts)
     columns = {}
     for column_name, column in zip(header.names, values, strict=True):
         if tuple in map(type, column):
             column_name, column = _in_seconds(where, column_name, column)
             notes = [*notes, "times to a millisecond"]
-        columns[column_name] = _cells(column, decimal)
+        columns[column_name] = _cells(column, marks)
     if not all(block.grid.follows[block.rows[1:]].all() for block in blocks):
         notes = [*notes, "empty rows are left out"]
     if header.units_row is not None:
         notes = ["units in a second header row", *notes]
     if before := len(first.above):
         notes = [f"{before} {word}{'s' * (before > 1)} before the header", *notes]
-    table = MemoryTable(path, columns, _metadata(first), notes, (word, places), decimal)
+    table = MemoryTable(path, columns, _metadata(first), notes, (word, places), marks)
     table.starts = np.cumsum([len(block.rows[:most_rows]) for block in blocks])[:-1].tolist()
     return table
 
@@ -441,12 +444,12 @@ def _padded(texts: Sequence[list[str]]) -> list[list[str]]:
     return [row + [""] * (width - len(row)) for row in texts]
 
 
-def _cells(values: Sequence[Cell], decimal: str) -> Cells:
+def _cells(values: Sequence[Cell], marks: str) -> Cells:
     """Returns the cells of a column as numbers, or as text if one cell is text."""
     if {*map(type, values)} <= {type(None), int, float}:
         return np.array(values, dtype=np.float64)
-    texts = [_text(cell).replace(".", decimal) if type(cell) is float else _text(cell) for cell in values]
-    return cells_of(texts, decimal)
+    texts = [_text(cell).replace(".", marks[0]) if type(cell) is float else _text(cell) for cell in values]
+    return cells_of(texts, marks)
 
 
 def _in_seconds(where: str, name: str, values: Sequence[Cell]) -> tuple[str, list[Cell]]:

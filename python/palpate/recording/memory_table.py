@@ -12,10 +12,8 @@ import numpy as np
 
 from ..errors import InputError, listed
 from .dialect import refuse_marks
+from .looks import LOOK_ROWS, Look
 from .table import MISSING, Cells, Table, parse_with, to_numbers
-
-STEADY_ROWS = 1000
-"""A column that has only one or two distinct values in this number of first rows is steady."""
 
 
 class MemoryTable(Table):
@@ -48,9 +46,8 @@ class MemoryTable(Table):
         self.names = tuple(self._columns)
         self.metadata = dict(metadata or {})
         self.notes = tuple(notes)
-        self.text_names = {name for name, cells in self._columns.items() if cells.dtype == object}
-        self.steady_names = {
-            name for name, cells in self._columns.items() if len(set(cells[:STEADY_ROWS].tolist())) < 3
+        self.looks = {
+            name: Look.of(cells[:LOOK_ROWS].tolist(), decimal) for name, cells in self._columns.items()
         }
         if len(self.names) < 2:
             raise InputError(
@@ -65,7 +62,7 @@ class MemoryTable(Table):
                 cells = np.array([_as_text(cell) for cell in cells], dtype=object)
             elif name in numbers and cells.dtype == object:
                 found = to_numbers(cells, self._decimal)
-                refuse_marks(f"{self._path}: column {name}", cells[np.isnan(found)], self._decimal, ";")
+                refuse_marks(f"{self._path}: column {name}", cells[np.isnan(found)], self._decimal)
                 cells = found
             columns[name] = cells
         return columns

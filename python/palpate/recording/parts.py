@@ -20,10 +20,10 @@ from typing import Any, TypeAlias
 from ..arguments import shown
 from ..errors import InputError, command_word, did_you_mean, escaped, listed, shortened
 from .conversion import MIN_ROWS, Conversion, converted
-from .dialect import HEAD_BYTES, read_rows
+from .dialect import HEAD_BYTES, Stated, read_rows
 from .files import require_memory
 from .grid import Block, Grid, joined_table, tables_of, whole_grid
-from .memory_table import STEADY_ROWS
+from .looks import LOOK_ROWS
 from .workbook import read_sheets
 
 PartNames: TypeAlias = str | int | Sequence[str | int]
@@ -70,7 +70,7 @@ class SeveralPartsError(InputError):
         self.parts = parts
 
 
-def parts_of_text(path: Path) -> list[Part]:
+def parts_of_text(path: Path, stated: Stated) -> list[Part]:
     """Returns the tables in a text file.
 
     Raises
@@ -78,10 +78,10 @@ def parts_of_text(path: Path) -> list[Part]:
     InputError
         The file is not text, or too large.
     """
-    return _parts_of(path, path.read_bytes())
+    return _parts_of(path, path.read_bytes(), stated)
 
 
-def several_parts_of_text(path: Path) -> list[Part]:
+def several_parts_of_text(path: Path, stated: Stated) -> list[Part]:
     """Returns the tables in a text file; none if it is long and clearly has one table only.
 
     Raises
@@ -92,19 +92,20 @@ def several_parts_of_text(path: Path) -> list[Part]:
     content = path.read_bytes()
     if len(content) > HEAD_BYTES:
         head = content[: content.rfind(b"\n", 0, HEAD_BYTES) + 1]
-        if len(_parts_of(path, head)) < 2 and not _OTHER_ROW.search(content, max(len(head) - 1, 0)):
+        if len(_parts_of(path, head, stated)) < 2 and not _OTHER_ROW.search(content, max(len(head) - 1, 0)):
             return []
-    return _parts_of(path, content)
+    return _parts_of(path, content, stated)
 
 
-def _parts_of(path: Path, content: bytes) -> list[Part]:
-    require_memory(path, _TEXT_CELL_BYTES * sum(map(content.count, (b"\n", b",", b";", b"\t"))))
+def _parts_of(path: Path, content: bytes, stated: Stated) -> list[Part]:
+    require_memory(path, _TEXT_CELL_BYTES * sum(map(content.count, b"\n,;\t ")))
     separator, rows, behind_empty = read_rows(str(path), content)
     require_memory(path, len(rows) * max(map(len, rows.values()), default=0))
-    return _named([Grid("", rows, separator=separator, behind_empty=frozenset(behind_empty))])
+    grid = Grid("", rows, separator=separator, behind_empty=frozenset(behind_empty), decimal=stated.decimal)
+    return _named([grid])
 
 
-def parts_of_workbook(path: Path) -> list[Part]:
+def parts_of_workbook(path: Path, stated: Stated) -> list[Part]:
     """Returns the tables in the sheets of a workbook; a sheet without a table is one part.
 
     Raises
@@ -115,7 +116,7 @@ def parts_of_workbook(path: Path) -> list[Part]:
     sheets = read_sheets(path)
     if not sheets:
         raise InputError(f"{path} has no sheet with cells")
-    return _named(sheets)
+    return _named([replace(each, decimal=stated.decimal) for each in sheets])
 
 
 def _named(grids: Sequence[Grid]) -> list[Part]:
@@ -237,7 +238,7 @@ def _kind(path: Path, blocks: Sequence[Part], options: dict[str, Any]) -> tuple[
     if _rows(blocks) < MIN_ROWS:
         return None
     try:
-        table = joined_table(path, str(path), [each.block for each in blocks], STEADY_ROWS)
+        table = joined_table(path, str(path), [each.block for each in blocks], LOOK_ROWS)
         choice = Conversion.of(table, str(path), **{each: options[each] for each in _COLUMN_OPTIONS}).choice
     except InputError:
         return None

@@ -19,6 +19,7 @@ from ..arguments import path_of, shown
 from ..errors import InputError
 from .conversion import Conversion, Source, converted
 from .csv_file import CsvFile
+from .dialect import Stated
 from .files import TooLargeError, require_file, sha256_of_file, unchanged
 from .formats import is_read_in_parts, is_text, open_table
 from .parts import Part, PartNames, parts_of_text, parts_of_workbook, read_part, several_parts_of_text
@@ -44,10 +45,12 @@ def read_recording(
     direction: str | None = None,
     inputs: Sequence[str] = (),
     units: Mapping[str, str] | None = None,
+    columns: Sequence[str] = (),
+    decimal: Literal[".", ","] | None = None,
     torque_constant: float | None = None,
     negate: Sequence[str] = (),
     rows: tuple[int | None, int | None] | None = None,
-    zero: tuple[int | None, int | None] | None = None,
+    zero: tuple[int | None, int | None] | Literal["air"] | None = None,
     force_late_s: float | Literal["auto"] = 0.0,
     invalid: Literal["refuse", "drop"] = "refuse",
     part: PartNames | None = None,
@@ -79,14 +82,19 @@ def read_recording(
     units : mapping of str to str, optional
         Unit of a column whose name has none. It replaces the unit in the name. The key is the column's name,
         or "position", "force" or "time" if that column is also named.
+    columns : sequence of str
+        Names of all columns of a text file without a header, with their units (``time_s``, ``position_mm``).
+    decimal : {".", ","}, optional
+        Decimal mark of a text file; the other mark then separates thousands. By default it is recognised.
     torque_constant : float, optional
         Torque per current [N*m/A]; converts a force column from A to N*m. By default a current remains in A.
     negate : sequence of str
         Invert the sign of position, force or a column. A column is given by its name and must be used.
     rows : (start, stop), optional
         Use only these rows, counted from 0. The range excludes stop; None leaves an end open.
-    zero : (start, stop), optional
-        Rows without contact; their mean force is subtracted. The range is counted as `rows`.
+    zero : (start, stop) or "air", optional
+        Rows without contact; their mean force is subtracted. The range is counted as `rows`; "air" are the
+        rows before the contact.
     force_late_s : float or "auto"
         Delay of the recorded force [s], or auto; needs time. Every force is moved to its position, for
         example if the converter of a load cell averages. "auto" finds the delay in the recording
@@ -112,6 +120,8 @@ def read_recording(
         One sentence that names the file, the line or column, and the value.
     """
     file = path_of("path", path)
+    if decimal not in (None, ".", ","):
+        raise InputError(f"decimal is {decimal!r}; it must be '.' or ','")
     if invalid not in ("refuse", "drop"):
         raise InputError(f"invalid is {invalid!r}; it must be 'refuse' or 'drop'")
     require_file(file)
@@ -129,7 +139,7 @@ def read_recording(
         "drop": invalid == "drop",
     }
     with unchanged(file):
-        fields = _fields(file, part, options)
+        fields = _fields(file, part, Stated(tuple(columns), decimal), options)
     recording = Recording(**fields)
     if not force_late_s:
         return recording
@@ -139,33 +149,35 @@ def read_recording(
         raise InputError(f"{path}: {error}") from None
 
 
-def _fields(file: Path, part: PartNames | None, options: dict[str, Any]) -> dict[str, Any]:
+def _fields(file: Path, part: PartNames | None, stated: Stated, options: dict[str, Any]) -> dict[str, Any]:
     """Returns the fields of the recording in a file, or in a part of it.
 
     A text file is first read as one table, which is fast. It is divided into its parts if this is refused, or
-    if it has empty rows.
+    if it has empty rows, unless its column names are stated.
     """
+    if stated.columns and (part is not None or is_workbook(file)):
+        raise InputError(f"{file}: --columns names the columns of a text file without parts; leave it out")
     if is_workbook(file):
-        return read_part(file, parts_of_workbook(file), part, options)
+        return read_part(file, parts_of_workbook(file, stated), part, options)
     if part is not None:
         if not is_text(file):
             raise InputError(f"{file} has one part only; leave out --part")
-        return read_part(file, parts_of_text(file), part, options)
+        return read_part(file, parts_of_text(file, stated), part, options)
     refusal: InputError | None = None
     fields: dict[str, Any] = {}
     try:
-        table = open_table(file)
+        table = open_table(file, stated)
         fields = converted(table, str(file), file=file, **options)
         has_dropped = options["drop"] and fields["source"].rows < fields["source"].file_rows
-        if not (isinstance(table, CsvFile) and (table.has_empty_rows or has_dropped)):
+        if stated.columns or not (isinstance(table, CsvFile) and (table.has_empty_rows or has_dropped)):
             return fields
     except InputError as error:
-        if not is_text(file) or isinstance(error, TooLargeError):
+        if stated.columns or not is_text(file) or isinstance(error, TooLargeError):
             raise
         refusal = error
     parts: list[Part] = []
     with suppress(InputError):
-        parts = several_parts_of_text(file)
+        parts = several_parts_of_text(file, stated)
     has_notes = any(each.block.unused and each.block.too_wide is None for each in parts)
     if len(parts) > 1 or (refusal is not None and has_notes):
         return read_part(file, parts, part, options)
@@ -278,6 +290,8 @@ class LongRecording:
     """Description of a long file from :func:`open_long_recording`, small enough to send to workers."""
 
     path: Path
+    stated: Stated
+    """What the caller states about the file"""
     conversion: Conversion
     """Conversion of the columns position, force and direction to SI values"""
     has_time: bool
@@ -312,7 +326,7 @@ class LongRecording:
         InputError
             A row has no finite number or no known direction, and rows may not be dropped.
         """
-        table = _long_table(self.path)
+        table = _long_table(self.path, self.stated)
         conversion = self.conversion
         for first, cells in table.blocks(part, BLOCK_ROWS, numbers=conversion.numbers, text=conversion.text):
             check, directions = conversion.checked(_PartPlaces(table, part), cells, first)
@@ -325,7 +339,7 @@ class LongRecording:
 
     def places(self) -> Places:
         """Returns the line numbers and cell texts of the rows of the file, for messages."""
-        return open_table(self.path)
+        return open_table(self.path, self.stated)
 
 
 class _PartPlaces:
@@ -349,6 +363,8 @@ def open_long_recording(
     time: str | None = None,
     direction: str | None = None,
     units: Mapping[str, str] | None = None,
+    columns: Sequence[str] = (),
+    decimal: Literal[".", ","] | None = None,
     negate: tuple[str, ...] = (),
     invalid: Literal["refuse", "drop"] = "refuse",
     part_rows: int = PART_ROWS,
@@ -367,7 +383,8 @@ def open_long_recording(
             f"{file} cannot be read part by part; leave out --out-of-core, --jobs and --scheduler, or "
             "convert the file to CSV or Parquet"
         )
-    table = _long_table(file)
+    stated = Stated(tuple(columns), decimal)
+    table = _long_table(file, stated)
     conversion = Conversion.of(
         table,
         str(file),
@@ -387,6 +404,7 @@ def open_long_recording(
     rows, parts = table.parts(part_rows)
     return LongRecording(
         path=file,
+        stated=stated,
         conversion=conversion,
         has_time=has_time,
         parts=tuple(parts),
@@ -396,7 +414,7 @@ def open_long_recording(
     )
 
 
-def _long_table(file: Path) -> LongTable:
-    table = open_table(file)
+def _long_table(file: Path, stated: Stated) -> LongTable:
+    table = open_table(file, stated)
     assert isinstance(table, LongTable)
     return table

@@ -7,7 +7,8 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol, TypeAlias
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,9 @@ from numpy.typing import NDArray
 
 from ..arguments import shown
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from .looks import Look
 
 Cells: TypeAlias = NDArray[Any]
 """(n,) float64 for numbers (NaN for a cell without a number), (n,) object of str for text"""
@@ -37,12 +41,15 @@ class Table(ABC):
     """Number of lines (0 or 1) at the end of the file that are ignored because they are incomplete"""
     notes: Sequence[str] = ()
     """Differences of the file from a plain table, as parts of one sentence"""
-    text_names: Collection[str] = ()
-    """Columns that are known to hold text before the rows are read"""
-    steady_names: Collection[str] = ()
-    """Columns that have only one or two distinct values in the first rows of the table"""
+    looks: Mapping[str, Look] = MappingProxyType({})
+    """First rows of each column; a column without a look is taken to hold numbers"""
     starts: Sequence[int] = ()
     """Rows at which a further block of the file begins, whose time can begin again"""
+
+    @property
+    def text_names(self) -> set[str]:
+        """Columns that hold text in the first rows."""
+        return {name for name, look in self.looks.items() if look.text}
 
     @abstractmethod
     def read(self, *, numbers: Collection[str], text: Collection[str]) -> dict[str, Cells]:
@@ -94,22 +101,48 @@ def parse_number(text: str) -> float | None:
         return None
 
 
-def parse_with(text: str, decimal: str) -> float | None:
-    """Returns the number in a cell with this decimal mark, or None."""
-    if decimal == ".":
-        return parse_number(text)
-    return None if "." in text or text.count(",") > 1 else parse_number(text.replace(",", "."))
+_GROUPED = re.compile(
+    r"\s*([-+]?\d{1,3}(?:(?P<group>[.,'’ \u00a0\u202f])\d{3})(?:(?P=group)\d{3})*)"
+    r"(?:(?P<decimal>[.,])(\d*))?\s*"
+)
+"""Number whose digits are in groups of three."""
+
+
+def parse_with(text: str, marks: str) -> float | None:
+    """Returns the number in a cell, or None.
+
+    Parameters
+    ----------
+    text : str
+    marks : str
+        The decimal mark, "." or ",", and behind it the mark between thousands if it is known. A cell with
+        both marks, several groups of thousands, or an apostrophe or space between them, needs no known mark.
+    """
+    decimal = marks[:1] or "."
+    number = (
+        text if decimal == "." else text.replace(",", ".") if "." not in text and text.count(",") < 2 else ""
+    )
+    if (value := parse_number(number)) is not None:
+        return value
+    if not (found := _GROUPED.fullmatch(text)):
+        return None
+    whole, group, mark, fraction = found.groups()
+    is_known = mark == decimal or whole.count(group) > 1 or group in marks[1:]
+    known = group not in ".," or (group != decimal and is_known)
+    if not known or mark not in (None, decimal):
+        return None
+    return parse_number(whole.replace(group, "") + "." + (fraction or ""))
 
 
 MISSING = ("", "NaN", "nan", "-NaN", "-nan", "NA", "N/A", "#N/A", "n/a", "NULL", "null", "None")
 """Texts that mean a missing value in a column of numbers."""
 
 
-def to_numbers(cells: Cells, decimal: str = ".") -> NDArray[np.float64]:
+def to_numbers(cells: Cells, marks: str = ".") -> NDArray[np.float64]:
     """Converts strings to numbers; NaN for a cell without a number."""
 
     def number(cell: Any) -> float:
-        value = parse_with(cell, decimal) if isinstance(cell, str) else cell
+        value = parse_with(cell, marks) if isinstance(cell, str) else cell
         return np.nan if value is None else value
 
     return np.fromiter(map(number, cells), dtype=np.float64, count=len(cells))

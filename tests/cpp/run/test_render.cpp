@@ -623,7 +623,7 @@ TEST_F(RecordedRendering, OpensRecordingAndTelemetryOnlyOnRequest) {
     std::ofstream{options.record} << "old\n";
     RecordSinks taken;
     EXPECT_EQ(refusal([&] { (void)detail::open_sinks(options, {}, {}, taken); }),
-              options.record + " exists already; choose another name, or set force to replace it");
+              options.record + " exists already; choose another name, or replace it with --force");
     options.force = true;
     RecordSinks replacing;
     EXPECT_EQ(detail::open_sinks(options, {}, {{"key", "text"}}, replacing), "");

@@ -100,7 +100,7 @@ def test_wrong_settings_are_refused(settings: dict[str, object], sentence: str) 
 def test_an_existing_recording_is_refused_and_replaced_with_force(tmp_path: Path) -> None:
     out = tmp_path / "rendered.csv"
     out.write_text("precious", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"rendered.csv exists already; .* set force to replace it"):
+    with pytest.raises(ValueError, match=r"rendered.csv exists already; .* replace it with --force"):
         render(Scheme(), duration_s=0.3, record=str(out))
     command = [*COMMAND, "--duration-s", "0.8", "--record", str(out)]
     refused = run(*command)

@@ -42,9 +42,14 @@ def test_a_recording_with_time_prints_verdict_rows_ranges_and_rate(
     assert main(["show", str(timed)]) == 0
     output = capsys.readouterr().out
     assert output.startswith("verdict: good\n")
-    for text in ("rows      5000\n", "position 'position_rad'", "time      4.999 s at 1000 Hz, 0 gaps"):
+    for text in (
+        "rows     5000 of 5000 in the file: 5000 move\n",
+        "position 'position_rad'",
+        "4.999 s at 1000 Hz, 0 gaps",
+    ):
         assert text in output
-    assert " N*m\n" in output
+    assert " N*m, time" in output
+    assert "missing  nothing" in output
 
 
 def test_a_recording_without_time_prints_strokes_in_the_units_of_the_file(
@@ -52,9 +57,8 @@ def test_a_recording_without_time_prints_strokes_in_the_units_of_the_file(
 ) -> None:
     assert main(["show", str(strokes)]) == 0
     shown = printed(capsys)
-    assert shown["position"] == "0 to 4 mm"
-    assert shown["force"] == "0 to 200 gf"
-    assert shown["time"] == "no column of time: no rate, no velocity"
+    assert shown["ranges"] == "position 0 to 4 mm, force 0 to 200 gf"
+    assert shown["missing"] == "no time, so no velocity, damping, memory or lag"
     assert shown["strokes"] == "2 press, 1 release, from the order of the rows"
 
 
@@ -198,7 +202,7 @@ def waiting(path: Path) -> Path:
 
 def test_the_roles_of_the_rows_are_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", str(waiting(tmp_path / "held.csv"))]) == 0
-    roles = printed(capsys)["roles"].split(", ")
+    roles = printed(capsys)["rows"].partition(": ")[2].split(", ")
     assert [each.split(" ", 1)[1] for each in roles] == ["move", "wait in contact", "approach"]
     counts = [int(each.split(" ", 1)[0]) for each in roles]
     # The contact is known to one block of rows: the square root of their number.
@@ -216,4 +220,4 @@ def test_rows_of_each_role_have_a_colour(tmp_path: Path) -> None:
 
 def test_a_recording_without_waits_has_one_role(strokes: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", str(strokes)]) == 0
-    assert printed(capsys)["roles"] == "170 move"
+    assert printed(capsys)["rows"] == "170 of 170 in the file: 170 move"

@@ -13,6 +13,7 @@ import pytest
 
 import palpate
 from corruptions import SEED, SYNTHETIC, Rows, base, base_names
+from palpate import InputError, Recording, read_recording
 from palpate.cli.main import main
 from palpate.recording.checks import CHECKS, findings_of, quality_findings
 from palpate.recording.checks.recordings import UNIT_RATIOS
@@ -350,3 +351,41 @@ def test_each_check_has_its_own_function_and_uses_its_thresholds() -> None:
     for check in CHECKS:
         keywords = set(inspect.signature(check.findings).parameters) - {"checked"}
         assert keywords == set(check.thresholds), check.defect
+
+
+def in_air(offset: float) -> Recording:
+    """Returns a press and release of a spring, with an approach of half a millimetre."""
+    there = np.linspace(-0.5e-3, 4e-3, 800)
+    position = np.r_[there, there[::-1]]
+    noise = 0.01 * np.random.default_rng(1).standard_normal(len(position))
+    force = np.where(position > 0.0, 2e3 * position, 0.0) + noise + offset
+    return Recording.from_arrays(position, force, units={"position": "m", "force": "N"})
+
+
+def test_a_force_before_the_contact_is_named_with_the_option_that_removes_it(tmp_path: Path) -> None:
+    assert not in_air(0.0).verdict.findings
+    (finding,) = in_air(0.8).verdict.findings
+    assert "the force before the contact is 0.80" in finding.sentence
+    assert finding.sentence.endswith("add --zero air")
+    path = tmp_path / "press.csv"
+    in_air(0.8).write(path)
+    zeroed = read_recording(path, zero="air")
+    assert not zeroed.verdict.findings
+    np.testing.assert_allclose(zeroed.force, in_air(0.0).force, atol=0.002)
+
+
+def test_a_sensor_without_rows_before_the_contact_cannot_be_zeroed_by_them(tmp_path: Path) -> None:
+    position = np.linspace(0.0, 4e-3, 100)
+    path = tmp_path / "press.csv"
+    Recording.from_arrays(position, 2e3 * position, units={"position": "m", "force": "N"}).write(path)
+    with pytest.raises(InputError, match="--zero air finds no rows before the contact"):
+        read_recording(path, zero="air")
+
+
+def test_a_part_that_breaks_has_no_wrong_sign_and_a_force_of_many_kilonewtons_no_wrong_unit() -> None:
+    position = np.linspace(0.0, 4e-3, 800)
+    force = np.where(position > 2.5e-3, 0.1, 1.0) * 1.5e7 * position
+    broken = Recording.from_arrays(position, force, units={"position": "m", "force": "N"})
+    assert not [
+        each for each in broken.verdict.findings if "sign" in each.sentence or "unit" in each.sentence
+    ]

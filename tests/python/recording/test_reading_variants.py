@@ -2,8 +2,6 @@
 """Variants of a recording from other programs give the same arrays and the same model."""
 
 import contextlib
-import re
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -203,9 +201,7 @@ def same_model(model: palpate.Model, expected: palpate.Model, clean: Recording) 
 
 
 @pytest.mark.parametrize("seed", sampled(range(8), 0, 1, 2))
-def test_thousands_separators_are_refused_and_the_command_gives_the_clean_recording(
-    tmp_path: Path, seed: int
-) -> None:
+def test_a_recording_with_thousands_separators_is_the_clean_recording(tmp_path: Path, seed: int) -> None:
     clean = sources()[seed % len(sources())]
     separator, mark, decimal = [(";", ".", ","), ("\t", ",", "."), (";", "'", "."), (",", ",", ".")][seed % 4]
     force = clean.force * 1e5
@@ -221,14 +217,6 @@ def test_thousands_separators_are_refused_and_the_command_gives_the_clean_record
     ]
     path = tmp_path / "press.csv"
     path.write_text("\n".join([separator.join(names), *rows]), encoding="utf-8")
-    with pytest.raises(InputError, match="thousands separators") as refused:
-        read_recording(path)
-    command = re.search(r"sed -E '[^']*'", str(refused.value))
-    assert command is not None
-    new = tmp_path / "new.csv"
-    new.write_bytes(
-        subprocess.run(f"{command[0]} {path}", shell=True, check=True, capture_output=True).stdout
-    )
-    recording = read_recording(new)
+    recording = read_recording(path)
     np.testing.assert_allclose(recording.force, force, atol=1e-6)
     np.testing.assert_allclose(recording.position, position, atol=1e-6)

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from palpate.recording.units import UNITS, split_name, symbols_of, unit_of
+from palpate.recording.units import UNITS, parse_name, split_name, symbols_of, unit_of
 
 # Value of each unit in SI, from the SI brochure; standard gravity g_n = 9.80665 m/s^2 (CGPM 1901);
 # lb = 0.45359237 kg and in = 25.4 mm (1959).
@@ -15,16 +15,25 @@ EXPECTED = {
     "um": ("m", 1e-6),
     "nm": ("m", 1e-9),
     "cm": ("m", 1e-2),
+    "dm": ("m", 0.1),
     "in": ("m", 0.0254),
+    "mil": ("m", 25.4e-6),
+    "ft": ("m", 0.3048),
     "rad": ("rad", 1.0),
     "deg": ("rad", math.pi / 180),
+    "gon": ("rad", math.pi / 200),
+    "mrad": ("rad", 1e-3),
+    "rev": ("rad", 2 * math.pi),
     "count": ("count", 1.0),
-    "counts": ("count", 1.0),
     "N": ("N", 1.0),
     "mN": ("N", 1e-3),
     "uN": ("N", 1e-6),
     "nN": ("N", 1e-9),
+    "pN": ("N", 1e-12),
+    "cN": ("N", 1e-2),
+    "daN": ("N", 10.0),
     "kN": ("N", 1e3),
+    "MN": ("N", 1e6),
     "gf": ("N", 9.80665e-3),
     "kgf": ("N", 9.80665),
     "lbf": ("N", 4.4482216152605),
@@ -40,6 +49,8 @@ EXPECTED = {
     "s": ("s", 1.0),
     "ms": ("s", 1e-3),
     "us": ("s", 1e-6),
+    "ns": ("s", 1e-9),
+    "h": ("s", 3600.0),
     "min": ("s", 60.0),
 }
 
@@ -65,7 +76,6 @@ def test_the_unit_is_the_text_after_the_last_underscore() -> None:
     [
         *(
             "torque_nM",
-            "position_MM",
             "voltage_V",
             "x",
             "m",
@@ -84,7 +94,18 @@ def test_the_unit_is_the_text_after_the_last_underscore() -> None:
             "Speed, mm/s",
             "Strain [-]",
         ),
-        *("Force (N) [filtered]", "(N)", "force_min", "angle_min", "Force N"),
+        *(
+            "Force (N) [filtered]",
+            "(N)",
+            "force_min",
+            "angle_min",
+            "Sensor N",
+            "Data in",
+            "Load_A",
+            "adc_in",
+            "sample_N",
+        ),
+        *("Work [Nm]", "Strain [mm/mm]", "Scale (g)", "pressure_kPa", "row_count"),
     ],
 )
 def test_a_name_without_a_unit_of_the_table_has_none(name: str) -> None:
@@ -92,7 +113,7 @@ def test_a_name_without_a_unit_of_the_table_has_none(name: str) -> None:
 
 
 def test_units_are_listed_by_quantity() -> None:
-    assert symbols_of(("m", "rad")) == "m, mm, um, nm, cm, in, rad, deg"
+    assert symbols_of(("m", "rad")) == "m, mm, um, nm, cm, dm, in, mil, ft, rad, mrad, deg, gon, rev"
 
 
 @pytest.mark.parametrize(
@@ -113,12 +134,79 @@ def test_units_are_listed_by_quantity() -> None:
         ("time_min", "time", "min"),
         ("Time [min]", "Time", "min"),
         ("a / b [mm]", "a / b", "mm"),
+        ("position_MM", "position", "mm"),
+        ("Weg in mm", "Weg", "mm"),
+        ("Load N", "Load", "N"),
+        ("Force kg", "Force", "kgf"),
+        ("travel_inches", "travel", "in"),
+        ("force_g", "force", "gf"),
+        ("Elapsed (sec.)", "Elapsed", "s"),
     ],
 )
 def test_the_unit_of_a_name_is_read_in_each_notation(name: str, stem: str, symbol: str) -> None:
     assert split_name(name) == (stem, UNITS[symbol])
 
 
-@pytest.mark.parametrize("symbol", ["N/m", "MM", "n", "N m", "lb", "%", "-", "", ".", "m."])
-def test_a_symbol_outside_the_table_has_no_unit(symbol: str) -> None:
+@pytest.mark.parametrize("symbol", ["nM", "NM", "mn", "grad", "raw", "hh:mm:ss", "-", "", ".", "lbx"])
+def test_a_text_with_several_meanings_or_none_is_not_read(symbol: str) -> None:
     assert unit_of(symbol) is None
+
+
+@pytest.mark.parametrize("symbol", ["N/m", "%", "kPa", "MPa", "mm/s", "N/mm2", "kgf/cm²", "V", "°C"])
+def test_a_unit_of_another_quantity_has_no_role(symbol: str) -> None:
+    unit = unit_of(symbol)
+    assert unit is not None
+    assert unit.si not in {each.si for each in UNITS.values()}
+
+
+@pytest.mark.parametrize(
+    ("spellings", "symbol"),
+    [
+        ("mm MM Mm millimeter millimetres Millimeter", "mm"),
+        ('in inch inches in. "', "in"),
+        ("mil mils thou", "mil"),
+        ("µm μm um micron microns Micrometer", "um"),
+        ("deg degree degrees ° Grad", "deg"),
+        ("rev turns revolutions", "rev"),
+        ("count counts ticks steps pulses", "count"),
+        ("N Newton Newtons n", "N"),
+        ("kN KN", "kN"),
+        ("g gram grams gf gF", "gf"),
+        ("kg kgf kp KG", "kgf"),
+        ("lb lbs lbf LBF lb-f pounds", "lbf"),
+        ("oz ozf ounces", "ozf"),
+        ("s S sec secs sec. second Seconds", "s"),
+        ("ms msec milliseconds", "ms"),
+        ("min minutes mins", "min"),
+        ("h hr hours", "h"),
+        ("Nm N-m N.m N·m N*m", "Nm"),
+        ("mNm mN.m mN-m", "mNm"),
+        ("Ncm N-cm N.cm", "N*cm"),
+        ("Nmm N-mm N.mm", "N*mm"),
+    ],
+)
+def test_usual_spellings_are_read(spellings: str, symbol: str) -> None:
+    assert {unit_of(each) for each in spellings.split()} == {UNITS[symbol]}
+
+
+@pytest.mark.parametrize(
+    ("spellings", "factor"),
+    [
+        ("in-lb in.lb lb-in lbf-in lbf*in inlb", 4.4482216152605 * 0.0254),
+        ("oz-in ozf-in oz.in ozin", 4.4482216152605 / 16 * 0.0254),
+        ("ft-lb ft-lbs lbf-ft", 4.4482216152605 * 0.3048),
+        ("kgf-cm kgf.cm kg-cm kgcm", 9.80665e-2),
+        ("gf-cm gf.cm g-cm", 9.80665e-5),
+    ],
+)
+def test_the_product_of_a_force_and_a_length_is_a_torque(spellings: str, factor: float) -> None:
+    for each in spellings.split():
+        unit = unit_of(each)
+        assert unit is not None
+        assert (unit.si, unit.factor) == ("N*m", pytest.approx(factor, rel=1e-12))
+
+
+def test_a_name_keeps_the_text_in_the_place_of_a_unit_that_is_not_read() -> None:
+    assert parse_name("Force (grains)").stated == "grains"
+    assert parse_name("pressure_kPa").stated == "kPa"
+    assert parse_name("tip_left").stated == ""

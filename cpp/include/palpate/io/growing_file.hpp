@@ -290,7 +290,7 @@ class GrowingFile {
         if (!S_ISREG(there.st_mode) && !S_ISLNK(there.st_mode)) {
             return name_ + " cannot be written: it is not an ordinary file";
         }
-        return force_ ? "" : name_ + " exists already; choose another name, or set force to replace it";
+        return force_ ? "" : name_ + " exists already; choose another name, or replace it with --force";
     }
 
     /// Returns the number of bytes up to the end of the last whole line in a text.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..._typing import Float1D
-from ...verdict import Finding
+from ...verdict import Finding, usable
 from ..conversion import MIN_ROWS
 from .cells import Checked
 from .gaps import position_gaps
@@ -20,7 +20,7 @@ from .parts import changed_force
 from .ranges import implausible_range
 from .recordings import scale_findings
 from .sensors import clipped_force, repeated_samples
-from .signs import mirrored_stroke, moved_zero, reversed_sign
+from .signs import force_without_contact, mirrored_stroke, moved_zero, reversed_sign
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -38,7 +38,19 @@ class Check:
     thresholds: Mapping[str, Any]
 
 
+def unread_time(checked: Checked) -> list[Finding]:
+    """Returns a finding if the file has a column of times that was not read."""
+    sentence = checked.recording.unread_time
+    return [usable(sentence)] if sentence else []
+
+
 CHECKS = (
+    Check(
+        "time that is not read",
+        unread_time,
+        "a unit of time that is not known, a clock without fractions of a second",
+        {},
+    ),
     Check(
         "wrong unit",
         implausible_range,
@@ -66,6 +78,12 @@ CHECKS = (
         moved_zero,
         "a tare between press and release; no release of 56 measured switches and domes ends so low",
         {"shift_share": 0.02, "range_share": 0.2, "rows": 5},
+    ),
+    Check(
+        "force without contact",
+        force_without_contact,
+        "a sensor that was not set to zero",
+        {},
     ),
     Check(
         "clipped force",

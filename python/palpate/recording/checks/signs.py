@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...verdict import Finding, no, usable
+from ...verdict import FORCE_FLOOR, Finding, no, usable
+from ..contact import air_rows
 from ..conversion import mirror_notes
 from ..lag import LONGEST_LAG_S
+from ..motion import LEAST_STROKE_ROWS
 from .cells import Checked, inner_range
 
 if TYPE_CHECKING:
@@ -151,3 +153,27 @@ def _lowest_force(recording: Recording, rows: NDArray[np.intp], count: int) -> f
     """Returns the median force of some rows at the smallest positions."""
     lowest = rows[np.argsort(recording.position[rows], kind="stable")[:count]]
     return float(np.median(recording.force[lowest]))
+
+
+def force_without_contact(checked: Checked) -> list[Finding]:
+    """Returns a finding if the force before the contact has the sign of the force in contact.
+
+    A hand feels it if it exceeds the floor of the just noticeable difference. A force of the other sign may
+    be that of an object which pulls.
+    """
+    recording = checked.recording
+    air = air_rows(recording.position, recording.force)
+    if recording.input_names or np.count_nonzero(air) < LEAST_STROKE_ROWS:
+        return []
+    mean = float(recording.force[air].mean())
+    in_contact = float(recording.force[~air].mean()) - mean
+    if mean * in_contact <= 0.0 or abs(mean) <= FORCE_FLOOR * float(np.ptp(recording.force)):
+        return []
+    position, force = recording.file_unit("position"), recording.file_unit("force")
+    rows = f"{np.count_nonzero(air)} rows below {position.text(float(recording.position[~air].min()))}"
+    return [
+        usable(
+            f"the force before the contact is {force.text(mean)}, not zero ({rows}): if the sensor was not "
+            "set to zero, add --zero air"
+        )
+    ]
