@@ -113,8 +113,11 @@ def test_the_table_of_statuses_equals_the_statuses_of_the_core() -> None:
     assert rows == list(_core.status.status_meanings.items())
 
 
+FOLDERS = ["bench/README.md", "tests/README.md"]
+
+
 @pytest.mark.parametrize(
-    "name", ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"]
+    "name", ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", *FOLDERS]
 )
 def test_linked_files_exist(name: str) -> None:
     text = (ROOT / name).read_text(encoding="utf-8")
