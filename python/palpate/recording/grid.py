@@ -45,8 +45,9 @@ EMPTY, TEXT, READING = 0, 1, 2
 _KINDS = {type(None): EMPTY, str: TEXT, bool: TEXT, int: READING, float: READING, tuple: READING}
 """Kind of a cell by its type; text can also be a reading."""
 
-_DECIMAL_ROWS = 200
-"""Number of first rows of a table from which the decimal mark of numbers stored as text is recognised."""
+_HEAD_ROWS = 200
+"""Largest number of rows above a table in which its header is searched, and of its first rows from which the
+decimal mark of numbers stored as text is recognised."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +195,7 @@ def joined_table(path: Path, name: str, blocks: Sequence[Block], most_rows: int 
         places += [f"{number} of {block.grid.name}" for number in numbers] if several_grids else numbers
     marks = marks_of(first.grid.decimal)
     if places and first.grid.decimal is None:
-        heads = zip(*(column[:_DECIMAL_ROWS] for column in values), strict=True)
+        heads = zip(*(column[:_HEAD_ROWS] for column in values), strict=True)
         texts = [[cell for cell in row if isinstance(cell, str)] for row in heads]
         marks = decimal_mark(f"{name}, {word} {places[0]}", texts)
     columns = {}
@@ -230,7 +231,7 @@ def tables_of(grid: Grid) -> list[Block]:
 
 def whole_grid(grid: Grid) -> Block:
     """Returns the rows of a grid without a table; its first row is the header."""
-    texts = _padded(list(map(_texts, grid.rows)))
+    texts = _padded(list(map(_texts, grid.rows[:_HEAD_ROWS])))
     header = find_header(texts) or first_row_as_header(texts)
     columns = tuple(range(len(header.names)))
     above = tuple(reversed(grid.rows[: header.row]))
@@ -260,9 +261,10 @@ def _bands(grid: Grid) -> list[_Band]:
     bands: list[_Band] = []
     after_data = 0
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        header, row = _header_of(grid, after_data, start, stop), start
+        head = max(after_data, start - _HEAD_ROWS)
+        header, row = _header_of(grid, head, start, stop), start
         if header is not None:
-            row = after_data + header.row
+            row = head + header.row
         elif bands and min(stop - start, after_data - bands[-1].first) >= MIN_ROWS:
             header = bands[-1].header if _is_title(grid.kinds[after_data:start]) else None
         if header is not None:
@@ -359,10 +361,13 @@ def _below(block: Block, rows: NDArray[np.intp]) -> tuple[str, ...]:
 def _repeated(names: Sequence[str], columns: Sequence[int]) -> list[list[int]]:
     """Divides columns where their names begin to repeat; names before the repeated ones are shared."""
     groups: list[list[int]] = [[]]
+    used: set[str] = set()
     for k in columns:
-        if names[k] in [names[each] for each in groups[-1]]:
+        if names[k] in used:
             groups.append([])
+            used.clear()
         groups[-1].append(k)
+        used.add(names[k])
     named = [[names[k] for k in group] for group in groups]
     last = named[-1]
     whole = len(last) >= LEAST_NUMBERS and "" not in last
@@ -383,10 +388,9 @@ def _used(grid: Grid, held: NDArray[np.intp], columns: Sequence[int]) -> NDArray
     first = np.argmax(kinds != EMPTY, axis=1)
     is_note = (kinds[0, first] == READING) & (kinds[np.arange(len(held)), first] == TEXT)
     readings = np.where(is_note, 0, np.count_nonzero(kinds == READING, axis=1))
-    stop = int(np.flatnonzero(readings >= LEAST_NUMBERS)[-1]) + 1
-    while (
-        stop < len(held) and held[stop] == held[stop - 1] + 1 and grid.follows[held[stop]] and readings[stop]
-    ):
+    stop = int(np.flatnonzero(readings >= LEAST_NUMBERS).max(initial=-1)) + 1
+    directly_below = grid.follows[held] & (np.diff(held, prepend=-1) == 1)
+    while stop < len(held) and directly_below[stop] and readings[stop]:
         stop += 1
     return held[:stop]
 

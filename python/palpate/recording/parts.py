@@ -10,6 +10,7 @@ others of its kind.
 from __future__ import annotations
 
 import hashlib
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +20,7 @@ from typing import Any, TypeAlias
 from ..arguments import shown
 from ..errors import InputError, command_word, did_you_mean, escaped, listed, shortened
 from .conversion import MIN_ROWS, Conversion, converted
-from .dialect import Stated, read_rows
+from .dialect import HEAD_BYTES, Stated, read_rows
 from .files import require_memory
 from .grid import Block, Grid, joined_table, tables_of, whole_grid
 from .looks import LOOK_ROWS
@@ -30,6 +31,9 @@ PartNames: TypeAlias = str | int | Sequence[str | int]
 
 _TEXT_CELL_BYTES = 100
 """Memory of a cell of a text file that is split into cells [bytes]."""
+
+_OTHER_ROW = re.compile(rb"\n[ \t;,\"]*(?:\r?\n|[^-+.,;\"\d\s])")
+"""Row of a text file that is empty or begins with a word, so that it can be between two tables."""
 
 _COLUMN_OPTIONS = ("position", "force", "time", "direction", "inputs", "units", "negate", "drop")
 """Arguments of `read_recording` with which columns are chosen."""
@@ -74,8 +78,27 @@ def parts_of_text(path: Path, stated: Stated) -> list[Part]:
     InputError
         The file is not text, or too large.
     """
+    return _parts_of(path, path.read_bytes(), stated)
+
+
+def several_parts_of_text(path: Path, stated: Stated) -> list[Part]:
+    """Returns the tables in a text file; none if it is long and clearly has one table only.
+
+    Raises
+    ------
+    InputError
+        The file is not text, or too large.
+    """
     content = path.read_bytes()
-    require_memory(path, _TEXT_CELL_BYTES * sum(map(content.count, (b"\n", b",", b";", b"\t"))))
+    if len(content) > HEAD_BYTES:
+        head = content[: content.rfind(b"\n", 0, HEAD_BYTES) + 1]
+        if len(_parts_of(path, head, stated)) < 2 and not _OTHER_ROW.search(content, max(len(head) - 1, 0)):
+            return []
+    return _parts_of(path, content, stated)
+
+
+def _parts_of(path: Path, content: bytes, stated: Stated) -> list[Part]:
+    require_memory(path, _TEXT_CELL_BYTES * sum(map(content.count, b"\n,;\t ")))
     separator, rows, behind_empty = read_rows(str(path), content)
     require_memory(path, len(rows) * max(map(len, rows.values()), default=0))
     grid = Grid("", rows, separator=separator, behind_empty=frozenset(behind_empty), decimal=stated.decimal)
@@ -143,7 +166,7 @@ def read_part(
             raise InputError(f"{error} {_options(parts, chosen)}") from None
         raise
     if len(_series(parts)) > 1:
-        source, names = fields["source"], list(dict.fromkeys(each.group or each.name for each in chosen))
+        source, names = fields["source"], _names(parts, chosen)
         fields["source"] = replace(
             source,
             files=tuple(f"{path}, part {each}" for each in names),
@@ -167,6 +190,8 @@ def _chosen(
     candidates = list(parts)
     if wanted is not None:
         names = [wanted] if isinstance(wanted, (str, int)) else list(wanted)
+        if not names:
+            raise InputError("part is empty; give the name or the number of a part")
         candidates = list(dict.fromkeys(part for each in names for part in _selected(path, parts, each)))
         if len(names) > 1:
             other = next((each for each in candidates if each.block.names != candidates[0].block.names), None)
@@ -197,7 +222,7 @@ def _selected(path: Path, parts: Sequence[Part], wanted: object) -> list[Part]:
     if isinstance(wanted, bool) or not isinstance(wanted, (str, int)):
         raise InputError(f"part is {shown(wanted)}; it must be the name or the number of a part, or a list")
     text = str(wanted)
-    found = [part for part in parts if part.has(text)]
+    found = [part for part in parts if text and part.has(text)]
     if not found and text.isdecimal() and 1 <= int(text) <= len(parts):
         found = [parts[int(text) - 1]]
     if not found:
@@ -224,20 +249,24 @@ def _rows(parts: Sequence[Part]) -> int:
     return sum(each.rows for each in parts)
 
 
+def _names(parts: Sequence[Part], chosen: Sequence[Part]) -> list[str]:
+    """Returns the names of parts: that of a table if all its blocks are chosen and nothing else has it."""
+    whole = {
+        group
+        for group in {each.group for each in chosen} - {""}
+        if len(_series([each for each in parts if each.group == group])) == 1
+        and all(each in chosen for each in parts if each.group == group)
+    }
+    return list(dict.fromkeys(each.group if each.group in whole else each.name for each in chosen))
+
+
 def _label(parts: Sequence[Part], chosen: Sequence[Part]) -> str:
-    """Returns the name of parts: that of their sheet or table, if it has no others."""
-    group = chosen[0].group
-    if group and all(each in chosen for each in parts if each.group == group):
-        return shortened(group)
-    return listed(each.name for each in chosen)
+    return listed(_names(parts, chosen))
 
 
 def _options(parts: Sequence[Part], chosen: Sequence[Part]) -> str:
     """Returns the options that choose parts."""
-    group = chosen[0].group
-    whole = group and all(each in chosen for each in parts if each.group == group)
-    names = [group] if whole else [each.name for each in chosen]
-    return " ".join(f"--part {command_word(each)}" for each in names)
+    return " ".join(f"--part {command_word(each)}" for each in _names(parts, chosen))
 
 
 def _name_of(path: Path, parts: Sequence[Part], chosen: Sequence[Part]) -> str:

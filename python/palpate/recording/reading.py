@@ -22,7 +22,7 @@ from .csv_file import CsvFile
 from .dialect import Stated
 from .files import TooLargeError, require_file, sha256_of_file, unchanged
 from .formats import is_read_in_parts, is_text, open_table
-from .parts import Part, PartNames, parts_of_text, parts_of_workbook, read_part
+from .parts import Part, PartNames, parts_of_text, parts_of_workbook, read_part, several_parts_of_text
 from .recording import Recording
 from .rows import LeftOut
 from .table import LongTable, Places
@@ -177,7 +177,7 @@ def _fields(file: Path, part: PartNames | None, stated: Stated, options: dict[st
         refusal = error
     parts: list[Part] = []
     with suppress(InputError):
-        parts = parts_of_text(file, stated)
+        parts = several_parts_of_text(file, stated)
     has_notes = any(each.block.unused and each.block.too_wide is None for each in parts)
     if len(parts) > 1 or (refusal is not None and has_notes):
         return read_part(file, parts, part, options)

@@ -67,7 +67,7 @@ def _filled_rows(sheet: Any) -> dict[int, list[Any]]:
     left = [None] * sheet.start[1] if sheet.start else []
     rows = {}
     for number, row in enumerate(sheet.iter_rows(), 1):
-        cells = [_cell(each) for each in row]
+        cells = [each if type(each) is float else _cell(each) for each in row]
         while cells and cells[-1] is None:
             cells.pop()
         if cells:

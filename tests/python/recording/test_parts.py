@@ -224,6 +224,18 @@ def test_a_single_time_that_does_not_increase_is_refused(tmp_path: Path, row: in
     )
 
 
+def test_a_clock_that_is_set_back_is_refused(tmp_path: Path) -> None:
+    rows = [[row[0] - 0.05 * (k >= 20), *row[1:]] for k, row in enumerate(indent(0))]
+    assert "line 22: column Time (s) holds" in refusal(text_file(tmp_path / "a.csv", [HEADER, *rows]))
+
+
+def test_dropped_rows_do_not_join_specimens(tmp_path: Path) -> None:
+    rows = [row for k in range(3) for row in ([f"Specimen {k}"], HEADER, *indent(k))]
+    assert "holds 3 recordings: Specimen 0 (40 rows)" in refusal(
+        text_file(tmp_path / "a.csv", rows), invalid="drop"
+    )
+
+
 def test_the_time_of_blocks_is_kept_if_it_increases(tmp_path: Path) -> None:
     later = [[row[0] + 5.0, *row[1:]] for row in indent(1)]
     recording = read_recording(text_file(tmp_path / "a.csv", [HEADER, *indent(0), [], *later]))
@@ -315,6 +327,8 @@ def test_an_unknown_part_is_refused_with_the_nearest_name_and_all_parts(tmp_path
         "Run two (40 rows)"
     )
     assert "there is no part '3'" in refusal(path, part=3)
+    assert "there is no part ''" in refusal(path, part="")
+    assert refusal(path, part=[]) == "part is empty; give the name or the number of a part"
     with pytest.raises(InputError, match=r"part is 1\.5; it must be the name or the number of a part"):
         read_recording(path, part=[1.5])  # type: ignore[list-item]
 
@@ -334,6 +348,40 @@ def test_another_part_of_a_file_is_fresh_data_and_the_same_part_is_not(tmp_path:
     assert not is_fresh(first, again)
     assert not is_fresh(both, second)
     assert first.files == (f"{path}, part S0",)
+
+
+def test_specimens_in_two_sheets_and_side_by_side_are_different_data(tmp_path: Path) -> None:
+    pair = side_by_side([HEADER, *indent(0)], [HEADER, *indent(1)])
+    path = workbook(tmp_path / "a.xlsx", {"A": pair, "B": pair})
+    listed = "A 1 (40 rows), A 2 (40 rows), B 1 (40 rows), B 2 (40 rows)"
+    assert f"holds 4 recordings: {listed}. For example, add: --part 'A 1'" in refusal(path)
+    assert "holds 2 recordings: B 1 (40 rows), B 2 (40 rows)" in refusal(path, part="B")
+    sources = [read_recording(path, part=k + 1).source for k in range(4)]
+    assert len({source.sha256 for source in sources}) == 4
+    assert [source.files[0] for source in sources] == [
+        f"{path}, part {name}" for name in ("A 1", "A 2", "B 1", "B 2")
+    ]
+
+
+def test_one_part_is_identified_and_verified_with_another(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = workbook(tmp_path / "a.xlsx", {f"S{k}": [HEADER, *indent(0, 80)] for k in range(2)})
+    model = tmp_path / "m.json"
+    assert main(["identify", str(path), "--part", "S0", "-o", str(model)]) == 0
+    assert main(["verify", str(model), str(path), "--part", "S1"]) == 0
+    assert "recording  fresh" in capsys.readouterr().out
+    assert main(["verify", str(model), str(path), "--part", "S0"]) == 0
+    assert "not fresh" in capsys.readouterr().out
+
+
+def test_a_table_behind_the_first_megabyte_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("palpate.recording.parts.HEAD_BYTES", 300)
+    for kind in ("empty rows", "repeated headers"):
+        path = text_file(tmp_path / "a.csv", blocks(kind, 3))
+        assert any("3 blocks" in note for note in read_recording(path).notes)
+    rows = [row for k in range(2) for row in ([f"Cycle {k + 1}"], HEADER, *indent(k))]
+    assert "holds 2 recordings: Cycle 1 (40 rows)" in refusal(text_file(tmp_path / "b.csv", rows))
 
 
 def test_the_only_recording_of_a_file_has_the_same_source_with_and_without_its_name(tmp_path: Path) -> None:
