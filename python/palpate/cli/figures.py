@@ -345,6 +345,6 @@ def picture_path(path: Path, model: Model) -> None:
     if not model.path:
         raise InputError("the model file lists no networks that identification compared: identify again")
     fit = model.fit
-    title = f"{source_name(model.data.files)}\n{fit.n_wavelets} wavelets, NRMSE {number(fit.nrmse)}"
+    title = f"{source_name(model.data.files)}\n{model.terms}, NRMSE {number(fit.nrmse)}"
     with figure_file(path, height_inches=4.0, rows=(1.4, 1.0), title=title) as (error, criterion):
         draw_path(error, criterion, model.path, model.units["force"])
