@@ -4,7 +4,7 @@ Motor cogging with a period
 ===========================
 
 The magnets of a motor pull its rotor into 12 positions of one revolution. This example simulates a recording
-of this cogging torque. A model with a period needs fewer wavelets, and it holds after any number of
+of this cogging torque. A model with a period is a sum of few harmonics, and it holds after any number of
 revolutions.
 """
 
@@ -40,8 +40,8 @@ x = np.linspace(3.9 * np.pi, 4.3 * np.pi, 500)
 figure, axes = plt.subplots(layout="constrained")
 axes.plot(angle[angle > x[0]], 1e3 * torque[angle > x[0]], ".", color="0.7", label="recording")
 axes.plot(x, 1e3 * torque_of(x), color="0.6", linewidth=4, label="object")
-axes.plot(x, 1e3 * periodic.force(x), "k", label=f"period of 30°: {periodic.n_wavelets} wavelets")
-axes.plot(x, 1e3 * free.force(x), "C3--", label=f"without period: {free.n_wavelets} wavelets")
+axes.plot(x, 1e3 * periodic.force(x), "k", label=f"period of 30°: {periodic.terms}")
+axes.plot(x, 1e3 * free.force(x), "C3--", label=f"without period: {free.terms}")
 axes.set(xlabel="angle [rad]", ylabel="torque [mN·m]", ylim=(-60, 60))
 axes.legend()
 
@@ -52,6 +52,6 @@ axes.legend()
 # motor whose 12 positions differ needs the period of one revolution.
 far = 200 * np.pi + np.linspace(0.0, 2 * np.pi, 1000)
 error = np.sqrt(np.mean((periodic.force(far) - torque_of(far)) ** 2))
-print(f"{periodic.n_wavelets} wavelets in place of {free.n_wavelets}")
+print(f"{periodic.terms} in place of {free.terms}")
 print(f"RMS error after 100 revolutions {1e3 * error:.3f} mN*m, sensor noise 2 mN*m")
 plt.show()

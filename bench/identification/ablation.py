@@ -149,6 +149,10 @@ def _one(*_: Any, **__: Any) -> float:
     return 1.0
 
 
+def _no_orders(problem: Any, start: Any, **_: Any) -> Any:
+    return [problem.solve(start)]
+
+
 def _no_findings(*_: Any, **__: Any) -> Any:
     return []
 
@@ -206,6 +210,9 @@ RULES = (
     Rule("approach is not fitted", "recording.roles", "contact_at", lambda x, f: float(x.min())),
     Rule("wrong readings are dropped", "recording.roles", "wrong_readings", _no_wrong_readings),
     Rule("period is found", "identification.identify", "period_of", _nothing),
+    Rule("closed revolution is a period", "identification.identify", "revolution_of", _nothing),
+    Rule("harmonics", f"{SEARCH}.growth", "select_orders", _no_orders),
+    Rule("usual gap bounds the orders", f"{DATA}.rows", "Rows._usual_gap", _zero),
     Rule(
         "repeated rows are dropped",
         "recording.roles",

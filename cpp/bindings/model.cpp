@@ -146,14 +146,15 @@ ForceModel make_model(const Array& alpha, const Array& beta, const Array& weight
                       const std::string& above, std::optional<double> period,
                       std::optional<double> play_radius, bool of_velocity,
                       const std::optional<MemoryParameters>& memory, const std::string& position_unit,
-                      const std::string& force_unit) {
+                      const std::string& force_unit, std::size_t harmonics) {
     const ModelUnits units{position_unit, force_unit};
     NetworkParameters network{static_cast<std::size_t>(lower.size()),
                               copied(alpha),
                               copied(beta),
                               copied(weight),
                               copied(linear),
-                              bias};
+                              bias,
+                              harmonics};
     Domain domain{copied(lower), copied(upper), named<Continuation>(below, "below"),
                   named<Continuation>(above, "above"), period};
     const int given = int{weight_hysteresis.has_value()} + int{linear_hysteresis.has_value()} +
@@ -346,8 +347,8 @@ py::object extrapolated(const ForceModel& model, const ArrayLike& positions) {
 }
 
 NetworkParameters network_of(const Array& alpha, const Array& beta, const Array& weight, double linear,
-                             double bias) {
-    return {1, copied(alpha), copied(beta), copied(weight), {linear}, bias};
+                             double bias, std::size_t harmonics = 0) {
+    return {1, copied(alpha), copied(beta), copied(weight), {linear}, bias, harmonics};
 }
 
 std::pair<double, double> network_slope_bounds(const Array& alpha, const Array& beta, const Array& weight,
@@ -361,9 +362,9 @@ std::pair<double, double> network_slope_bounds(const Array& alpha, const Array& 
 
 py::array_t<double> cell_derivative_bounds(const Array& alpha, const Array& beta, const Array& weight,
                                            double linear, double bias, const Array& lower, const Array& upper,
-                                           std::size_t order) {
-    const NetworkParameters network = network_of(alpha, beta, weight, linear, bias);
-    validate(network, {{0.0}, {1.0}, {}, {}, std::nullopt});
+                                           std::size_t order, std::size_t harmonics) {
+    const NetworkParameters network = network_of(alpha, beta, weight, linear, bias, harmonics);
+    validate(network, {{0.0}, {1.0}, {}, {}, 1.0});
     require_vector(lower, "lower");
     detail::require_size(copied(upper), view(lower).size(), "upper");
     detail::require(order <= highest_derivative, "order is " + std::to_string(order) + ", must be at most " +
@@ -412,11 +413,12 @@ void bind_model(py::module_& module) {
         "weight_hysteresis"_a = py::none(), "linear_hysteresis"_a = py::none(),
         "bias_hysteresis"_a = py::none(), "lower"_a, "upper"_a, "below"_a = "linear", "above"_a = "linear",
         "period"_a = py::none(), "play_radius"_a = py::none(), "of_velocity"_a = false,
-        "memory"_a = py::none(), "position_unit"_a = "", "force_unit"_a = "",
+        "memory"_a = py::none(), "position_unit"_a = "", "force_unit"_a = "", "harmonics"_a = 0,
         "Makes the model of N wavelets and d inputs: alpha, beta (N, d); weight (N,); linear, lower,\n"
         "upper (d,). of_velocity is true if the second of two inputs is the velocity. With a memory, the\n"
-        "network is the force at rest. The units do not change the numbers; empty: not stated. Raises\n"
-        "ValueError with the wrong field.");
+        "network is the force at rest. The units do not change the numbers; empty: not stated. The last\n"
+        "`harmonics` wavelets of a periodic force are w cos(alpha (x - beta)). Raises ValueError with the\n"
+        "wrong field.");
 
     bind_quantity<&EnvironmentSample::force>(
         type, "force",
@@ -472,6 +474,9 @@ void bind_model(py::module_& module) {
     type.def_property_readonly("n_wavelets",
                                [](const ForceModel& m) { return m.parameters().weight.size(); });
     type.def_property_readonly(
+        "harmonics", [](const ForceModel& m) { return m.parameters().harmonics; },
+        "Number of last wavelets that are harmonics of the period, w cos(alpha (x - beta)).");
+    type.def_property_readonly(
         "alpha", [](const ForceModel& m) { return table(m.parameters().alpha, m.parameters().dimension); });
     type.def_property_readonly(
         "beta", [](const ForceModel& m) { return table(m.parameters().beta, m.parameters().dimension); });
@@ -526,9 +531,10 @@ void bind_model(py::module_& module) {
         "Returns proved bounds (smallest, largest) of the slope f' of a network of one input from lower\n"
         "to upper. They are wider than the true range by at most `relative` times the largest |f'|.");
     module.def("derivative_bounds", &cell_derivative_bounds, py::kw_only(), "alpha"_a, "beta"_a, "weight"_a,
-               "linear"_a, "bias"_a, "lower"_a, "upper"_a, "order"_a,
+               "linear"_a, "bias"_a, "lower"_a, "upper"_a, "order"_a, "harmonics"_a = 0,
                "Returns proved upper bounds (k,) of the absolute derivative of a network of one input,\n"
-               "for orders up to 9, in k intervals of positions from lower (k,) to upper (k,).");
+               "for orders up to 9, in k intervals of positions from lower (k,) to upper (k,). The last\n"
+               "`harmonics` wavelets are harmonics of the period 1.");
     module.attr("most_wavelets") = most_wavelets;
     module.def("fingerprint", &fingerprint, "model"_a,
                "Returns a fingerprint of a model: 16 hexadecimal digits, computed from its units and all "

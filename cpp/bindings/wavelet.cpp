@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <tuple>
@@ -130,13 +131,18 @@ using Columns = py::array_t<double, py::array::f_style>;
 }
 
 /// Returns the array (n, N) of value(hats, i, k) for every wavelet i and every sample, where k is the index of the
-/// sample in its block.
-template <class Value>
-Columns filled(const Frame& frame, Value value) {
+/// sample in its block. The last `harmonics` columns are those of wave(u, i) with the scaled distance u.
+template <class Value, class Wave>
+Columns filled(const Frame& frame, std::size_t harmonics, Value value, Wave wave) {
+    if (harmonics > (frame.dimension == 1 ? frame.wavelets : 0)) {
+        throw std::invalid_argument("harmonics is " + std::to_string(harmonics) +
+                                    ", must be at most the number of wavelets of one input");
+    }
+    const std::size_t hats_end = frame.wavelets - harmonics;
     auto result = columns(frame.samples, frame.wavelets);
     double* out = result.mutable_data();
     const py::gil_scoped_release unlocked;
-    for (std::size_t i = 0; i < frame.wavelets; ++i) {
+    for (std::size_t i = 0; i < hats_end; ++i) {
         frame.radial(i, [&](const Hats& hats) {
             double* column = out + i * frame.samples + hats.first;
             for (std::size_t k = 0; k < hats.size; ++k) {
@@ -144,12 +150,19 @@ Columns filled(const Frame& frame, Value value) {
             }
         });
     }
+    for (std::size_t i = hats_end; i < frame.wavelets; ++i) {
+        for (std::size_t k = 0; k < frame.samples; ++k) {
+            out[i * frame.samples + k] = wave(frame.scaled(i, k, 0), i);
+        }
+    }
     return result;
 }
 
-Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta) {
-    return filled(Frame(x, alpha, beta),
-                  [](const Hats& hats, std::size_t /*i*/, std::size_t k) { return hats.at(k).value; });
+Columns wavelet_columns(const Array& x, const Array& alpha, const Array& beta, std::size_t harmonics) {
+    return filled(
+        Frame(x, alpha, beta), harmonics,
+        [](const Hats& hats, std::size_t /*i*/, std::size_t k) { return hats.at(k).value; },
+        [](double u, std::size_t /*i*/) { return std::cos(u); });
 }
 
 std::tuple<Columns, std::vector<Columns>, std::vector<Columns>> wavelet_jacobian(const Array& x,
@@ -255,24 +268,28 @@ std::vector<Columns> wavelet_curvature_columns(const Array& x, const Array& alph
     return result;
 }
 
-Columns wavelet_slope_columns(const Array& x, const Array& alpha, const Array& beta) {
+Columns wavelet_slope_columns(const Array& x, const Array& alpha, const Array& beta, std::size_t harmonics) {
     const Frame frame(x, alpha, beta);
     if (frame.dimension != 1) {
         throw std::invalid_argument("x has shape " + shape_of(x) + ", must be (n,), one input");
     }
-    return filled(frame, [&](const Hats& hats, std::size_t i, std::size_t k) {
-        return frame.alpha[i] * (hats.at(k).gradient_over_u * frame.clamped(i, hats.first + k, 0));
-    });
+    return filled(
+        frame, harmonics,
+        [&](const Hats& hats, std::size_t i, std::size_t k) {
+            return frame.alpha[i] * (hats.at(k).gradient_over_u * frame.clamped(i, hats.first + k, 0));
+        },
+        [&](double u, std::size_t i) { return -frame.alpha[i] * std::sin(u); });
 }
 
 }  // namespace
 
 void bind_wavelet(py::module_& module) {
     module.def(
-        "wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a,
+        "wavelet_columns", &wavelet_columns, "x"_a, "alpha"_a, "beta"_a, "harmonics"_a = 0,
         "Returns the values psi(alpha_i o (x_k - beta_i)) of N wavelets (radial Mexican hats) at n samples: "
         "(n, N),\ncolumn by column in memory.\n\n"
-        "x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.");
+        "x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1. The last `harmonics` columns are\n"
+        "cos(alpha_i (x_k - beta_i)), for d = 1.");
     module.def(
         "wavelet_jacobian", &wavelet_jacobian, "x"_a, "alpha"_a, "beta"_a,
         "Returns the values of the wavelets (n, N), and their derivatives by the dilations alpha and by the\n"
@@ -286,8 +303,9 @@ void bind_wavelet(py::module_& module) {
         "wavelet_curvature_columns", &wavelet_curvature_columns, "x"_a, "alpha"_a, "beta"_a,
         "Returns the second derivatives of the wavelets' values by each input: a list of d arrays (n, N).");
     module.def(
-        "wavelet_slope_columns", &wavelet_slope_columns, "x"_a, "alpha"_a, "beta"_a,
-        "Returns the derivatives d psi(alpha_i (x_k - beta_i)) / dx of wavelets of one input: (n, N).");
+        "wavelet_slope_columns", &wavelet_slope_columns, "x"_a, "alpha"_a, "beta"_a, "harmonics"_a = 0,
+        "Returns the derivatives d psi(alpha_i (x_k - beta_i)) / dx of wavelets of one input: (n, N). The\n"
+        "last `harmonics` columns are those of cosines.");
 }
 
 }  // namespace palpate::bindings

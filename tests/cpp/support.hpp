@@ -60,6 +60,17 @@ inline NetworkParameters random_network(Random& random, std::size_t size, std::s
     return network;
 }
 
+/// Returns the network with `count` more wavelets that are harmonics of the period 1.
+inline NetworkParameters with_harmonics(Random& random, NetworkParameters network, std::size_t count) {
+    for (std::size_t k = 0; k < count; ++k) {
+        network.alpha.push_back(2.0 * std::numbers::pi * static_cast<double>(1 + random() % 90));
+        network.beta.push_back(uniform(random, -0.1, 1.1));
+        network.weight.push_back(uniform(random, -1.0, 1.0));
+    }
+    network.harmonics += count;
+    return network;
+}
+
 /// Returns a memory of one to four branches over [0, 1]. The ratio may have any sign; in half of the cases it is 1.
 inline MemoryParameters random_memory(Random& random) {
     MemoryParameters memory;

@@ -33,7 +33,7 @@ RESULTS = {
     ],
     "05_viscous_knob": [(r"damping (\S+) N\*m\*s/rad, of", 0.0198, 0.0202)],
     "06_motor_cogging": [
-        (r"(\d+) wavelets in place of", 2, 8),
+        (r"(\d+) harmonics in place of", 2, 2),
         (r"after 100 revolutions (\S+) mN\*m", 0.0, 0.5),
     ],
     "07_several_inputs": [(r"NRMSE (\S+) with the gap", 0.0, 0.025), (r"(\S+) without it", 0.3, 0.6)],

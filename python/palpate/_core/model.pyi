@@ -52,12 +52,13 @@ class ForceModel:
     is f(x, s) = g(x) + s h(x), with the mean force g of press and release, the direction state s
     from -1 to 1, and the hysteresis h, which has separate weights for the same wavelets.
     """
-    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.SupportsFloat | typing.SupportsIndex, weight_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, linear_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, bias_hysteresis: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], below: str = 'linear', above: str = 'linear', period: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, of_velocity: bool = False, memory: Memory | None = None, position_unit: str = '', force_unit: str = '') -> None:
+    def __init__(self, *, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.SupportsFloat | typing.SupportsIndex, weight_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, linear_hysteresis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] | None = None, bias_hysteresis: typing.SupportsFloat | typing.SupportsIndex | None = None, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], below: str = 'linear', above: str = 'linear', period: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex | None = None, of_velocity: bool = False, memory: Memory | None = None, position_unit: str = '', force_unit: str = '', harmonics: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
         Makes the model of N wavelets and d inputs: alpha, beta (N, d); weight (N,); linear, lower,
         upper (d,). of_velocity is true if the second of two inputs is the velocity. With a memory, the
-        network is the force at rest. The units do not change the numbers; empty: not stated. Raises
-        ValueError with the wrong field.
+        network is the force at rest. The units do not change the numbers; empty: not stated. The last
+        `harmonics` wavelets of a periodic force are w cos(alpha (x - beta)). Raises ValueError with the
+        wrong field.
         """
     @typing.overload
     def energy(self, position: float, *, velocity: typing.Any = None, acceleration: typing.Any = None, direction: typing.SupportsFloat | typing.SupportsIndex | None = None, play: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
@@ -151,6 +152,11 @@ class ForceModel:
         Unit of the force, N*m, N or A; empty: not stated.
         """
     @property
+    def harmonics(self) -> int:
+        """
+        Number of last wavelets that are harmonics of the period, w cos(alpha (x - beta)).
+        """
+    @property
     def hysteretic(self) -> bool:
         ...
     @property
@@ -195,10 +201,11 @@ class ForceModel:
     @property
     def weight_hysteresis(self) -> numpy.typing.NDArray[numpy.float64] | None:
         ...
-def derivative_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], order: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+def derivative_bounds(*, alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], weight: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], linear: typing.SupportsFloat | typing.SupportsIndex, bias: typing.SupportsFloat | typing.SupportsIndex, lower: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], upper: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], order: typing.SupportsInt | typing.SupportsIndex, harmonics: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
     """
     Returns proved upper bounds (k,) of the absolute derivative of a network of one input,
-    for orders up to 9, in k intervals of positions from lower (k,) to upper (k,).
+    for orders up to 9, in k intervals of positions from lower (k,) to upper (k,). The last
+    `harmonics` wavelets are harmonics of the period 1.
     """
 def fingerprint(model: ForceModel) -> str:
     """
@@ -221,12 +228,13 @@ def stretches(time: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], coo
     coordinates (n, m) at increasing times (n,), from rest: e <- factor (kept e + share du).
     `factor` (n,) reduces the stretches at each row; by default 1.
     """
-def wavelet_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+def wavelet_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], harmonics: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
     """
     Returns the values psi(alpha_i o (x_k - beta_i)) of N wavelets (radial Mexican hats) at n samples: (n, N),
     column by column in memory.
     
-    x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1.
+    x is (n, d), alpha and beta are (N, d); (n,) and (N,) mean d = 1. The last `harmonics` columns are
+    cos(alpha_i (x_k - beta_i)), for d = 1.
     """
 def wavelet_curvature_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> list[numpy.typing.NDArray[numpy.float64]]:
     """
@@ -237,9 +245,10 @@ def wavelet_jacobian(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     Returns the values of the wavelets (n, N), and their derivatives by the dilations alpha and by the
     translations beta, each as a list of d arrays (n, N): (value, by_alpha, by_beta).
     """
-def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+def wavelet_slope_columns(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], harmonics: typing.SupportsInt | typing.SupportsIndex = 0) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Returns the derivatives d psi(alpha_i (x_k - beta_i)) / dx of wavelets of one input: (n, N).
+    Returns the derivatives d psi(alpha_i (x_k - beta_i)) / dx of wavelets of one input: (n, N). The
+    last `harmonics` columns are those of cosines.
     """
 def wavelet_steps(x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], alpha: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beta: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], used: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> numpy.typing.NDArray[numpy.float64]:
     """

@@ -381,7 +381,7 @@ def identify(
             print_verdict(verdict)
             print_numbers(
                 {
-                    "model": f"{output}: {model.fit.model_class}, {model.n_wavelets} wavelets, "
+                    "model": f"{output}: {model.fit.model_class}, {model.terms}, "
                     f"{model.n_parameters} parameters",
                     "error": f"{rms}NRMSE {number(nrmse)} on {judged}{left_out}",
                     **_left_out_text(model),

@@ -146,7 +146,7 @@ def _about(argument: str) -> str:
 
 def sized(model: Model) -> str:
     """Returns kind and size of a model as text: "hysteresis, 28 wavelets, 116 parameters"."""
-    return f"{model.kind}, {model.n_wavelets} wavelets, {model.n_parameters} parameters"
+    return f"{model.kind}, {model.terms}, {model.n_parameters} parameters"
 
 
 expert_option = partial(click.option, cls=Option, group="Expert")

@@ -26,7 +26,7 @@ from .classes.findings import USABLE_NRMSE, identified, verdict_of
 from .classes.memory import IdentifyRest, better_with_memory
 from .classes.model_selection import select
 from .data.limits import ForceScale
-from .data.period import period_of
+from .data.period import period_of, revolution_of
 from .data.rows import Rows, require_in_range, require_usable, rows_of
 from .data.sections import in_sections
 from .decision import latest
@@ -165,25 +165,29 @@ def _fitted_with_period(
 ) -> tuple[FittedNetwork, IdentifyOptions, Rows]:
     """Returns the identified force law, the options with the period that it has, and its rows.
 
-    If the force repeats over position, a good periodic force law is taken. Otherwise it is compared with one
-    that is not periodic.
+    If the force repeats over position, or the angle closes a revolution, a good periodic force law is taken.
+    Otherwise it is compared with one that is not periodic.
     """
-    found = period_of(recordings) if options.period is None and options.inputs == "auto" else None
+    searched = options.period is None and options.inputs == "auto"
+    found = [period_of(recordings), revolution_of(recordings)] if searched else []
     tried = []
-    for period in [options.period] if found is None else [found, None]:
+    for period in [*(each for each in found if each is not None), options.period]:
         chosen = replace(options, period=period)
         rows = rows_of(recordings, chosen, objects)
         tried.append((fit_rows(rows, chosen), chosen, rows))
-        if found is not None and tried[0][0].nrmse <= USABLE_NRMSE:
+        if period is not None and tried[-1][0].nrmse <= USABLE_NRMSE:
             break
 
+    n = min(min(each.independent_rows, each.residuals) for each, *_ in tried)
+
     def value(network: FittedNetwork) -> float:
-        n = min(network.independent_rows, network.residuals)
         return deviance("bic", max(network.rmse**2, TINY) * n, n, network.n_parameters)
 
-    network, chosen, rows = min(tried, key=lambda each: value(each[0])) if len(tried) > 1 else tried[0]
-    if chosen.period is not None and found is not None:
-        text = recordings[0].file_unit("position").text(found)
+    network, chosen, rows = tried[-1]
+    if chosen.period is None and len(tried) > 1:
+        network, chosen, rows = min(reversed(tried), key=lambda each: value(each[0]))
+    if chosen.period is not None and searched:
+        text = recordings[0].file_unit("position").text(chosen.period)
         note = f"The force repeats every {text}: positions are taken modulo this period (--period)."
         network = replace(network, notes=(note, *network.notes))
     return network, chosen, rows

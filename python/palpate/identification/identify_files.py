@@ -28,7 +28,6 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .._core.model import ForceModel
 from .._typing import Float1D, Float2D
 from ..arguments import path_of
 from ..errors import InputError
@@ -249,7 +248,7 @@ def _error_on_rows(
     position, lower = summary.position, float(network.lower[0])
     if period is not None:
         position = lower + period * modulo((position - lower) / period)
-    model = ForceModel(**network.parameters())
+    model = network.force_model()
     given = {} if side is None or network.weight_hysteresis is None else {"direction": side}
     force, slope = (np.asarray(read(position, **given)) for read in (model.force, model.slope))
     inside = summary.yy - 2.0 * slope * summary.xy + slope**2 * summary.xx

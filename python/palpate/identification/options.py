@@ -123,7 +123,7 @@ class IdentifyOptions:
     the further inputs of the recording. Or names, as a tuple or separated by commas: position, then
     hysteresis, velocity (from time) or columns."""
     max_wavelets: int = 64
-    """Largest number of wavelets [-]."""
+    """Largest number of wavelets [-]. An order of the harmonics of a periodic force counts as one."""
     criterion: str = "bic"
     """Criterion to stop adding wavelets. It also compares models. From the fitted rows: bic, aicc, gcv, fpe
     (Bayesian, corrected Akaike, generalised cross-validation, final prediction error). From the error on
@@ -143,7 +143,7 @@ class IdentifyOptions:
     period: float | None = None
     """Period of a repeating force [m or rad]; searched if not given. It is the change of position after which
     the force repeats, such as one revolution of a knob. The search needs inputs="auto" and two periods in
-    one direction."""
+    one direction, or an angle that closes a revolution."""
     below: str = "auto"
     """Force below the recorded positions: free, linear or auto. free falls to zero, because the tool leaves;
     linear continues straight. auto is free, unless the recording shows that the object pulls the tool."""

@@ -25,7 +25,7 @@ from ..recording.files import require_file
 from ..verdict import Verdict
 from .band import Band
 from .model_display import frame_of, html_of
-from .model_file import Fit, PathStep, describe, memory_record, write_json
+from .model_file import Fit, PathStep, describe, memory_record, terms_of, write_json
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,6 +63,9 @@ class Model(ForceModel):
     bias : float
     weight_hysteresis, linear_hysteresis, bias_hysteresis : optional
         Weights (N,), slopes (d,) and constant of the hysteresis h, which has the wavelets of g; all or none.
+    harmonics : int
+        Number of last wavelets that are harmonics of the period, w cos(alpha (x - beta)) in place of
+        w psi(alpha (x - beta)), with order alpha period / (2 pi), amplitude w and phase alpha beta [rad].
     memory : Memory, optional
         Branches that relax, for a force of position: springs in series with dashpots.
     lower, upper : (d,) array_like
@@ -111,6 +114,7 @@ class Model(ForceModel):
         weight_hysteresis: npt.ArrayLike | None = None,
         linear_hysteresis: npt.ArrayLike | None = None,
         bias_hysteresis: float | None = None,
+        harmonics: int = 0,
         memory: Memory | None = None,
         lower: npt.ArrayLike,
         upper: npt.ArrayLike,
@@ -147,6 +151,9 @@ class Model(ForceModel):
             _require_numbers(name, value)
         for name, word in (("kind", kind), ("below", below), ("above", above)):
             instance_of(name, word, str, "one of the words in the documentation of Model")
+        instance_of("harmonics", harmonics, int, "a whole number")
+        if harmonics < 0:
+            raise InputError(f"harmonics is {harmonics}: must be >= 0")
         instance_of("inputs", inputs, (list, tuple), "the names of the inputs")
         instance_of("units", units, Mapping, "the units of position and force")
         instance_of("fit", fit, Fit, "the result of the identification")
@@ -156,6 +163,7 @@ class Model(ForceModel):
         position_unit, force_unit = (str(units.get(role, "")) for role in ("position", "force"))
         super().__init__(
             **network,
+            harmonics=harmonics,
             below=below,
             above=above,
             of_velocity=of_velocity,
@@ -223,6 +231,17 @@ class Model(ForceModel):
     def n_parameters(self) -> int:
         """Number of fitted real numbers of the model, including dilations and translations."""
         return self.fit.n_parameters
+
+    @property
+    def orders(self) -> Float1D:
+        """Order (H,) of each harmonic, the number of its waves in the period [-]; empty without harmonics."""
+        waves = self.alpha[self.n_wavelets - self.harmonics :, 0]
+        return np.rint(waves * (self.period or 0.0) / (2.0 * np.pi))
+
+    @property
+    def terms(self) -> str:
+        """Numbers of wavelets and harmonics as text: "12 wavelets", "3 wavelets and 34 harmonics"."""
+        return terms_of(self)
 
     @property
     def stop_reason(self) -> str:
@@ -333,6 +352,7 @@ class Model(ForceModel):
                 if hysteresis_weights[1] is None
                 else hysteresis_weights[1].tolist(),
                 "bias_hysteresis": self.bias_hysteresis,
+                **({"harmonics": self.harmonics} if self.harmonics else {}),
             },
             **({} if memory is None else {"memory": memory_record(memory)}),
             "play_radius": self.play_radius,
@@ -408,7 +428,8 @@ class Model(ForceModel):
         """Returns a table of the wavelets, one row each.
 
         The names of the columns end in the unit: dilation alpha_per_m, translation beta_m, weight_N, and with
-        hysteresis weight_hysteresis_N. With several inputs they also contain the name of the input.
+        hysteresis weight_hysteresis_N. With several inputs they also contain the name of the input. With
+        harmonics, the columns order and phase_rad follow; the order of a wavelet is 0.
         """
         return frame_of(self)
 
@@ -451,7 +472,7 @@ class Model(ForceModel):
         return describe(self)
 
     def __repr__(self) -> str:
-        return f"<palpate.Model: {self.kind}, {self.n_wavelets} wavelets, {self.n_parameters} parameters>"
+        return f"<palpate.Model: {self.kind}, {self.terms}, {self.n_parameters} parameters>"
 
 
 def _kind_of(dimension: int, *, hysteretic: bool, memory: bool) -> str:

@@ -11,6 +11,7 @@ import pandas as pd
 from .._typing import Float1D
 from ..html_table import Curve, html_table
 from ..recording.units import COLUMN_SUFFIX, Unit, split_name
+from .model_file import phases_of
 
 if TYPE_CHECKING:
     from .model import Model
@@ -44,6 +45,10 @@ def frame_of(model: Model) -> pd.DataFrame:
     columns[f"weight{ending}"] = model.weight
     if model.weight_hysteresis is not None:
         columns[f"weight_hysteresis{ending}"] = model.weight_hysteresis
+    if model.harmonics:
+        hats = np.zeros(model.n_wavelets - model.harmonics)
+        columns["order"] = np.append(hats, model.orders)
+        columns["phase_rad"] = np.append(hats, phases_of(model))
     return pd.DataFrame(columns)
 
 
@@ -52,7 +57,7 @@ def html_of(model: Model) -> str:
     position_unit, force_unit = (Unit.of_si(model.units[role]) for role in ("position", "force"))
     fit, data = model.fit, model.data
     rows = {
-        "model": f"{model.kind}, {model.n_wavelets} wavelets, {model.n_parameters} parameters",
+        "model": f"{model.kind}, {model.terms}, {model.n_parameters} parameters",
         "error": f"NRMSE {fit.nrmse:.4g} on {data.rows} rows of {', '.join(data.files) or 'arrays'}",
         "model class": f"{fit.model_class}, growth stopped by {fit.stop_reason}",
     }

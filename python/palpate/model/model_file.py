@@ -12,9 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
 
+import numpy as np
+
 from .._core.io import largest_json_bytes
 from .._core.model import Memory
 from .._core.stability import Certificate
+from .._typing import Float1D
 from ..errors import InputError, escaped
 from ..recording.files import replacing
 from ..recording.units import Unit
@@ -128,7 +131,7 @@ def describe(model: Model) -> str:
     lines = [
         f"verdict: {model.verdict.level}",
         *(f"  {reason}" for reason in model.verdict.reasons),
-        f"{model.kind} model: {model.n_wavelets} wavelets, {model.n_parameters} parameters "
+        f"{model.kind} model: {model.terms}, {model.n_parameters} parameters "
         f"(model class {fit.model_class}, stopped by {fit.stop_reason})",
         f"  NRMSE {fit.nrmse:.4g} on {data.rows} rows of {', '.join(map(escaped, data.files)) or 'arrays'}",
     ]
@@ -173,11 +176,29 @@ def _band_lines(band: Band, units: Mapping[str, str]) -> list[str]:
     return lines
 
 
+def terms_of(model: Model) -> str:
+    """Returns the numbers of wavelets and harmonics of a model as text."""
+    counts = {"wavelet": model.n_wavelets - model.harmonics, "harmonic": len(np.unique(model.orders))}
+    shown = [name for name, count in counts.items() if count or (name == "wavelet" and not model.harmonics)]
+    return " and ".join(f"{counts[name]} {name}{'' if counts[name] == 1 else 's'}" for name in shown)
+
+
+def phases_of(model: Model) -> Float1D:
+    """Returns the phase (H,) of each harmonic at position 0, from -pi to pi [rad]."""
+    hats = model.n_wavelets - model.harmonics
+    return np.asarray(np.angle(np.exp(1j * model.alpha[hats:, 0] * model.beta[hats:, 0])))
+
+
 def _terms(model: Model, force: str) -> list[str]:
-    """Returns the model's force as a formula, and the wavelets of its network as a table."""
+    """Returns the model's force as a formula, and the wavelets and harmonics of its network as tables."""
     names = ["x"] if model.dimension == 1 else [f"x{k + 1}" for k in range(model.dimension)]
-    linear = " ".join(f"{c:+.6g} {name}" for c, name in zip(model.linear, names, strict=True))
-    network = "sum_i w_i psi(alpha_i (x - beta_i)) " if model.n_wavelets else ""
+    slopes = zip(model.linear, names, strict=True)
+    linear = "".join(f"{c:+.6g} {name} " for c, name in slopes if c or not model.harmonics)
+    hats = model.n_wavelets - model.harmonics
+    network = "sum_i w_i psi(alpha_i (x - beta_i)) " if hats else ""
+    if model.harmonics:
+        waves = "sum_k w_k cos(n_k 2 pi x / period - phase_k) "
+        network = f"{network}+ {waves}" if hats else waves
     unit = f"  [{force}]"
     hysteretic = model.weight_hysteresis is not None and model.linear_hysteresis is not None
     if model.memory is not None:
@@ -185,36 +206,40 @@ def _terms(model: Model, force: str) -> list[str]:
         pairs = zip(model.memory.stiffness, model.memory.time_constant_s, strict=True)
         formula = [
             f"  f(x, t) = g(x) + p(x) sum_j k_j e_j{unit}, de_j/dt = p(x) dx/dt - e_j / tau_j",
-            f"  g(x) = {network}{linear} {model.bias:+.6g}",
+            f"  g(x) = {network}{linear}{model.bias:+.6g}",
             f"  p(x) = {ratio}{model.memory.linear:+.6g} x {model.memory.bias:+.6g}",
             *(f"  branch {j}: k = {k:.6g}, tau = {tau:.6g} s" for j, (k, tau) in enumerate(pairs)),
         ]
     elif not hysteretic:
-        formula = [f"  f(x) = {network}{linear} {model.bias:+.6g}{unit}"]
+        formula = [f"  f(x) = {network}{linear}{model.bias:+.6g}{unit}"]
     else:
         assert model.linear_hysteresis is not None
         loss = f"{model.linear_hysteresis[0]:+.6g} x {model.bias_hysteresis:+.6g}"
-        network_h = network.replace("w_i", "v_i")
+        network_h = network.replace("w_i", "v_i").replace("w_k", "v_k")
         formula = [
             f"  f(x, s) = g(x) + s h(x){unit}, s = +1 pressing, -1 releasing",
-            f"  g(x) = {network}{linear} {model.bias:+.6g}",
+            f"  g(x) = {network}{linear}{model.bias:+.6g}",
             f"  h(x) = {network_h}{loss}",
         ]
-    if not model.n_wavelets:
-        return formula
-    head = ["i", *(f"{word}{k}" for word in ("alpha", "beta") for k in _numbers(model.dimension)), "w"]
-    table = [head + (["v"] if hysteretic else [])]
-    for i in range(model.n_wavelets):
-        row = [
-            str(i),
-            *(f"{value:.6g}" for value in (*model.alpha[i], *model.beta[i])),
-            f"{model.weight[i]:.6g}",
-        ]
-        if model.weight_hysteresis is not None:
-            row.append(f"{model.weight_hysteresis[i]:.6g}")
-        table.append(row)
-    widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
-    return formula + [
+    end = ["w", *(["v"] if hysteretic else [])]
+    weights = [model.weight, *([] if model.weight_hysteresis is None else [model.weight_hysteresis])]
+    values = np.column_stack([model.alpha, model.beta, *weights])[:hats]
+    shape = [f"{word}{k}" for word in ("alpha", "beta") for k in _numbers(model.dimension)]
+    lines = _table(["i", *shape, *end], [[str(i), *map(_shown, row)] for i, row in enumerate(values)])
+    rows = zip(model.orders, phases_of(model), *(each[hats:] for each in weights), strict=True)
+    harmonics = [[f"{order:.0f}", *map(_shown, row)] for order, *row in rows]
+    return [*formula, *lines, *_table(["n", "phase [rad]", *end], harmonics)]
+
+
+def _shown(value: float) -> str:
+    return f"{value:.6g}"
+
+
+def _table(head: list[str], rows: list[list[str]]) -> list[str]:
+    """Returns the lines of a table with right-aligned columns; no line without rows."""
+    table = [head, *rows] if rows else []
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return [
         "  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in table
     ]
 

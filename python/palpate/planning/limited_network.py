@@ -19,7 +19,7 @@ import scipy
 
 from .._core import stability
 from .._core.device import DeviceProfile
-from .._core.model import ForceModel, wavelet_columns, wavelet_slope_columns
+from .._core.model import ForceModel
 from .._core.rendering import fewest_encoder_steps_in_play
 from .._core.stability import ForceBounds, force_bounds
 from .._typing import Float1D, Float2D
@@ -162,8 +162,8 @@ def _limited_once(
     close = min(
         _SUFFICIENT_ERROR * float(np.ptp(forces)), _SUFFICIENT_SLOPE_ERROR * sigma * min(abs(low), abs(high))
     )
-    before = model.alpha[:, 0], model.beta[:, 0]
-    chosen = _chosen(x, changes, before, (alpha, beta), sigma, close)
+    before = Basis(model.alpha, model.beta, model.harmonics)
+    chosen = _chosen(x, changes, before, Basis(alpha[:, None], beta[:, None]), sigma, close)
     return _fitted(model, x, wanted, alpha[chosen], beta[chosen], _IMPOSED_SHARE * low, _IMPOSED_SHARE * high)
 
 
@@ -244,7 +244,7 @@ def _fitted(
         force_range=float(np.ptp(wanted)) or 1.0,
         resolved_by=1,
     )
-    basis = Basis(model.alpha * travel, (model.beta - lower) / travel).joined(
+    basis = Basis(model.alpha * travel, (model.beta - lower) / travel, model.harmonics).joined(
         Basis(alpha[:, None] * travel, (beta[:, None] - lower) / travel)
     )
     slopes = (low * float(travel[0]), high * float(travel[0]))
@@ -285,8 +285,8 @@ def _candidates(x: Float1D, changed: Float1D, finest: float) -> tuple[Float1D, F
 def _chosen(
     x: Float1D,
     changes: Float2D,
-    before: tuple[Float1D, Float1D],
-    candidates: tuple[Float1D, Float1D],
+    before: Basis,
+    candidates: Basis,
     sigma: float,
     close: float,
 ) -> Sequence[int]:
@@ -304,13 +304,12 @@ def _chosen(
     targets = both(changes.T, rates.T)
     ones, zeros = np.ones_like(x), np.zeros_like(x)
 
-    def wavelets(alpha: Float1D, beta: Float1D) -> Float2D:
-        values = wavelet_columns(x[:, None], alpha[:, None], beta[:, None])
-        return both(values, wavelet_slope_columns(x, alpha[:, None], beta[:, None]))
+    def wavelets(basis: Basis) -> Float2D:
+        return both(basis.columns(x[:, None]), basis.slopes(x))
 
     line = both(np.column_stack([ones, x]), np.column_stack([zeros, ones]))
-    always = np.concatenate([line, wavelets(*before)], axis=1)
-    columns = wavelets(*candidates)
+    always = np.concatenate([line, wavelets(before)], axis=1)
+    columns = wavelets(candidates)
     basis = np.linalg.qr(always)[0]
     residual = targets - basis @ (basis.T @ targets)
     left = columns - basis @ (basis.T @ columns)

@@ -56,6 +56,7 @@ NETWORK = (
     "weight_hysteresis",
     "linear_hysteresis",
     "bias_hysteresis",
+    "harmonics",
 )
 """Arguments of a force model that define its network"""
 
@@ -451,7 +452,8 @@ def with_network(model: ForceModel, **changes: Any) -> ForceModel:
 
 def network_of(model: ForceModel) -> dict[str, Any]:
     """Returns the network of a model as stored in a model file."""
-    return {name: np.asarray(getattr(model, name)).tolist() for name in NETWORK}
+    network = {name: np.asarray(getattr(model, name)).tolist() for name in NETWORK}
+    return network if model.harmonics else {name: network[name] for name in NETWORK if name != "harmonics"}
 
 
 def strokes(model: ForceModel, x: Float1D) -> Float2D:

@@ -25,6 +25,12 @@ from .words import amount, counted, date_text, interval, percent
 WAVELET_POINTS = 61
 """Number of points at which one wavelet is drawn"""
 
+POINTS_PER_WAVE = 8
+"""Number of points at which one wave of the harmonic of the highest order is drawn"""
+
+MOST_ORDERS = 5
+"""Number of harmonics that the text names"""
+
 WAVELET_HALF_WIDTH = 5.0
 """Half the drawn width of a wavelet, in units of 1/alpha; beyond it the wavelet is below 1e-4 of its peak"""
 
@@ -45,7 +51,10 @@ _VERDICT_NOTE = "verdict"
 def wavelets(subject: Subject) -> Section:
     """Curve of the model, and the line and the wavelets whose sum it is."""
     key, title = "wavelets", "Wavelets of the model"
-    explanation = "The curve is the sum of a straight line and these small waves, the wavelets."
+    explanation = (
+        "The curve is the sum of a straight line and these small waves, the wavelets; of a periodic force "
+        "also of harmonics."
+    )
     model = subject.model
     if model.dimension > 1:
         reason = f"the model has the inputs {', '.join(model.inputs)}; wavelets are drawn for one input"
@@ -72,27 +81,49 @@ def wavelets(subject: Subject) -> Section:
     )
     below.level(0.0, "dotted")
     sentences = []
+    if model.harmonics:
+        sentences.append(_largest_orders(model))
     if model.hysteretic:
         sentences.append(
             "Wavelets and line give the mean force of press and release; the hysteresis uses the same "
             "wavelets with other weights."
         )
-    description = (
-        f"Force of the model with its straight line; below, its {counted(model.n_wavelets, 'wavelet')}."
-    )
+    description = f"Force of the model with its straight line; below, its {model.terms}."
     return Section(key, title, explanation, sentences, [Chart(description, above, below)])
 
 
+def _largest_orders(model: Model) -> str:
+    """Returns a sentence on the harmonics with the largest amplitudes."""
+    orders, place = np.unique(model.orders, return_inverse=True)
+    weights = model.weight[model.n_wavelets - model.harmonics :]
+    amplitude = np.sqrt(np.bincount(place, weights**2))
+    largest = np.argsort(-amplitude)[:MOST_ORDERS]
+    unit = model.units["force"]
+    named = ", ".join(f"{orders[k]:.0f} ({amount(float(amplitude[k]), unit)})" for k in largest)
+    return (
+        f"The sum of {counted(len(orders), 'harmonic')} of the period is one curve. The orders with the "
+        f"largest amplitudes are {named}."
+    )
+
+
 def _wavelet_curves(model: Model) -> tuple[list[Float1D], list[Float1D]]:
-    """Returns positions and values of each weighted wavelet within the domain."""
+    """Returns positions and values of each weighted wavelet within the domain, and of the sum of all
+    harmonics."""
     at, parts = [], []
-    for alpha, beta, weight in zip(model.alpha, model.beta, model.weight, strict=True):
+    hats = model.n_wavelets - model.harmonics
+    for alpha, beta, weight in zip(model.alpha[:hats], model.beta[:hats], model.weight[:hats], strict=True):
         reach = WAVELET_HALF_WIDTH / alpha[0]
         low, high = max(model.lower[0], beta[0] - reach), min(model.upper[0], beta[0] + reach)
         if low < high:
             x = np.linspace(low, high, WAVELET_POINTS)
             at.append(x)
             parts.append(weight * wavelet_columns(x[:, None], alpha[None, :], beta[None, :])[:, 0])
+    if model.harmonics:
+        points = POINTS_PER_WAVE * int(model.orders.max()) + 1
+        x = np.linspace(model.lower[0], model.upper[0], max(points, WAVELET_POINTS))
+        waves = wavelet_columns(x[:, None], model.alpha[hats:], model.beta[hats:], model.harmonics)
+        at.append(x)
+        parts.append(waves @ model.weight[hats:])
     return at, parts
 
 
@@ -124,7 +155,7 @@ def selection_path(subject: Subject) -> Section:
         judged = rows & np.isfinite(criterion)
         below.steps(size[judged], criterion[judged], mark, "")
     sentence = (
-        f"The model class is {model.fit.model_class} with {counted(model.n_wavelets, 'wavelet')} and "
+        f"The model class is {model.fit.model_class} with {model.terms} and "
         f"{model.n_parameters} parameters: the last point of its line, after wavelets that were not needed "
         f"were removed. {STOPS.get(model.stop_reason, f'Growth was stopped by {model.stop_reason}')}."
     )
@@ -149,8 +180,7 @@ def provenance(subject: Subject) -> Section:
         *_columns(data.columns),
     ]
     facts["model"] = [
-        f"{model.kind}, model class {model.fit.model_class}, {counted(model.n_wavelets, 'wavelet')}, "
-        f"{model.n_parameters} parameters",
+        f"{model.kind}, model class {model.fit.model_class}, {model.terms}, {model.n_parameters} parameters",
         f"NRMSE {percent(model.fit.nrmse)} on the fitted rows",
         *_domain(model),
     ]

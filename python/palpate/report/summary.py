@@ -95,6 +95,6 @@ def _plan_number(subject: Subject) -> KeyNumber | None:
 def _size(subject: Subject) -> KeyNumber:
     return KeyNumber(
         str(subject.model.n_wavelets),
-        "wavelets",
+        "wavelets and harmonics" if subject.model.harmonics else "wavelets",
         f"Size of the model: {subject.model.n_parameters} fitted numbers describe the force.",
     )

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._core.model import wavelet_jacobian
+from .._core.model import wavelet_columns, wavelet_jacobian, wavelet_slope_columns
 from .._typing import Float1D, Float2D
 from ..errors import InputError
 from ..model import Model
@@ -121,14 +121,19 @@ def _jacobian(model: Model, position: Float1D, direction: Float1D | None) -> Flo
     """Returns the Jacobian (n, p) of the force by the parameters; the columns for the hysteresis are those of
     the mean force times the direction +1 or -1."""
     x = np.ascontiguousarray(position, dtype=np.float64)[:, None]
-    value, (by_alpha,), (by_beta,) = wavelet_jacobian(x, model.alpha, model.beta)
+    hats = model.n_wavelets - model.harmonics
+    _, (by_alpha,), (by_beta,) = wavelet_jacobian(x, model.alpha[:hats], model.beta[:hats])
+    value = wavelet_columns(x, model.alpha, model.beta, model.harmonics)
+    # The order of a harmonic is a whole number and has no error, so that only its amplitude and phase count.
+    by_phase = -wavelet_slope_columns(x[:, 0], model.alpha[hats:], model.beta[hats:], model.harmonics)
     linear = np.concatenate([np.ones_like(x), x - model.lower, value], axis=1)
     weight = np.broadcast_to(model.weight, value.shape)
     if model.weight_hysteresis is not None:
         side = np.asarray(direction, dtype=np.float64)[:, None]
         linear = np.concatenate([linear, side * linear], axis=1)
         weight = weight + side * model.weight_hysteresis
-    return np.concatenate([linear, weight * by_alpha, weight * by_beta], axis=1)
+    shift = np.concatenate([by_beta, by_phase], axis=1)
+    return np.concatenate([linear, weight[:, :hats] * by_alpha, weight * shift], axis=1)
 
 
 def _inverse(gram: Float2D) -> Float2D:

@@ -2,6 +2,7 @@
 // Tests the model-file reader with the valid and invalid files in tests/models.
 #include <fstream>
 #include <iterator>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -10,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/io/parse_model.hpp"
+#include "support.hpp"
 
 namespace palpate {
 namespace {
@@ -139,6 +141,20 @@ TEST(ModelFile, RefusesMoreWaveletsThanATickCanEvaluate) {
                          "ms can evaluate");
         }
     }
+}
+
+TEST(ModelFile, CountsAHarmonicAsTwoWaveletsOfATick) {
+    Json content = with_wavelets("harmonics", 900);
+    for (Json& alpha : content["network"]["alpha"]) {
+        alpha[0] = 40.0 * std::numbers::pi;
+    }
+    content["network"]["harmonics"] = 100;
+    EXPECT_NO_THROW((void)parse_model(content));
+    content["network"]["harmonics"] = 101;
+    EXPECT_EQ(
+        test::refusal([&] { (void)parse_model(content); }),
+        "network.harmonics is 101: must be at most 100, because a harmonic takes as long as two wavelets "
+        "and a tick of 1 ms can evaluate 1000");
 }
 
 TEST(ModelFile, AcceptsManyWaveletsOfAForceThatIsNotRendered) {

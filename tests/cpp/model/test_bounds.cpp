@@ -43,6 +43,9 @@ NetworkParameters difficult_network(Random& random, int kind) {
     if (kind % 3 == 0) {
         cancel(network, random);
     }
+    if (kind % 4 == 1) {
+        network = test::with_harmonics(random, network, 1 + static_cast<std::size_t>(kind % 5));
+    }
     return network;
 }
 

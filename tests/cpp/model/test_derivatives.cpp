@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -38,6 +39,12 @@ long double exact_derivative(const NetworkParameters& network, long double x, st
     long double sum = n == 0 ? c * x + network.bias : n == 1 ? c : 0.0L;
     for (std::size_t i = 0; i < network.weight.size(); ++i) {
         const long double alpha = network.alpha[i];
+        if (i >= network.hats()) {
+            const long double quarters = static_cast<long double>(n) * 0.5L * std::numbers::pi_v<long double>;
+            sum += network.weight[i] * std::pow(alpha, static_cast<long double>(n)) *
+                   std::cos(alpha * (x - network.beta[i]) + quarters);
+            continue;
+        }
         sum += network.weight[i] * std::pow(alpha, static_cast<long double>(n)) *
                hat_derivative(n, alpha * (x - network.beta[i]));
     }
@@ -47,7 +54,9 @@ long double exact_derivative(const NetworkParameters& network, long double x, st
 TEST(Derivatives, AgreeWithHermiteFunctionsWithinTheirRoundingBounds) {
     Random random{51};
     for (int k = 0; k < cases(300); ++k) {
-        const NetworkParameters network = test::random_network(random, static_cast<std::size_t>(k % 40));
+        const NetworkParameters network =
+            test::with_harmonics(random, test::random_network(random, static_cast<std::size_t>(k % 40)),
+                                 static_cast<std::size_t>(k % 3));
         const Derivatives rounding = derivatives_rounding(network, 2.0);
         for (int j = 0; j < 10; ++j) {
             const double x = uniform(random, -2.0, 2.0);

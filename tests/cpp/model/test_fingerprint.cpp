@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstdint>
 #include <cstdio>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <string>
@@ -171,6 +172,15 @@ TEST(Fingerprint, DistinguishesAPeriodicForce) {
     const std::string once = fingerprint(ForceModel{constant, domain});
     domain.period = 1.0;
     EXPECT_NE(fingerprint(ForceModel{constant, domain}), once);
+}
+
+TEST(Fingerprint, DistinguishesAHarmonicFromAWavelet) {
+    NetworkParameters network{1, {2.0 * std::numbers::pi}, {0.1}, {0.5}, {0.0}, 0.5};
+    Domain domain = test::unit_domain();
+    domain.period = 1.0;
+    const std::string wavelet = fingerprint(ForceModel{network, domain});
+    network.harmonics = 1;
+    EXPECT_NE(fingerprint(ForceModel{network, domain}), wavelet);
 }
 
 TEST(Fingerprint, DistinguishesVelocityFromASecondPosition) {

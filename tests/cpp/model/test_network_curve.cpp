@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -36,7 +37,15 @@ TEST(NetworkCurve, AntiderivativesAreIntegralsOverAnyNumberOfPeriods) {
             if (periodic) {
                 domain.period = 0.8 - 0.1;
             }
-            const NetworkCurve curve{smooth_network(random, 4), domain};
+            NetworkParameters network = smooth_network(random, 4);
+            if (periodic && k % 2 == 0) {  // two harmonics of the period 0.7
+                network.alpha.insert(network.alpha.end(),
+                                     {2.0 * std::numbers::pi / 0.7, 6.0 * std::numbers::pi / 0.7});
+                network.beta.insert(network.beta.end(), {0.3, 0.5});
+                network.weight.insert(network.weight.end(), {0.5, -0.2});
+                network.harmonics = 2;
+            }
+            const NetworkCurve curve{network, domain};
             constexpr int steps = 400;  // in one period
             const double h = 0.7 / steps;
             for (const int side : {-1, 1}) {
@@ -151,7 +160,11 @@ TEST(NetworkCurve, BatchesReplaceEveryPositionOutsideTheDomain) {
         if (periodic) {
             domain.period = 1.0;
         }
-        const NetworkCurve curve{test::random_network(random, 3), domain};
+        NetworkParameters network = test::random_network(random, 3);
+        if (periodic) {
+            network = test::with_harmonics(random, network, 2);
+        }
+        const NetworkCurve curve{network, domain};
         for (const double place : {-2.5, 1.25, -0.0001, 0.5, 1e10}) {
             const std::array<double, 1> x{place};
             std::array<double, 1> result{};

@@ -3,6 +3,8 @@
 #include "special_values.hpp"
 
 #include <limits>
+#include <numbers>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -95,6 +97,28 @@ TEST(Parameters, PeriodIsTheLengthOfTheDomainOfOneInput) {
     EXPECT_EQ(with_period(2.0 + 2.1e-9), refused);
     EXPECT_EQ(with_period(2.0 - 2.1e-9), refused);
     EXPECT_EQ(with_period(nan), "period is nan, must equal upper - lower, 2.000000");
+}
+
+TEST(Parameters, HarmonicsAreWholeMultiplesOfThePeriod) {
+    const auto with = [](double alpha, std::size_t harmonics, std::optional<double> period) {
+        return test::refusal([&] {
+            validate(NetworkParameters{1, {5.0, alpha}, {0.1, 0.2}, {1.0, 2.0}, {0.0}, 0.0, harmonics},
+                     Domain{{1.0}, {3.0}, {}, {}, period});
+        });
+    };
+    EXPECT_EQ(with(7.0 * std::numbers::pi, 1, 2.0), "");
+    EXPECT_EQ(with(7.0 * std::numbers::pi * (1.0 + 5e-10), 1, 2.0), "");
+    const std::string refused =
+        ": must be a whole multiple of 2 pi / period, because it belongs to a harmonic";
+    EXPECT_EQ(with(7.0 * std::numbers::pi * (1.0 + 2e-9), 1, 2.0), "alpha[1] is 21.991149" + refused);
+    EXPECT_EQ(with(1e-12, 1, 2.0), "alpha[1] is 0.000000" + refused);
+    EXPECT_EQ(with(7.0 * std::numbers::pi, 2, 2.0), "alpha[0] is 5.000000" + refused);
+    EXPECT_EQ(with(7.0 * std::numbers::pi, 3, 2.0),
+              "harmonics is 3, must be at most the number of wavelets, 2");
+    EXPECT_EQ(with(7.0 * std::numbers::pi, 1, std::nullopt),
+              "harmonics is 1, must be 0 in a network without period");
+    EXPECT_EQ(refusal([](auto& n, auto&) { n.harmonics = 1; }),
+              "harmonics is 1, must be 0 in a network without period");
 }
 
 TEST(Parameters, OneInputIsRequiredWithAMessage) {

@@ -33,6 +33,9 @@ Scheme direct(int predict = 0) {
 ForceModel random_periodic_model(Random& random) {
     NetworkParameters network = test::random_network(random, 1 + random() % 6);
     network.linear = {0.0};
+    if (random() % 2 == 0) {
+        network = test::with_harmonics(random, network, 1 + random() % 9);
+    }
     Domain domain = test::unit_domain();
     domain.period = 1.0;
     return {network, domain};

@@ -47,6 +47,12 @@ KINDS: dict[str, dict[str, Any]] = {
         "model": {"period": 0.5, "linear": [0.0]},
         "scheme": {"structure": "massless", "coupling_stiffness": 600.0, "coupling_damping": 0.2},
     },
+    "harmonics": {
+        "model": {
+            "period": 0.5, "linear": [0.0], "harmonics": 3,
+            "alpha": [[30.0], [50.0], *[[4.0 * np.pi * order] for order in (1, 4, 13)]],
+        }
+    },
     "memory": {"model": {"memory": MEMORY}},
     "free_memory": {"model": {"memory": MEMORY, "below": "free"}},
 }  # fmt: skip

@@ -237,6 +237,71 @@ def test_the_file_has_a_line_for_each_field(tmp_path: Path) -> None:
     assert len(text.splitlines()) < 50
 
 
+def with_harmonics(**change: Any) -> Model:
+    """Returns a model of one wavelet and two harmonics of the period 0.6 m, of the orders 2 and 9."""
+    wave = 2.0 * np.pi / 0.6
+    given = {
+        "alpha": [[40.0], [2.0 * wave], [9.0 * wave]],
+        "beta": [[0.3], [0.1], [-0.02]],
+        "linear": [0.0],
+        "period": 0.6,
+        "harmonics": 2,
+    }
+    return Model(**content(wavelets=3, **given | change))
+
+
+def test_harmonics_follow_their_formula_in_every_period() -> None:
+    model = with_harmonics()
+    x = np.linspace(-1.9, 2.5, 401)
+    at = np.mod(x, 0.6)
+    u, waves = 40.0 * (at - 0.3), [model.alpha[k] * (x - model.beta[k]) for k in (1, 2)]
+    force = model.bias + model.weight[0] * (u * u - 1.0) * np.exp(-0.5 * u * u)
+    slope = 40.0 * model.weight[0] * (3.0 - u * u) * u * np.exp(-0.5 * u * u)
+    for k, wave in enumerate(waves, start=1):
+        force = force + model.weight[k] * np.cos(wave)
+        slope = slope - model.weight[k] * model.alpha[k] * np.sin(wave)
+    np.testing.assert_allclose(model.force(x), force, atol=1e-12)
+    np.testing.assert_allclose(model.slope(x), slope, atol=1e-10)
+    assert model.slope_bounds[0] <= slope.min()
+    assert model.slope_bounds[1] >= slope.max()
+    assert model.slope_bounds[1] < 1.03 * np.abs(slope).max()
+    integral = model.energy(0.6 * np.arange(1, 4)) - model.energy(0.0)
+    np.testing.assert_allclose(integral, model.bias * 0.6 * np.arange(1, 4), rtol=1e-9)
+
+
+def test_harmonics_are_saved_shown_and_listed(tmp_path: Path) -> None:
+    model = with_harmonics()
+    again = load_model(model.save(tmp_path / "motor.json"))
+    assert again == model
+    assert _core.model.fingerprint(again) == _core.model.fingerprint(model)
+    assert pickle.loads(pickle.dumps(model)) == model
+    assert model.orders.tolist() == [2.0, 9.0]
+    assert model.terms == "1 wavelet and 2 harmonics"
+    phases = [float(np.angle(np.exp(1j * model.alpha[k, 0] * model.beta[k, 0]))) for k in (1, 2)]
+    frame = model.to_frame()
+    assert frame["order"].tolist() == [0.0, 2.0, 9.0]
+    assert frame["phase_rad"].tolist() == pytest.approx([0.0, *phases])
+    text = str(model)
+    assert "1 wavelet and 2 harmonics" in text
+    assert "sum_i w_i psi(alpha_i (x - beta_i)) + sum_k w_k cos(n_k 2 pi x / period - phase_k)" in text
+    assert f"9  {phases[1]:>11.6g}  {model.weight[2]:.6g}" in text
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"period": None}, "harmonics is 2, must be 0 in a network without period"),
+        ({"harmonics": 4}, "harmonics is 4, must be at most the number of wavelets, 3"),
+        ({"harmonics": 3}, "alpha[0] is 40.000000: must be a whole multiple of 2 pi / period"),
+        ({"harmonics": -1}, "harmonics is -1: must be >= 0"),
+        ({"harmonics": 1.5}, "harmonics is 1.5; it must be a int: a whole number"),
+    ],
+)
+def test_wrong_harmonics_are_refused(change: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(sentence)):
+        with_harmonics(**change)
+
+
 def test_the_text_of_a_model_names_terms_domain_and_error() -> None:
     text = str(Model(**content(hysteresis=True, play_radius=1e-4, wavelets=2)))
     assert "hysteresis model: 2 wavelets, 8 parameters (model class network, stopped by bic)" in text

@@ -61,6 +61,27 @@ def test_the_plan_balances_the_limited_force() -> None:
     assert given_in_a_turn(chosen.rendered, BENCH_KNOB.force_limit) < 1e-6
 
 
+def test_the_slopes_of_harmonics_are_limited_and_the_plan_keeps_them() -> None:
+    waves = [[2.0 * np.pi * order / 0.5] for order in (1, 5, 12)]
+    model = model_by_hand(
+        alpha=waves,
+        beta=[[0.0], [0.03], [0.2]],
+        weight=[0.5, 0.2, 0.1],
+        linear=[0.0],
+        period=0.5,
+        harmonics=3,
+    )
+    whole = force_bounds(model, math.inf).slope_max
+    limited = limit_slopes(model, -0.6 * whole, 0.6 * whole)
+    assert limited is not None
+    assert limited.harmonics == 3
+    assert force_bounds(limited, math.inf).slope_max <= 0.6 * whole
+    chosen = plan(model, BENCH_KNOB)
+    assert chosen.certificate is not None
+    assert chosen.certificate.certified
+    assert Model.from_dict(chosen.model.to_dict()).planned.harmonics == 3
+
+
 def bump(alpha: float, weight: float) -> Model:
     return model_by_hand(alpha=[[alpha]], weight=[weight])
 

@@ -49,6 +49,22 @@ def test_errors_agree_with_their_standard_errors() -> None:
         assert np.mean(np.abs(found) < 2.0) > 0.9
 
 
+def test_amplitudes_and_phases_of_harmonics_have_errors() -> None:
+    def motor(x: np.ndarray) -> np.ndarray:
+        return np.cos(3.0 * x) + 0.4 * np.sin(11.0 * x + 1.0)
+
+    ratios = []
+    for seed in range(10):
+        x = 2.0 * np.pi * np.arange(300) / 300
+        noise = np.random.default_rng(seed).normal(0.0, 0.05, len(x))
+        recording = Recording.from_arrays(x, motor(x) + noise)
+        model = palpate.identify(recording, period=2.0 * np.pi, max_wavelets=2)
+        assert model.orders.tolist() == [3.0, 11.0]
+        at = 6.0 * GRID
+        ratios.append((model.force(at) - motor(at)) / uncertainty(model, recording).force(at))
+    assert 0.7 < np.sqrt(np.mean(np.square(ratios))) < 1.3
+
+
 def test_noise_is_estimated_and_four_times_the_rows_halve_the_error() -> None:
     few, many = noisy(1, 1000), noisy(1, 4000)
     errors = []

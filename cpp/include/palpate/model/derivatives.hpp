@@ -22,7 +22,7 @@ using Derivatives = std::array<double, 5>;
 [[nodiscard]] inline Derivatives derivatives(const NetworkParameters& network, double x) noexcept {
     const double c = network.linear[0];
     Derivatives sum{c * x + network.bias, c, 0.0, 0.0, 0.0};
-    for (std::size_t i = 0; i < network.weight.size(); ++i) {
+    for (std::size_t i = 0; i < network.hats(); ++i) {
         const double alpha = network.alpha[i];
         const double u = std::clamp(alpha * (x - network.beta[i]), -wavelet_reach, wavelet_reach);
         const double square = u * u;
@@ -32,6 +32,17 @@ using Derivatives = std::array<double, 5>;
         sum[2] += (factor *= alpha) * ((square - 6.0) * square + 3.0);
         sum[3] += (factor *= alpha) * ((10.0 - square) * square - 15.0) * u;
         sum[4] += factor * alpha * (((square - 15.0) * square + 45.0) * square - 15.0);
+    }
+    for (std::size_t i = network.hats(); i < network.weight.size(); ++i) {
+        const double alpha = network.alpha[i];
+        const double u = alpha * (x - network.beta[i]);
+        double cosine = network.weight[i] * std::cos(u);
+        double sine = network.weight[i] * std::sin(u);
+        sum[0] += cosine;
+        sum[1] -= (sine *= alpha);
+        sum[2] -= (cosine *= alpha * alpha);
+        sum[3] += (sine *= alpha * alpha);
+        sum[4] += cosine * alpha * alpha;
     }
     return sum;
 }
@@ -76,9 +87,14 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
     const double terms = 0.5 * static_cast<double>(network.weight.size() + 4);
     Derivatives sum{(terms + 2.0) * (std::abs(network.bias) + c * reach), (terms + 2.0) * c, 0.0, 0.0, 0.0};
     for (std::size_t i = 0; i < network.weight.size(); ++i) {
+        const bool hat = i < network.hats();
+        // The argument u of a cosine has an error of 1.5 epsilon |u|, its powers of alpha and the cosine itself of a
+        // few epsilon
+        const double wave = 2.0 * network.alpha[i] * (reach + std::abs(network.beta[i])) + 8.0;
         double factor = std::abs(network.weight[i]);
         for (std::size_t n = 0; n < sum.size(); ++n) {
-            sum[n] += factor * (detail::hat_rounding[n] + terms * detail::hat_suprema[n]);
+            sum[n] +=
+                factor * (hat ? detail::hat_rounding[n] + terms * detail::hat_suprema[n] : wave + terms);
             factor *= network.alpha[i];
         }
     }
@@ -96,8 +112,8 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
 }
 
 /// Returns proved upper bounds of the absolute value of a network f and of its first nine derivatives over [from, to].
-/// Each bound is the sum of the largest contributions of all wavelets at their distance from [from, to]. The bounds can
-/// be much wider than those of `value_bounds` and `slope_bounds`, but need no search.
+/// Each bound is the sum of the largest contributions of all wavelets at their distance from [from, to]; a harmonic
+/// contributes |w| alpha^n everywhere. The bounds can be much wider than those of `value_bounds` and `slope_bounds`, but need no search.
 [[nodiscard]] inline DerivativeBounds derivative_bounds(const NetworkParameters& network, double from,
                                                         double to) noexcept {
     const double c = std::abs(network.linear[0]);
@@ -109,7 +125,9 @@ inline constexpr Derivatives hat_rounding{14.47, 40.6, 129.3, 452.5, 1714.2};
         const double decay = std::exp(-0.25 * std::min(distance * distance, 2800.0));
         double factor = std::abs(network.weight[i]);
         for (std::size_t n = 0; n <= highest_derivative; ++n) {
-            bounds[n] += factor * std::min(detail::hat_suprema[n], detail::hat_tails[n] * decay);
+            bounds[n] += i < network.hats()
+                             ? factor * std::min(detail::hat_suprema[n], detail::hat_tails[n] * decay)
+                             : factor;
             factor *= alpha;
         }
     }

@@ -65,6 +65,9 @@ class NumberHash {
     hash.add(network.weight);
     hash.add(network.linear);
     hash.add(network.bias);
+    if (network.harmonics > 0) {
+        hash.add(static_cast<std::uint64_t>(network.harmonics));
+    }
     if (const HysteresisNetwork* pair = model.hysteresis()) {
         const NetworkParameters& hysteresis = pair->hysteresis_force().parameters();
         hash.add(hysteresis.weight);

@@ -81,12 +81,13 @@ inline constexpr std::array<double, 12> exponential{
 }  // namespace detail
 
 /// The sum of the wavelets of a network of one input, w_i psi(alpha_i (x - beta_i)), with its derivative and
-/// antiderivatives. Computes one vectorised exponential for each wavelet, with the widest registers of the processor.
-/// Any position x is allowed: a distant wavelet adds less than rounding, and NaN gives NaN.
+/// antiderivatives. Computes one vectorised exponential for each wavelet, with the widest registers of the processor,
+/// and one sine and cosine for each harmonic. Any position x is allowed: a distant wavelet adds less than rounding, and
+/// NaN gives NaN.
 class HatSum {
   public:
     explicit HatSum(const NetworkParameters& network, const detail::HatKernel& kernel = detail::hat_kernel())
-        : kernel_{kernel}, count_{network.weight.size()}, size_{(count_ + 7) / 8 * 8} {
+        : kernel_{kernel}, count_{network.hats()}, size_{(count_ + 7) / 8 * 8} {
         columns_.assign(6 * size_, 0.0);
         std::fill_n(columns_.begin(), size_, 1.0);
         for (std::size_t i = 0; i < count_; ++i) {
@@ -98,18 +99,44 @@ class HatSum {
                 columns_[j * size_ + i] = values[j];
             }
         }
+        for (std::size_t i = count_; i < network.weight.size(); ++i) {
+            harmonics_.push_back({network.alpha[i], network.beta[i], network.weight[i]});
+        }
     }
 
     /// Adds value, derivative and antiderivatives of the sum of all wavelets at position x to `sum`.
-    void add(double x, Curve& sum) const noexcept { kernel_.at(columns(), x, sum); }
+    void add(double x, Curve& sum) const noexcept {
+        kernel_.at(columns(), x, sum);
+        for (const Harmonic& each : harmonics_) {
+            const double u = each.alpha * (x - each.beta);
+            const double cosine = each.weight * std::cos(u);
+            const double sine = each.weight * std::sin(u);
+            sum.value += cosine;
+            sum.slope -= each.alpha * sine;
+            sum.integral += sine / each.alpha;
+            sum.double_integral -= cosine / each.alpha / each.alpha;
+        }
+    }
 
     /// Adds the wavelets' value, derivative or antiderivative at every position in `x` to the element of `sum` with the
     /// same index. Both spans have the same size.
     void add(HatQuantity quantity, std::span<const double> x, std::span<double> sum) const noexcept {
         kernel_.batch[static_cast<std::size_t>(quantity)](columns(), x.data(), x.size(), sum.data());
+        for (const Harmonic& each : harmonics_) {
+            for (std::size_t k = 0; k < x.size(); ++k) {
+                const double u = each.alpha * (x[k] - each.beta);
+                sum[k] += each.weight * (quantity == HatQuantity::Force   ? std::cos(u)
+                                         : quantity == HatQuantity::Slope ? -each.alpha * std::sin(u)
+                                                                          : std::sin(u) / each.alpha);
+            }
+        }
     }
 
   private:
+    struct Harmonic {
+        double alpha, beta, weight;
+    };
+
     [[nodiscard]] detail::HatColumns columns() const noexcept {
         const double* first = columns_.data();
         return {count_,
@@ -126,6 +153,7 @@ class HatSum {
     std::size_t count_;
     std::size_t size_;
     std::vector<double> columns_;
+    std::vector<Harmonic> harmonics_;
 };
 
 }  // namespace palpate

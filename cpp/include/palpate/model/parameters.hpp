@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -13,6 +14,9 @@
 namespace palpate {
 
 /// Parameters of a network of N wavelets with d inputs. Matrices are stored row by row, one row for each wavelet.
+///
+/// The last `harmonics` of the N wavelets are w cos(alpha (x - beta)) in place of w psi(alpha (x - beta)). Such a
+/// harmonic has the order alpha period / (2 pi), a whole number, the amplitude w and the phase alpha beta [rad].
 struct NetworkParameters {
     std::size_t dimension = 1;      ///< number of inputs d
     std::vector<double> alpha{};    ///< N x d dilations, > 0 [1/m]
@@ -20,6 +24,10 @@ struct NetworkParameters {
     std::vector<double> weight{};   ///< N weights [N]
     std::vector<double> linear{0};  ///< d slopes of the straight line [N/m]
     double bias = 0.0;              ///< constant b of the network [N]
+    std::size_t harmonics = 0;  ///< number of harmonics among the N wavelets; 0 unless the force is periodic
+
+    /// Returns the number of wavelets that are Mexican hats; the harmonics follow them.
+    [[nodiscard]] std::size_t hats() const noexcept { return weight.size() - harmonics; }
 };
 
 /// Smallest and largest value of each input in the recording from which a network was identified, and the kind of force
@@ -68,6 +76,12 @@ inline void require_size(const std::vector<double>& values, std::size_t size, co
     return finest;
 }
 
+/// Returns true if cos(alpha x) is a harmonic of the period: a whole number of its waves fits into it.
+[[nodiscard]] inline bool is_harmonic(double alpha, double period) noexcept {
+    const double order = alpha * period / (2.0 * std::numbers::pi);
+    return order > 0.5 && std::abs(order - std::round(order)) <= 1e-9 * order;
+}
+
 /// Throws std::invalid_argument if a parameter of the network or its domain is invalid. The message states the name of
 /// the parameter and the rule.
 inline void validate(const NetworkParameters& network, const Domain& domain) {
@@ -102,6 +116,15 @@ inline void validate(const NetworkParameters& network, const Domain& domain) {
         require(std::abs(*domain.period - travel) <= 1e-9 * travel,
                 "period is " + std::to_string(*domain.period) + ", must equal upper - lower, " +
                     std::to_string(travel));
+    }
+    require(network.harmonics <= n, "harmonics is " + std::to_string(network.harmonics) +
+                                        ", must be at most the number of wavelets, " + std::to_string(n));
+    require(network.harmonics == 0 || domain.period,
+            "harmonics is " + std::to_string(network.harmonics) + ", must be 0 in a network without period");
+    for (std::size_t i = network.hats(); i < n; ++i) {
+        require(is_harmonic(network.alpha[i], *domain.period),
+                "alpha[" + std::to_string(i) + "] is " + std::to_string(network.alpha[i]) +
+                    ": must be a whole multiple of 2 pi / period, because it belongs to a harmonic");
     }
 }
 

@@ -14,7 +14,6 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...recording.motion import FORCE_RESOLUTION, LowPass, Piece, at_rows, long_enough, quiet_low_pass
 from ..data.rows import Rows, modulo
@@ -242,7 +241,7 @@ class Dynamics:
         v, r, x = velocity[rows, None], residual[rows], self._data.box[rows]
         if len(rows) == 0 or not (np.ptp(v) and np.ptp(x)):
             return 0.0
-        over_x = np.concatenate([np.ones_like(x), x, wavelet_columns(x, basis.alpha, basis.beta)], 1)
+        over_x = np.concatenate([np.ones_like(x), x, basis.columns(x)], 1)
         columns = [v * np.abs(v), v * over_x]
         if friction:
             slow = SMOOTHING_SPEED_SHARE * float(np.sqrt(np.mean(v * v)))
@@ -269,11 +268,7 @@ class Dynamics:
             box = (part.position - self._data.lower[0]) / self._data.reach[0]
             box = box if self._data.period is None else modulo(box)
             plain = np.concatenate(
-                [
-                    np.ones((len(box), 1)),
-                    box[:, None],
-                    wavelet_columns(box, basis.alpha, basis.beta),
-                ],
+                [np.ones((len(box), 1)), box[:, None], basis.columns(box[:, None])],
                 axis=1,
             )
             if side is not None:

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._core.model import wavelet_columns
 from ..._typing import Float1D, Float2D
 from ...verdict import FORCE_FLOOR, FORCE_JND
 from .limits import NO_LIMITS, RowLimits, distinct_rows
@@ -273,17 +272,10 @@ class HeldOutRows:
             np.ascontiguousarray(positions[index]), force[index], None if side is None else side[index]
         )
 
-    def errors(self, readings: Float2D, alpha: Float2D, beta: Float2D) -> Float1D:
+    def errors(self, readings: Float2D, wavelets: Float2D) -> Float1D:
         """Returns the recorded force minus the force of a network (k,); `readings` (1 or 2, 1 + d + N) are
-        its coefficients of mean force and hysteresis."""
-        columns = np.concatenate(
-            [
-                np.ones((len(self.force), 1)),
-                self.positions,
-                wavelet_columns(self.positions, alpha, beta),
-            ],
-            axis=1,
-        )
+        its coefficients of mean force and hysteresis, `wavelets` (k, N) its wavelets at the positions."""
+        columns = np.concatenate([np.ones((len(self.force), 1)), self.positions, wavelets], axis=1)
         channels = columns @ readings.T
         modelled = channels[:, 0] if self.side is None else channels[:, 0] + self.side * channels[:, -1]
         return np.asarray(self.force - modelled)

@@ -59,6 +59,9 @@ class RowLimits:
     force_error: float = 0.0
     """RMS error that the force step or the differences between repeats hide [force]; a criterion does not
     count smaller errors"""
+    position_gap: float = 0.0
+    """Gap between neighbouring positions that bounds the harmonics of a periodic force [share of the
+    period]"""
 
 
 NO_LIMITS = RowLimits()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Period of a force that repeats over position, as of a knob with detents, from its autocorrelation."""
+"""Period of a force that repeats over position, as of a knob with detents, from its autocorrelation; or one
+revolution."""
 
 from __future__ import annotations
 
@@ -14,6 +15,12 @@ from ...recording.motion import ordered_strokes
 LEAST_CORRELATION = 0.5
 """Correlation of the force with itself, one period apart, from which a periodic model is tried [-]."""
 
+REVOLUTION = 2.0 * np.pi
+"""Period of every force over the angle of a shaft that turns without end [rad]."""
+
+SAME_STEP = 1e-3
+"""Share of a step by which rounding in a file may change it [-]."""
+
 SAME_PEAK = 0.95
 """Share of the largest correlation from which the correlation at a shorter distance is that of the period
 [-]: the force repeats after two periods as well."""
@@ -24,19 +31,46 @@ def period_of(recordings: Sequence[Recording]) -> float | None:
 
     The strokes of one direction are compared, because hysteresis has the same sign in them.
     """
-    ways = [each.direction if each.direction is not None else ordered_strokes(each) for each in recordings]
-    if any(way is None or len(each.input_names) for way, each in zip(ways, recordings, strict=True)):
+    position, force = _press(recordings)
+    if not len(position):
         return None
-    press = np.concatenate([way > 0 for way in ways if way is not None])
-    if not press.any():
-        return None
-    position = np.concatenate([each.position for each in recordings])[press]
-    force = np.concatenate([each.force for each in recordings])[press]
     travel, cells = float(np.ptp(position)), len(force) // 2
     if not travel > 0.0:
         return None
     peak = _first_peak(_autocorrelation(_curve((position - position.min()) / travel, force, cells)))
     return None if peak is None else peak * travel / cells
+
+
+def revolution_of(recordings: Sequence[Recording]) -> float | None:
+    """Returns 2 pi if the angle of the press strokes closes a revolution, else None.
+
+    Then neither the gap between two angles nor the step of the force is larger where the revolution closes
+    than somewhere along the strokes. The force of a torsion spring jumps there.
+    """
+    position, force = _press(recordings)
+    if not len(position) or any(each.units["position"] != "rad" for each in recordings):
+        return None
+
+    def largest_steps(angle: Float1D, *end: float) -> tuple[float, float]:
+        order = np.argsort(angle, kind="stable")
+        gap = np.diff(angle[order], append=[angle[order[0]] + each for each in end])
+        step = np.diff(force[order], append=[force[order[0]] for _ in end])
+        return float(gap.max(initial=0.0)), float(np.abs(step).max(initial=0.0))
+
+    along, around = largest_steps(position), largest_steps(np.mod(position, REVOLUTION), REVOLUTION)
+    closed = around[0] <= (1.0 + SAME_STEP) * along[0] and around[1] <= (1.0 + SAME_STEP) * along[1]
+    return REVOLUTION if closed else None
+
+
+def _press(recordings: Sequence[Recording]) -> tuple[Float1D, Float1D]:
+    """Returns positions and forces of the press strokes of recordings; empty if the direction is not known or
+    the force has further inputs."""
+    ways = [each.direction if each.direction is not None else ordered_strokes(each) for each in recordings]
+    if any(way is None or len(each.input_names) for way, each in zip(ways, recordings, strict=True)):
+        return np.zeros(0), np.zeros(0)
+    press = np.concatenate([way > 0 for way in ways if way is not None])
+    position = np.concatenate([each.position for each in recordings])[press]
+    return position, np.concatenate([each.force for each in recordings])[press]
 
 
 def _curve(box: Float1D, force: Float1D, cells: int) -> Float1D:

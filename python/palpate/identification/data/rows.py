@@ -188,14 +188,26 @@ class Rows:
 
         Rows with a given weight use it in the fit and in the error, and get no such limits.
         """
+        gap = 0.0 if self.period is None else self._usual_gap()
         if self.weight is not None:
-            return replace(self, counted=self.weight)
-        limits = RowLimits(force_error=STEP_ERROR * force_step(self.force))
+            return replace(self, counted=self.weight, limits=RowLimits(position_gap=gap))
+        limits = RowLimits(force_error=STEP_ERROR * force_step(self.force), position_gap=gap)
         again, repeats = repeated(self.positions, self.force, self.side)
         notes = (*self.notes, repeats) if repeats else self.notes
         unused = again | ~self.fitted
         weight = np.where(unused, 0.0, 1.0) if unused.any() else None
         return replace(self, limits=limits, weight=weight, notes=notes)
+
+    def _usual_gap(self) -> float:
+        """Returns the gap [box] that is not exceeded between neighbouring positions on `COVERED_SHARE` of the
+        travel.
+
+        Positions in different periods do not show a finer force: it would fit the differences between the
+        periods.
+        """
+        gaps = np.sort(np.diff(np.unique(self.path[self.fitted, 0])))
+        covered = np.cumsum(gaps) >= COVERED_SHARE * gaps.sum()
+        return float(gaps[np.argmax(covered)])
 
 
 def require_usable(rows: Rows, options: IdentifyOptions) -> None:
@@ -432,6 +444,9 @@ def paper_target(recording: Recording, options: IdentifyOptions) -> Float1D:
         target = target - options.search.assumed_damping * velocity
     return np.asarray(target)
 
+
+COVERED_SHARE = 0.95
+"""Share of the travel on which positions must be near each other: a few gaps do not change the resolution."""
 
 USABLE_GAP = 0.05
 """Width of a gap in the recorded positions above which a periodic model is usable with a reservation [share

@@ -6,13 +6,14 @@ with V voices psi_v(x) = 2^(-v/V) psi(2^(-v/V) x), v = 0 .. V - 1, all on the sa
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..._core.model import wavelet_columns, wavelet_slope_columns
 from ..._typing import Float1D, Float2D
 from ...arguments import number_of
 from ...errors import InputError
@@ -30,11 +31,14 @@ UNUSED_TRANSLATION = 0.5
 class Basis:
     """Wavelets without their weights: dilations alpha (N, d) > 0 and translations beta (N, d).
 
-    A wavelet may use only some of several inputs. Along the others its dilation is `UNUSED_DILATION`.
+    A wavelet may use only some of several inputs. Along the others its dilation is `UNUSED_DILATION`. The
+    last `harmonics` of the N columns are cos(alpha (x - beta)), for a periodic force: a cosine and a sine for
+    each order.
     """
 
     alpha: Float2D
     beta: Float2D
+    harmonics: int = 0
 
     @staticmethod
     def empty(dimension: int) -> "Basis":
@@ -46,13 +50,41 @@ class Basis:
         shape = (count, dimension)
         return Basis(np.full(shape, UNUSED_DILATION), np.full(shape, UNUSED_TRANSLATION))
 
+    @staticmethod
+    def of_orders(orders: Float1D) -> "Basis":
+        """Returns a cosine and a sine of each order, the number of waves in the unit box (k,)."""
+        wave = np.repeat(orders, 2)
+        quarter = np.tile([0.0, 0.25], len(orders)) / wave
+        return Basis(2.0 * np.pi * wave[:, None], quarter[:, None], len(wave))
+
     def __len__(self) -> int:
         return len(self.alpha)
 
     @property
+    def hats(self) -> int:
+        """Number of wavelets without the harmonics."""
+        return len(self.alpha) - self.harmonics
+
+    @property
+    def size(self) -> int:
+        """Number of wavelets and orders of harmonics."""
+        return self.hats + self.harmonics // 2
+
+    @property
     def used(self) -> NDArray[np.bool_]:
-        """True (N, d) for the inputs that each wavelet uses."""
-        return np.asarray(self.alpha > UNUSED_DILATION)
+        """True (N, d) for the inputs with a fitted dilation and translation of each wavelet; harmonics have
+        none."""
+        used = np.asarray(self.alpha > UNUSED_DILATION)
+        used[self.hats :] = False
+        return used
+
+    def columns(self, positions: Float2D) -> Float2D:
+        """Returns the values (n, N) of all wavelets and harmonics at positions (n, d)."""
+        return np.asarray(wavelet_columns(positions, self.alpha, self.beta, self.harmonics))
+
+    def slopes(self, x: Float1D) -> Float2D:
+        """Returns the slopes (n, N) of all wavelets and harmonics at positions (n,) of one input."""
+        return np.asarray(wavelet_slope_columns(x, self.alpha, self.beta, self.harmonics))
 
     def over(self, inputs: Sequence[int], dimension: int) -> "Basis":
         """Returns these wavelets of some inputs as wavelets of `dimension` inputs, which do not use the
@@ -62,14 +94,29 @@ class Basis:
         return found
 
     def joined(self, other: "Basis") -> "Basis":
-        return Basis(np.concatenate([self.alpha, other.alpha]), np.concatenate([self.beta, other.beta]))
+        """Returns the wavelets of both, then the harmonics of both."""
+
+        def both(mine: Float2D, its: Float2D) -> Float2D:
+            return np.concatenate(
+                [mine[: self.hats], its[: other.hats], mine[self.hats :], its[other.hats :]]
+            )
+
+        harmonics = self.harmonics + other.harmonics
+        return Basis(both(self.alpha, other.alpha), both(self.beta, other.beta), harmonics)
+
+    def without_harmonics(self) -> "Basis":
+        return Basis(self.alpha[: self.hats], self.beta[: self.hats])
 
     def without(self, index: int) -> "Basis":
-        return Basis(np.delete(self.alpha, index, axis=0), np.delete(self.beta, index, axis=0))
+        """Returns the basis without one of its `size` wavelets or orders."""
+        order = index - self.hats
+        gone = [index] if order < 0 else [index + order, index + order + 1]
+        left = self.harmonics if order < 0 else self.harmonics - 2
+        return Basis(np.delete(self.alpha, gone, axis=0), np.delete(self.beta, gone, axis=0), left)
 
     def without_input(self, index: int, k: int) -> "Basis":
         """Returns the wavelets with one that no longer uses input k."""
-        found = Basis(self.alpha.copy(), self.beta.copy())
+        found = replace(self, alpha=self.alpha.copy(), beta=self.beta.copy())
         found.alpha[index, k], found.beta[index, k] = UNUSED_DILATION, UNUSED_TRANSLATION
         return found
 
@@ -84,6 +131,12 @@ class Resolution:
 
     def __len__(self) -> int:
         return len(self._positions)
+
+    def widest_gap(self) -> float:
+        """Returns the widest gap between neighbouring positions of one input that repeat with the period
+        1."""
+        places = np.unique(np.mod(self._positions[:, 0], 1.0))
+        return float(np.diff(places, append=places[0] + 1.0).max())
 
     def reach(self, basis: Basis, count: int) -> Float1D:
         """Returns the radius (N,) around the translation of each of N wavelets that contains `count`

@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..._core.model import derivative_bounds, wavelet_columns, wavelet_slope_columns
+from ..._core.model import derivative_bounds
 from ..._typing import Float1D, Float2D
 from ..data.compression import Compressed
 from .basis import Basis
@@ -213,6 +213,7 @@ def violated_positions(problem: SeparableProblem, solution: Solution, bound: Bou
             lower=left,
             upper=right,
             order=3 if bound.of_slope else 2,
+            harmonics=solution.basis.harmonics,
         )
         undecided = (lowest >= 0.0) & (lowest < bend * (right - left) ** 2 / 8.0)
         shown = undecided | (lowest < 0.0) if halving == MOST_HALVINGS else lowest < 0.0
@@ -249,8 +250,8 @@ def _columns(basis: Basis, of_slope: bool, x: Float1D) -> Float2D:
     slopes."""
     one, zero = np.ones((len(x), 1)), np.zeros((len(x), 1))
     if of_slope:
-        return np.concatenate([zero, one, wavelet_slope_columns(x, basis.alpha, basis.beta)], axis=1)
-    return np.concatenate([one, x[:, None], wavelet_columns(x, basis.alpha, basis.beta)], axis=1)
+        return np.concatenate([zero, one, basis.slopes(x)], axis=1)
+    return np.concatenate([one, x[:, None], basis.columns(x[:, None])], axis=1)
 
 
 def _least_squares(problem: SeparableProblem, free: Solution, rows: Float2D, limits: Float1D) -> Float2D:
@@ -350,8 +351,7 @@ def crosses_where_steep(problem: SeparableProblem, free: Solution) -> bool:
     A force recorded with delay t reduces the hysteresis h by slope * speed * t.
     """
     places = np.linspace(0.0, 1.0, COMPARED_POSITIONS)
-    columns = wavelet_columns(places, free.basis.alpha, free.basis.beta)
-    slopes = wavelet_slope_columns(places, free.basis.alpha, free.basis.beta)
+    columns, slopes = free.basis.columns(places[:, None]), free.basis.slopes(places)
     (_, slope, *of_g), (bias, tilt, *of_h) = problem.readout @ free.coefficients
     steepness = np.abs(slope + slopes @ np.asarray(of_g))
     above = np.maximum(-(bias + tilt * places + columns @ np.asarray(of_h)), 0.0)
@@ -384,7 +384,7 @@ def crossing(problem: SeparableProblem, free: Solution) -> Crossing | None:
     if len(problem.readout) < 2 or last <= first:
         return None
     places = np.linspace(first, last, COMPARED_POSITIONS)
-    columns = wavelet_columns(places, free.basis.alpha, free.basis.beta)
+    columns = free.basis.columns(places[:, None])
     bias, slope, *weights = problem.readout[1] @ free.coefficients
     above = -2.0 * (bias + slope * places + columns @ np.asarray(weights))
     deepest = int(np.argmax(above))

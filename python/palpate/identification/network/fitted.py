@@ -77,6 +77,8 @@ class FittedNetwork:
     linear_hysteresis: Float1D | None
     """(d,)"""
     bias_hysteresis: float | None
+    harmonics: int
+    """Number of last wavelets that are harmonics of the period, w cos(alpha (x - beta))"""
     lower: Float1D
     """(d,) lower end of the domain"""
     upper: Float1D
@@ -137,9 +139,15 @@ class FittedNetwork:
             "weight_hysteresis": self.weight_hysteresis,
             "linear_hysteresis": self.linear_hysteresis,
             "bias_hysteresis": self.bias_hysteresis,
+            "harmonics": self.harmonics,
             "lower": self.lower,
             "upper": self.upper,
         }
+
+    def force_model(self) -> ForceModel:
+        """Returns the force law over the domain; it is periodic if it has harmonics."""
+        period = float(self.upper[0] - self.lower[0]) if self.harmonics else None
+        return ForceModel(**self.parameters(), period=period)
 
     def fit(self) -> Fit:
         """Returns the model class and the tested networks, in the form of a model file."""
@@ -196,19 +204,27 @@ class FittedNetwork:
 
         `described` holds the other fields of the network.
         """
-        d, two = len(lower), len(readout) == 2
+        d, two, basis = len(lower), len(readout) == 2, solution.basis
         table = readout @ solution.coefficients
         linear, weights = table[:, 1 : 1 + d] / reach, table[:, 1 + d :]
+        if basis.harmonics and not basis.hats:
+            linear = np.zeros_like(
+                linear
+            )  # harmonics repeat, so that equal ends leave a slope of rounding size
         bias = table[:, 0] - linear @ lower
+        alpha, beta = basis.alpha / reach, lower + basis.beta * reach
+        if basis.harmonics and not two:
+            alpha, beta, weights = _one_per_order(alpha, beta, weights, basis.hats)
         return cls(
-            alpha=solution.basis.alpha / reach,
-            beta=lower + solution.basis.beta * reach,
+            alpha=alpha,
+            beta=beta,
             weight=weights[0],
             linear=linear[0],
             bias=float(bias[0]),
             weight_hysteresis=weights[1] if two else None,
             linear_hysteresis=linear[1] if two else None,
             bias_hysteresis=float(bias[1]) if two else None,
+            harmonics=len(alpha) - basis.hats,
             lower=lower,
             upper=lower + reach,
             **described,
@@ -216,10 +232,25 @@ class FittedNetwork:
 
     def force(self, positions: Float2D, side: Float1D | None) -> Float1D:
         """Returns the force at positions (n, d), limited to the domain, with direction states (n,)."""
-        two, model = self.weight_hysteresis is not None, ForceModel(**self.parameters())
+        two, model = self.weight_hysteresis is not None, self.force_model()
         inside = np.clip(positions, self.lower, self.upper)
         if len(self.lower) > 1:
             return np.asarray(model.predict(inside))
         if not two or side is None:
             return np.asarray(model.force(inside[:, 0]))
         return np.asarray(model.force(inside[:, 0], direction=np.clip(side, -1.0, 1.0)))
+
+
+def _one_per_order(
+    alpha: Float2D, beta: Float2D, weights: Float2D, hats: int
+) -> tuple[Float2D, Float2D, Float2D]:
+    """Returns dilations, translations and weights (1, N) in which harmonics of the same order, which follow
+    the wavelets, are one harmonic with a positive amplitude and a phase from -pi to pi."""
+    wave, order = np.unique(alpha[hats:, 0], return_inverse=True)
+    phasor = np.zeros(len(wave), complex)
+    np.add.at(phasor, order, weights[0, hats:] * np.exp(1j * alpha[hats:, 0] * beta[hats:, 0]))
+    return (
+        np.concatenate([alpha[:hats], wave[:, None]]),
+        np.concatenate([beta[:hats], (np.angle(phasor) / wave)[:, None]]),
+        np.concatenate([weights[:, :hats], np.abs(phasor)[None]], axis=1),
+    )

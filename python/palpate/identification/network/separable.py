@@ -27,7 +27,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..._core.model import wavelet_columns, wavelet_jacobian, wavelet_steps
+from ..._core.model import wavelet_jacobian, wavelet_steps
 from ..._typing import Float1D, Float2D
 from ...recording.motion import FORCE_RESOLUTION
 from ..data.compression import Compressed, HeldOutRows
@@ -203,7 +203,8 @@ class SeparableProblem:
         """Returns the number of fitted values with these wavelets and `more` wavelets of all inputs.
 
         These are a dilation and a translation for each input that a wavelet uses, a weight per wavelet and
-        channel, and d slopes and a bias per channel.
+        channel, d slopes and a bias per channel, and two weights per order of harmonics and channel. An order
+        is a whole number, which many rows determine without error, and does not count.
         """
         used = int(basis.used.sum()) + more * self.dimension
         return 2 * used + self.n_channels * (len(basis) + more + 1 + self.dimension)
@@ -251,7 +252,7 @@ class SeparableProblem:
 
     def errors(self, solution: Solution, rows: HeldOutRows) -> Float1D:
         """Returns the recorded force minus the force of a solution at held-out rows."""
-        return rows.errors(self.readout @ solution.coefficients, solution.basis.alpha, solution.basis.beta)
+        return rows.errors(self.readout @ solution.coefficients, solution.basis.columns(rows.positions))
 
     def with_prior(self, rss: float) -> SeparableProblem:
         """Returns the problem with a penalty on weights that are large compared with the range of the force.
@@ -283,15 +284,17 @@ class SeparableProblem:
 
     def finest(self, basis: Basis) -> Float2D:
         """Returns the largest dilation (N, 1) that the positions around each wavelet resolve, on every
-        stroke [1/range of recorded positions]."""
-        reach = np.max([each.reach(basis, self.resolved_by) for each in self.resolutions], axis=0)
-        return np.asarray(CORE_RADIUS / np.maximum(reach, 1e-9))[:, None]
+        stroke [1/range of recorded positions]; infinite for harmonics."""
+        hats = basis.without_harmonics()
+        reach = np.max([each.reach(hats, self.resolved_by) for each in self.resolutions], axis=0)
+        finest = CORE_RADIUS / np.maximum(reach, 1e-9)
+        return np.asarray(np.append(finest, np.full(basis.harmonics, np.inf)))[:, None]
 
     def solve(self, basis: Basis) -> Solution:
         """Fits weights, slopes and biases of all channels for given wavelets."""
         tables, designs, grams = [], [], []
         for block in self.blocks:
-            design = block.design(wavelet_columns(block.positions, basis.alpha, basis.beta))
+            design = block.design(basis.columns(block.positions))
             gram = self._gram(block, design)
             found = solve_gram(gram, design.T @ block.target)
             tables.append(found.reshape(block.n_channels, -1))
@@ -354,19 +357,23 @@ class SeparableProblem:
         return matrix, gradient
 
     def removal_costs(self, solution: Solution) -> Float1D:
-        """Returns, for each of N wavelets, the increase of the penalised squared error if this wavelet were
-        removed and all weights, slopes and biases fitted again."""
-        n, first = len(solution.basis), 1 + self.dimension
-        cost = np.zeros(n)
+        """Returns, for each wavelet and each order of harmonics, the increase of the penalised squared error
+        if it were removed and all weights, slopes and biases fitted again."""
+        n, first, hats = len(solution.basis), 1 + self.dimension, solution.basis.hats
+        alone, pairs = np.arange(hats)[:, None], np.arange(hats, n).reshape(-1, 2)
+        costs = [np.zeros(len(terms)) for terms in (alone, pairs)]
         for block, gram, table in zip(
             self.blocks, solution.grams, self._tables(solution.coefficients), strict=True
         ):
             inverse = solve_gram(gram, np.eye(len(gram)))
-            weights = table[:, first:].T
-            columns = np.arange(block.n_channels) * (first + n) + first + np.arange(n)[:, None]
-            minors = inverse[columns[:, :, None], columns[:, None, :]]
-            cost += np.einsum("nk,nk->n", weights, np.linalg.solve(minors, weights[:, :, None])[:, :, 0])
-        return cost
+            for cost, terms in zip(costs, (alone, pairs), strict=True):
+                shape = len(terms), block.n_channels * terms.shape[1]
+                weights = table.T[first + terms].transpose(0, 2, 1).reshape(shape)
+                channel = np.arange(block.n_channels)[:, None] * (first + n) + first
+                columns = (channel + terms[:, None, :]).reshape(shape)
+                minors = inverse[columns[:, :, None], columns[:, None, :]]
+                cost += np.einsum("nk,nk->n", weights, np.linalg.solve(minors, weights[:, :, None])[:, :, 0])
+        return np.concatenate(costs)
 
     def _gram(self, block: Block, design: Float2D) -> Float2D:
         gram = design.T @ design
@@ -438,7 +445,7 @@ def refine(problem: SeparableProblem, start: Solution, *, steps: int, tolerance:
     than `tolerance`.
     """
     best, linearised = start, None
-    if len(start.basis) == 0:
+    if start.basis.hats == 0:
         return best
     step_damping, idle, finest = 1e-2, 0, problem.finest(best.basis)
     for _ in range(steps):
@@ -499,10 +506,10 @@ def _moved(problem: SeparableProblem, basis: Basis, step: Float1D) -> tuple[Basi
     grow, shift = step.reshape(2, problem.dimension, len(basis)).transpose(0, 2, 1)
     beta = np.clip(basis.beta + shift / basis.alpha, -LARGEST_OVERHANG, 1 + LARGEST_OVERHANG)
     used = basis.used
-    moved = Basis(basis.alpha, np.where(used, beta, basis.beta))
+    moved = replace(basis, beta=np.where(used, beta, basis.beta))
     finest = problem.finest(moved)
     alpha = np.clip(basis.alpha * np.exp(grow), LEAST_DILATION, np.maximum(finest, LEAST_DILATION))
-    return Basis(np.where(used, alpha, basis.alpha), moved.beta), finest
+    return replace(moved, alpha=np.where(used, alpha, basis.alpha)), finest
 
 
 QUASI_NEWTON_STEPS = 10

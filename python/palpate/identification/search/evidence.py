@@ -235,7 +235,7 @@ class Candidate:
 
     @property
     def n_wavelets(self) -> int:
-        return len(self.solution.basis)
+        return self.solution.basis.size
 
     @property
     def rmse(self) -> float:

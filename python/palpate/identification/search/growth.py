@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._core.model import most_wavelets
 from ..._typing import Float1D
 from ...recording.motion import FORCE_RESOLUTION
 from ..network.basis import COARSEST_CANDIDATE, MOST_LIBRARY_ENTRIES, Basis, truncated_frame
@@ -27,7 +28,7 @@ from ..network.separable import (
 )
 from ..options import IdentifyOptions
 from .evidence import CRITERIA, ON_HELD_OUT_ROWS, choice, criterion_of, enough, report
-from .selection import Library, orthogonal_gains, residual_gains, select_backward
+from .selection import Library, orthogonal_gains, residual_gains, select_backward, select_orders
 
 MOST_PRUNE_TRIALS = 3
 """Largest number of wavelets tried for removal in succession. Wavelets whose removal raises the error least
@@ -94,6 +95,10 @@ MOST_REFINED_CANDIDATES = 5
 CANDIDATE_STEPS = 4
 """Number of refinement steps of each candidate wavelet before one is chosen: enough to compare them."""
 
+MOST_WITH_HARMONICS = most_wavelets // 4
+"""Largest number of wavelets and orders of harmonics: with hysteresis an order has two harmonics, and each
+takes as long as two wavelets."""
+
 GROWING_TOLERANCE = 0.4
 """Decrease of the deviance below which a refinement step during growth is too small to continue [-]: far
 below the penalty of one wavelet."""
@@ -130,6 +135,8 @@ class Growth:
     def __init__(self, options: IdentifyOptions, *, single: bool = True) -> None:
         self._search, self._criterion, self._most = options.search, options.criterion, options.max_wavelets
         self._single = single
+        paper = options.search.refinement == "quasi-newton" or options.search.selection == "backward"
+        self._harmonics = options.period is not None and not paper
         self._refine = refine_all if options.search.refinement == "quasi-newton" else refine
 
     def grow(
@@ -141,7 +148,38 @@ class Growth:
         most: int | None = None,
         library: Library | None = None,
     ) -> Grown:
-        """Grows from the wavelets of start to `most` wavelets at most.
+        """Grows from the wavelets of start to `most` wavelets at most; an order of harmonics counts as one.
+
+        A periodic force grows twice: from harmonics, to which wavelets are added, and from wavelets alone, as
+        long as these have fewer parameters. The criterion decides.
+        """
+        most, criterion = self._most if most is None else most, self._criterion
+        if not self._harmonics:
+            return self._grown_finer(problem, start, model_class, most, library)
+        problem = problem.with_prior(problem.solve(start).rss)
+        few = min(most, MOST_WITH_HARMONICS)
+        orders = select_orders(
+            problem, start, max_wavelets=few, criterion=criterion, patience=self._search.patience
+        )
+        both = self._grown_finer(problem, orders[-1].basis, model_class, few, library)
+        passed = tuple(self._point(problem, each, model_class) for each in orders)
+        both = replace(both, path=(*passed, *both.path))
+        fewer = problem.n_parameters(both.solution.basis) // (2 * problem.dimension + problem.n_channels)
+        alone = self._grown_finer(problem, start.without_harmonics(), model_class, min(most, fewer), library)
+        if alone.stop_reason == "max_wavelets" and fewer < most:
+            alone = replace(alone, stop_reason=criterion)
+        compared = problem.independent if problem.held_out is None else len(problem.held_out.force)
+        return (alone, both)[choice(criterion, [alone.criterion, both.criterion], compared)]
+
+    def _grown_finer(
+        self,
+        problem: SeparableProblem,
+        start: Basis,
+        model_class: str,
+        most: int,
+        library: Library | None,
+    ) -> Grown:
+        """Grows from the wavelets and harmonics of start to `most` of both by wavelets.
 
         If the residual is not noise, growth continues with narrower wavelets. Noise has the same size at all
         positions and no correlation between neighbouring positions. Narrower wavelets are accepted if they
@@ -152,7 +190,6 @@ class Growth:
         wavelets fit a force over several inputs.
         """
         search = self._search
-        most = self._most if most is None else most
         coarse = not search.refine or search.selection == "backward"
         free = self._single and not coarse and problem.n_channels == 1
         free = free and self._criterion not in ON_HELD_OUT_ROWS
@@ -271,8 +308,8 @@ class Growth:
         problem, current = self._improved(problem, problem.solve(start), search.refine_steps)
         path, grown = [self._point(problem, current, model_class)], [current]
         best, since, stop_reason = path[0].criterion, 0, "max_wavelets"
-        while len(current.basis) < most:
-            report(model_class, len(current.basis))
+        while current.basis.size < most:
+            report(model_class, current.basis.size)
             if enough(criterion, path[-1].criterion) or search.selection == "backward":
                 stop_reason = criterion
                 break
@@ -301,7 +338,7 @@ class Growth:
         if smooth is not None and problem.rmse(smooth.solution) <= problem.rmse(final):
             return smooth
         path.append(self._point(problem, final, model_class))
-        if len(final.basis) < most and stop_reason == "max_wavelets":
+        if final.basis.size < most and stop_reason == "max_wavelets":
             stop_reason = criterion
         return Grown(problem, final, path[-1].criterion, stop_reason, tuple(path))
 
@@ -326,9 +363,9 @@ class Growth:
 
     def _price(self, problem: SeparableProblem, solution: Solution) -> float:
         """Returns the increase of the penalty in the criterion by the last wavelet of the solution."""
-        penalty, n = CRITERIA[self._criterion], len(solution.basis)
+        penalty, size = CRITERIA[self._criterion], solution.basis.size
         return penalty(problem.independent, problem.n_parameters(solution.basis)) - penalty(
-            problem.independent, problem.n_parameters(solution.basis.without(n - 1))
+            problem.independent, problem.n_parameters(solution.basis.without(size - 1))
         )
 
     def _with_candidate(
@@ -418,7 +455,7 @@ class Growth:
 
     def _point(self, problem: SeparableProblem, solution: Solution, model_class: str) -> PathPoint:
         return PathPoint(
-            model_class, len(solution.basis), problem.rmse(solution), self._criterion_of(problem, solution)
+            model_class, solution.basis.size, problem.rmse(solution), self._criterion_of(problem, solution)
         )
 
 

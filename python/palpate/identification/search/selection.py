@@ -97,6 +97,32 @@ class Library:
         return chosen
 
 
+class OrderLibrary:
+    """Candidate harmonics of a periodic force: every order that the positions resolve, with a cosine and a
+    sine for each channel.
+
+    The shortest wave is two times as long as the gap between neighbouring positions: the usual gap of the
+    recording, and the widest one within the period on any stroke.
+    """
+
+    def __init__(self, problem: SeparableProblem) -> None:
+        gap = max(problem.limits.position_gap, *(each.widest_gap() for each in problem.resolutions))
+        self.orders = np.arange(1.0, 0.5 / gap)
+        basis = Basis.of_orders(self.orders)
+        self.columns: list[NDArray[np.float32]] = []
+        """For each block of m rows (2 channels, orders, m): cosine and sine of each order times the
+        channel"""
+        self.grams: list[Float2D] = []
+        for block in problem.blocks:
+            pairs = basis.columns(block.positions).T
+            columns = [pairs[part::2] * channel for channel in block.channels.T for part in (0, 1)]
+            self.columns.append(np.array(columns, np.float32))
+            self.grams.append(np.einsum("knm,lnm->kln", self.columns[-1], self.columns[-1], dtype=float))
+
+    def __len__(self) -> int:
+        return len(self.orders)
+
+
 class OrthogonalSelection:
     """Forward selection: starts from fitted wavelets, computes the gain of each candidate, and takes
     candidates.
@@ -105,7 +131,7 @@ class OrthogonalSelection:
     the residual; the residual sum of squares falls by z' S^-1 z, summed over the blocks.
     """
 
-    def __init__(self, library: Library, start: Solution) -> None:
+    def __init__(self, library: Library | OrderLibrary, start: Solution) -> None:
         self._library = library
         self._factors = [np.linalg.qr(design)[0] for design in start.designs]
         self._residuals = list(start.residuals)
@@ -223,6 +249,31 @@ def select_forward(
         order.append(int(np.argmax(gains)))
         totals.append(problem.total(selection.take(order[-1])))
     return order, totals
+
+
+def select_orders(
+    problem: SeparableProblem, start: Basis, *, max_wavelets: int, criterion: str, patience: int
+) -> list[Solution]:
+    """Adds harmonics of a periodic force to a basis, the order first that reduces the error most, until the
+    criterion has not fallen for `patience` orders. Returns the solutions up to the one that it prefers."""
+    library = OrderLibrary(problem)
+    found = [problem.solve(start)]
+    values = [criterion_of(problem, found[0], criterion)]
+    selection = OrthogonalSelection(library, found[0])
+    while (
+        found[-1].basis.size < max_wavelets
+        and problem.n_parameters(found[-1].basis) + 2 * problem.n_channels < problem.independent
+        and len(values) - np.argmin(values) <= patience
+    ):
+        gains = selection.gains()
+        if len(gains) == 0 or gains.max() <= 0.0:
+            break
+        best = int(np.argmax(gains))
+        selection.take(best)
+        found.append(problem.solve(found[-1].basis.joined(Basis.of_orders(library.orders[[best]]))))
+        values.append(criterion_of(problem, found[-1], criterion))
+    compared = problem.independent if problem.held_out is None else len(problem.held_out.force)
+    return found[: 1 + choice(criterion, values, compared)]
 
 
 def select_backward(

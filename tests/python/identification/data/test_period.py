@@ -9,7 +9,7 @@ import pytest
 import palpate
 from imperfect import Array, knob, press_and_release
 from palpate import Recording
-from palpate.identification.data.period import period_of
+from palpate.identification.data.period import period_of, revolution_of
 
 TURNS = press_and_release(3600, 1080.0)
 
@@ -115,3 +115,58 @@ def test_a_given_period_is_not_searched() -> None:
     model = palpate.identify(turned(TURNS, knob(TURNS)), period=30.0)
     assert model.period == 30.0
     assert "The force repeats every" not in str(model.notes["identification"])
+
+
+TURN = 2.0 * np.pi
+
+
+def motor(angle: Array) -> Array:
+    return np.asarray(np.sin(3.0 * angle) + 0.5 * np.cos(7.0 * angle + 1.0) + 0.2 * np.sin(angle))
+
+
+def torsion_spring(angle: Array) -> Array:
+    return np.asarray(0.5 * angle + 0.1 * np.sin(7.0 * angle))
+
+
+def at_angles(law: Callable[[Array], Array], turns: float, unit: str = "rad", rows: int = 400) -> Recording:
+    angle = np.round(TURN * np.arange(int(rows * turns)) / rows, 6)
+    noise = np.random.default_rng(4).normal(0.0, 0.01, len(angle))
+    return Recording.from_arrays(angle, law(angle) + noise, units={"position": unit, "force": "N*m"})
+
+
+@pytest.mark.parametrize("turns", [1.0, 1.4])
+def test_an_angle_that_closes_a_revolution_has_the_period_of_a_turn(turns: float) -> None:
+    recording = at_angles(motor, turns)
+    assert revolution_of([recording]) == TURN
+    model = palpate.identify(recording)
+    assert model.period == TURN
+    assert any("repeats every 6.283 rad" in note for note in model.notes["identification"])
+
+
+@pytest.mark.parametrize(
+    ("law", "turns", "unit"),
+    [(motor, 0.97, "rad"), (motor, 1.0, "m"), (torsion_spring, 1.0, "rad"), (torsion_spring, 1.4, "rad")],
+)
+def test_an_open_revolution_a_length_or_a_spring_has_no_period_of_a_turn(
+    law: Callable[[Array], Array], turns: float, unit: str
+) -> None:
+    recording = at_angles(law, turns, unit)
+    assert revolution_of([recording]) is None
+    assert palpate.identify(recording).period is None
+
+
+@pytest.mark.parametrize("seed", [30, 33, 40])
+def test_a_period_is_found_below_noise_of_which_each_model_counts_other_independent_rows(
+    seed: int,
+) -> None:
+    random = np.random.default_rng(seed)
+    x, way = np.r_[np.linspace(0.0, 4.3, 900), np.linspace(4.3, 0.0, 900)], np.repeat([1.0, -1.0], 900)
+    force = np.sin(TURN * x) + 0.4 * np.sin(2.0 * TURN * x + 1.0) + 0.2 * way
+    slow = np.zeros(len(x))
+    for k, each in enumerate(random.normal(0.0, 0.066, len(x) - 1), start=1):
+        slow[k] = 0.8 * slow[k - 1] + each
+    step = 0.3
+    recording = Recording.from_arrays(x, step * np.round((force + slow) / step), direction=way)
+    model = palpate.identify(recording)
+    assert model.fit.nrmse > 0.1
+    assert model.period == pytest.approx(1.0, rel=0.01)

@@ -121,6 +121,28 @@ def test_reach_among_many_positions_of_many_inputs_is_of_the_right_size(rows: in
     assert np.median(Resolution(positions).reach(places, 7) / exact) == pytest.approx(1.0, abs=0.35)
 
 
+def test_harmonics_stay_behind_the_wavelets_and_leave_in_pairs() -> None:
+    hats = Basis(np.array([[3.0], [9.0]]), np.array([[0.3], [0.8]]))
+    joined = Basis.of_orders(np.array([2.0])).joined(hats).joined(Basis.of_orders(np.array([5.0])))
+    assert (joined.hats, joined.harmonics, joined.size, len(joined)) == (2, 4, 4, 6)
+    x = np.linspace(-0.2, 1.3, 40)
+    waves = [wave(2.0 * np.pi * n * x) for n in (2.0, 5.0) for wave in (np.cos, np.sin)]
+    expected = np.column_stack([wavelet_columns(x[:, None], hats.alpha, hats.beta), *waves])
+    assert joined.columns(x[:, None]) == pytest.approx(expected, abs=1e-13)
+    step = 1e-6
+    differences = (joined.columns(x[:, None] + step) - joined.columns(x[:, None] - step)) / (2.0 * step)
+    assert joined.slopes(x) == pytest.approx(differences, abs=1e-6)
+    assert not joined.used[2:].any()
+    assert joined.without(2).columns(x[:, None]) == pytest.approx(expected[:, [0, 1, 4, 5]], abs=1e-13)
+    assert joined.without(0).columns(x[:, None]) == pytest.approx(expected[:, 1:], abs=1e-13)
+    assert joined.without_harmonics().alpha.tolist() == hats.alpha.tolist()
+
+
+def test_the_widest_gap_of_a_period_includes_its_ends() -> None:
+    positions = np.array([[0.1], [0.15], [0.4], [1.2], [-0.5]])
+    assert Resolution(positions).widest_gap() == pytest.approx(0.6)  # from 0.5 to 1.1
+
+
 def test_a_wavelet_does_not_change_along_an_unused_input() -> None:
     one = Basis(np.array([[3.0]]), np.array([[0.3]])).over([1], 3)
     x = np.random.default_rng(5).uniform(size=(1000, 3))

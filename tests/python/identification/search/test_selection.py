@@ -15,6 +15,7 @@ from palpate.identification.search.selection import (
     LEAST_DISTANCE,
     STRETCH_FACTORS,
     Library,
+    OrderLibrary,
     OrthogonalSelection,
     orthogonal_gains,
     select_forward,
@@ -62,6 +63,22 @@ def test_gains_equal_those_of_a_new_least_squares(kind: str) -> None:
         new = column - before @ (before.T @ column)
         rounding = float(np.finfo(np.float32).eps) * (column @ column) / (new @ new)
         assert gains[index] == pytest.approx(direct, rel=16.0 * rounding)
+
+
+@pytest.mark.parametrize("kind", SIDES)
+def test_gains_of_orders_equal_those_of_a_new_least_squares(kind: str) -> None:
+    problem = problem_of(rows_of(kind), resolved_by=5)
+    orders = OrderLibrary(problem)
+    assert orders.orders.tolist() == list(range(1, 60))  # 120 positions, of which two are equal in a period
+    start = problem.solve(
+        Basis(np.array([[6.0]]), np.array([[0.3]])).joined(Basis.of_orders(np.array([3.0])))
+    )
+    gains = OrthogonalSelection(orders, start).gains()
+    assert gains[2] < 1e-6 * gains.max()
+    for index in [0, 1, 5, 40]:
+        one = Basis.of_orders(orders.orders[[index]])
+        direct = start.rss - problem.solve(start.basis.joined(one)).rss
+        assert gains[index] == pytest.approx(direct, rel=1e-4, abs=1e-6 * start.rss)
 
 
 @pytest.mark.parametrize("kind", SIDES)

@@ -157,7 +157,7 @@ inline ModelUnits read_units(const JsonField& file) {
 /// Domain and kind of the model are those in `file`.
 inline ForceModel read_network(const JsonField& network, const JsonField& file) {
     network.require_keys({"dimension", "alpha", "beta", "weight", "weight_hysteresis", "linear", "bias",
-                          "linear_hysteresis", "bias_hysteresis"});
+                          "linear_hysteresis", "bias_hysteresis", "harmonics"});
     NetworkParameters read;
     read.dimension = network["dimension"].count(1);
     const std::size_t d = read.dimension;
@@ -170,6 +170,11 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
     network["beta"].require_length(n, "one for each wavelet of alpha");
     network["weight"].require_length(n, "one for each wavelet of alpha");
     network["linear"].require_length(d, "one for each dimension");
+    if (network.value().contains("harmonics")) {
+        read.harmonics = network["harmonics"].count(1);
+        network["harmonics"].require(read.harmonics <= n,
+                                     "at most the number of wavelets, " + std::to_string(n));
+    }
     const JsonField hysteresis = network["weight_hysteresis"];
     for (const char* name : {"linear_hysteresis", "bias_hysteresis"}) {
         network[name].require(network[name].is_null() == hysteresis.is_null(),
@@ -195,6 +200,20 @@ inline ForceModel read_network(const JsonField& network, const JsonField& file) 
     radius.require(radius.is_null() || !hysteresis.is_null(), "null in a model without hysteresis");
     network["dimension"].require(hysteresis.is_null() || d == 1, "1 in a model with hysteresis");
     const Domain domain = read_domain(file, d);
+    if (read.harmonics > 0) {
+        network["harmonics"].require(domain.period.has_value(), "left out: continuation.period is null");
+        network["harmonics"].require(
+            n + read.harmonics <= most_wavelets,
+            "at most " + std::to_string(most_wavelets - n) +
+                ", because a harmonic takes as long as two wavelets and a tick of 1 ms can "
+                "evaluate " +
+                std::to_string(most_wavelets));
+        const std::vector<JsonField> alpha = network["alpha"].items();
+        for (std::size_t i = read.hats(); i < n; ++i) {
+            alpha[i].require(is_harmonic(read.alpha[i], *domain.period),
+                             "a whole multiple of 2 pi / period, as of a harmonic");
+        }
+    }
     const ModelUnits units = read_units(file);
     if (remembers) {
         file["continuation"]["period"].require(!domain.period, "null in a model with memory");
