@@ -351,8 +351,7 @@ def picture_path(path: Path, model: Model) -> None:
     if not model.path:
         raise InputError("the model file lists no networks that identification compared: identify again")
     fit = model.fit
-    title = f"{source_name(model.data.files)}
-{model.terms}, NRMSE {number(fit.nrmse)}"
+    title = f"{source_name(model.data.files)}\n{model.terms}, NRMSE {number(fit.nrmse)}"
     with _written(path, (_COLUMN_INCHES, 6.0), title=title) as figure:
         force, error, criterion = figure.subplots(3, 1, gridspec_kw={"height_ratios": (1.6, 1.4, 1.0)})
         draw_model(force, model)
