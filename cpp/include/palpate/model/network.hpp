@@ -38,7 +38,7 @@ class WaveletNetwork {
     [[nodiscard]] const NetworkCurve& curve() const noexcept { return curve_; }
 
     /// Returns force, slope and energy at position x.
-    [[nodiscard]] EnvironmentSample at(double x, const State&) const noexcept {
+    [[nodiscard]] EnvironmentSample at(double x, State) const noexcept {
         const Curve curve = curve_.at(x);
         return {curve.value, curve.slope, curve.integral, curve_.extrapolated(x)};
     }
