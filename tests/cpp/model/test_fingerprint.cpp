@@ -175,7 +175,7 @@ TEST(Fingerprint, DistinguishesAPeriodicForce) {
 }
 
 TEST(Fingerprint, DistinguishesAHarmonicFromAWavelet) {
-    NetworkParameters network{1, {2.0 * std::numbers::pi}, {0.1}, {0.5}, {0.0}, 0.5};
+    NetworkParameters network{1, {40.0 * std::numbers::pi}, {0.5}, {0.5}, {0.0}, 0.5};  // 0 at both ends
     Domain domain = test::unit_domain();
     domain.period = 1.0;
     const std::string wavelet = fingerprint(ForceModel{network, domain});

@@ -79,7 +79,7 @@ inline void require_size(const std::vector<double>& values, std::size_t size, co
 /// Returns true if cos(alpha x) is a harmonic of the period: a whole number of its waves fits into it.
 [[nodiscard]] inline bool is_harmonic(double alpha, double period) noexcept {
     const double order = alpha * period / (2.0 * std::numbers::pi);
-    return order > 0.5 && std::abs(order - std::round(order)) <= 1e-9 * order;
+    return std::abs(order - std::round(order)) <= 1e-9 * order;
 }
 
 /// Throws std::invalid_argument if a parameter of the network or its domain is invalid. The message states the name of
