@@ -200,21 +200,21 @@ def _compare(
                     "verdict": str(verdict),
                     **{
                         name: {stroke.name or "both": getattr(stroke, name) for stroke in strokes}
-                        for name in ("worst", "worst_difference", "worst_position", "felt_share")
+                        for name in ("worst", "worst_difference", "worst_position", "noticed_share")
                     },
                 }
             )
         else:
             print_verdict(verdict)
             print_table(
-                ("stroke", "largest difference", "at", "in JND", "felt on"),
+                ("stroke", "largest difference", "at", "in JND", "noticed on"),
                 [
                     (
                         each.name or "both",
                         force.text(each.worst_difference),
                         position.text(each.worst_position),
                         number(each.worst),
-                        f"{each.felt_share:.0%}",
+                        f"{each.noticed_share:.0%}",
                     )
                     for each in strokes
                 ],
@@ -229,8 +229,8 @@ def _noticed(strokes: tuple[Stroke, ...], position: Unit, force: Unit) -> Verdic
         return GOOD
     stroke = f" of the {worst.name}" if worst.name else ""
     sentence = (
-        f"a hand notices the difference of the models on {worst.felt_share:.0%} of the travel{stroke}: up to "
-        f"{number(worst.worst)} just noticeable differences, {force.text(worst.worst_difference)} at "
+        f"a hand notices the difference of the models on {worst.noticed_share:.0%} of the travel{stroke}: "
+        f"up to {number(worst.worst)} just noticeable differences, {force.text(worst.worst_difference)} at "
         f"{position.text(worst.worst_position)}"
     )
     return Verdict((usable(sentence),))

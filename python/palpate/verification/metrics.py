@@ -161,7 +161,7 @@ class Stroke:
         return float((self.second - self.first)[np.argmax(self._noticed)])
 
     @property
-    def felt_share(self) -> float:
+    def noticed_share(self) -> float:
         """Share of the travel on which a hand feels the difference [-]"""
         return float(np.mean(self._noticed > 1.0))
 

@@ -5,8 +5,9 @@ a play operator."""
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy
@@ -80,22 +81,25 @@ class Hysteresis(ModelClass):
         selection, data, report = self._selection, self._selection.data, self._selection.report
         if data.side is not None:
             return self._of(below, HysteresisInput.of_strokes(data.side))
-        play, of_order, basis = PlaySearch(selection.samples, selection.options), None, below.solution.basis
+        play, of_order, bases = PlaySearch(selection.samples, selection.options), None, [below.solution.basis]
         start = dict(selection.start_basis)
         if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()):
-            # The direction can also change at once at a turn. Its wavelets show the radius better than those
-            # without hysteresis.
+            # The direction can also change at once at a turn. Its wavelets usually show the radius better
+            # than those without hysteresis, but not if some of them fit the rows after a turn.
             of_order = self._of(below, HysteresisInput(data.order, data.order != 0.0))
-            basis = of_order.solution.basis
-            # Its wavelets would fit the rows after a turn at any radius.
-            selection.start_basis = start
-        before, strokes = list(report.decisions), play.best_of_options(basis)
-        of_play = None if strokes is None else self._of(below, strokes, play)
+            bases.append(of_order.solution.basis)
+        before, of_play, of_its_fit = list(report.decisions), None, (list[Decision](), dict(start))
+        for strokes in play.best_of_options(bases):
+            report.decisions[:], selection.start_basis = before, dict(start)
+            found = self._of(below, strokes, play)
+            if of_play is None or self._fits_better(found, of_play):
+                of_play, of_its_fit = found, (list(report.decisions), selection.start_basis)
         if of_order is not None and (of_play is None or self._fits_better(of_order, of_play)):
             report.decisions[:] = before
-            selection.start_basis[self.name] = of_order.solution.basis
+            selection.start_basis = {**start, self.name: of_order.solution.basis}
             return of_order
         if of_play is not None:
+            report.decisions[:], selection.start_basis = of_its_fit
             return of_play
         untested = "the motions of the recording between gaps of time are too short, or never turn back"
         if self._named:
@@ -252,17 +256,21 @@ class PlaySearch:
         self._samples, self._path, self._starts = samples, data.path[:, 0], list(data.starts or ())
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
-    def best_of_options(self, basis: Basis) -> HysteresisInput | None:
-        """Returns the direction states for the play radius of the options with the smallest error on given
-        wavelets.
+    def best_of_options(self, bases: Sequence[Basis]) -> list[HysteresisInput]:
+        """Returns, for each of several sets of wavelets, the direction states for the play radius of the
+        options with the smallest error; equal ones once.
 
-        Returns None if the motions between gaps of time are too short for every play radius, or never
+        Returns none if the motions between gaps of time are too short for every play radius, or never
         reverse: with one stroke only the sum g + h is determined.
         """
         if not self._usable:
-            return None
+            return []
         known = _thinned(self._usable[-1].known)
-        return min(self._usable, key=lambda strokes: self._residual_squares(strokes, basis, known))
+        best = (
+            min(self._usable, key=partial(self._residual_squares, basis=basis, known=known))
+            for basis in bases
+        )
+        return list({strokes.play_radius: strokes for strokes in best}.values())
 
     def with_best_radius(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
         """Returns the direction states for the best play radius near the given one, on given wavelets.
