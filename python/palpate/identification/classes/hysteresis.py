@@ -5,9 +5,8 @@ a play operator."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -81,15 +80,15 @@ class Hysteresis(ModelClass):
         selection, data, report = self._selection, self._selection.data, self._selection.report
         if data.side is not None:
             return self._of(below, HysteresisInput.of_strokes(data.side))
-        play, of_order, bases = PlaySearch(selection.samples, selection.options), None, [below.solution.basis]
+        play, of_order, basis = PlaySearch(selection.samples, selection.options), None, below.solution.basis
         start = dict(selection.start_basis)
         if data.order is not None and {-1.0, 1.0} <= set(data.order.tolist()):
-            # The direction can also change at once at a turn. Its wavelets usually show the radius better
-            # than those without hysteresis, but not if some of them fit the rows after a turn.
+            # The direction can also change at once at a turn. Its wavelets show the radius better than those
+            # without hysteresis.
             of_order = self._of(below, HysteresisInput(data.order, data.order != 0.0))
-            bases.append(of_order.solution.basis)
+            basis = of_order.solution.basis
         before, of_play, of_its_fit = list(report.decisions), None, (list[Decision](), dict(start))
-        for strokes in play.best_of_options(bases):
+        for strokes in play.best_of_options(basis):
             report.decisions[:], selection.start_basis = before, dict(start)
             found = self._of(below, strokes, play)
             if of_play is None or self._fits_better(found, of_play):
@@ -256,21 +255,25 @@ class PlaySearch:
         self._samples, self._path, self._starts = samples, data.path[:, 0], list(data.starts or ())
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
-    def best_of_options(self, bases: Sequence[Basis]) -> list[HysteresisInput]:
-        """Returns, for each of several sets of wavelets, the direction states for the play radius of the
-        options with the smallest error; equal ones once.
+    def best_of_options(self, basis: Basis) -> list[HysteresisInput]:
+        """Returns the direction states for each play radius of the options at which the error on given
+        wavelets is smaller than at its neighbours.
 
-        Returns none if the motions between gaps of time are too short for every play radius, or never
-        reverse: with one stroke only the sum g + h is determined.
+        Wavelets that fit the rows after a turn can make a wrong radius the best one. Returns none if the
+        motions between gaps of time are too short for every play radius, or never reverse: with one stroke
+        only the sum g + h is determined.
         """
         if not self._usable:
             return []
         known = _thinned(self._usable[-1].known)
-        best = (
-            min(self._usable, key=partial(self._residual_squares, basis=basis, known=known))
-            for basis in bases
-        )
-        return list({strokes.play_radius: strokes for strokes in best}.values())
+        errors = [math.inf, *(self._residual_squares(each, basis, known) for each in self._usable), math.inf]
+        return [
+            strokes
+            for strokes, before, error, after in zip(
+                self._usable, errors, errors[1:], errors[2:], strict=False
+            )
+            if error <= min(before, after)
+        ]
 
     def with_best_radius(self, strokes: HysteresisInput, basis: Basis) -> HysteresisInput:
         """Returns the direction states for the best play radius near the given one, on given wavelets.

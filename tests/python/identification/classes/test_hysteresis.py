@@ -66,6 +66,21 @@ def test_play_radius_between_the_options_is_found_without_more_wavelets(radius: 
     assert model.fit.nrmse * np.std(force) < 1.02 * noise + 1e-4 * np.ptp(force)
 
 
+def test_strokes_that_turn_at_one_depth_predict_those_that_turn_at_another() -> None:
+    """At one depth, wavelets behind the turn fit the change of direction as well as a play radius does."""
+
+    def tissue(seed: int, depth: float) -> Recording:
+        time = np.arange(0.0, 60.0, 0.02)
+        x = 0.5 * depth * (1.0 - np.cos(2.0 * np.pi * time / 10.0))
+        force = 0.4 * np.expm1(x / 0.003) * (1.0 + 0.25 * state(x, 2e-4, 0.0))
+        force += np.random.default_rng(seed).normal(0.0, 0.01, len(x))
+        return Recording.from_arrays(x, force, time, units={"position": "m", "force": "N"})
+
+    model = identify(tissue(1, 0.008))
+    assert model.play_radius == pytest.approx(2e-4, rel=0.02)
+    assert verify(model, tissue(2, 0.007)).nrmse < 0.01
+
+
 @pytest.mark.full
 def test_short_strokes_along_a_sweep_are_as_simple_as_long_ones() -> None:
     """Press a little, release a little, while the mean advances: both strokes cover every position."""
