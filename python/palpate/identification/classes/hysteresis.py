@@ -93,7 +93,10 @@ class Hysteresis(ModelClass):
             found = self._of(below, strokes, play)
             if of_play is None or self._fits_better(found, of_play):
                 of_play, of_its_fit = found, (list(report.decisions), selection.start_basis)
-        if of_order is not None and (of_play is None or self._fits_better(of_order, of_play)):
+        evidence = (
+            selection.options.search.evidence
+        )  # a play radius is one more number than the order of rows
+        if of_order is not None and (of_play is None or self._fits_better(of_order, of_play, evidence)):
             report.decisions[:] = before
             selection.start_basis = {**start, self.name: of_order.solution.basis}
             return of_order
@@ -106,13 +109,14 @@ class Hysteresis(ModelClass):
         report.decisions.append(Decision("hysteresis", "not tested", untested))
         return below
 
-    def _fits_better(self, one: Candidate, other: Candidate) -> bool:
-        """True if the first of two candidates has the smaller criterion on the rows that both can use."""
+    def _fits_better(self, one: Candidate, other: Candidate, margin: float = 0.0) -> bool:
+        """True if the criterion of the first of two candidates is smaller, or larger by at most `margin`, on
+        the rows that both can use."""
         weight = one.error_on(one.data.weight).weight * (other.error_on(None).weight > 0.0)
         name = self._selection.judge.criterion
         if name in ON_HELD_OUT_ROWS:
             name = "bic"
-        return one.on_rows(name, weight) <= other.on_rows(name, weight)
+        return one.on_rows(name, weight) <= other.on_rows(name, weight) + margin
 
     def _of(self, below: Candidate, strokes: HysteresisInput, play: PlaySearch | None = None) -> Candidate:
         """Returns the better of the simpler candidate and a network with hysteresis for given direction
