@@ -415,7 +415,8 @@ def find_header(rows: Sequence[Row], stated: tuple[str, ...] = ()) -> Header | N
     if stated:
         names = [*stated, *[""] * (cells - len(stated))]
         return _without_trailing(
-            Header(first, tuple(names), first, numbers=numbers, stated=True), rows[first : first + 3]
+            Header(first, tuple(names), first, numbers=numbers, stated=True),
+            rows[first : first + LEAST_CONSECUTIVE_ROWS],
         )
     above = first
     while above > 0 and _may_be_header(rows, above - 1, first) and not _is_data(rows[above - 1][:cells]):

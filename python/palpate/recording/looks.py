@@ -46,17 +46,17 @@ class Look:
     """First cell with text, if there is one"""
 
     @staticmethod
-    def of(cells: Sequence[Any], decimal: str) -> Look:
+    def of(cells: Sequence[Any], marks: str) -> Look:
         """Describes the first cells of a column, which are numbers or texts.
 
         Parameters
         ----------
         cells : sequence of (float or str)
-        decimal : str
-            Decimal mark of numbers in text.
+        marks : str
+            Decimal mark of numbers in text, and mark between thousands, as in :func:`parse_with`.
         """
         words = [cell.strip() if isinstance(cell, str) else cell for cell in cells[:LOOK_ROWS]]
-        numbers = [parse_with(each, decimal) if isinstance(each, str) else each for each in words]
+        numbers = [parse_with(each, marks) if isinstance(each, str) else each for each in words]
         texts = [
             word
             for word, number in zip(words, numbers, strict=True)

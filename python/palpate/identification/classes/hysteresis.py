@@ -93,9 +93,8 @@ class Hysteresis(ModelClass):
             found = self._of(below, strokes, play)
             if of_play is None or self._fits_better(found, of_play):
                 of_play, of_its_fit = found, (list(report.decisions), selection.start_basis)
-        evidence = (
-            selection.options.search.evidence
-        )  # a play radius is one more number than the order of rows
+        # A play radius is one more number than the order of rows.
+        evidence = selection.options.search.evidence
         if of_order is not None and (of_play is None or self._fits_better(of_order, of_play, evidence)):
             report.decisions[:] = before
             selection.start_basis = {**start, self.name: of_order.solution.basis}
