@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import listed
 from ..recording import Recording
 from ..recording.checks import quality_findings
-from ..recording.motion import GAP_RATIO, ordered_strokes
+from ..recording.motion import GAP_RATIO, cycles_of, ordered_strokes
 from ..recording.parts import Part, SeveralPartsError
 from ..recording.roles import counts_text, informative, role_counts, roles_of
 from ..verdict import Verdict
@@ -106,6 +106,9 @@ def _summary(recording: Recording, strokes: dict[str, int] | None, roles: dict[s
     else:
         source = "the order of the rows" if recording.direction is None else "the direction column"
         stroke_text = f"{strokes['press']} press, {strokes['release']} release, from {source}"
+        if len(cycles := cycles_of(recording)) > 1:
+            first, last = (f"(rows {each.start} to {each.stop - 1})" for each in (cycles[0], cycles[-1]))
+            stroke_text += f"; --part 'cycle N' reads one: cycle 1 {first} to cycle {len(cycles)} {last}"
     missing = ["no time, so no velocity, damping, memory or lag"] if recording.time is None else []
     missing += ["no direction, so no hysteresis"] if strokes is None else []
     return {
@@ -141,4 +144,5 @@ def _record(file: Path, recording: Recording, strokes: dict[str, int] | None) ->
         "duration_s": None if time is None else float(time[-1] - time[0]),
         "rate_hz": None if period is None else 1.0 / period,
         "strokes": strokes,
+        "cycles": [[each.start, each.stop] for each in cycles_of(recording)],
     }

@@ -168,8 +168,10 @@ def recognise(file: str, head: bytes, whole: bool, stated: Stated = NOT_STATED) 
     )
 
 
-def read_rows(file: str, content: bytes) -> tuple[str, dict[int, list[str | None]], set[int]]:
-    """Splits a text file into its cells.
+def read_rows(
+    file: str, content: bytes, names: tuple[str, ...] = ()
+) -> tuple[str, dict[int, list[str | None]], set[int]]:
+    """Splits a text file into its cells. `names` are those that the caller states for its columns.
 
     Returns
     -------
@@ -185,7 +187,7 @@ def read_rows(file: str, content: bytes) -> tuple[str, dict[int, list[str | None
         The bytes are not text, or a quotation mark is missing.
     """
     lines = list(io.StringIO(_text_of(file, content, True)[2], newline=""))
-    separator = _header(file, lines, ()).separator
+    separator = _header(file, lines, names).separator
     without_marks = (_COMMENT_START.sub("", line, count=1) if _is_comment(line) else line for line in lines)
     reader = cells_of_lines(without_marks, separator)
     rows: dict[int, list[str | None]] = {}
@@ -460,7 +462,7 @@ def with_checked_names(where: str, header: Header) -> tuple[Header, list[str]]:
     names = list(header.names)
     notes = []
     if any(parse_number(name) is not None for name in names):
-        raise InputError(f"{where}: a header with column names must come first, found {listed(names)}")
+        raise InputError(f"{where}: a header must name the columns, found {listed(names)}")
     if names[0] == "" and len(names) > LEAST_NUMBERS:
         names[0] = "unnamed"
         while names[0] in names[1:]:

@@ -22,7 +22,9 @@ from .conversion import MIN_ROWS
 from .dialect import (
     LEAST_CONSECUTIVE_ROWS,
     LEAST_NUMBERS,
+    NOT_STATED,
     Header,
+    Stated,
     decimal_mark,
     find_header,
     first_row_as_header,
@@ -30,6 +32,7 @@ from .dialect import (
     marks_of,
     with_checked_names,
 )
+from .looks import LOOK_ROWS, cure_of_header
 from .memory_table import MemoryTable, cells_of
 from .table import MISSING, Cells
 from .units import split_name
@@ -63,8 +66,7 @@ class Grid:
     """Separator of the cells of a text file; empty for a sheet"""
     behind_empty: frozenset[int] = frozenset()
     """Numbers of the rows of a text file that follow an empty row"""
-    decimal: str | None = None
-    """Decimal mark of numbers in texts if the caller states it"""
+    stated: Stated = NOT_STATED
 
     @property
     def word(self) -> str:
@@ -135,6 +137,17 @@ class Block:
         """Key that is the same for blocks without separate names: strokes of one recording."""
         return self.grid.name, self.names, self.columns, self.title
 
+    @property
+    def columns_without_header(self) -> list[list[Cell]]:
+        """First cells of the columns of numbers, if the first row of the block is no header but numbers."""
+        if not any(map(is_number, self.names)):
+            return []
+        rows = [self.header_row, *self.rows[:LOOK_ROWS].tolist()]
+        full = sorted(_full_columns(self.grid.kinds[rows]))
+        return [
+            [row[k] if k < len(row) else None for row in map(self.grid.rows.__getitem__, rows)] for k in full
+        ]
+
     def text_above(self, rows: int) -> str:
         """Returns the text in a row above the header, counted from the header."""
         return _line(self.above[rows][slice(*self.span)])
@@ -172,6 +185,10 @@ def joined_table(path: Path, name: str, blocks: Sequence[Block], most_rows: int 
     """
     first, word = blocks[0], blocks[0].grid.word
     where = f"{name}, {first.place(first.header_row)}"
+    if not first.header.stated and (columns_found := first.columns_without_header):
+        if stated := first.grid.stated.columns:
+            raise InputError(f"{name} has {len(columns_found)} columns, but --columns names {len(stated)}")
+        raise InputError(f"{name} has no header. {cure_of_header(list(zip(*columns_found, strict=True)))}")
     if "" in first.names[1:]:
         place = first.columns[first.names.index("", 1)]
         raise InputError(f"{where}: column {place + 1} has no name; name it in the file")
@@ -193,8 +210,8 @@ def joined_table(path: Path, name: str, blocks: Sequence[Block], most_rows: int 
             column += [row[place] if place < len(row) else None for row in cells]
         numbers = block.grid.numbers[rows].tolist()
         places += [f"{number} of {block.grid.name}" for number in numbers] if several_grids else numbers
-    marks = marks_of(first.grid.decimal)
-    if places and first.grid.decimal is None:
+    marks = marks_of(first.grid.stated.decimal)
+    if places and first.grid.stated.decimal is None:
         heads = zip(*(column[:_HEAD_ROWS] for column in values), strict=True)
         texts = [[cell for cell in row if isinstance(cell, str)] for row in heads]
         marks = decimal_mark(f"{name}, {word} {places[0]}", texts)
@@ -208,8 +225,11 @@ def joined_table(path: Path, name: str, blocks: Sequence[Block], most_rows: int 
         notes = [*notes, "empty rows are left out"]
     if header.units_row is not None:
         notes = ["units in a second header row", *notes]
+    if header.stated:
+        notes = ["the column names are stated", *notes]
     if before := len(first.above):
-        notes = [f"{before} {word}{'s' * (before > 1)} before the header", *notes]
+        below = "data" if header.stated else "header"
+        notes = [f"{before} {word}{'s' * (before > 1)} before the {below}", *notes]
     table = MemoryTable(path, columns, _metadata(first), notes, (word, places), marks)
     table.starts = np.cumsum([len(block.rows[:most_rows]) for block in blocks])[:-1].tolist()
     return table
@@ -230,13 +250,20 @@ def tables_of(grid: Grid) -> list[Block]:
 
 
 def whole_grid(grid: Grid) -> Block:
-    """Returns the rows of a grid without a table; its first row is the header."""
-    texts = _padded(list(map(_texts, grid.rows[:_HEAD_ROWS])))
-    header = find_header(texts) or first_row_as_header(texts)
+    """Returns the rows of a grid without a table; its first row of numbers, if it has one, is the header."""
+    texts = _padded(list(map(_texts, grid.rows)))
+    row = next((start for start, stop in _data_runs(grid) if stop - start >= LEAST_CONSECUTIVE_ROWS), 0)
+    header = first_row_as_header(texts[row:])
     columns = tuple(range(len(header.names)))
-    above = tuple(reversed(grid.rows[: header.row]))
-    rows = np.arange(header.first, len(grid.rows))
-    return Block(grid, header, header.row, columns, (0, len(columns)), above, rows)
+    above, rows = tuple(reversed(grid.rows[:row])), np.arange(row + 1, len(grid.rows))
+    return Block(grid, header, row, columns, (0, len(columns)), above, rows)
+
+
+def _data_runs(grid: Grid) -> list[tuple[int, int]]:
+    """Returns the first row of each run of rows of data, and the row behind its last one."""
+    is_data = np.count_nonzero(grid.kinds == READING, axis=1) >= LEAST_NUMBERS
+    edges = np.flatnonzero(np.diff(is_data, prepend=False, append=False)).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 @dataclass(frozen=True)
@@ -256,11 +283,11 @@ class _Band:
 
 def _bands(grid: Grid) -> list[_Band]:
     """Returns the headers of a grid with their rows, from the top to the bottom."""
-    is_data = np.count_nonzero(grid.kinds == READING, axis=1) >= LEAST_NUMBERS
-    edges = np.flatnonzero(np.diff(is_data, prepend=False, append=False)).tolist()
+    if grid.stated.columns:
+        return _stated_bands(grid)
     bands: list[_Band] = []
     after_data = 0
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in _data_runs(grid):
         head = max(after_data, start - _HEAD_ROWS)
         header, row = _header_of(grid, head, start, stop), start
         if header is not None:
@@ -278,6 +305,18 @@ def _bands(grid: Grid) -> list[_Band]:
                 bands.append(_Band(header, above if bands else 0, row, start, len(grid.rows)))
         after_data = stop
     return bands
+
+
+def _stated_bands(grid: Grid) -> list[_Band]:
+    """Returns the first rows with as many full columns as the caller names, and all rows below, as one
+    band."""
+    for start, stop in _data_runs(grid):
+        full = _full_columns(grid.kinds[start:stop])
+        if stop - start >= LEAST_CONSECUTIVE_ROWS and len(full) == len(grid.stated.columns):
+            names = dict(zip(sorted(full), grid.stated.columns, strict=True))
+            all_names = tuple(names.get(k, "") for k in range(grid.kinds.shape[1]))
+            return [_Band(Header(start, all_names, start, stated=True), 0, start, start, len(grid.rows))]
+    return []
 
 
 def _is_title(kinds: NDArray[np.int8]) -> bool:
@@ -308,6 +347,9 @@ def _header_of(grid: Grid, above: int, start: int, stop: int) -> Header | None:
     header = find_header(rows)
     if header is None or sum(map(bool, header.names)) < LEAST_NUMBERS:
         return None
+    below = slice(above + header.row + 1, start + 1)
+    if not all(header.names[k] for k in full - {0}) and not grid.follows[below].all():
+        return None  # text in fewer cells, above an empty row
     width = grid.kinds.shape[1]
     return replace(header, names=header.names + ("",) * (width - len(header.names)), trailing=False)
 

@@ -39,9 +39,11 @@ class Look:
     counter: bool = False
     """True if the column numbers the rows: each value is the one before plus one"""
     rises: bool = False
-    """True if every value is larger than the one before"""
+    """True if every value is larger than the one before, or is the first one again"""
     least: float = np.nan
     largest: float = np.nan
+    turns: int = 0
+    """How often the column changes the sense in which it changes"""
     example: str = ""
     """First cell with text, if there is one"""
 
@@ -70,11 +72,16 @@ class Look:
             clock=clock and not np.isnan(clock_seconds(np.array(texts, dtype=object))).any(),
             steady=len(set(words)) < 3,
             counter=len(finite) == len(values) > 2 and bool((np.diff(finite) == 1.0).all()),
-            rises=len(finite) == len(values) > 2 and bool((np.diff(finite) > 0.0).all()),
+            rises=len(finite) == len(values) > 2 and _rises(finite),
             least=float(finite.min()) if finite.size else np.nan,
             largest=float(finite.max()) if finite.size else np.nan,
+            turns=_turns(finite),
             example=texts[0] if texts else "",
         )
+
+    def __str__(self) -> str:
+        rises = " (rises)" if self.rises else ""
+        return "text" if self.text else f"{self.least:.4g} to {self.largest:.4g}{rises}"
 
 
 NO_LOOK = Look()
@@ -116,29 +123,31 @@ def _of_day(texts: pd.Series[str]) -> pd.Series[float]:
     return seconds.fillna(60.0 * minutes[0] + minutes[1])
 
 
-def cure_of_header(rows: Sequence[Sequence[str]]) -> str:
+def cure_of_header(rows: Sequence[Sequence[Any]]) -> str:
     """Describes the columns of a table without a header by its first rows, and returns the option that names
     them.
 
-    If there are three columns that change, one that rises in every row is the time. Of the others, the
-    position is the one that turns less often.
+    If there are three columns that change, one that never falls, or only to its first value, is the time. Of
+    the others, the position is the one that turns less often.
     """
-    columns = [
-        np.array([np.nan if (value := parse_with(cell, ".,")) is None else value for cell in column])
-        for column in zip(*rows, strict=True)
-    ]
-    described = [f"{k}: {_described(values)}" for k, values in enumerate(columns, 1)]
-    turns = {k: _turns(values) for k, values in enumerate(columns) if np.ptp(values) > 0.0}
-    time = next((k for k, count in turns.items() if count == 0 and len(turns) > 2), None)
-    others = sorted((k for k in turns if k != time), key=turns.__getitem__)[:2]
+    looks = [Look.of(column, ".,") for column in zip(*rows, strict=True)]
+    described = ", ".join(f"{k}: {look}" for k, look in enumerate(looks, 1))
+    changing = [k for k, look in enumerate(looks) if not look.text and look.least < look.largest]
+    time = next((k for k in changing if (looks[k].rises or looks[k].turns == 0) and len(changing) > 2), None)
+    others = sorted((k for k in changing if k != time), key=lambda k: looks[k].turns)[:2]
     if len(others) < 2:
-        return f"The columns are {', '.join(described)}"
+        return f"The columns are {described}"
     roles = {others[0]: ("position_mm", "the position in mm"), others[1]: ("force_N", "the force in N")}
     if time is not None:
         roles[time] = ("time_s", "the time in s")
     assumed = " and ".join(f"column {k + 1} is {roles[k][1]}" for k in sorted(roles))
-    names = ",".join(roles.get(k, (f"column_{k + 1}", ""))[0] for k in range(len(columns)))
-    return f"The columns are {', '.join(described)}. If {assumed}, add: --columns {names}"
+    names = ",".join(roles.get(k, (f"column_{k + 1}", ""))[0] for k in range(len(looks)))
+    return f"The columns are {described}. If {assumed}, add: --columns {names}"
+
+
+def _rises(values: Float1D) -> bool:
+    steps = np.diff(values)
+    return bool(((steps > 0.0) | ((steps < 0.0) & (values[1:] == values[0]))).all())
 
 
 def _turns(values: Float1D) -> int:
@@ -146,10 +155,3 @@ def _turns(values: Float1D) -> int:
     steps = np.sign(np.diff(values))
     steps = steps[steps != 0]
     return int(np.count_nonzero(np.diff(steps)))
-
-
-def _described(values: Float1D) -> str:
-    if np.isnan(values).any():
-        return "text"
-    rises = " (rises in every row)" if (np.diff(values) > 0).all() else ""
-    return f"{values.min():.4g} to {values.max():.4g}{rises}"

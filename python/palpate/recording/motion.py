@@ -139,6 +139,20 @@ def ordered_strokes(recording: Recording) -> Int8Vector | None:
     return None if direction is None else direction[motion.rows]
 
 
+def cycles_of(recording: Recording) -> list[slice]:
+    """Returns the rows of each cycle of a recording: a press and the release behind it, with their holds.
+
+    Without a column of directions they are those of the order of rows.
+    """
+    direction = ordered_strokes(recording) if recording.direction is None else recording.direction
+    if direction is None:
+        return []
+    moving = np.flatnonzero(direction)
+    begins = moving[1:][np.diff(direction[moving]) > 0]
+    edges = [0, *begins.tolist(), len(direction)]
+    return [slice(first, stop) for first, stop in pairwise(edges)]
+
+
 def turns_of(direction: Int8Vector) -> int:
     """Returns the number of sign changes of the direction (n,)."""
     moving = direction[direction != 0]

@@ -99,9 +99,9 @@ def several_parts_of_text(path: Path, stated: Stated) -> list[Part]:
 
 def _parts_of(path: Path, content: bytes, stated: Stated) -> list[Part]:
     require_memory(path, _TEXT_CELL_BYTES * sum(map(content.count, b"\n,;\t ")))
-    separator, rows, behind_empty = read_rows(str(path), content)
+    separator, rows, behind_empty = read_rows(str(path), content, stated.columns)
     require_memory(path, len(rows) * max(map(len, rows.values()), default=0))
-    grid = Grid("", rows, separator=separator, behind_empty=frozenset(behind_empty), decimal=stated.decimal)
+    grid = Grid("", rows, separator=separator, behind_empty=frozenset(behind_empty), stated=stated)
     return _named([grid])
 
 
@@ -116,7 +116,7 @@ def parts_of_workbook(path: Path, stated: Stated) -> list[Part]:
     sheets = read_sheets(path)
     if not sheets:
         raise InputError(f"{path} has no sheet with cells")
-    return _named([replace(each, decimal=stated.decimal) for each in sheets])
+    return _named([replace(each, stated=stated) for each in sheets])
 
 
 def _named(grids: Sequence[Grid]) -> list[Part]:

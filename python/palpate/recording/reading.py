@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -31,6 +32,9 @@ from .workbook import is_workbook
 
 RecordingLike: TypeAlias = Recording | str | os.PathLike[str] | pd.DataFrame
 """A recording, or data that can be read as one."""
+
+_CYCLE = re.compile(r"cycle (\d+)")
+"""Name of a cycle of a recording, as a part of a file"""
 
 RECORDING_TYPES = "give a Recording, the name of a file, a DataFrame, or arrays of position and force"
 ELEMENT_TYPES = "a list holds Recordings, names of files or DataFrames; Recording.from_arrays takes arrays"
@@ -83,7 +87,7 @@ def read_recording(
         Unit of a column whose name has none. It replaces the unit in the name. The key is the column's name,
         or "position", "force" or "time" if that column is also named.
     columns : sequence of str
-        Names of all columns of a text file without a header, with their units (``time_s``, ``position_mm``).
+        Names of all columns of a table without a header, with their units (``time_s``, ``position_mm``).
     decimal : {".", ","}, optional
         Decimal mark of a text file; the other mark then separates thousands. By default it is recognised.
     torque_constant : float, optional
@@ -103,9 +107,10 @@ def read_recording(
         Refuse the file, or drop rows without a number. An infinite number, a missing direction, or a time
         that does not increase is treated in the same way. The error names the row; dropped rows are counted.
     part : str, int or sequence, optional
-        Sheet, specimen or block of rows to read, by its name or its number from 1. Several are joined as
-        strokes of one recording. By default the longest table with a position and a force is read. A file
-        with several such recordings is refused; the error names them.
+        Sheet, specimen or block of rows to read, by its name or its number from 1, or "cycle N" of a
+        recording with several. Several are joined as strokes of one recording. By default the longest table
+        with a position and a force is read. A file with several such recordings is refused; the error names
+        them.
 
     Returns
     -------
@@ -138,25 +143,37 @@ def read_recording(
         "zero": zero,
         "drop": invalid == "drop",
     }
+    stated, cycles = Stated(tuple(columns), decimal), list[int]()
     with unchanged(file):
-        fields = _fields(file, part, Stated(tuple(columns), decimal), options)
+        try:
+            fields = _fields(file, part, stated, options)
+        except InputError:
+            tables, cycles = _without_cycles(part)
+            if not cycles:
+                raise
+            fields = _fields(file, tables, stated, options)
     recording = Recording(**fields)
-    if not force_late_s:
-        return recording
     try:
-        return recording.with_force_earlier(force_late_s)
+        recording = recording.cycles(*cycles) if cycles else recording
+        return recording.with_force_earlier(force_late_s) if force_late_s else recording
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def _without_cycles(part: PartNames | None) -> tuple[PartNames | None, list[int]]:
+    """Returns the names of parts that are not "cycle N", None without one, and the numbers N."""
+    names = [part] if isinstance(part, (str, int)) else list(part or ())
+    found = [_CYCLE.fullmatch(str(each)) for each in names]
+    others = [each for each, cycle in zip(names, found, strict=True) if cycle is None]
+    return others or None, [int(cycle[1]) for cycle in found if cycle is not None]
 
 
 def _fields(file: Path, part: PartNames | None, stated: Stated, options: dict[str, Any]) -> dict[str, Any]:
     """Returns the fields of the recording in a file, or in a part of it.
 
     A text file is first read as one table, which is fast. It is divided into its parts if this is refused, or
-    if it has empty rows, unless its column names are stated.
+    if it has empty rows.
     """
-    if stated.columns and (part is not None or is_workbook(file)):
-        raise InputError(f"{file}: --columns names the columns of a text file without parts; leave it out")
     if is_workbook(file):
         return read_part(file, parts_of_workbook(file, stated), part, options)
     if part is not None:
@@ -169,10 +186,10 @@ def _fields(file: Path, part: PartNames | None, stated: Stated, options: dict[st
         table = open_table(file, stated)
         fields = converted(table, str(file), file=file, **options)
         has_dropped = options["drop"] and fields["source"].rows < fields["source"].file_rows
-        if stated.columns or not (isinstance(table, CsvFile) and (table.has_empty_rows or has_dropped)):
+        if not (isinstance(table, CsvFile) and (table.has_empty_rows or has_dropped)):
             return fields
     except InputError as error:
-        if stated.columns or not is_text(file) or isinstance(error, TooLargeError):
+        if not is_text(file) or isinstance(error, TooLargeError):
             raise
         refusal = error
     parts: list[Part] = []

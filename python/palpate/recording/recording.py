@@ -15,7 +15,7 @@ import pandas as pd
 
 from .._typing import Float1D, Float2D, Int8Vector
 from ..arguments import number_of, path_of, real_of, shown, vector_of
-from ..errors import InputError
+from ..errors import InputError, listed
 from ..verdict import Verdict
 from .checks import quality_findings
 from .conversion import UNSTATED, Motion, Source, converted, digest_of
@@ -23,6 +23,7 @@ from .display import columns_of, html_of
 from .files import write_csv
 from .lag import LAG_DIGITS, UNKNOWN_CURE, ForceLag, lag_of
 from .mcap_file import write_mcap
+from .motion import cycles_of
 from .roles import informative
 from .table import FRAME, Cells, FrameTable, python_arguments
 from .units import FORCE_UNITS, POSITION_UNITS, Unit
@@ -296,6 +297,30 @@ class Recording:
     def without(self, rows: npt.NDArray[np.bool_]) -> Recording:
         """Returns a copy of the recording without the rows that `rows` (n,) marks with True."""
         return self._rows(~rows)
+
+    def cycles(self, *numbers: int) -> Recording:
+        """Returns some of the cycles of the recording; a cycle is a press and the release behind it.
+
+        Parameters
+        ----------
+        numbers : int
+            Numbers of the cycles, from 1.
+
+        Raises
+        ------
+        InputError
+            There is no such cycle.
+        """
+        cycles = cycles_of(self)
+        for number in numbers:
+            if not 1 <= number <= len(cycles):
+                raise InputError(f"there is no cycle {number}; the recording has {len(cycles)}")
+        chosen = np.zeros(len(self), dtype=np.bool_)
+        for number in numbers:
+            chosen[cycles[number - 1]] = True
+        part, name = self._rows(chosen), f"cycle{'s' * (len(numbers) > 1)} {listed(map(str, numbers))}"
+        source = replace(part.source, files=tuple(f"{file}, {name}" for file in part.source.files))
+        return replace(part, source=source, notes=(*self.notes, f"{name} of {len(cycles)}"))
 
     @property
     def force_lag(self) -> ForceLag:

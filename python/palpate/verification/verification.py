@@ -242,7 +242,7 @@ def verify(
     fresh = is_fresh(model.data, recording.source)
     notes = prediction.notes
     if not fresh:
-        notes += ("The model was identified on this data: this is not a fresh recording.",)
+        notes += ("The model was identified on this recording: this is not a fresh recording.",)
     found = Verification(
         nrmse=nrmse,
         rmse=rmse,
@@ -312,8 +312,8 @@ def _of_rows(model: Model, recording: Recording, found: Verification) -> list[Fi
     if not found.fresh:
         findings.append(
             usable(
-                "the model was identified on this data, and the error on other data may be larger: verify "
-                "with another recording, or identify with --hold-out-every 5"
+                "the model was identified on this recording, and the error on other data may be larger: "
+                "verify with another recording, or identify with --hold-out-every 5"
             )
         )
     outside = found.extrapolated / found.n

@@ -59,7 +59,10 @@ def test_a_recording_without_time_prints_strokes_in_the_units_of_the_file(
     shown = printed(capsys)
     assert shown["ranges"] == "position 0 to 4 mm, force 0 to 200 gf"
     assert shown["missing"] == "no time, so no velocity, damping, memory or lag"
-    assert shown["strokes"] == "2 press, 1 release, from the order of the rows"
+    assert shown["strokes"] == (
+        "2 press, 1 release, from the order of the rows; --part 'cycle N' reads one: cycle 1 (rows 0 to 119) "
+        "to cycle 2 (rows 120 to 169)"
+    )
 
 
 def test_json_has_the_same_properties(strokes: Path, capsys: pytest.CaptureFixture[str]) -> None:

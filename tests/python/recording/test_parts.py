@@ -389,3 +389,74 @@ def test_the_only_recording_of_a_file_has_the_same_source_with_and_without_its_n
     assert read_recording(path).source == read_recording(path, part="S0").source
     alone = workbook(tmp_path / "b.xlsx", {"S0": [HEADER, *indent(0)]})
     assert read_recording(alone).source == read_recording(alone, part=1).source
+
+
+def three_cycles(folder: Path) -> Path:
+    rows = [row for number in range(3) for row in indent(number)]
+    return text_file(folder / "a.csv", [HEADER, *([0.01 * k, *row[1:]] for k, row in enumerate(rows))])
+
+
+def test_cycles_are_listed_by_show_and_chosen_by_their_number(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = three_cycles(tmp_path)
+    assert main(["show", str(path)]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "cycle 1 (rows 0 to 40) to cycle 3 (rows 81 to 119)" in text
+    whole, second = read_recording(path), read_recording(path, part="cycle 2")
+    np.testing.assert_array_equal(second.position, whole.position[41:81])
+    np.testing.assert_array_equal(second.force, whole.force[41:81])
+    assert second.source.files == (f"{path}, cycle 2",)
+    assert second.notes[-1] == "cycle 2 of 3"
+    np.testing.assert_array_equal(
+        read_recording(path, part=["cycle 1", "cycle 3"]).force, np.delete(whole.force, np.s_[41:81])
+    )
+
+
+def test_a_cycle_that_a_recording_does_not_have_is_refused_with_their_number(tmp_path: Path) -> None:
+    path = three_cycles(tmp_path)
+    assert refusal(path, part="cycle 4") == "a.csv: there is no cycle 4; the recording has 3"
+    assert refusal(path, part="cycle 0") == "a.csv: there is no cycle 0; the recording has 3"
+
+
+def test_a_cycle_of_a_specimen_is_chosen_by_both_names_and_a_specimen_named_cycle_by_its_name(
+    tmp_path: Path,
+) -> None:
+    path = workbook(
+        tmp_path / "a.xlsx",
+        {"S": [HEADER, *indent(0), *indent(1)], "cycle 1": [HEADER, *indent(2), *indent(3), *indent(4)]},
+    )
+    both = read_recording(path, part=["S", "cycle 2"])
+    np.testing.assert_array_equal(both.force, read_recording(path, part="S").force[41:])
+    assert len(read_recording(path, part="cycle 1")) == 120
+
+
+# ------------------------------------------------------------------------------------------------ no header
+
+
+@pytest.mark.parametrize("suffix", ALL)
+def test_a_table_without_a_header_is_refused_with_the_option_that_names_its_columns(
+    tmp_path: Path, suffix: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    above: Rows = [["Operator", "me"], ["Rate", "10 mm/min"]]
+    path = any_file(tmp_path / f"a{suffix}", [*above, [], *indent(0), *indent(1)])
+    sentence = refusal(path)
+    assert sentence.endswith("add: --columns time_s,position_mm,force_N")
+    found = follow(path, sentence, capsys)
+    assert_same_rows(found, clean(tmp_path, indent(0), indent(1)))
+    assert "the column names are stated" in found.notes[0]
+
+
+@pytest.mark.parametrize("suffix", ALL)
+def test_blocks_without_a_header_are_strokes_of_one_recording(tmp_path: Path, suffix: str) -> None:
+    path = any_file(tmp_path / f"a{suffix}", [*indent(0), [], *indent(1)])
+    columns = ["time_s", "position_mm", "force_N"]
+    assert_same_rows(read_recording(path, columns=columns), clean(tmp_path, indent(0), indent(1)))
+    assert_same_rows(read_recording(path, columns=columns, part=2), clean(tmp_path, indent(1)))
+
+
+@pytest.mark.parametrize("suffix", ALL)
+def test_another_number_of_names_than_columns_is_refused(tmp_path: Path, suffix: str) -> None:
+    path = any_file(tmp_path / f"a{suffix}", indent(0))
+    found = refusal(path, columns=["position_mm", "force_N"])
+    assert found == f"{path.name} has 3 columns, but --columns names 2"

@@ -66,8 +66,8 @@ REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "no header": (
         "1,2\n3,4\n",
         {},
-        "press.csv has no header. The columns are 1: 1 to 3 (rises in every row), 2: 2 to 4 (rises in every "
-        "row). If column 1 is the position in mm and column 2 is the force in N, add: "
+        "press.csv has no header. The columns are 1: 1 to 3, 2: 2 to 4. If column 1 "
+        "is the position in mm and column 2 is the force in N, add: "
         "--columns position_mm,force_N",
     ),
     "nameless column": (

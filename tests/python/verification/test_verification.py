@@ -231,7 +231,7 @@ def test_rows_of_the_identification_and_outside_the_domain_give_findings() -> No
     recording = curve()
     seen = verify(model_of(recording.source), recording).verdict
     assert seen.level == "usable"
-    assert "identified on this data" in seen.reasons[0]
+    assert "identified on this recording" in seen.reasons[0]
     outside = verify(model_of(stroke().source, lower=[0.0], upper=[0.9]), recording).verdict
     assert outside.level == "usable"
     assert "100 of 1000 rows (10%) lie outside the model's domain from 0 to 0.9" in str(outside)
