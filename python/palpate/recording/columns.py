@@ -435,7 +435,8 @@ def _cure(
             added.append(f"--units {command_word(f'{suggestion.name}={shown}')}")
             if not suggestion.stated:
                 assumed.append(f"{shortened(suggestion.name)} is in {unit}")
-    choice, _ = _attempt(names, _Request(roles, direction, inputs, units, request.looks), unstated)
+    request = _Request(roles, direction, inputs, units, request.looks)
+    choice, _ = _attempt(names, request, unstated)
     time_column = None if choice is None or choice.time is not None else _unread_time(names, request)
     if time_column is not None and not time_column.look.text and not time_column.stated:
         added += _time_options(time_column)

@@ -139,7 +139,7 @@ class Block:
 
     @property
     def columns_without_header(self) -> list[list[Cell]]:
-        """First cells of the columns of numbers, if the first row of the block is no header but numbers."""
+        """First cells of the columns of numbers, if the first row of the block holds numbers, not names."""
         if not any(map(is_number, self.names)):
             return []
         rows = [self.header_row, *self.rows[:LOOK_ROWS].tolist()]

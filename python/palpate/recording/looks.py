@@ -43,7 +43,7 @@ class Look:
     least: float = np.nan
     largest: float = np.nan
     turns: int = 0
-    """How often the column changes the sense in which it changes"""
+    """Number of changes from rising to falling or back"""
     example: str = ""
     """First cell with text, if there is one"""
 
@@ -151,7 +151,7 @@ def _rises(values: Float1D) -> bool:
 
 
 def _turns(values: Float1D) -> int:
-    """Returns how often a column changes the sense in which it changes."""
+    """Returns the number of changes from rising to falling or back."""
     steps = np.sign(np.diff(values))
     steps = steps[steps != 0]
     return int(np.count_nonzero(np.diff(steps)))
