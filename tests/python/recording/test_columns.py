@@ -277,6 +277,11 @@ def test_a_time_without_a_unit_is_reported_and_added_by_the_cure() -> None:
         choose("Time,depth_mm,y")
 
 
+def test_the_column_suggested_as_force_is_not_also_suggested_as_time() -> None:
+    with pytest.raises(InputError, match=r"--force b --units b=N$"):
+        choose("a,b,c", looks={"b": Look(least=0.0, largest=1.0, rises=True)})
+
+
 @pytest.mark.parametrize(
     ("since_1970", "unit"), [(1.67e9, "s"), (1.67e12, "ms"), (1.67e15, "us"), (1673419984615459296, "ns")]
 )
