@@ -45,8 +45,9 @@ export MPLCONFIGDIR ?= $(CURDIR)/build/matplotlib
 unexport PYTHONDONTWRITEBYTECODE
 
 python := .venv/bin/python
-# Two runs of pip must not change one environment at the same time.
-pip := flock .venv/pip.lock $(python) -m pip
+# Two runs of pip must not change one environment at the same time, nor two builds the folder build/control.
+alone := flock .venv/pip.lock
+pip := $(alone) $(python) -m pip
 # Exact versions with their SHA-256, and no package that runs its own build; tools/lock.sh writes the files.
 install_locked := $(pip) install --quiet --require-hashes --only-binary :all: --requirement
 # Two runs of apt-get must not overlap either.
@@ -75,11 +76,11 @@ $(stamps)/build: tools/locked/build.txt tools/system_packages.sh $(moved)
 	mkdir -p $(stamps) && pwd -P > .venv/folder
 	touch $@
 
-# The compiled module and the editable package: a change of a C++ source builds the module again. `make control` builds
-# palpate-control in another folder.
+# The compiled module and the editable package: a change of a C++ source builds the module again. palpate-control is
+# built in the same folder, because it consists of the same libraries.
 $(stamps)/core: $(stamps)/build $(core_sources) $(renamed)
-	$(pip) install --quiet --no-deps --no-build-isolation -C cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON \
-	    -C cmake.define.PALPATE_BUILD_CONTROL=OFF --editable .
+	CMAKE_EXECUTABLE="$$(command -v cmake)" $(pip) install --quiet --no-deps --no-build-isolation -C build-dir=build/control \
+	    -C cmake.define.PALPATE_WARNINGS_AS_ERRORS=ON -C cmake.define.PALPATE_BUILD_CONTROL=OFF --editable .
 	$(module_names) > $(stamps)/modules
 	touch $@
 
@@ -120,8 +121,8 @@ test-python: setup control
 
 # The real-time program; the build tool detects changed sources.
 control: $(stamps)/control
-	cmake --preset control >/dev/null
-	cmake --build --preset control
+	$(alone) cmake --preset control >/dev/null
+	$(alone) cmake --build --preset control
 
 # The programs of the C++ tests.
 cpp-tests: setup
@@ -188,7 +189,7 @@ lint-python: setup
 	if $(python) -c "import sys; sys.exit(sys.version_info < (3, 11))"; then $(python) -m mypy; \
 	else echo "mypy: skipped, the stubs of NumPy and pandas need Python 3.11"; fi
 
-lint-cpp: setup
+lint-cpp: setup control
 	tools/cpp_lint.sh
 
 lint-stubs: setup

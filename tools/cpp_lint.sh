@@ -10,7 +10,7 @@ find cpp tests bench examples packaging \( -name '*.hpp' -o -name '*.cpp' \) -pr
     xargs -0r .venv/bin/clang-format --dry-run --Werror
 
 export commands cache sources
-commands=$(dirname "$(ls -t build/python-*/compile_commands.json | head -1)")
+commands=build/control
 cache=build/clang-tidy
 sources=$({
     .venv/bin/clang-tidy --version
