@@ -24,6 +24,8 @@ asan | tsan)
     export PALPATE_TEST_SCALE=$(((scale + 9) / 10))
     ;;
 release) sample test_model ;;
+# The device on an emulated microcontroller runs in a second program, and the same device in C in this one.
+dev) if [ "$scale" -lt 10 ]; then chosen=(--exclude-regex 'on device-m4$'); fi ;;
 # Only these tests run a tick without a forbidden action. A compiler without this sanitizer is refused by CMake.
 rtsan)
     built=(--target test_run)

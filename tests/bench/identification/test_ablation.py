@@ -39,6 +39,7 @@ def test_every_rule_names_a_function_or_constant_of_the_package(rule: Rule) -> N
     assert getattr(owner, name) is kept
 
 
+@pytest.mark.full
 def test_rows_that_wait_change_the_fit_if_they_are_fitted() -> None:
     row = measure("held spring", waiting_spring)
     without = row["without"]["rows that wait are not fitted"]

@@ -100,9 +100,8 @@ def test_a_recording_that_begins_with_the_release_has_no_jump() -> None:
         assert np.abs(np.diff(position)).max() < 0.05 * travel
 
 
-@pytest.mark.parametrize(
-    "draw", [pytest.param(5, id="spring with wall", marks=pytest.mark.full), pytest.param(13, id="pedal")]
-)
+@pytest.mark.full
+@pytest.mark.parametrize("draw", [pytest.param(5, id="spring with wall"), pytest.param(13, id="pedal")])
 def test_changes_without_new_information_keep_class_and_verdict(draw: int) -> None:
     measured = measure(draw, list(KEPT))
     for change in KEPT.keys() & measured.keys():

@@ -179,6 +179,7 @@ def test_a_finding_sets_the_verdict_of_a_recording(
     assert capsys.readouterr().out.startswith("verdict: usable\n  the recording has no rows from")
 
 
+@pytest.mark.full
 def test_measured_recordings_of_all_kinds_are_drawn(data: Path, tmp_path: Path) -> None:
     for number, name in enumerate(
         [

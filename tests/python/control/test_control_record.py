@@ -385,6 +385,7 @@ def palpate(*arguments: Any) -> str:
     return completed.stdout
 
 
+@pytest.mark.full
 def test_a_rendered_model_is_identified_as_the_same_model(tmp_path: Path) -> None:
     """Runs all steps with the programs: identify, render, record, identify the record, compare."""
     sample, rendered = tmp_path / "sample.csv", tmp_path / "rendered.csv"

@@ -263,6 +263,7 @@ def test_a_check_without_pushes_reports_the_unknown_sign_of_the_force() -> None:
     assert str(found.verdict) == ("usable: sign of the force: not measured (check a free handle with --push)")
 
 
+@pytest.mark.full
 def test_the_simulated_device_agrees_with_its_profile(tmp_path: Path) -> None:
     profile = DeviceProfile()
     found = check_device(duration_s=4.0, push=True, profile=profile)
@@ -276,6 +277,7 @@ def test_the_simulated_device_agrees_with_its_profile(tmp_path: Path) -> None:
     assert DeviceProfile.load(path).encoder_step == measured.encoder_step
 
 
+@pytest.mark.full
 def test_the_measured_profile_of_the_simulated_device_gives_a_certified_direct_plan(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

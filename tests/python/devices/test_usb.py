@@ -143,7 +143,12 @@ def test_devices_prints_the_model_on_the_device() -> None:
             "usable",
             "no haptic USB device is plugged in; record and render need none with --device simulated",
         ),
-        (["--info-bytes", "33"], "no", "the answer to GET_INFO has 33 bytes, must have 32"),
+        pytest.param(
+            ["--info-bytes", "33"],
+            "no",
+            "the answer to GET_INFO has 33 bytes, must have 32",
+            marks=pytest.mark.full,
+        ),
         (["--wrong-magic"], "no", "the answer to GET_INFO begins with 0x58, must begin with 'I'"),
     ],
 )

@@ -180,7 +180,7 @@ def test_nothing_diverges_on_other_measured_files(data: Path, folder: str) -> No
         assert force.max() < recording.force.max() + margin, path.name
 
 
-@pytest.mark.parametrize("rows", [30, 50, 80])
+@pytest.mark.parametrize("rows", sampled([30, 50, 80], 30))
 def test_few_rows_without_direction_and_time_show_the_hysteresis(rows: int) -> None:
     x = press_and_release(rows)
     f = loop(x) + np.random.default_rng(0).normal(0.0, 0.2, len(x))
@@ -222,7 +222,7 @@ def test_an_object_that_pulls_in_the_recording_continues_below_it() -> None:
 
 
 @pytest.mark.parametrize("end", ["below", "above"])
-@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("way", [1.0, pytest.param(-1.0, marks=pytest.mark.full)])
 def test_both_ends_continue_as_they_are_given(end: str, way: float) -> None:
     at = {"below": -1e-2, "above": 2e-2}[end]
     straight = identify(push_button(), **{end: "linear"}).force(at, direction=way)

@@ -153,14 +153,13 @@ def wrong_rows(x: Array, y: Array) -> list[int]:
 @pytest.mark.parametrize(
     "at",
     [
-        {100: 0.0},
-        {300: 60.0},
-        {100: 500.0, 101: 500.0},
-        {200: 20.0, 500: -60.0, 600: 30.0},
-        {0: 30.0},
-        {799: -200.0},
+        pytest.param({100: 0.0}, id="zero", marks=pytest.mark.full),
+        pytest.param({300: 60.0}, id="moderate", marks=pytest.mark.full),
+        pytest.param({100: 500.0, 101: 500.0}, id="pair", marks=pytest.mark.full),
+        pytest.param({200: 20.0, 500: -60.0, 600: 30.0}, id="several"),
+        pytest.param({0: 30.0}, id="first", marks=pytest.mark.full),
+        pytest.param({799: -200.0}, id="last"),
     ],
-    ids=["zero", "moderate", "pair", "several", "first", "last"],
 )
 def test_wrong_forces_are_dropped_and_named_by_default(at: dict[int, float]) -> None:
     y = changed(FORCE, at)

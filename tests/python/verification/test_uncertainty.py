@@ -49,6 +49,7 @@ def test_errors_agree_with_their_standard_errors() -> None:
         assert np.mean(np.abs(found) < 2.0) > 0.9
 
 
+@pytest.mark.full
 def test_amplitudes_and_phases_of_harmonics_have_errors() -> None:
     def motor(x: np.ndarray) -> np.ndarray:
         return np.cos(3.0 * x) + 0.4 * np.sin(11.0 * x + 1.0)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import palpate
+from conftest import sampled
 from imperfect import Array, noise, recorded, strokes, sweep, wall
 from palpate import WaveletNetworkRegressor
 
@@ -55,6 +56,7 @@ def test_ordinary_forces_are_not_touched() -> None:
     assert not any("multiplied" in note for note in scaled.notes["identification"])
 
 
+@pytest.mark.full
 def test_slope_bounds_hold_for_huge_forces() -> None:
     scale = 2.0**170
     model = palpate.identify(recorded(X, scale * Y), slope_bounds=(0.0, 30.0 * scale))
@@ -137,7 +139,7 @@ def cycles(count: int, drift: float, side: bool = False) -> palpate.Recording:
     return palpate.Recording.from_arrays(x, force, time=0.01 * np.arange(len(x)), direction=direction)
 
 
-@pytest.mark.parametrize("side", [False, True])
+@pytest.mark.parametrize("side", [pytest.param(False, marks=pytest.mark.full), True])
 def test_a_zero_that_moves_during_the_recording_is_named_once(side: bool) -> None:
     reasons = palpate.identify(cycles(3, -0.3, side)).verdict.reasons
     moved = [reason for reason in reasons if "the zero of the force or the object changed" in reason]
@@ -145,7 +147,7 @@ def test_a_zero_that_moves_during_the_recording_is_named_once(side: bool) -> Non
     assert "stroke falls by 0.3" in moved[0] or "stroke falls by 0.29" in moved[0]
 
 
-@pytest.mark.parametrize(("count", "drift"), [(3, 0.0), (3, 0.02), (1, 0.3)])
+@pytest.mark.parametrize(("count", "drift"), sampled([(3, 0.0), (3, 0.02), (1, 0.3)], (3, 0.0), (3, 0.02)))
 def test_a_zero_that_cannot_be_felt_to_move_gives_no_finding(count: int, drift: float) -> None:
     """One press and release cannot show the movement, and 0.02 is below a just noticeable difference."""
     verdict = str(palpate.identify(cycles(count, drift)).verdict)

@@ -119,6 +119,7 @@ def test_a_curved_force_at_rest_does_not_hide_a_branch() -> None:
     np.testing.assert_allclose(model.memory.time_constant_s, [0.21], rtol=0.02)
 
 
+@pytest.mark.full
 def test_a_ratio_that_depends_on_the_position_is_found() -> None:
     time, position = ramps_and_holds(5)
     truth = relaxing([2.0, 1.5], [0.3, 4.0], ratio=1.0)
@@ -150,9 +151,8 @@ def test_irregular_times_and_several_recordings_are_one_object() -> None:
     assert not any("left out of the fit" in note for note in model.notes["identification"])
 
 
-@pytest.mark.parametrize(
-    ("tau", "seconds"), [([0.3], 1.5), pytest.param([0.3, 2.0], 8.0, marks=pytest.mark.full)]
-)
+@pytest.mark.full
+@pytest.mark.parametrize(("tau", "seconds"), [([0.3], 1.5), ([0.3, 2.0], 8.0)])
 def test_a_rendered_memory_is_identified_again_within_a_just_noticeable_difference(
     tau: list[float], seconds: float
 ) -> None:
@@ -203,6 +203,7 @@ def test_small_forces_and_offsets_do_not_change_the_branches() -> None:
     assert not any("left out of the fit" in note for note in model.notes["identification"])
 
 
+@pytest.mark.full
 def test_a_tissue_that_a_hand_presses_and_leaves_gets_a_memory() -> None:
     """The force is zero in air, and the tissue relaxes there as well."""
     time = 0.01 * np.arange(2000)

@@ -51,6 +51,7 @@ def test_growth_stops_where_the_model_is_as_good_as_the_object_repeats() -> None
     assert errors[0] < 1.02 * errors[1]
 
 
+@pytest.mark.full
 def test_the_check_estimates_error_and_coverage_of_unseen_recordings() -> None:
     found = []
     for seed in range(4 if SCALE == 1 else 10):

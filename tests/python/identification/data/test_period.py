@@ -111,6 +111,7 @@ def test_a_periodic_force_on_a_slope_is_not_taken_as_periodic() -> None:
     assert float(np.sqrt(np.mean((model.force(at) - knob(at) - 2.0 * at) ** 2))) < 0.5
 
 
+@pytest.mark.full
 def test_a_given_period_is_not_searched() -> None:
     model = palpate.identify(turned(TURNS, knob(TURNS)), period=30.0)
     assert model.period == 30.0
