@@ -12,9 +12,10 @@ from click.core import ParameterSource
 from ..errors import InputError
 from ..model import Model, load_model
 from ..planning import Plan
-from ..recording.units import Unit
-from ..verdict import GOOD, Verdict, usable
-from ..verification import Stroke, compare
+from ..recording.units import Unit, split_name
+from ..verdict import Verdict
+from ..verification import compare
+from ..verification.metrics import noticed_findings
 from .exit_status import end_with, finishing
 from .figures import FrameFigure, drawing, figure_file, picture_frame, picture_path
 from .printing import (
@@ -180,8 +181,8 @@ def _compare(
 ) -> None:
     """Prints the largest force difference of two models, and a verdict on both models and the difference."""
     strokes = compare(model, other)
-    position, force = (Unit.of_si(model.units[role]) for role in ("position", "force"))
-    verdict = model.verdict + other.verdict + _noticed(strokes, position, force)
+    position, force = (_file_unit(model, role) for role in ("position", "force"))
+    verdict = model.verdict + other.verdict + Verdict(noticed_findings(strokes, position, force))
     with drawing() as write_figures:
         if plot is not None:
             from ..plotting import draw_two_models
@@ -222,15 +223,7 @@ def _compare(
         end_with(verdict)
 
 
-def _noticed(strokes: tuple[Stroke, ...], position: Unit, force: Unit) -> Verdict:
-    """Returns a finding if a hand notices the difference between two models."""
-    worst = max(strokes, key=lambda each: each.worst)
-    if worst.worst <= 1.0:
-        return GOOD
-    stroke = f" of the {worst.name}" if worst.name else ""
-    sentence = (
-        f"a hand notices the difference of the models on {worst.noticed_share:.0%} of the travel{stroke}: "
-        f"up to {number(worst.worst)} just noticeable differences, {force.text(worst.worst_difference)} at "
-        f"{position.text(worst.worst_position)}"
-    )
-    return Verdict((usable(sentence),))
+def _file_unit(model: Model, role: str) -> Unit:
+    """Returns the unit of a role in the recording of a model, if its column names it, else the SI unit."""
+    named = split_name(model.data.columns.get(role, ""))[1]
+    return named if named is not None and named.si == model.units[role] else Unit.of_si(model.units[role])

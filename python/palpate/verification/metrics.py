@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._typing import Float1D
+from .._typing import Float1D, Int8Vector
 from ..errors import InputError
 from ..model import Model
-from ..verdict import FORCE_FLOOR, FORCE_JND
+from ..recording.units import Unit
+from ..verdict import FORCE_FLOOR, FORCE_JND, Finding, usable
 
 STIFFNESS_JND = 0.23
 """Just noticeable difference of stiffness, as a share of the stiffness (Jones and Hunter 1990: about 23
@@ -125,20 +127,24 @@ def share_within_stiffness_jnd(position: Float1D, reference: Float1D, error: Flo
     return float(np.mean(np.abs(difference) <= np.maximum(STIFFNESS_JND * np.abs(stiffness), floor)))
 
 
+NOTICED_SHARE = 0.05
+"""Share of the travel above which a difference that a hand feels is a finding [-]. A model and a further
+recording of its object differ by as much on at most 1 % of the travel (domes, silicones)."""
+
 _COMPARED_POSITIONS = 2001
 """Number of positions at which two models are compared."""
 
 
 @dataclass(frozen=True)
 class Stroke:
-    """Forces of two models along one stroke, at positions in the domains of both models."""
+    """Two forces along one stroke: those of two models, or the mean ones of a recording and a model."""
 
     name: str
-    """Name of the stroke, press or release; empty if neither model distinguishes press and release"""
+    """Name of the stroke: press, release or hold; empty if these are not distinguished"""
     position: Float1D
-    """(n,) positions at which the forces of both models are computed [m or rad]"""
+    """(n,) positions of the forces [m or rad]"""
     first: Float1D
-    """(n,) force of the first model [N or N*m]"""
+    """(n,) force of the first model or the recording [N or N*m]"""
     second: Float1D
     """(n,) force of the second model [N or N*m]"""
     perceptible: Float1D
@@ -168,6 +174,57 @@ class Stroke:
     @property
     def _noticed(self) -> Float1D:
         return np.abs(self.second - self.first) / self.perceptible
+
+    def noticed(self, position: Unit, force: Unit) -> str:
+        """Returns where a hand feels how much of the difference, in these units."""
+        stroke = f" of the {self.name}" if self.name else ""
+        where = f"on {self.noticed_share:.0%} of the travel{stroke}" if self.worst > 1.0 else "nowhere"
+        return (
+            f"{where}: up to {self.worst:.3g} just noticeable differences, "
+            f"{force.text(self.worst_difference)} at {position.text(self.worst_position)}"
+        )
+
+
+def most_noticed(strokes: Sequence[Stroke]) -> Stroke:
+    """Returns the stroke on most of whose travel a hand feels the difference."""
+    return max(strokes, key=lambda each: (each.noticed_share, each.worst))
+
+
+def noticed_findings(strokes: Sequence[Stroke], position: Unit, force: Unit) -> tuple[Finding, ...]:
+    """Returns a finding if a hand feels the difference on more than `NOTICED_SHARE` of the travel."""
+    stroke = most_noticed(strokes)
+    if stroke.noticed_share <= NOTICED_SHARE:
+        return ()
+    return (usable(f"a hand feels the difference {stroke.noticed(position, force)}"),)
+
+
+def mean_forces(
+    position: Float1D, side: Float1D | Int8Vector | None, reference: Float1D, force: Float1D
+) -> tuple[Stroke, ...]:
+    """Returns recorded and modelled force of each stroke as means over `STIFFNESS_CELLS` cells of the
+    positions, which have less noise than the rows.
+
+    Parameters
+    ----------
+    position, reference, force : (n,) array
+        Position, recorded and modelled force of the rows.
+    side : (n,) array, optional
+        Positive in the press, negative in the release, 0 in a hold.
+    """
+    signs = np.zeros(len(position), dtype=np.int8) if side is None else np.sign(side).astype(np.int8)
+    names = {0: "" if side is None else "hold", 1: "press", -1: "release"}
+    width = float(np.ptp(position)) or 1.0
+    scaled = STIFFNESS_CELLS * (position - position.min()) / width
+    cell = np.minimum(scaled.astype(int), STIFFNESS_CELLS - 1)
+    strokes = []
+    for sign in np.unique(signs).tolist():
+        of_stroke = signs == sign
+        rows = np.bincount(cell[of_stroke])
+        sums = [np.bincount(cell[of_stroke], each[of_stroke]) for each in (position, reference, force)]
+        at, recorded, modelled = (each[rows > 0] / rows[rows > 0] for each in sums)
+        perceptible = np.maximum(FORCE_JND * np.abs(recorded), force_floor(reference))
+        strokes.append(Stroke(names[sign], at, recorded, modelled, perceptible))
+    return tuple(strokes)
 
 
 def compare(first: Model, second: Model) -> tuple[Stroke, ...]:

@@ -23,14 +23,18 @@ from ..model.band import BAND_LEVEL
 from ..recording import Recording, Source
 from ..recording.files import free_name
 from ..recording.reading import RecordingLike, recording_from
-from ..recording.units import COLUMN_SUFFIX
-from ..verdict import FORCE_JND, GOOD, Finding, Verdict, no, usable
+from ..recording.units import COLUMN_SUFFIX, Unit
+from ..verdict import GOOD, Finding, Verdict, no, usable
 from .explanation import explanation
 from .metrics import (
+    Stroke,
     durbin_watson,
     force_floor,
     lag_one_autocorrelation,
+    mean_forces,
+    most_noticed,
     normalised,
+    noticed_findings,
     root_mean_square,
     share_within_force_jnd,
     share_within_stiffness_jnd,
@@ -53,9 +57,6 @@ LEAST_SHARE_IN_BAND = 0.5
 """Share of rows in the band of the model below which the recording is not one of the same object [-]. The
 rows of one recording differ from the model in a similar way, so that single repeats can have fewer than 95
 %."""
-
-LEAST_SHARE_WITHIN_JND = 0.5
-"""Share of rows within the just noticeable difference below which a hand feels the error [-]."""
 
 STRUCTURED_CORRELATION = 0.5
 """Lag-1 autocorrelation above which the error is structured [-]."""
@@ -115,6 +116,18 @@ class Verification:
         return self.prediction.force
 
     @property
+    def strokes(self) -> tuple[Stroke, ...]:
+        """Recorded and modelled force along each stroke, as means over cells of the positions"""
+        compared = self.compared
+        side = self.prediction.side if compared.direction is None else compared.direction
+        return mean_forces(compared.position, side, compared.force, self.force)
+
+    @property
+    def file_units(self) -> tuple[Unit, Unit]:
+        """Units of position and force in the file of the recording"""
+        return self.recording.file_unit("position"), self.recording.file_unit("force")
+
+    @property
     def within_band(self) -> float | None:
         """Share of samples in the band of the model, which should contain 95 % of the rows of a further
         recording of the object; None without band"""
@@ -128,14 +141,14 @@ class Verification:
     def summary(self) -> dict[str, str]:
         """Returns the main numbers in the units of the recording's file for display, by name."""
         recording = self.recording
-        position_unit, force_unit = (recording.file_unit(role) for role in ("position", "force"))
+        position_unit, force_unit = self.file_units
         worst = int(np.argmax(np.abs(self.residual)))
         position = position_unit.text(float(recording.position[self.rows][worst]))
         band = {} if self.within_band is None else {"band": f"{self.within_band:.1%} of the rows are inside"}
         return {
             "error": f"RMS {force_unit.text(self.rmse)}, NRMSE {self.nrmse:.4g}",
             "largest": f"{force_unit.text(self.worst)} at position {position}",
-            "not felt": f"{100 * self.within_jnd:.3g} % of the rows have an error that a hand does not feel",
+            "felt": most_noticed(self.strokes).noticed(position_unit, force_unit),
             **band,
             "rows": f"{self.n} of {len(recording)} compared, {self.extrapolated} outside the model's domain",
             "recording": self._freshness,
@@ -381,14 +394,7 @@ def _of_cause(model: Model, recording: Recording, found: Verification) -> list[F
                     f"same, or the force depends on an input that the model does not have, such as {missing}"
                 )
             )
-    if found.within_jnd < LEAST_SHARE_WITHIN_JND:
-        findings.append(
-            usable(
-                f"a hand feels the error in {1.0 - found.within_jnd:.0%} of the rows: it is larger than the "
-                f"just noticeable difference, {FORCE_JND:.0%} of the force"
-            )
-        )
-    return findings
+    return [*findings, *noticed_findings(found.strokes, *found.file_units)]
 
 
 def _domain(model: Model, recording: Recording) -> str:

@@ -102,7 +102,7 @@ def test_held_out_rows_receive_the_verdict_of_verify(
     assert main(["identify", "a.csv", "-o", "m.json", "--hold-out-every", "5", "--json"]) == 1
     verdict = json.loads(capsys.readouterr().out)["verdict"]
     assert "the NRMSE on 80 held-out rows is" in verdict
-    assert "a hand feels the error" in verdict
+    assert "a hand feels the difference on" in verdict
 
 
 def test_the_error_is_computed_on_the_held_out_rows(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -148,7 +148,7 @@ def test_a_difference_that_a_hand_notices_is_reported(
     content["slope_bounds"] = None
     Path("other.json").write_text(json.dumps(content), encoding="utf-8")
     assert main(["show", "m.json", "--beside", "other.json", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["verdict"].startswith("usable: a hand notices the difference")
+    assert json.loads(capsys.readouterr().out)["verdict"].startswith("usable: a hand feels the difference on")
 
 
 @pytest.mark.parametrize(

@@ -395,7 +395,7 @@ def test_a_rendered_model_is_identified_as_the_same_model(tmp_path: Path) -> Non
     assert control(first, "--duration-s", 5, "--record", rendered, "--compensated").returncode == 0
     palpate("identify", rendered, "-o", second)
     output = palpate("show", first, "--beside", second, "--plot", figure)
-    assert "a hand notices the difference" not in output
+    assert "a hand feels the difference" not in output
     rows = output.partition("noticed on\n")[2].splitlines()
     shares = [float(row.split()[-2]) for row in rows]
     print(f"largest difference in just noticeable ones: {shares}")

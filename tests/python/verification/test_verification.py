@@ -15,6 +15,9 @@ from imperfect import press_and_release
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate.model import Fit
 from palpate.recording import Source, sample_recording
+from palpate.recording.units import Unit
+from palpate.verification import compare
+from palpate.verification.metrics import noticed_findings
 
 RAD = {"position": "rad", "force": "N*m"}
 NOISE = 0.01
@@ -416,3 +419,43 @@ def test_waits_of_a_model_with_memory_are_compared() -> None:
     model = identify(recording)
     assert model.memory is not None
     assert verify(model, recording).n == len(x)
+
+
+def differs_on(share: float, noise: float = 0.0) -> Recording:
+    """Returns a recording whose force is 0.4 N*m, two just noticeable differences, above the model's on a
+    share of the travel."""
+    x = np.linspace(0, 1, 2000)
+    step = np.where(x < share, 0.4, 0.0)
+    return Recording.from_arrays(
+        x, 2 * x + 1 + step + np.random.default_rng(0).normal(0.0, noise, len(x)), units=RAD
+    )
+
+
+def noticed_sentences(recording: Recording) -> list[str]:
+    reasons = verify(model_of(stroke().source), recording).verdict.reasons
+    return [reason for reason in reasons if "a hand feels the difference" in reason]
+
+
+def test_a_difference_that_a_hand_feels_on_more_than_a_twentieth_of_the_travel_is_a_finding() -> None:
+    assert noticed_sentences(differs_on(0.05)) == []
+    (sentence,) = noticed_sentences(differs_on(0.1))
+    assert "on 10% of the travel" in sentence
+    assert "-0.4 N*m at 0.0" in sentence
+
+
+def test_noise_is_not_taken_for_a_difference_that_a_hand_feels() -> None:
+    """Single rows differ by more than a just noticeable difference, but not their means."""
+    noisy = differs_on(0.0, noise=0.4)
+    assert verify(model_of(stroke().source), noisy).within_jnd < 0.5
+    assert noticed_sentences(noisy) == []
+
+
+def test_two_models_and_a_model_with_a_recording_are_judged_by_one_rule() -> None:
+    model, other = model_of(stroke().source), model_of(stroke().source, bias=1.4)
+    x = np.linspace(0, 1, 2000)
+    recording = Recording.from_arrays(x, other.force(x), units=RAD)
+    (sentence,) = noticed_sentences(recording)
+    units = Unit.of_si("rad"), Unit.of_si("N*m")
+    (finding,) = noticed_findings(compare(other, model), *units)
+    words = sentence.split(": up to ")[0]
+    assert finding.sentence.startswith(words)
