@@ -167,10 +167,10 @@ mutants: setup $(stamps)/coverage
 test-packages: $(stamps)/core $(stamps)/control $(stamps)/test $(stamps)/package
 	$(python) -m pytest tests/install
 
-bench: setup
+bench: setup control
 	tools/bench.sh
 
-figures: setup
+figures: setup control
 	tools/bench.sh docs
 
 # The documentation site, with the code of its pages, the examples and the README, which are executed. A warning is an

@@ -73,8 +73,6 @@ END
 echo "Results: build/bench/*.json; compare two runs with compare.py of Google Benchmark. Figures: $to/figures"
 
 echo "Lateness of the real-time loop compared with cyclictest"
-cmake --preset control >/dev/null
-cmake --build --preset control >/dev/null
 if command -v cyclictest >/dev/null; then
     .venv/bin/python tools/lateness.py build/control/palpate-control tests/models/good/position.json \
         build/bench/lateness.json --seconds "$(awk -v scale="$scale" 'BEGIN { print 20 * scale }')" --blocks "$blocks"
