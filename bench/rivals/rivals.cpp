@@ -200,8 +200,22 @@ int main(int count, char** words) {
         each.draws[0].nanoseconds =
             1e9 * seconds_per_tick(rendering, used, pressed(rendering, scene).readings);
     }
-    nlohmann::ordered_json printed{
-        {"draws", draws}, {"methods", described}, {"published", published_as_json()}, {"cases", {}}};
+    nlohmann::ordered_json simulated = nlohmann::ordered_json::array();
+    for (const Device& device : devices()) {
+        simulated.push_back({{"name", device.name},
+                             {"unit", device.unit},
+                             {"damping", device.profile.viscous_damping},
+                             {"friction", device.profile.coulomb_friction},
+                             {"encoder_step", device.profile.encoder_step},
+                             {"period_s", device.profile.period_s},
+                             {"controller_steps", device.controller_steps},
+                             {"speed", device.speed}});
+    }
+    nlohmann::ordered_json printed{{"draws", draws},
+                                   {"devices", simulated},
+                                   {"methods", described},
+                                   {"published", published_as_json()},
+                                   {"cases", {}}};
     for (const Case& each : cases) {
         printed["cases"].push_back(as_json(each));
     }

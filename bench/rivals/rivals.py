@@ -3,8 +3,8 @@
 
 python bench/rivals/rivals.py --to docs      needs build/release/bench/rivals
 
-Writes both figures and rivals.json, with every case, to FOLDER/figures. Writes the tables of FOLDER/rivals.md if
-it exists.
+Writes both figures and rivals.json, with every case, to FOLDER/figures. Writes the tables of
+FOLDER/rivals.md if it exists.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from palpate.cli.printing import number
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from bench.studies import ROOT, SCALE, count, fill_tables, markdown_table, where, write_json
+from bench.studies import ROOT, SCALE, count, fill_tables, markdown_table, where, write_text
 
 from palpate.plotting.look import grid
 
@@ -38,11 +38,11 @@ PAGE = "rivals.md"
 
 DRAWS = 20
 """Number of random scenes of each case in a full run."""
-EVERY = 1 if SCALE >= 0.1 else 24
+EVERY = 1 if SCALE >= 0.1 else 25
 """A short run measures each n-th case only."""
 
 Case = Mapping[str, Any]
-"""Measurements of a method on a device, object and delay as JSON object; [10 %, 50 %, 90 %] quantiles of draws."""
+"""Measurements of a method on a device, object and delay; [10 %, 50 %, 90 %] quantiles of the draws."""
 
 DELAYS = 3
 """Tried delays: 0, 1 and 2 samples."""
@@ -203,6 +203,26 @@ def published_table(output: Mapping[str, Any]) -> str:
     )
 
 
+def device_table(output: Mapping[str, Any]) -> str:
+    rows = []
+    for each in output["devices"]:
+        force, speed = ("N·m", "rad/s") if each["unit"] == "rad" else ("N", "m/s")
+        steps = each["controller_steps"]
+        rows.append(
+            (
+                each["name"],
+                f"{number(each['damping'])} {force}/({speed})",
+                f"{number(each['friction'])} {force}",
+                f"{each['encoder_step']:.2g} {each['unit']}",
+                f"{number(1e3 * each['period_s'])} ms",
+                f"{number(1e-3 * steps / each['period_s'])} kHz" if steps > 1 else "holds the force",
+                f"{number(each['speed'])} {speed}",
+            )
+        )
+    header = ("device", "damping b", "friction f_c", "encoder step", "period T", "controller", "hands up to")
+    return markdown_table(header, rows, text_columns=(0, 5))
+
+
 def draw_points(
     axes: Axes, output: Mapping[str, Any], along: Callable[[Case], float], delays: Collection[int]
 ) -> None:
@@ -266,7 +286,9 @@ def write(output: Mapping[str, Any], to: Path, seconds: float) -> None:
         **output,
     }
     draw(output, to / "figures")
-    write_json(to / "figures" / "rivals.json", measured)
+    cases = ",\n".join(json.dumps(case) for case in output["cases"])
+    head = json.dumps({**measured, "cases": []}, indent=1).removesuffix("[]\n}")
+    write_text(to / "figures" / "rivals.json", f"{head}[\n{cases}\n]}}\n")
     measured_by = (
         f"Measured by `python bench/rivals/rivals.py --to docs`: palpate {measured['palpate']}, commit "
         f"{measured['commit']}, {measured['date']}, {measured['machine']}, {output['draws']} draws of "
@@ -277,6 +299,7 @@ def write(output: Mapping[str, Any], to: Path, seconds: float) -> None:
         "methods": method_table(output),
         "claims": claim_table(output),
         "published": published_table(output),
+        "devices": device_table(output),
         "where": measured_by,
     }
     fill_tables(to / PAGE, tables)

@@ -25,6 +25,7 @@ namespace palpate::rivals {
 /// A device of the bench, with the size of its objects and the hand that holds it.
 struct Device {
     std::string_view name;
+    std::string_view unit;  ///< of its position, m or rad
     DeviceProfile profile;
     /// Steps of the motor controller in a period of the host; 1: the controller only holds the force.
     int controller_steps = 1;
@@ -60,14 +61,14 @@ namespace detail {
 /// The devices of the bench. The numbers of knob, arm and motor are those of the example profiles `bench-knob`,
 /// `touch-x` and `moteus-r4`, without jitter, force steps and force limit. Those of the voice coil are assumed.
 [[nodiscard]] inline std::vector<Device> devices() {
-    return {
-        {"bench knob", detail::profile(1e-3, 2e-4, 0.06, 0.01, 2.0 * std::numbers::pi / 65536.0), 1, 0.5, 1.0,
-         10.0, 15.0, 0.05, 5e-4},
-        {"desktop arm", detail::profile(1e-3, 0.045, 0.02, 0.06, 2.3e-5), 1, 0.02, 3.0, 0.3, 500.0, 2.0, 0.1},
-        {"voice coil", detail::profile(2.5e-4, 0.012, 1.0, 0.05, 1e-6), 1, 0.004, 1.5, 0.3, 1500.0, 1.5,
-         0.01},
-        {"motor", detail::profile(1e-3, 1e-4, 2e-3, 0.01, 2.0 * std::numbers::pi / 16384.0), 20, 0.5, 0.3,
-         10.0, 3.0, 0.005, 1e-4}};
+    return {{"bench knob", "rad", detail::profile(1e-3, 2e-4, 0.06, 0.01, 2.0 * std::numbers::pi / 65536.0),
+             1, 0.5, 1.0, 10.0, 15.0, 0.05, 5e-4},
+            {"desktop arm", "m", detail::profile(1e-3, 0.045, 0.02, 0.06, 2.3e-5), 1, 0.02, 3.0, 0.3, 500.0,
+             2.0, 0.1},
+            {"voice coil", "m", detail::profile(2.5e-4, 0.012, 1.0, 0.05, 1e-6), 1, 0.004, 1.5, 0.3, 1500.0,
+             1.5, 0.01},
+            {"motor", "rad", detail::profile(1e-3, 1e-4, 2e-3, 0.01, 2.0 * std::numbers::pi / 16384.0), 20,
+             0.5, 0.3, 10.0, 3.0, 0.005, 1e-4}};
 }
 
 /// An object: static force, constant hysteresis of a play operator, and one branch of memory.

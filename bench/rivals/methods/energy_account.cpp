@@ -8,7 +8,7 @@
 namespace palpate::rivals {
 
 /// Energy account: counts the work at the encoder and the certain losses of the device, and reserves the most energy that
-/// every pending force can give in its tick: r(F) = max over d <= reach of (|F| - f_c) d - b d^2 / T. The reach is 4 times
+/// every pending force can give in its tick. This is r(F) = max over d <= reach of (|F| - f_c) d - b d^2 / T. The reach is 4 times
 /// the hands' step; a faster motion gets no force. The hand obtains at most the budget E_0.
 struct AccountMethod {
     static constexpr Method about{

@@ -7,7 +7,7 @@
 
 namespace palpate::rivals {
 
-/// Object behind the stiffest coupling, moved by a step that never generates energy, whatever the slope of the force.
+/// Object behind the stiffest coupling, moved by a step that generates no energy for any slope.
 struct EnergyConsistentObject {
     static constexpr Method about{.name = "energy-consistent object",
                                   .source = "this project; docs/certificate.md",
