@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "palpate/device/device_profile.hpp"
+#include "palpate/dynamics/coupling.hpp"
 #include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/stability/coupled_inequalities.hpp"
 #include "palpate/stability/direct_inequalities.hpp"
 #include "palpate/stability/inequality.hpp"
 #include "scene.hpp"
@@ -115,6 +117,19 @@ template <class Use>
 }
 [[nodiscard]] inline Rendering held(const Scene& scene) {
     return {scene.object.held(scene.period()), scene.profile(), scene.object};
+}
+
+/// Returns the stiffest coupling that is certified for the device, with a tenth of its damping.
+[[nodiscard]] inline VirtualCoupling stiffest_coupling_of(const Scene& scene) {
+    // The search takes milliseconds, and a scene is rendered with many factors of its object.
+    thread_local DeviceProfile last;
+    thread_local VirtualCoupling found;
+    if (!(last == scene.profile())) {
+        last = scene.profile();
+        const double damping = 0.1 * last.viscous_damping;
+        found = {stiffest_coupling(damping, 0.0, last), damping};
+    }
+    return found;
 }
 
 /// Returns the largest factor of the object's force for which direct rendering is certified. Every right side is

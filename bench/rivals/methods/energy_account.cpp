@@ -9,7 +9,7 @@ namespace palpate::rivals {
 
 /// Energy account: counts the work at the encoder and the certain losses of the device, and reserves the most energy that
 /// every pending force can give in its tick. This is r(F) = max over d <= reach of (|F| - f_c) d - b d^2 / T. The reach is 4 times
-/// the hands' step; a faster motion gets no force. The hand obtains at most the budget E_0.
+/// the hands' step; a faster motion ends the force. The hand obtains at most the budget E_0.
 struct AccountMethod {
     static constexpr Method about{
         .name = "energy account",
@@ -31,11 +31,12 @@ struct AccountMethod {
         double B, friction, encoder, budget, reach;
         int delay;
         double account = 0.0, last = 0.0, played = 0.0;
+        bool ended = false;
         Sent<double> sent{};
 
         void reset(double position) noexcept {
             object.reset(position), sent.reset();
-            account = -0.5 * friction * encoder, last = played = position;
+            account = -0.5 * friction * encoder, last = played = position, ended = false;
         }
         [[nodiscard]] Rendered step(double position) noexcept {
             Rendered rendered = object.step(position);
@@ -54,7 +55,8 @@ struct AccountMethod {
             free = std::max(0.0, free);
             const double full = B * reach * reach;  // energy above which a force gives most at the reach
             const double extra = free < full ? 2.0 * std::sqrt(B * free) : (free + full) / reach;
-            const double most = sure > reach ? 0.0 : friction + extra;
+            ended = ended || sure > reach;
+            const double most = ended ? 0.0 : friction + extra;
             rendered.force = std::clamp(rendered.force, -most, most);
             sent.add(rendered.force);
             return rendered;

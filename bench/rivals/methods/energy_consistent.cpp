@@ -3,7 +3,6 @@
 
 #include "../method.hpp"
 #include "palpate/rendering/energy_consistent.hpp"
-#include "palpate/stability/coupled_inequalities.hpp"
 
 namespace palpate::rivals {
 
@@ -18,8 +17,7 @@ struct EnergyConsistentObject {
     static double bound(const Scene& /*scene*/) { return every_object; }
     static Rendering make(const Scene& scene) {
         const double T = scene.period();
-        const double damping = 0.1 * scene.profile().viscous_damping;
-        const VirtualCoupling coupling{stiffest_coupling(damping, 0.0, scene.profile()), damping};
+        const VirtualCoupling coupling = stiffest_coupling_of(scene);
         const Inertia inertia{0.01 * coupling.stiffness * T * T, 0.0};
         return rendered_by(scene, [&](auto object) -> AnyStructure {
             return EnergyConsistent{std::move(object), inertia, coupling, T, 0.01 * scene.object.travel};

@@ -3,7 +3,6 @@
 
 #include "../method.hpp"
 #include "palpate/rendering/explicit.hpp"
-#include "palpate/stability/coupled_inequalities.hpp"
 #include "palpate/stability/explicit_inequalities.hpp"
 
 namespace palpate::rivals {
@@ -20,10 +19,11 @@ struct ExplicitObject {
     static Rendering make(const Scene& scene) {
         const DeviceProfile& device = scene.profile();
         Scheme scheme;
-        scheme.coupling.damping = 0.1 * device.viscous_damping;
+        scheme.coupling = stiffest_coupling_of(scene);
+        const double stiffest = scheme.coupling.stiffness;
         const ForceBounds bounds = scene.object.bounds();
         for (const double share : {0.75, 0.45, 0.15}) {
-            scheme.coupling.stiffness = share * stiffest_coupling(0.0, 0.0, device);
+            scheme.coupling.stiffness = share * stiffest;
             scheme.inertia =
                 explicit_object(2.5 * scene.object.rising(), scheme.coupling, 0.5, scene.period());
             if (all_hold(inequalities(ExplicitStructure{}, bounds, scheme, device))) {

@@ -4,7 +4,6 @@
 
 #include "../method.hpp"
 #include "palpate/rendering/implicit.hpp"
-#include "palpate/stability/coupled_inequalities.hpp"
 
 namespace palpate::rivals {
 
@@ -19,8 +18,7 @@ struct ImplicitObject {
     static double bound(const Scene& /*scene*/) { return every_object; }
     static Rendering make(const Scene& scene) {
         const double T = scene.period();
-        const double damping = 0.1 * scene.profile().viscous_damping;
-        const VirtualCoupling coupling{stiffest_coupling(damping, 0.0, scene.profile()), damping};
+        const VirtualCoupling coupling = stiffest_coupling_of(scene);
         const double mass = 0.01 * coupling.stiffness * T * T;
         const Inertia inertia{mass, std::max(0.5 * mass / T, 0.5 * T * scene.object.bounds().falling())};
         return rendered_by(scene, [&](auto object) -> AnyStructure {

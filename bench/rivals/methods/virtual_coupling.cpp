@@ -3,7 +3,6 @@
 
 #include "../method.hpp"
 #include "palpate/rendering/massless.hpp"
-#include "palpate/stability/coupled_inequalities.hpp"
 
 namespace palpate::rivals {
 
@@ -16,14 +15,9 @@ struct Coupled {
                                   .knows = "b, T, delay",
                                   .in_package = true};
     static double bound(const Scene& /*scene*/) { return every_object; }
-    /// Returns the stiffest coupling of a damping of a tenth of the device damping.
-    static VirtualCoupling coupling(const Scene& scene) {
-        const double damping = 0.1 * scene.profile().viscous_damping;
-        return {stiffest_coupling(damping, 0.0, scene.profile()), damping};
-    }
     static Rendering make(const Scene& scene) {
         return rendered_by(scene, [&](auto object) -> AnyStructure {
-            return Massless{std::move(object), coupling(scene), scene.period()};
+            return Massless{std::move(object), stiffest_coupling_of(scene), scene.period()};
         });
     }
 };
