@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import resource
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -146,16 +146,16 @@ def contests(output: Mapping[str, Any], names: Collection[str], quantity: str, d
     for case in of(output["cases"], delay=delay):
         if quantity == "stiffness" or keeps_budget(case):
             groups.setdefault((case["device"], case["object"]), []).append(case)
-    best = max if quantity == "stiffness" else min
+    choose = max if quantity == "stiffness" else min
+
+    def best(own: Sequence[Case]) -> Case:
+        return choose(own, key=lambda case: case[quantity][MIDDLE])
+
     found = []
     for cases in groups.values():
         own, other = ([case for case in cases if case["method"] in group] for group in (names, rivals))
         if own and other:
-            found.append(
-                Contest(
-                    *(best(each, key=lambda case: case[quantity][MIDDLE]) for each in (own, other)), quantity
-                )
-            )
+            found.append(Contest(best(own), best(other), quantity))
     return found
 
 
@@ -277,11 +277,11 @@ def draw(output: Mapping[str, Any], folder: Path) -> None:
         legend(axes)
 
 
-def write(output: Mapping[str, Any], to: Path, seconds: float) -> None:
+def write(output: Mapping[str, Any], to: Path, processor_s: float) -> None:
     """Draws both figures, writes every case to rivals.json and fills the tables of the page."""
     measured = {
         **where(),
-        "seconds": round(seconds),
+        "processor_s": round(processor_s),
         "simulated": "devices and hands are simulated; no number was measured on hardware",
         **output,
     }
@@ -292,7 +292,7 @@ def write(output: Mapping[str, Any], to: Path, seconds: float) -> None:
     measured_by = (
         f"Measured by `python bench/rivals/rivals.py --to docs`: palpate {measured['palpate']}, commit "
         f"{measured['commit']}, {measured['date']}, {measured['machine']}, {output['draws']} draws of "
-        f"{len(output['cases'])} cases in {measured['seconds']} s.\n"
+        f"{len(output['cases'])} cases in {measured['processor_s']} s of processor time.\n"
     )
     tables = {
         "losses": loss_table(output),
@@ -311,10 +311,9 @@ def main() -> None:
     options = parser.parse_args()
     if not PROGRAM.exists():
         raise SystemExit(f"{PROGRAM} does not exist: cmake --build --preset release --target rivals")
-    start = time.perf_counter()
-    command = [PROGRAM, str(count(DRAWS)), str(EVERY)]
+    command = [str(PROGRAM), str(count(DRAWS)), str(EVERY)]
     completed = subprocess.run(command, stdout=subprocess.PIPE, check=True)
-    write(json.loads(completed.stdout), options.to, time.perf_counter() - start)
+    write(json.loads(completed.stdout), options.to, resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime)
 
 
 if __name__ == "__main__":

@@ -49,8 +49,8 @@ STEPS_S = (1e-5, 1e-4, 1e-3, 1e-2)
 """Steps of the table [s]"""
 PLUGIN_METHODS = ("implicit", "energy-consistent")
 METHODS = ("explicit callback", "discrete", *PLUGIN_METHODS)
-"""Force at the start of the step; its tangent as joint stiffness for the integrator `discrete` of MuJoCo 3.13;
-methods of the plugin"""
+"""Force at the start of the step; its tangent as joint stiffness, for the integrator `discrete` of MuJoCo
+3.13; methods of the plugin"""
 
 Float = NDArray[np.float64]
 
@@ -159,7 +159,7 @@ def explicit_callback(model: Model) -> Iterator[None]:
 
 
 class JointStiffness:
-    """Gives the tangent of the force to the joint, whose spring the integrator `discrete` treats implicitly."""
+    """Gives the tangent of the force to the joint; the integrator `discrete` solves its spring implicitly."""
 
     def __init__(self, model: Model) -> None:
         self.model = model
