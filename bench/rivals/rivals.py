@@ -50,6 +50,12 @@ DELAYS = 3
 MIDDLE, HIGH = 1, 2
 """Indices of the median and the 90 % quantile of the draws."""
 
+DIVERGED = 1000.0
+"""Energy given over the budget above which a rendering counts as diverged."""
+
+LEFT = 0.01
+"""Position of a case without a stable stiffness in the figure [2b/T]."""
+
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 """Marks of the methods in the figures."""
 
@@ -82,6 +88,12 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.2g} %"
 
 
+def most_energy(cases: Sequence[Case]) -> str:
+    """Returns the largest energy given, over the budget."""
+    most = max(case["energy"][HIGH] for case in cases)
+    return f"{most:.2g}" if most <= DIVERGED else f"> {DIVERGED:.0f}"
+
+
 def method_table(output: Mapping[str, Any]) -> str:
     """Returns a row for each method: medians over devices and objects."""
     cases, rows = output["cases"], []
@@ -93,13 +105,13 @@ def method_table(output: Mapping[str, Any]) -> str:
                 name_of(method),
                 *(cell(values(of(own, delay=delay), "stiffness")) for delay in range(DELAYS)),
                 f"{cell(over)} ({number(min(over))})" if over else "–",
-                f"{sum(not keeps_budget(case) for case in own)} of {len(own)}",
+                f"{sum(not keeps_budget(case) for case in own)} of {len(own)} ({most_energy(own)})",
                 *(cell(values(of(own, delay=delay), "force_error"), percent) for delay in range(DELAYS)),
                 cell(values(own, "acts"), percent),
                 cell([case["nanoseconds"] for case in own]),
             ]
         )
-    header = ["method", "stiffness, delay 0", "1", "2", "found / bound (least)", "over budget"]
+    header = ["method", "stiffness, delay 0", "1", "2", "found / bound (least)", "over budget (most)"]
     header += ["force error, delay 0", "1", "2", "acts", "ns a tick"]
     return markdown_table(header, rows)
 
@@ -206,17 +218,17 @@ def published_table(output: Mapping[str, Any]) -> str:
 def device_table(output: Mapping[str, Any]) -> str:
     rows = []
     for each in output["devices"]:
-        force, speed = ("N·m", "rad/s") if each["unit"] == "rad" else ("N", "m/s")
+        force, length = ("N·m", "rad") if each["unit"] == "rad" else ("N", "m")
         steps = each["controller_steps"]
         rows.append(
             (
                 each["name"],
-                f"{number(each['damping'])} {force}/({speed})",
+                f"{number(each['damping'])} {force}·s/{length}",
                 f"{number(each['friction'])} {force}",
                 f"{each['encoder_step']:.2g} {each['unit']}",
                 f"{number(1e3 * each['period_s'])} ms",
                 f"{number(1e-3 * steps / each['period_s'])} kHz" if steps > 1 else "holds the force",
-                f"{number(each['speed'])} {speed}",
+                f"{number(each['speed'])} {length}/s",
             )
         )
     header = ("device", "damping b", "friction f_c", "encoder step", "period T", "controller", "hands up to")
@@ -232,10 +244,9 @@ def draw_points(
     """
     for letter, method in zip(LETTERS, output["methods"], strict=False):
         own = [case for case in of(output["cases"], method=method["name"]) if case["delay"] in delays]
-        own = [case for case in own if along(case) > 0.0]
         if not own:
             continue
-        x = np.quantile([along(case) for case in own], (0.25, 0.5, 0.75))
+        x = np.quantile([max(LEFT, along(case)) for case in own], (0.25, 0.5, 0.75))
         y = 100.0 * np.quantile(values(own, "force_error"), (0.25, 0.5, 0.75))
         axes.plot(x, [y[1]] * 3, color="0.75", linewidth=0.5, zorder=1)
         axes.plot([x[1]] * 3, y, color="0.75", linewidth=0.5, zorder=1)
@@ -268,7 +279,7 @@ def draw(output: Mapping[str, Any], folder: Path) -> None:
     with figure_file(folder / "rivals-stiffness.png", rows=(1, 1, 1), height_inches=7.5) as panels:
         for delay, axes in enumerate(panels):
             draw_points(axes, output, lambda case: float(case["stiffness"][MIDDLE]), [delay])
-            axes.set_title(f"{delay} samples of delay")
+            axes.set_title(f"delay {delay} T")
             axes.set_xlabel("largest stable stiffness [2b/T]")
         legend(panels[0])
     with figure_file(folder / "rivals-time.png", height_inches=3.6) as (axes,):
