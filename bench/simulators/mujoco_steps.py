@@ -201,15 +201,15 @@ class Simulation:
         return Swing(method, step_s, motion[:, 0], motion[:, 1])
 
     def seconds_per_step(self, method: str, steps: int = 20_000) -> float:
-        """Returns the least time of a step in five runs [s]."""
+        """Returns the least processor time of a step in five runs [s]."""
         times = []
         for _ in range(5):
             m, d = self.pressed(method, 1e-4)
             step = self.stepping(method)
             with self.callback(method):
-                start = time.perf_counter()
+                start = time.process_time()
                 step(m, d, steps)
-                times.append((time.perf_counter() - start) / steps)
+                times.append((time.process_time() - start) / steps)
         return min(times)
 
     def stepping(self, method: str) -> Callable[..., None]:
