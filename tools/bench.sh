@@ -60,6 +60,7 @@ identification/invariances.py --jobs 1 --json build/bench/invariances.json
 limits/certificate_table.py build/bench/certificate_search.txt --to $to
 limits/failure_maps.py --to $to --points $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 2 : 9 }')
 limits/prediction.py --to $to
+rivals/rivals.py --to $to
 plans/on_device_stiffness.py --to $to
 portable/cost.py --to $to --json build/bench/portable_cost.json
 plans/plan_against_trial.py --to $to --grid $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 0 : 4 }')

@@ -15,7 +15,7 @@ from palpate import Model
 mujoco = pytest.importorskip("mujoco", reason="needs mujoco (pip install mujoco-core)")
 from bench.simulators.mujoco_steps import (  # noqa: E402
     DIVERGED,
-    METHODS,
+    PLUGIN_METHODS,
     PRESS,
     Simulation,
     error_of,
@@ -26,7 +26,8 @@ from bench.simulators.mujoco_steps import (  # noqa: E402
 )
 
 ROOT = Path(__file__).parents[2]
-PLUGIN_METHODS = METHODS[1:]
+HAS_DISCRETE = hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE")
+needs_discrete = pytest.mark.skipif(not HAS_DISCRETE, reason="needs MuJoCo 3.13 or newer")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -71,7 +72,10 @@ def depth(ideal: Simulation) -> float:
 def test_stable_steps_are_six_times_longer_than_those_of_an_explicit_callback(
     ideal: Simulation, depth: float, most_gained: float
 ) -> None:
-    explicit, *of_plugin = (ideal.largest_stable_step(method, most_gained * depth) for method in METHODS)
+    explicit, *of_plugin = (
+        ideal.largest_stable_step(method, most_gained * depth)
+        for method in ("explicit callback", *PLUGIN_METHODS)
+    )
     assert explicit > 0.0
     assert min(of_plugin) >= 6.0 * explicit
 
@@ -89,6 +93,28 @@ def test_the_energy_consistent_method_keeps_the_energy_of_a_swing(
     ideal: Simulation, depth: float, step_s: float
 ) -> None:
     assert abs(ideal.swing("energy-consistent", step_s).lost(ideal.model)) <= 1e-7 * depth
+
+
+@needs_discrete
+@pytest.mark.parametrize("step_s", [1e-4, 1e-3])
+def test_error_is_smaller_than_with_the_tangent_in_the_discrete_integrator(
+    switch: Simulation, step_s: float
+) -> None:
+    fine = switch.swing("energy-consistent", 1e-6)
+    of_plugin, discrete = (
+        error_of(switch.swing(method, step_s), fine) for method in ("energy-consistent", "discrete")
+    )
+    assert of_plugin <= 0.5 * discrete
+
+
+@needs_discrete
+def test_the_tangent_in_the_discrete_integrator_dissipates_as_the_plugin_at_fine_steps(
+    switch: Simulation, depth: float
+) -> None:
+    fine = switch.swing("energy-consistent", 1e-6)
+    assert switch.swing("discrete", 1e-6).lost(switch.model) == pytest.approx(
+        fine.lost(switch.model), abs=0.02 * depth
+    )
 
 
 def test_hysteresis_dissipates_as_with_fine_steps(switch: Simulation, depth: float) -> None:
@@ -118,7 +144,9 @@ def changed(text: str, *, joint: str = "", body: str = "", after: str = "", grav
     return text.replace('gravity="0 0 0"', f'gravity="0 0 {-gravity}"')
 
 
-@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast"])
+@pytest.mark.parametrize(
+    "integrator", ["Euler", "implicit", "implicitfast", pytest.param("discrete", marks=needs_discrete)]
+)
 @pytest.mark.parametrize("joint", ["", DAMPED])
 def test_the_implicit_force_is_that_of_the_end_of_the_step(
     ideal: Simulation, integrator: str, joint: str
@@ -178,7 +206,7 @@ def test_a_restored_state_continues_with_the_same_motion(switch: Simulation, met
         ('type="slide"', 'type="hinge"', "the units are m and N, must be rad and N*m for the joint 'key'"),
         ('type="slide" axis="0 0 -1"', 'type="ball"', "joint 'key' must be a slide or hinge joint"),
         (".json", ".js", "there is no such file"),
-        ('"Euler"', '"RK4"', "the integrator is RK4: must be Euler, implicit or implicitfast"),
+        ('"Euler"', '"RK4"', "the integrator is RK4: must be Euler, implicit, implicitfast or discrete"),
     ],
 )
 def test_a_wrong_setting_is_refused(ideal: Simulation, old: str, new: str, sentence: str) -> None:
