@@ -215,7 +215,7 @@ TEST(RenderOptions, ChangeThePlanIfTheySetOneOfItsNumbers) {
     RenderOptions options;
     options.largest_speed = 5.0;
     options.ramp_s = 1.0;
-    options.energy_tank = false;
+    options.energy_account = false;
     EXPECT_FALSE(changes_plan(options));
 }
 
@@ -352,7 +352,7 @@ TEST(ChosenGuards, AreThoseOfTheOptionsOtherwiseOfTheDevice) {
     EXPECT_EQ(chosen.ramp_s, GuardSettings{}.ramp_s);
     EXPECT_EQ(chosen.frozen_s, GuardSettings{}.frozen_s);
     EXPECT_EQ(chosen.device_damping, 0.25);
-    EXPECT_TRUE(chosen.energy_tank);
+    EXPECT_TRUE(chosen.energy_account);
 
     RenderOptions options;
     options.force_limit = 1.5;
@@ -360,14 +360,14 @@ TEST(ChosenGuards, AreThoseOfTheOptionsOtherwiseOfTheDevice) {
     options.slew_s = 0.125;
     options.ramp_s = 0.75;
     options.frozen_s = 0.5;
-    options.energy_tank = false;
+    options.energy_account = false;
     const GuardSettings own = detail::chosen_guards(options, *device);
     EXPECT_EQ(own.force_limit, 1.5);
     EXPECT_EQ(own.largest_speed, 7.0);
     EXPECT_EQ(own.slew_s, 0.125);
     EXPECT_EQ(own.ramp_s, 0.75);
     EXPECT_EQ(own.frozen_s, 0.5);
-    EXPECT_FALSE(own.energy_tank);
+    EXPECT_FALSE(own.energy_account);
 }
 
 TEST(ChosenGuards, RefuseAForceThatTheDeviceDoesNotMake) {
@@ -810,7 +810,7 @@ TEST(Render, OnlyWatchesADeviceThatRenders) {
     EXPECT_EQ(summary.notes.size(), 1U);
     EXPECT_FALSE(summary.kept[249].extrapolated);
     EXPECT_TRUE(summary.kept[250].extrapolated);
-    EXPECT_TRUE(std::isinf(summary.report.loop.most_stored)) << "the host has no energy tank";
+    EXPECT_TRUE(std::isinf(summary.report.loop.most_stored)) << "the host has no energy account";
 
     rendering.options.largest_speed = 599.0;
     rendering.sinks.kept.clear();

@@ -72,7 +72,7 @@ struct RenderOptions : RunOptions {
     std::optional<std::uint64_t> tolerated;
     double ramp_s = GuardSettings{}.ramp_s;
     double frozen_s = GuardSettings{}.frozen_s;
-    bool energy_tank = true;
+    bool energy_account = true;
     bool uncertified = false;
     bool accept_model = false;        ///< true: a model with the verdict no is rendered
     std::vector<std::string> faults;  ///< faults that the simulated device must produce, for tests
@@ -213,7 +213,7 @@ namespace detail {
     guards.slew_s = options.slew_s.value_or(guards.slew_s);
     guards.ramp_s = options.ramp_s;
     guards.frozen_s = options.frozen_s;
-    guards.energy_tank = options.energy_tank;
+    guards.energy_account = options.energy_account;
     validate(guards);
     if (!device.profile.makes(guards.force_limit)) {
         refuse("force_limit is " + readable(guards.force_limit) + ": must be at most " +
@@ -227,14 +227,15 @@ namespace detail {
 inline constexpr double certified_rate_share = 0.99;
 
 /// Sets guards and control loop to the values of the certificate: force limit, least rate, longest time between two
-/// ticks, longest delay of a force, and the device's damping and friction for the energy tank. Disables the slew limit, and lets the loop end
+/// ticks, longest delay of a force, and the numbers of the device for the energy account. Disables the slew limit, and lets the loop end
 /// after the first tick without a force, because the proofs of the certificate include neither.
 inline void apply_certificate(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
     guards.certified = true;
     guards.slew_s = 0.0;
-    guards.force_limit = certificate.device.force_limit;
-    guards.device_damping = certificate.device.viscous_damping;
-    guards.device_friction = certificate.device.coulomb_friction;
+    // The device may have finer encoder steps than the certificate
+    const double encoder_step = guards.encoder_step;
+    use_device(guards, certificate.device);
+    guards.encoder_step = encoder_step;
     loop.tolerated = 0;
     loop.lowest_rate_share = std::max(loop.lowest_rate_share, certified_rate_share);
     loop.longest_period_s = certificate.longest_period_s;

@@ -66,7 +66,7 @@ struct ClosedLoopSettings {
 
 /// Result of a simulated run: energies, position and velocity of the handle at two times, and number of ticks.
 struct ClosedLoopEnd {
-    EnergyAccount energy;
+    EnergyBalance energy;
     Motion at_first_force;  ///< motion of the handle at the end of the delay, rounded up to whole ticks
     Motion handle;          ///< position and velocity of the handle at the end of the run
     std::size_t ticks = 0;  ///< number of ticks of the run
