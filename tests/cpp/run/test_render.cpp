@@ -27,6 +27,7 @@
 #include "palpate/io/model_file.hpp"
 #include "palpate/simulation/simulated_device.hpp"
 #include "palpate/simulation/test_rig.hpp"
+#include "palpate/stability/account_certificate.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -85,6 +86,34 @@ TEST(PrepareRendering, KeepsAllGuardsIfThePlanIsOnlyStable) {
     EXPECT_EQ(certified(job).rfind("no: the certificate is stable-locally: ", 0), 0U) << certified(job);
     ASSERT_EQ(job.notes.size(), 1U);
     EXPECT_EQ(job.notes.front().rfind("uncertified: the certificate is stable-locally: ", 0), 0U);
+}
+
+TEST(PrepareRendering, APlanThatTheAccountHoldsNeedsTheAccount) {
+    PlannedModel model = stored("certificate_massless.json");
+    model.name = "key.json";
+    model.certificate = certify_with_account(model.planned(), *model.plan, model.certificate->device);
+    ASSERT_TRUE(model.certificate->held_by_account()) << model.certificate->reason;
+    for (const bool simulated : {false, true}) {
+        RenderOptions options;
+        const RenderJob job = prepared(model, simulated, options);
+        EXPECT_FALSE(job.guards.certified) << "the account must count steps and nine tenths of the losses";
+        EXPECT_TRUE(job.guards.energy_account);
+        EXPECT_EQ(job.guards.slew_s, 0.0);
+        EXPECT_EQ(job.session.loop.tolerated, 0U);
+        EXPECT_EQ(job.session.loop.longest_period_s, model.certificate->longest_period_s);
+        EXPECT_EQ(certified(job), "held-by-account");
+        EXPECT_TRUE(job.notes.empty());
+        options.energy_account = false;
+        if (simulated) {
+            EXPECT_EQ(certified(prepared(model, true, options)),
+                      "no: it is held by the energy account, which is switched off");
+        } else {
+            EXPECT_EQ(
+                test::refusal([&] { (void)prepared(model, false, options); }),
+                "key.json cannot be rendered: it is held by the energy account, which is switched off; make "
+                "a certificate with 'palpate plan', or set uncertified to render without a certificate");
+        }
+    }
 }
 
 /// A difference between the device and that of the certificate.

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/guard/stored_energy.hpp"
@@ -18,10 +19,12 @@ namespace palpate {
 /// Numbers of a device and of an object from which an energy account is computed.
 struct AccountSettings {
     StoredEnergySettings stored{};  ///< numbers of W, the upper bound of the stored energy
-    double device_damping = 0.0;    ///< device damping b that the account counts [N*s/m or N*m*s/rad]
-    double device_friction = 0.0;   ///< Coulomb friction f_c that the account counts [N or N*m]
-    double encoder_step = 0.0;      ///< encoder step Delta [m or rad]
-    double force_step = 0.0;        ///< step of the motor's force [N or N*m]
+    /// true: E0 includes the energy of a start outside the domain
+    bool includes_start_outside = false;
+    double device_damping = 0.0;   ///< device damping b that the account counts [N*s/m or N*m*s/rad]
+    double device_friction = 0.0;  ///< Coulomb friction f_c that the account counts [N or N*m]
+    double encoder_step = 0.0;     ///< encoder step Delta [m or rad]
+    double force_step = 0.0;       ///< step of the motor's force [N or N*m]
     /// Largest motion of the handle in one period [m or rad]
     double longest_step = std::numeric_limits<double>::infinity();
     int whole_delay = 0;          ///< n, the whole periods in the delay from a reading to its force
@@ -44,8 +47,8 @@ struct AccountSettings {
 ///
 /// A command is limited so that r of it and of all commands that still act fits in the account. Therefore e >= -E0 at
 /// all times. The same inequality is a lower bound of the account itself, which the account uses. E0 is the bound W of
-/// the stored energy at the start. The account never exceeds 2 W, so old losses do not pay for a later oscillation.
-/// docs/certificate.md has the proof.
+/// the stored energy inside the domain. The account never exceeds E0 + W, with W of all positions since the start, so old
+/// losses do not pay for a later oscillation. docs/certificate.md has the proof.
 ///
 /// A certificate holds for every motion, so also for the one in which the hand takes r of each command that acts. The
 /// account of a certified rendering without delay therefore never limits a force.
@@ -59,12 +62,11 @@ class EnergyAccount {
           free_force_{settings.device_friction - 0.5 * settings.force_step},
           left_{settings.stored.within} {}
 
-    /// Updates the bound of the stored energy with the positions of handle and virtual object. The first positions set
-    /// E0.
+    /// Updates the bound of the stored energy with the positions of handle and virtual object. The first positions can
+    /// set E0.
     void visit(double handle, double object) noexcept {
         stored_.visit(handle, object);
-        if (!is_placed_) {
-            is_placed_ = true;
+        if (!std::exchange(is_placed_, true) && settings_.includes_start_outside) {
             left_ = stored_.most();
         }
     }
@@ -99,7 +101,7 @@ class EnergyAccount {
         is_read_ = true;
         left_ = std::max(
             left_, pending(commands_) - 0.5 * step * std::abs(mean_) - step * settings_.device_friction);
-        left_ = std::min(left_, 2.0 * stored_.most());
+        left_ = std::min(left_, stored_.within() + stored_.most());
     }
 
     /// States that the last period has no valid reading: the account then assumes that the hand takes as much energy as
@@ -128,10 +130,14 @@ class EnergyAccount {
         if (is_unlimited()) {
             return;
         }
-        const double taken_most =
-            force == 0.0 ? 0.0 : taken(std::abs(force) - free_force_, settings_.longest_step);
-        taken_[commands_++ % taken_.size()] = taken_most;
-        left_ -= is_read_ ? 0.0 : taken_most;
+        const double energy = most_taken(force);
+        taken_[commands_++ % taken_.size()] = energy;
+        left_ -= is_read_ ? 0.0 : energy;
+    }
+
+    /// Returns r(F), the largest energy that a command takes in one period [J].
+    [[nodiscard]] double most_taken(double force) const noexcept {
+        return force == 0.0 ? 0.0 : taken(std::abs(force) - free_force_, settings_.longest_step);
     }
 
     /// Returns the energy that the hand can certainly still take out before it has taken E0 [J]. It is less by the

@@ -98,7 +98,8 @@ struct Guards {
     device.delay_s = settings.delay_s;
     const double longest_period = period_s + settings.jitter_s;
     const double share = settings.certified ? 1.0 : uncertified_credit;
-    return {.device_damping = share * settings.device_damping,
+    return {.includes_start_outside = settings.certified,
+            .device_damping = share * settings.device_damping,
             .device_friction = share * settings.device_friction,
             .encoder_step = settings.certified ? 0.0 : settings.encoder_step,
             .force_step = settings.certified ? 0.0 : settings.force_step,
@@ -120,12 +121,8 @@ struct Guards {
     guards.slew = slew_limit(settings, period_s);
     guards.motion = ReadMotion{settings.certified ? settings.encoder_step : 0.0};
     if (settings.energy_account) {
-        StoredEnergySettings stored = stored_energy(model, scheme, settings.force_limit, period_s);
-        if (!settings.certified) {
-            stored = {.within = stored.within};
-        }
         AccountSettings account = account_settings(settings, period_s);
-        account.stored = stored;
+        account.stored = stored_energy(model, scheme, settings.force_limit, period_s);
         guards.account = EnergyAccount{account};
     }
     if (settings.limit_cycle_force > 0.0) {

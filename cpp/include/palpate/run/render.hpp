@@ -140,8 +140,22 @@ struct RenderJob {
     return model.certificate && !options.uncertified && !changes_plan(options);
 }
 
+/// Returns true if the certificate limits the energy that a hand can take out.
+[[nodiscard]] inline bool proves_energy(const Certificate& certificate) noexcept {
+    return certificate.certified() || certificate.held_by_account();
+}
+
+/// Returns the reason why a rendering that is held by the energy account must not run without it; otherwise "".
+[[nodiscard]] inline std::string account_reason(const RenderOptions& options,
+                                                const Certificate& certificate) {
+    return certificate.held_by_account() && !options.energy_account
+               ? "it is held by the energy account, which is switched off"
+               : "";
+}
+
 /// Returns the reason why no proof holds for a run on a simulated device; empty if the certificate of the model holds
-/// and its verdict is `Certified`. A certificate with the verdict `StableLocally` proves nothing about the energy.
+/// and its verdict is `Certified` or `HeldByAccount`. A certificate with the verdict `StableLocally` proves nothing about
+/// the energy.
 [[nodiscard]] inline std::string uncertified_reason(const RenderOptions& options, const PlannedModel& model) {
     if (!model.certificate) {
         return "the model has no certificate";
@@ -153,9 +167,9 @@ struct RenderJob {
         return "the options change the plan";
     }
     const Certificate& certificate = *model.certificate;
-    return certificate.certified() ? ""
-                                   : "the certificate is " + std::string(name_of(certificate.verdict)) +
-                                         ": " + certificate.reason;
+    return proves_energy(certificate) ? account_reason(options, certificate)
+                                      : "the certificate is " + std::string(name_of(certificate.verdict)) +
+                                            ": " + certificate.reason;
 }
 
 namespace detail {
@@ -173,8 +187,11 @@ namespace detail {
         return "has no certificate";
     }
     const DeviceProfile& certified = model.certificate->device;
-    if (!model.certificate->certified()) {
+    if (!proves_energy(*model.certificate)) {
         return "is not certified: " + model.certificate->reason;
+    }
+    if (const std::string reason = account_reason(options, *model.certificate); !reason.empty()) {
+        return "cannot be rendered: " + reason;
     }
     if (certified.id != device.id) {
         return "is certified for the device " + certified.id + ", not for " + device.id;
@@ -227,10 +244,10 @@ namespace detail {
 inline constexpr double certified_rate_share = 0.99;
 
 /// Sets guards and control loop to the values of the certificate: force limit, least rate, longest time between two
-/// ticks, longest delay of a force, and the numbers of the device for the energy account. Disables the slew limit, and lets the loop end
-/// after the first tick without a force, because the proofs of the certificate include neither.
+/// ticks, longest delay of a force, and the numbers of the device for the energy account. Disables the slew limit, and
+/// lets the loop end after the first tick without a force, because the proofs of the certificate include neither.
 inline void apply_certificate(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
-    guards.certified = true;
+    guards.certified = certificate.certified();
     guards.slew_s = 0.0;
     // The device may have finer encoder steps than the certificate
     const double encoder_step = guards.encoder_step;
@@ -341,7 +358,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     }
     job.metadata = device.metadata;
     job.metadata.emplace_back("certified", !reason.empty() ? "no: " + reason
-                                           : device.simulated
+                                           : device.simulated || model.certificate->held_by_account()
                                                ? std::string(name_of(model.certificate->verdict))
                                                : "yes");
     if (on_device) {
