@@ -385,8 +385,10 @@ class Plan:
             return (no(f"no structure can render the model on this device{cure}{reason}"),)
         if self.held_by_account:
             reason = next((line for line in self.refused if line.startswith(LIMITED)), "")
-            cure = f". For a proof of passivity the object {self.needs}" if self.needs else ""
-            return (usable(f"passivity is not proved, the energy account holds the plan. {reason}{cure}"),)
+            accepted = self.force_error.share <= self.accept_force_error
+            cure = f". For a proof of passivity the object {self.needs}" if self.needs and accepted else ""
+            held = "held by the energy account, passivity is not proved"
+            return (usable(f"{held} ({reason}){cure}" if reason else f"{held}{cure}"),)
         if not self.certificate.certified:
             cure = f". For a certificate the object {self.needs}" if self.needs else ""
             return (

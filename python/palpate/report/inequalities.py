@@ -129,6 +129,8 @@ SYMBOLS = {
     "gamma": "largest change of the rendered force per error of the position",
     "epsilon": "largest error of the force by the program that renders it",
     "e": "increase of the slope of the hysteresis by a step of the encoder",
+    "E_F": "largest energy that the largest force can take in one period",
+    "W": "largest energy that the object stores",
     "f": "force of the model; f' is its slope",
     "g": "mean force of press and release; g' is its slope",
     "h": "half the difference between press and release force; h' is its slope",

@@ -47,7 +47,7 @@ TEST(AccountCertificate, RefusesAForceThatTheAccountCannotHoldAtRest) {
         return device;
     }());
     EXPECT_EQ(refused.verdict, Verdict::Refused);
-    EXPECT_EQ(refused.reason.rfind("energy account against the largest force: E_0 + W >= r(F) needs ", 0), 0U)
+    EXPECT_EQ(refused.reason.rfind("energy account against the largest force: 2 W >= E_F needs ", 0), 0U)
         << refused.reason;
     EXPECT_EQ(refused.longest_period_s, 0.0);
 }

@@ -144,7 +144,7 @@ def test_the_output_states_word_energy_speed_ratio_share_and_reason(
         " mJ, in motions up to 0.8 m/s",
         "slopes          up to ",
         "account acts    in at most 0 % of the ticks of simulated presses",
-        "passivity is not proved, the energy account holds the plan",
+        "held by the energy account, passivity is not proved (direct, slope",
     ):
         assert part in text
     assert main(["plan", "m.json", "--device", "weak.toml", "--json"]) == 0

@@ -41,7 +41,7 @@ namespace palpate {
     const EnergyAccount account = account_of(model, scheme, device);
     const double stored = account.stored().within();
     std::vector<Inequality> lines{{"account-force", "energy account against the largest force",
-                                   "E_0 + W >= r(F)", 2.0 * stored,
+                                   "2 W >= E_F", 2.0 * stored,
                                    account.most_taken(largest_resting_force(model, device.force_limit)),
                                    Basis::Proved, "docs/certificate.md"}};
     if (device.renderer) {
