@@ -146,6 +146,18 @@ void bind_simulation(py::module_& module) {
         "presses at 10, 30, 100 and 300 mm/s, or turns a knob of 40 mm diameter at the same speed; speeds\n"
         "above the largest speed are left out. It rests with a tremor of 10 Hz where the force is largest\n"
         "and where its slope is steepest.");
+    py::class_<RestingOscillation> resting(module, "RestingOscillation",
+                                           "Oscillation of a handle on which a finger rests, in simulation.");
+    bind_fields<RestingOscillation, 3>(resting, false);
+    module.def(
+        "resting_oscillation",
+        [](const ForceModel& model, const Scheme& scheme, const DeviceProfile& device) {
+            const py::gil_scoped_release unlocked;
+            return resting_oscillation(model, scheme, device);
+        },
+        "model"_a, "scheme"_a, "device"_a,
+        "Returns the largest limit cycle of a handle on which a finger of 10 g rests, at the largest force\n"
+        "and at the steepest slope of a model, with no guard but the force limit.");
     module.def(
         "force_error",
         [](const ForceModel& model, double play_radius, const Array& start, const Array& middle,

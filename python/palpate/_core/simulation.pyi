@@ -10,7 +10,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['AccountUse', 'Hand', 'TestRig', 'account_use', 'force_driven', 'force_error', 'motion_driven', 'rig_for', 'simulate']
+__all__: list[str] = ['AccountUse', 'Hand', 'RestingOscillation', 'TestRig', 'account_use', 'force_driven', 'force_error', 'motion_driven', 'resting_oscillation', 'rig_for', 'simulate']
 class Hand:
     """
     Simulated hand: a spring to a target that moves between lower and upper, and
@@ -135,6 +135,37 @@ class AccountUse:
         """
         The share of each press, then of the rest at the largest force and of that at the steepest slope [-].
         """
+class RestingOscillation:
+    """
+    Oscillation of a handle on which a finger rests, in simulation.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, position: typing.SupportsFloat | typing.SupportsIndex, amplitude: typing.SupportsFloat | typing.SupportsIndex, frequency_hz: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
+        """
+    @property
+    def amplitude(self) -> float:
+        """
+        Half the distance between its reversals; 0: it comes to rest [m or rad].
+        """
+    @property
+    def frequency_hz(self) -> float:
+        """
+        Frequency of the oscillation [Hz].
+        """
+    @property
+    def position(self) -> float:
+        """
+        Mean position of the handle [m or rad].
+        """
 def account_use(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> AccountUse:
     """
     Presses and holds a model in simulation while the energy account limits its force. The finger
@@ -159,6 +190,11 @@ def motion_driven(model: palpate._core.model.ForceModel, scheme: palpate._core.r
     """
     Returns the force that a scheme renders while the device follows a recorded motion (n,).
     Arrays (n,) by name: force, environment_position, evaluations, status.
+    """
+def resting_oscillation(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> RestingOscillation:
+    """
+    Returns the largest limit cycle of a handle on which a finger of 10 g rests, at the largest force
+    and at the steepest slope of a model, with no guard but the force limit.
     """
 def rig_for(model: palpate._core.model.ForceModel, is_angle: bool, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001) -> TestRig:
     """

@@ -240,6 +240,8 @@ def _held(task: Task) -> Candidate | Refusal:
     if task.device.renderer == "device":
         return Refusal("the program on a motor controller has no energy account")
     refusal = _no_slope(task.device)
+    if renderable_slopes(task.device, model=task.model)[1] <= 0.0:
+        return refusal
     for ratio in _ACCOUNT_RATIOS:
         # The slopes that are proved on this device are `ratio` times those that are proved on the true device
         stronger = replace(task, device=_times(task.device, ratio), predict=0)

@@ -13,8 +13,8 @@ import numpy as np
 from .._core.device import DeviceProfile
 from .._core.io import checked_certificate, scheme_of
 from .._core.model import ForceModel
-from .._core.rendering import Scheme, solver_name
-from .._core.simulation import AccountUse, account_use, motion_driven
+from .._core.rendering import Scheme, default_play_radius, solver_name
+from .._core.simulation import AccountUse, account_use, motion_driven, resting_oscillation
 from .._core.stability import (
     Certificate,
     certify,
@@ -47,6 +47,12 @@ LIMITED = "direct, slope limited"
 
 ACCEPTED_FORCE_ERROR = 0.1
 """Default limit of the force error [share of the range of the identified force]"""
+
+_FORCE_SHARES = (0.125, 0.25, 0.5, 1.0)
+"""Tried shares of the identified force with which a resting finger may oscillate, the smallest first [-]"""
+
+_FORCES = ("weight", "linear", "bias", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
+"""Arguments of a force model that are proportional to its force"""
 
 _MOST_ADVISED_ERROR = 0.5
 """Largest force error that a verdict advises to accept [share of the range]; with more the object is lost"""
@@ -153,6 +159,28 @@ class Plan:
         assert self.certificate is not None
         lines = certify(self.rendered, self.scheme, self.certificate.device).inequalities
         return max((line.right / line.left for line in lines if line.left > 0.0), default=0.0)
+
+    @cached_property
+    def oscillation_text(self) -> str:
+        """Smallest tried share of the identified force with which a resting finger oscillates in simulation,
+        in words."""
+        text = "no structure is proved stable on this device"
+        if self.certificate is None or self.model.of_velocity or self.model.memory is not None:
+            return text
+        device, unit = self.certificate.device, self._units()["position"]
+        direct = Scheme(structure="direct", play_radius=default_play_radius(self.model, device.encoder_step))
+        forces = {name: getattr(self.model, name) for name in _FORCES}
+        forces = {name: np.asarray(force) for name, force in forces.items() if force is not None}
+        for share in _FORCE_SHARES:
+            scaled = with_network(self.model, **{name: share * force for name, force in forces.items()})
+            found = resting_oscillation(scaled, direct, device)
+            if found.amplitude:
+                part = "" if share == 1.0 else f"with {_percent(share)} of the force "
+                return (
+                    f"{text}, and {part}a finger of 10 g that rests at {found.position:.3g}{unit} oscillates "
+                    f"by {found.amplitude:.2g}{unit} at {found.frequency_hz:.3g} Hz in simulation"
+                )
+        return f"{text}; in simulation a resting finger of 10 g did not oscillate"
 
     def account_rows(self) -> dict[str, str]:
         """Returns the numbers of the energy account that holds the plan for display, by name."""
@@ -382,7 +410,7 @@ class Plan:
         if self.certificate.refused:
             cure = f". The object {self.needs}" if self.needs else ""
             reason = "" if self.needs else f": {self.certificate.reason}"
-            return (no(f"no structure can render the model on this device{cure}{reason}"),)
+            return (no(f"not renderable: {self.oscillation_text}{cure}{reason}"),)
         if self.held_by_account:
             reason = next((line for line in self.refused if line.startswith(LIMITED)), "")
             accepted = self.force_error.share <= self.accept_force_error

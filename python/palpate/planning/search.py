@@ -148,6 +148,28 @@ def plan(
             f"predict is {samples}: must be 0 (off) with a coupling, mass, damping, velocity input or "
             "memory; a prediction is certified only for direct rendering of a force of position"
         )
+    chosen, refused = choose(task, accept_force_error)
+    identified = chosen.rendered is task.model
+    planned = Plan(
+        model,
+        chosen.scheme,
+        chosen.certificate,
+        refused,
+        None if identified else model.with_network(**network_of(chosen.rendered)),
+        accept_force_error,
+    )
+    stable_only = not (chosen.certificate.certified or chosen.certificate.refused)
+    if stable_only or planned.verdict.level == "no":
+        planned = replace(planned, needs=needed(task, accept_force_error, certified=stable_only))
+    return planned
+
+
+def choose(task: Task, accept_force_error: float) -> tuple[Candidate, tuple[str, ...]]:
+    """Returns the candidate for a task that is not refused, and the refused structures with their reasons.
+
+    If all are refused, returns the last candidate with a certificate. `accept_force_error` is the largest
+    accepted force error [share of the range].
+    """
     refused: list[str] = []
     chosen: Candidate | None = None
     found = ""
@@ -170,19 +192,7 @@ def plan(
                 continue
         chosen, found = outcome, name
     assert chosen is not None  # at least one of the direct and the explicit structure always applies
-    identified = chosen.rendered is task.model
-    planned = Plan(
-        model,
-        chosen.scheme,
-        chosen.certificate,
-        tuple(refused),
-        None if identified else model.with_network(**network_of(chosen.rendered)),
-        accept_force_error,
-    )
-    stable_only = not (chosen.certificate.certified or chosen.certificate.refused)
-    if stable_only or planned.verdict.level == "no":
-        planned = replace(planned, needs=needed(task, accept_force_error, certified=stable_only))
-    return planned
+    return chosen, tuple(refused)
 
 
 def _error(task: Task, candidate: Candidate | None) -> float:

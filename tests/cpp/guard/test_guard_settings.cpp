@@ -295,7 +295,7 @@ TEST(Guards, AnAccountUsesTheNumbersOfTheDevice) {
     EXPECT_EQ(account.encoder_step, 0.125);
     EXPECT_EQ(account.force_step, 0.5);
     EXPECT_EQ(account.whole_delay, 2);
-    EXPECT_DOUBLE_EQ(account.delay_fraction, 0.5);
+    EXPECT_DOUBLE_EQ(account.delay_fraction, 0.25) << "of the longest period";
     EXPECT_EQ(account.period_s, 0.5);
     EXPECT_EQ(account.longest_step, 8.0 * 0.5 + 0.125);
     settings.certified = true;

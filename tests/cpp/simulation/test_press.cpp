@@ -81,5 +81,22 @@ TEST(AccountUse, LeavesOutSpeedsThatEndTheRun) {
     EXPECT_EQ(use.shares.size(), 5U) << "0.3 m/s is above 0.2 m/s";
 }
 
+TEST(RestingOscillation, IsFoundOnAWallBeyondItsBoundOnly) {
+    for (const double share : {0.5, 20.0}) {
+        DeviceProfile device = coil(0.3);
+        device.coulomb_friction = 0.0;
+        const double stiffness = share * 2.0 * device.viscous_damping / device.period_s;
+        const ForceModel wall{NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0},
+                              {{0.0}, {4e-3}, Continuation::Free, Continuation::Linear, std::nullopt}};
+        const RestingOscillation found = resting_oscillation(wall, direct(), device);
+        if (share < 1.0) {
+            EXPECT_EQ(found.amplitude, 0.0);
+        } else {
+            EXPECT_GT(found.amplitude, 1e-5);
+            EXPECT_GT(found.frequency_hz, lowest_limit_cycle_hz);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace palpate

@@ -397,8 +397,10 @@ def test_unsuitable_device_is_refused_and_no_file_is_written(
     assert main(["plan", "m.json", "--device", "ice.toml", "-o", "planned.json", "--verbose"]) == 1
     refusal = " ".join(capsys.readouterr().out.split())
     assert refusal.startswith(
-        "verdict: no no structure can render the model on this device. The object needs device damping b >= "
+        "verdict: no not renderable: no structure is proved stable on this device, and a finger of 10 g that "
+        "rests at "
     )
+    assert "in simulation. The object needs device damping b >= " in refusal
     assert "short by" in refusal
     assert not Path("planned.json").exists()
 

@@ -2,6 +2,7 @@
 """Tests of plans that the energy account holds: choice, numbers, simulation, file and command line."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -155,6 +156,21 @@ def test_the_output_states_word_energy_speed_ratio_share_and_reason(
     assert main(["simulate", "held.json", "--json"]) == 0
     assert main(["export", "held.json", "--c", "-o", "held.h"]) == 2, "an exported program has no account"
     assert main(["plan", "m.json", "--device", "weak.toml", "--no-energy-account"]) == 1
+
+
+def test_a_refused_plan_names_the_smallest_force_with_which_a_finger_oscillates() -> None:
+    refused = plan(wall(20000.0), coil(viscous_damping=0.0, coulomb_friction=0.0))
+    assert refused.certificate is not None
+    assert refused.certificate.refused
+    found = re.search(
+        r"not renderable: no structure is proved stable on this device, and with ([\d.]+) % of the force a "
+        r"finger of 10 g that rests at (\S+) m oscillates by (\S+) m at (\S+) Hz in simulation",
+        str(refused.verdict),
+    )
+    assert found
+    assert float(found[1]) in (12.5, 25.0, 50.0)
+    assert 0.0 <= float(found[2]) <= 0.005
+    assert float(found[4]) > 20.0
 
 
 def test_words_of_a_plan() -> None:

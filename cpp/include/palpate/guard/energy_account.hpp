@@ -28,7 +28,7 @@ struct AccountSettings {
     /// Largest motion of the handle in one period [m or rad]
     double longest_step = std::numeric_limits<double>::infinity();
     int whole_delay = 0;          ///< n, the whole periods in the delay from a reading to its force
-    double delay_fraction = 0.0;  ///< tau, the rest of the delay divided by the period, 0 <= tau < 1
+    double delay_fraction = 0.0;  ///< tau, the rest of the delay divided by period_s, 0 <= tau < 1
     double period_s = 1e-3;       ///< longest period T of the control loop [s]
 };
 

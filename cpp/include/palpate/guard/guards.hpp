@@ -105,7 +105,7 @@ struct Guards {
             .force_step = settings.certified ? 0.0 : settings.force_step,
             .longest_step = settings.largest_speed * longest_period + settings.encoder_step,
             .whole_delay = device.whole_delay_samples(),
-            .delay_fraction = device.delay_fraction(),
+            .delay_fraction = device.delay_fraction() * period_s / longest_period,
             .period_s = longest_period};
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <tuple>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "palpate/device/device_profile.hpp"
 #include "palpate/fields/field_table.hpp"
 #include "palpate/guard/guards.hpp"
+#include "palpate/guard/limit_cycle_detector.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scale.hpp"
@@ -188,6 +190,61 @@ struct Rests {
         move(finger, position, 1.0);
     }
     return use;
+}
+
+/// Oscillation of a handle on which a finger rests, in simulation.
+struct RestingOscillation {
+    double position = 0.0;      ///< mean position of the handle [m or rad]
+    double amplitude = 0.0;     ///< half the distance between its reversals; 0: it comes to rest [m or rad]
+    double frequency_hz = 0.0;  ///< [Hz]
+};
+
+template <>
+inline constexpr auto fields_of<RestingOscillation> = std::tuple{
+    Field<&RestingOscillation::position>{"position", "Mean position of the handle [m or rad]."},
+    Field<&RestingOscillation::amplitude>{
+        "amplitude", "Half the distance between its reversals; 0: it comes to rest [m or rad]."},
+    Field<&RestingOscillation::frequency_hz>{"frequency_hz", "Frequency of the oscillation [Hz]."}};
+
+/// Returns the largest limit cycle of a handle on which a finger rests, at the largest force and at the steepest slope,
+/// without any guard but the force limit. The handle starts one hundredth of the travel away from its rest.
+[[nodiscard]] inline RestingOscillation resting_oscillation(const ForceModel& model, const Scheme& scheme,
+                                                            const DeviceProfile& device) {
+    const GuardSettings settings = account_guards(model, device);
+    const double travel = model.domain().upper[0] - model.domain().lower[0];
+    Finger finger;
+    finger.lever = device.position_unit == "rad" ? knob_radius : 1.0;
+    const double stiffness = Finger::stiffness * finger.lever * finger.lever;
+    const detail::Rests rests = detail::rests_of(model, device.force_limit);
+    RestingOscillation largest;
+    for (const double position : {rests.last, rests.steepest}) {
+        finger.to = position + detail::sliding_force(model, position, 1.0) / stiffness;
+        SimulatedHandle<Finger, SemiImplicitEuler> handle{device, finger, simulated_substeps(device.period_s),
+                                                          position - 0.01 * travel};
+        Guards guards{.limit = {device.force_limit}};
+        LimitCycleDetector detector = guards_of(settings, model, scheme, device.period_s).limit_cycle;
+        constexpr double duration_s = 1.0;
+        const std::size_t ticks = simulated_ticks(duration_s, device.period_s);
+        double low = std::numeric_limits<double>::infinity();
+        double high = -low;
+        std::size_t reversals = 0;
+        double before = 0.0;
+        (void)closed_loop(handle, make_structure(model, scheme, device.period_s, device.force_limit), guards,
+                          ticks, [&](const SimulatedTick& now) {
+                              detector.watch(now.end.position, now.tick.command.force);
+                              if (2 * now.number >= ticks) {
+                                  low = std::min(low, now.end.position);
+                                  high = std::max(high, now.end.position);
+                                  reversals += now.end.velocity * before < 0.0 ? 1 : 0;
+                              }
+                              before = now.end.velocity;
+                              return true;
+                          });
+        if (detector.limit_cycles() > 0 && high - low > 2.0 * largest.amplitude) {
+            largest = {0.5 * (low + high), 0.5 * (high - low), static_cast<double>(reversals) / duration_s};
+        }
+    }
+    return largest;
 }
 
 }  // namespace palpate
