@@ -71,7 +71,8 @@ struct AccountScene {
     return scene;
 }
 
-/// Energy of a motion. It ends with the first tick in which it is below -E0.
+/// Energy of a motion in the periods between two valid readings. It ends with the first tick in which it is far below
+/// -E0.
 struct AccountMotion {
     double deepest = 0.0;     ///< least energy that the hand has put in, divided by E0 [-]
     std::size_t limited = 0;  ///< ticks in which the account limited the force
@@ -86,6 +87,8 @@ struct AccountMotion {
     const double start = test::uniform(random, -1e-3, 1e-3);
     double x = start;
     double energy = 0.0;
+    double at_reading = 0.0;                                   // energy at the last valid reading
+    bool counts = true;                                        // the last reading had a force
     double before = std::numeric_limits<double>::quiet_NaN();  // last valid reading
     std::vector<double> commands(static_cast<std::size_t>(of.whole_delay) + 2, 0.0);
     double applied = 0.0;
@@ -127,15 +130,18 @@ struct AccountMotion {
                                     : 0.0;
         const double reading = x + error;
         double force = 0.0;
+        const bool has_force = scene.unread == 0.0 || random() % 1000 != 0;
         if (test::uniform(random, 0.0, 1.0) < scene.unread) {
             account.interrupt();
+            energy = at_reading;  // a period without a reading at both ends does not count
             before = std::numeric_limits<double>::quiet_NaN();
         } else {
             account.visit(reading, reading);
-            account.book(random() % 1000 == 0 && scene.unread > 0.0 ? std::numeric_limits<double>::quiet_NaN()
-                                                                    : applied,
-                         reading - before);
+            account.book(has_force ? applied : std::numeric_limits<double>::quiet_NaN(), reading - before);
+            energy = counts && has_force && !std::isnan(before) ? energy : at_reading;
+            counts = has_force;
             before = reading;
+            at_reading = energy;
             const double spring = scene.stiffness * (reading - start);
             const double any = scene.force_limit * test::uniform(random, -1.0, 1.0);
             force = std::array{spring, std::max(0.0, spring), any,

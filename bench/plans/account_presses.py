@@ -4,7 +4,7 @@
     python bench/plans/account_presses.py --to docs
 
 The object is a push button of `bench/identification/ordinary_objects.py`. The device is the example slide
-voice-coil with a damping that is 1, 2, ... times too small for a proof, with its own delay and with a period.
+voice-coil with a damping that is 1, 2, ... times too small for a proof, once with a delay of a period.
 
 Prints the table of FOLDER/certificate.md and writes it there if that page exists.
 """

@@ -122,25 +122,34 @@ TEST(EnergyAccount, ForgetsLossesAboveTwiceTheStoredEnergy) {
     EXPECT_DOUBLE_EQ(account.left(), 2.0);
 }
 
-TEST(EnergyAccount, MotionWithoutAReadingTakesWhatTheForcesAllow) {
+TEST(EnergyAccount, PeriodsWithoutTwoReadingsDoNotCount) {
     const auto r = [](double force) { return force * force / 8.0; };
-    for (const bool number : {true, false}) {
-        EnergyAccount account = started({.encoder_step = 0.125, .whole_delay = 1});
-        account.sent(1.0);
-        account.book(0.0, 0.0);
+    EnergyAccount account = started({.encoder_step = 0.125, .whole_delay = 1});
+    account.sent(1.0);
+    account.book(0.0, 0.0);
+    account.sent(0.5);
+    account.book(1.0, 0.0);
+    const double before = account.left() + r(0.5);
+    account.sent(0.0);
+    account.interrupt();
+    account.sent(0.0);
+    account.interrupt();
+    EXPECT_DOUBLE_EQ(account.left(), before) << "the error of the last reading counts once";
+    account.sent(0.0);
+    account.book(-9.0, nan);
+    EXPECT_DOUBLE_EQ(account.left(), before);
+    account.book(0.0, 0.125);
+    EXPECT_DOUBLE_EQ(account.left(), before) << "a reading that changes by one step proves no motion";
+}
+
+TEST(EnergyAccount, WithoutAReadingOfTheForceSendsOnlyForcesThatTakeNothing) {
+    EnergyAccount account = started({.device_friction = 0.5});
+    for (const double bad : {nan, infinity}) {
+        account.book(bad, 0.25);
+        EXPECT_DOUBLE_EQ(largest(account), 0.5);
         account.sent(0.5);
-        if (number) {
-            account.interrupt();
-        } else {
-            account.book(nan, 0.0);
-        }
-        EXPECT_DOUBLE_EQ(account.left(), 1.0 - r(1.0) - r(0.5));
-        account.sent(0.0);
-        account.interrupt();
-        EXPECT_DOUBLE_EQ(account.left(), 1.0 - r(1.0) - r(0.5)) << "zero force takes nothing";
-        account.sent(0.0);
-        account.book(0.0, nan);
-        EXPECT_DOUBLE_EQ(account.left(), 1.0 - r(1.0) - r(0.5));
+        account.book(0.5, 0.25);
+        EXPECT_DOUBLE_EQ(largest(account), 0.5 + 2.0 * std::sqrt(2.0));
     }
 }
 

@@ -48,7 +48,8 @@ struct AccountSettings {
 /// A command is limited so that r of it and of all commands that still act fits in the account. Therefore e >= -E0 at
 /// all times. The same inequality is a lower bound of the account itself, which the account uses. E0 is the bound W of
 /// the stored energy inside the domain. The account never exceeds E0 + W, with W of all positions since the start, so old
-/// losses do not pay for a later oscillation. docs/certificate.md has the proof.
+/// losses do not pay for a later oscillation. Energy in a period without two valid readings does not count.
+/// docs/certificate.md has the proof.
 ///
 /// A certificate holds for every motion, so also for the one in which the hand takes r of each command that acts. The
 /// account of a certified rendering without delay therefore never limits a force.
@@ -72,7 +73,8 @@ class EnergyAccount {
     }
 
     /// Adds the energy of the last period, in which the reading changed by `moved` [m or rad] and at whose end the motor
-    /// made the force `applied` [N or N*m]. `moved` is NaN for the first reading after readings were missing.
+    /// made the force `applied` [N or N*m]. `moved` is NaN for the first reading after readings were missing. While
+    /// `applied` is not finite, only forces that take no energy are sent.
     void book(double applied, double moved) noexcept {
         if (!std::isfinite(applied * moved)) {
             interrupt();
@@ -82,8 +84,7 @@ class EnergyAccount {
         }
         const double step = settings_.encoder_step;
         if (!is_read_) {
-            left_ += pending(commands_) - 0.5 * settings_.device_friction * step;
-            slack_ = mean_ = 0.0;
+            left_ -= 0.5 * settings_.device_friction * step;
         } else {
             const double tau = settings_.delay_fraction;
             const double mean = tau * applied_ + (1.0 - tau) * applied;
@@ -99,19 +100,15 @@ class EnergyAccount {
         }
         applied_ = applied;
         is_read_ = true;
-        left_ = std::max(
-            left_, pending(commands_) - 0.5 * step * std::abs(mean_) - step * settings_.device_friction);
+        left_ = std::max(left_, pending() - 0.5 * step * std::abs(mean_) - step * settings_.device_friction);
         left_ = std::min(left_, stored_.within() + stored_.most());
     }
 
-    /// States that the last period has no valid reading: the account then assumes that the hand takes as much energy as
-    /// the forces allow.
+    /// States that the last period has no valid reading: its energy does not count.
     void interrupt() noexcept {
-        if (is_read_) {
-            is_read_ = false;
-            left_ -= 0.5 * settings_.encoder_step * std::abs(mean_) + pending(commands_ - 1) +
-                     taken_by(commands_ - 1);
-            left_ = std::max(0.0, left_);
+        if (std::exchange(is_read_, false)) {
+            left_ -= 0.5 * settings_.encoder_step * std::abs(mean_);
+            slack_ = mean_ = 0.0;
         }
     }
 
@@ -126,24 +123,17 @@ class EnergyAccount {
     }
 
     /// Stores the force that was sent to the device, once in each tick.
-    void sent(double force) noexcept {
-        if (is_unlimited()) {
-            return;
-        }
-        const double energy = most_taken(force);
-        taken_[commands_++ % taken_.size()] = energy;
-        left_ -= is_read_ ? 0.0 : energy;
-    }
+    void sent(double force) noexcept { sent_[commands_++ % sent_.size()] = force; }
 
     /// Returns r(F), the largest energy that a command takes in one period [J].
     [[nodiscard]] double most_taken(double force) const noexcept {
         return force == 0.0 ? 0.0 : taken(std::abs(force) - free_force_, settings_.longest_step);
     }
 
-    /// Returns the energy that the hand can certainly still take out before it has taken E0 [J]. It is less by the
-    /// energy that commands can still take which were sent and not read back.
+    /// Returns the energy that the hand can certainly still take out before it has taken E0, less the energy that
+    /// commands can take which still act [J].
     [[nodiscard]] double left() const noexcept {
-        return is_read_ ? left_ - 0.5 * settings_.encoder_step * std::abs(mean_) - pending(commands_) : left_;
+        return left_ - 0.5 * settings_.encoder_step * std::abs(mean_) - pending();
     }
     [[nodiscard]] const StoredEnergy& stored() const noexcept { return stored_; }
 
@@ -155,7 +145,7 @@ class EnergyAccount {
         if (is_unlimited()) {
             return std::numeric_limits<double>::infinity();
         }
-        const double energy = std::max(0.0, left());
+        const double energy = is_read_ ? std::max(0.0, left()) : 0.0;
         const double longest = settings_.longest_step;
         // The first case also holds for an infinite motion without damping, whose product is not a number
         const double above = !(energy > damping_ * longest * longest) ? 2.0 * std::sqrt(damping_ * energy)
@@ -172,16 +162,15 @@ class EnergyAccount {
         return !(above > 2.0 * damping_ * longest) ? above * above / (4.0 * damping_)
                                                    : (above - damping_ * longest) * longest;
     }
-    [[nodiscard]] double taken_by(std::uint64_t command) const noexcept {
-        return taken_[command % taken_.size()];
-    }
+    [[nodiscard]] double command(std::uint64_t number) const noexcept { return sent_[number % sent_.size()]; }
 
-    /// Returns the largest energy that the commands before a command still take after its reading [J].
-    [[nodiscard]] double pending(std::uint64_t command) const noexcept {
+    /// Returns the largest energy that the commands sent so far still take after this reading [J].
+    [[nodiscard]] double pending() const noexcept {
         const auto whole = static_cast<std::uint64_t>(settings_.whole_delay);
-        double energy = settings_.delay_fraction * taken_by(command - whole - 1);
+        const double tau = settings_.delay_fraction;
+        double energy = tau > 0.0 ? tau * most_taken(command(commands_ - whole - 1)) : 0.0;
         for (std::uint64_t k = 1; k <= whole; ++k) {
-            energy += taken_by(command - k);
+            energy += most_taken(command(commands_ - k));
         }
         return energy;
     }
@@ -190,8 +179,7 @@ class EnergyAccount {
     StoredEnergy stored_;
     double damping_ = 0.0;     ///< B, damping divided by the period [N/m]
     double free_force_ = 0.0;  ///< largest commanded force that takes no energy [N or N*m]
-    /// With the error eps of the reading and the play operator pi, at most e + E0 + mean_ eps - f_c |pi - x|. Without a
-    /// valid reading, at most e + E0 minus the energy of pending commands [J].
+    /// At most e + E0 + mean_ eps - f_c |pi - x|, with the error eps of the reading and the play operator pi [J]
     double left_ = std::numeric_limits<double>::infinity();
     bool is_placed_ = false;
     bool is_read_ = false;
@@ -199,8 +187,8 @@ class EnergyAccount {
     double applied_ = 0.0;  ///< force at the end of the last period [N or N*m]
     double mean_ = 0.0;     ///< mean force of the last period [N or N*m]
     std::uint64_t commands_ = 0;
-    /// Largest energy that each of the last commands takes [J]; its size is a power of two, so that numbers wrap around
-    std::array<double, std::bit_ceil(std::size_t{longest_delay_samples} + 3)> taken_{};
+    /// Last commands; the size is a power of two, so that numbers wrap around [N or N*m]
+    std::array<double, std::bit_ceil(std::size_t{longest_delay_samples} + 2)> sent_{};
 };
 
 }  // namespace palpate
