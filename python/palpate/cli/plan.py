@@ -160,9 +160,12 @@ def _list_examples(*, as_json: bool) -> None:
     help="Largest accepted force error, as a share of the range of the force.",
 )
 @click.option(
-    "--energy-account/--no-energy-account",
+    "--no-energy-account",
+    "energy_account",
+    is_flag=True,
+    flag_value=False,
     default=True,
-    help="Try steeper slopes than the proved ones, held by the energy account.",
+    help="Choose proved slopes only, not steeper ones that the energy account holds.",
 )
 @accept_model_option
 @plot_option("the root locus of the explicit structure over its damping")
