@@ -165,6 +165,7 @@ def _list_examples(*, as_json: bool) -> None:
     is_flag=True,
     flag_value=False,
     default=True,
+    show_default=False,
     help="Choose proved slopes only, not steeper ones that the energy account holds.",
 )
 @accept_model_option

@@ -116,7 +116,8 @@ def simulate(
 ) -> Recording:
     """Renders a plan in closed loop and virtual time, with simulated device, hand and controller.
 
-    The handle starts at rest at 0, or at the end of the model's domain that is nearest to it.
+    The handle starts at rest at 0, or at the end of the model's domain that is nearest to it. A plan that the
+    energy account holds is limited by it, every other plan by the force limit only.
 
     Parameters
     ----------

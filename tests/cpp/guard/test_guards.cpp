@@ -546,6 +546,39 @@ TEST(GuardedAccount, NoMotionLimitsACertifiedRendering) {
     }
 }
 
+// Tests random motions on devices that are much too weak for a proof. The handle sums its own energy.
+TEST(GuardedAccount, NoMotionTakesMoreThanTheStoredEnergyFromAnUnprovedRendering) {
+    test::Random random{37};
+    double deepest = 0.0;
+    std::size_t limited = 0;
+    for (int k = 0; k < test::cases(100); ++k) {
+        test::Scene scene = test::random_certified_scene(random, 1.0);
+        scene.device.viscous_damping *= test::uniform(random, 0.02, 0.5);
+        scene.device.coulomb_friction *= test::uniform(random, 0.0, 0.5);
+        if (certify(scene.model, scene.scheme, scene.device).certified()) {
+            continue;
+        }
+        Motions motion{random, scene};
+        GuidedHandle handle{scene.device, scene.start};
+        Guards guards = certified_guards(scene.model, scene.scheme, scene.device, false);
+        guards.limit_cycle = {};
+        Controller controller{
+            handle,
+            make_structure(scene.model, scene.scheme, scene.device.period_s, scene.device.force_limit),
+            guards};
+        ASSERT_EQ(controller.start(), Status::Ok);
+        for (int tick = 0; tick < 3000; ++tick) {
+            handle.move_to(tick < 5 ? scene.start : motion.next(random, tick));
+            limited += controller.tick().status == Status::EnergyLimited ? 1 : 0;
+        }
+        const double allowed = controller.guards().account.stored().within();
+        EXPECT_GE(handle.least(), -allowed * (1.0 + 1e-9)) << "scene " << k << ": " << scene;
+        deepest = std::min(deepest, handle.least() / allowed);
+    }
+    EXPECT_GT(limited, 1000U);
+    EXPECT_LT(deepest, -0.5) << "the motions take much energy";
+}
+
 // A heavy object almost does not follow the handle, so its soft coupling stores more energy than the object can.
 TEST(GuardedAccount, AStretchedCouplingOfAHeavyObjectIsNotLimited) {
     DeviceProfile device;
