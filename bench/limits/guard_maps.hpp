@@ -23,7 +23,7 @@
 namespace palpate::bench {
 
 /// Map: speed of the handle in the last of three seconds, over the ratio of a wall's stiffness to its bound. A hand
-/// without damping presses the wall. One line each: without a guard, with the energy tank, with the limit-cycle
+/// without damping presses the wall. One line each: without a guard, with the energy account, with the limit-cycle
 /// detector, and with both.
 [[nodiscard]] inline FailureMap guard_map(int points) {
     constexpr std::size_t second = 1000;
@@ -31,22 +31,22 @@ namespace palpate::bench {
     const DeviceProfile device;
     struct Guarding {
         const char* name;
-        bool tank;
+        bool account;
         bool detector;
     };
     Scheme scheme;
     scheme.structure = StructureKind::Direct;
-    for (const auto& [name, tank, detector] : {Guarding{"no guard", false, false},
-                                               {"energy tank", true, false},
-                                               {"limit-cycle detector", false, true},
-                                               {"both", true, true}}) {
+    for (const auto& [name, account, detector] : {Guarding{"no guard", false, false},
+                                                  {"energy account", true, false},
+                                                  {"limit-cycle detector", false, true},
+                                                  {"both", true, true}}) {
         FailureLine line{name, logarithmic(0.5, 10.0, points), {}, {}};
         for (const double share : line.at) {
             const double stiffness = share * direct_limit(device);
             const ForceModel wall{NetworkParameters{1, {}, {}, {}, {stiffness}, 0.0},
                                   {{0.0}, {0.1}, Continuation::Linear, Continuation::Linear, std::nullopt}};
             GuardSettings settings;
-            settings.energy_tank = tank;
+            settings.energy_account = account;
             settings.limit_cycle_force = detector ? settings.limit_cycle_force : 0.0;
             settings.device_damping = device.viscous_damping;
             settings.encoder_step = device.encoder_step;
@@ -55,7 +55,7 @@ namespace palpate::bench {
             const ClosedLoopSettings start{20, 0.0, 0.0, guards_of(settings, wall, scheme, device.period_s)};
             (void)closed_loop(
                 Direct{*wall.network()}, device, PassiveHand{15.0, 0.0, 0.0, 0.1}, 3 * second, start,
-                [&](const Tick& /*tick*/, const Motion& handle, const EnergyAccount& /*account*/) {
+                [&](const Tick& /*tick*/, const Motion& handle, const EnergyBalance& /*account*/) {
                     squares += tick++ >= 2 * second ? handle.velocity * handle.velocity : 0.0;
                     return true;
                 });
@@ -210,8 +210,8 @@ template <SimulatedHand H>
             return impulse;
         });
     add(
-        "energy tank", [](Guards& guards, const Guards& all) { guards.tank = all.tank; }, oscillating,
-        pressing, "a wall of 5 times its bound: speed after 2 s [rad/s]", late_speed);
+        "energy account", [](Guards& guards, const Guards& all) { guards.account = all.account; },
+        oscillating, pressing, "a wall of 5 times its bound: speed after 2 s [rad/s]", late_speed);
     add(
         "limit-cycle detector",
         [](Guards& guards, const Guards& all) { guards.limit_cycle = all.limit_cycle; }, oscillating,

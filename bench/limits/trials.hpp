@@ -118,7 +118,7 @@ inline constexpr Guards unguarded{.limit = {1e9}};
     const double inertia = device.inertia + hand.mass;
     Growth growth{ticks};
     (void)closed_loop(std::move(structure), device, hand, ticks, {8, 0.0, 1.0, Guards{.limit = {endless}}},
-                      [&](const Tick& /*tick*/, const Motion& now, const EnergyAccount& /*account*/) {
+                      [&](const Tick& /*tick*/, const Motion& now, const EnergyBalance& /*account*/) {
                           return growth.add(inertia * now.velocity * now.velocity +
                                             (stiffness + hand.stiffness) * now.position * now.position);
                       });
@@ -145,7 +145,7 @@ struct PacedWork {
     PacedWork work;
     std::size_t tick = 0;
     (void)closed_loop(std::move(structure), device, hand, ticks, {2, start, 0.0, unguarded},
-                      [&](const Tick& /*now*/, const Motion& /*handle*/, const EnergyAccount& account) {
+                      [&](const Tick& /*now*/, const Motion& /*handle*/, const EnergyBalance& account) {
                           work.whole = account.motor + account.dissipated;
                           work.rounding = 1e-9 * account.throughput;
                           if (++tick == ticks / 2) {

@@ -209,7 +209,7 @@ def unchanged_part(model: Model, chosen: Plan, device: DeviceProfile) -> tuple[f
 
 
 def compare(name: str, model: Model, device: DeviceProfile, seconds: float, grid: int) -> Row:
-    chosen = plan(model, device)
+    chosen = plan(model, device, energy_account=False)
     certificate = chosen.certificate
     limited_error = None if chosen.limited is None else chosen.force_error
     assert certificate is not None

@@ -25,7 +25,7 @@ void closed_loop_of(benchmark::State& state, const S& structure, const H& hand) 
     for (auto _ : state) {
         const palpate::ClosedLoopEnd end = palpate::closed_loop(
             structure, device, hand, ticks, {static_cast<int>(state.range(0)), 0.2, 0.0, {}},
-            [](const palpate::Tick&, const palpate::Motion&, const palpate::EnergyAccount&) { return true; });
+            [](const palpate::Tick&, const palpate::Motion&, const palpate::EnergyBalance&) { return true; });
         const double kinetic = 0.5 * device.inertia * end.handle.velocity * end.handle.velocity;
         const double imbalance = end.energy.hand - end.energy.motor - end.energy.dissipated - kinetic;
         if (!(std::abs(imbalance) <= 1e-12 * end.energy.throughput)) {

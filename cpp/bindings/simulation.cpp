@@ -14,7 +14,9 @@
 #include "palpate/simulation/closed_loop.hpp"
 #include "palpate/simulation/force_error.hpp"
 #include "palpate/simulation/hand.hpp"
+#include "palpate/simulation/press.hpp"
 #include "palpate/simulation/test_rig.hpp"
+#include "palpate/stability/account_certificate.hpp"
 #include "settings.hpp"
 #include "signals.hpp"
 
@@ -37,13 +39,17 @@ std::vector<std::int8_t> numbered(const std::vector<Status>& statuses) {
 /// Simulates the rendering of a model and returns the columns of the simulated ticks as numpy arrays by name.
 py::dict simulate_in_python(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
                             const Hand& hand, double duration_s, int substeps, double start_position,
-                            const std::optional<py::function>& progress) {
+                            bool energy_account, const std::optional<py::function>& progress) {
     detail::require(std::isfinite(start_position), "start_position is not a finite number");
     const std::size_t ticks = simulated_ticks(duration_s, device.period_s);
     Trace trace;
     {
         const py::gil_scoped_release unlocked;
-        trace = simulate(model, scheme, device, hand, ticks, substeps, start_position,
+        Guards guards{.limit = {device.force_limit}};
+        if (energy_account) {
+            guards.account = account_of(model, scheme, device);
+        }
+        trace = simulate(model, scheme, device, hand, guards, ticks, substeps, start_position,
                          Interruptible{progress ? &*progress : nullptr});
     }
     return py::dict(
@@ -113,9 +119,11 @@ void bind_simulation(py::module_& module) {
 
     module.def(
         "simulate", &simulate_in_python, "model"_a, "scheme"_a, "device"_a, "hand"_a, "duration_s"_a,
-        "substeps"_a = usual_substeps, "start_position"_a = 0.0, "progress"_a = py::none(),
+        "substeps"_a = usual_substeps, "start_position"_a = 0.0, "energy_account"_a = false,
+        "progress"_a = py::none(),
         "Renders a model on a simulated device with a simulated hand, in simulated time.\n\n"
-        "The handle starts at rest at start_position. Calls progress(ticks) about ten times a second.\n"
+        "The handle starts at rest at start_position. With energy_account the energy account limits the\n"
+        "force, as in a rendering that it holds. Calls progress(ticks) about ten times a second.\n"
         "Ctrl-C raises KeyboardInterrupt. Raises ValueError for more than 3 600 000 ticks.\n\n"
         "Returns arrays (n,) by name:\n\n"
         "- time_s, position (measured), velocity, environment_position.\n"
@@ -123,6 +131,33 @@ void bind_simulation(py::module_& module) {
         "  the middle and at the end of the tick that holds the force.\n"
         "- force (commanded), applied (at the end of the tick), mean_applied (over the tick).\n"
         "- evaluations, status, extrapolated.");
+    py::class_<AccountUse> use(
+        module, "AccountUse",
+        "Effect of the energy account on simulated presses and rests, and the numbers of its limit.");
+    bind_fields<AccountUse, 2>(use, false);
+    module.def(
+        "account_use",
+        [](const ForceModel& model, const Scheme& scheme, const DeviceProfile& device) {
+            const py::gil_scoped_release unlocked;
+            return account_use(model, scheme, device);
+        },
+        "model"_a, "scheme"_a, "device"_a,
+        "Presses and holds a model in simulation while the energy account limits its force. The finger\n"
+        "presses at 10, 30, 100 and 300 mm/s, or turns a knob of 40 mm diameter at the same speed; speeds\n"
+        "above the largest speed are left out. It rests with a tremor of 10 Hz where the force is largest\n"
+        "and where its slope is steepest.");
+    py::class_<RestingOscillation> resting(module, "RestingOscillation",
+                                           "Oscillation of a handle on which a finger rests, in simulation.");
+    bind_fields<RestingOscillation, 3>(resting, false);
+    module.def(
+        "resting_oscillation",
+        [](const ForceModel& model, const Scheme& scheme, const DeviceProfile& device) {
+            const py::gil_scoped_release unlocked;
+            return resting_oscillation(model, scheme, device);
+        },
+        "model"_a, "scheme"_a, "device"_a,
+        "Returns the largest limit cycle of a handle on which a finger of 10 g rests, at the largest force\n"
+        "and at the steepest slope of a model, with no guard but the force limit.");
     module.def(
         "force_error",
         [](const ForceModel& model, double play_radius, const Array& start, const Array& middle,

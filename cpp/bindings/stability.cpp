@@ -9,6 +9,7 @@
 
 #include "bindings.hpp"
 #include "fields.hpp"
+#include "palpate/stability/account_certificate.hpp"
 #include "palpate/stability/certificate.hpp"
 #include "palpate/stability/certificate_check.hpp"
 #include "palpate/stability/renderable_slopes.hpp"
@@ -82,6 +83,7 @@ void bind_stability(py::module_& module) {
                                  "Inequalities and verdict for a model that a scheme renders on a device.");
     bind_fields<Certificate, 8>(type, false);
     type.def_property_readonly("certified", &Certificate::certified)
+        .def_property_readonly("held_by_account", &Certificate::held_by_account)
         .def_property_readonly(
             "refused", [](const Certificate& certificate) { return certificate.verdict == Verdict::Refused; })
         .def("check", &checked, "model"_a,
@@ -100,6 +102,16 @@ void bind_stability(py::module_& module) {
         "model"_a, "scheme"_a, "device"_a,
         "Returns the certificate of a model that a scheme renders on a device. If stability is not\n"
         "proved, the certificate states the reason. Raises ValueError for an invalid scheme or device.");
+    module.def(
+        "certify_with_account",
+        [](const ForceModel& model, const Scheme& scheme, const DeviceProfile& device) {
+            const py::gil_scoped_release unlocked;
+            return certify_with_account(model, scheme, device);
+        },
+        "model"_a, "scheme"_a, "device"_a,
+        "Returns the certificate of a rendering that the energy account limits: in no motion does a hand\n"
+        "take out more energy than the object can store. It is refused if the account cannot hold the\n"
+        "largest force at rest. Raises ValueError for an invalid scheme or device.");
     module.def(
         "certify_bounds",
         [](const ForceBounds& bounds, const Scheme& scheme, const DeviceProfile& device) {

@@ -164,8 +164,8 @@ void add_guards(CLI::App& app, RenderOptions& options) {
               "fault, 0 = no check"))
         ->check(not_negative())
         ->capture_default_str();
-    group(app.add_flag("!--no-energy-tank", options.energy_tank,
-                       "Do not limit the energy that the rendering gives"));
+    group(app.add_flag("!--no-energy-account", options.energy_account,
+                       "Do not limit the energy that a hand can take out"));
     group(app.add_option("--tolerated-samples", options.tolerated,
                          "Consecutive ticks without a valid sample that are tolerated"))
         ->check(number_between(0, 1e6))

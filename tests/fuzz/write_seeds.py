@@ -83,7 +83,7 @@ def main() -> None:
         write("inverse3", name, struct.pack("<Bd", 2, 1.5) + message.encode())
     for name, line in {
         "rendering": "m.json --device simulated --rate-hz 1000 --structure massless --mass 0.1 --predict 3",
-        "guards": "m.json --force-limit 2 --slew-s 0.1 --no-energy-tank --tolerated-samples 3 --ramp-s=1",
+        "guards": "m.json --force-limit 2 --slew-s 0.1 --no-energy-account --tolerated-samples 3 --ramp-s=1",
         "running": "m.json --duration-s inf --record a.csv --fault lost@1x3 --telemetry-port 9870 --cpu -1",
         "help": "--help",
     }.items():

@@ -32,7 +32,7 @@ INCLUDES = {
     "dynamics": {"model"},
     "solver": {"dynamics", "model"},
     "rendering": {"solver", "dynamics", "model", "device"},
-    "stability": {"rendering", "solver", "dynamics", "model", "device"},
+    "stability": {"guard", "rendering", "solver", "dynamics", "model", "device"},
     "portable": {"rendering", "solver", "dynamics", "model", "device"},
     "guard": {"rendering", "solver", "dynamics", "model", "device"},
     "device": {"realtime"},

@@ -11,6 +11,7 @@
 #include "palpate/run/measure.hpp"
 #include "palpate/simulation/faulty_device.hpp"
 #include "palpate/simulation/force_error.hpp"
+#include "palpate/simulation/press.hpp"
 #include "palpate/simulation/test_rig.hpp"
 #include "palpate/stability/certificate_check.hpp"
 #include "palpate/stability/renderable_slopes.hpp"

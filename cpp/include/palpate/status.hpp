@@ -50,7 +50,7 @@ inline constexpr std::array<StatusText, 14> status_texts{{
      "the position stopped within one sample during fast motion and stayed constant; the force sent is zero"},
     {"Ramp", "the force is scaled up from zero after the start"},
     {"EnergyLimited",
-     "the rendering had given all the energy that the energy tank allows; the force was scaled down"},
+     "a larger force could take the energy that the energy account still has; the force was limited"},
     {"LimitCycleScaled", "a limit cycle was detected; all forces are scaled down until the end of the run"},
     {"Stale",
      "the device applied a force computed from an older sample than the certificate allows; the force sent "

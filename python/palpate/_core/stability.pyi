@@ -8,7 +8,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'certify', 'certify_bounds', 'device_difference', 'explicit_scheme', 'force_bounds', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share', 'with_force_error']
+__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'certify', 'certify_bounds', 'certify_with_account', 'device_difference', 'explicit_scheme', 'force_bounds', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share', 'with_force_error']
 class ForceBounds:
     """
     Proved bounds of a model's force and slope at all positions, inside and outside the domain.
@@ -194,6 +194,9 @@ class Certificate:
         16 hexadecimal digits computed from all other stored fields.
         """
     @property
+    def held_by_account(self) -> bool:
+        ...
+    @property
     def inequalities(self) -> list[Inequality]:
         """
         All inequalities with both sides.
@@ -224,7 +227,7 @@ class Certificate:
     @property
     def verdict(self) -> str:
         """
-        certified, stable-locally or refused.
+        certified, held-by-account, stable-locally or refused.
         """
 def certify(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> Certificate:
     """
@@ -234,6 +237,12 @@ def certify(model: palpate._core.model.ForceModel, scheme: palpate._core.renderi
 def certify_bounds(bounds: ForceBounds, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> Certificate:
     """
     Returns the certificate of every force within the bounds, rendered by a scheme on a device.
+    """
+def certify_with_account(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> Certificate:
+    """
+    Returns the certificate of a rendering that the energy account limits: in no motion does a hand
+    take out more energy than the object can store. It is refused if the account cannot hold the
+    largest force at rest. Raises ValueError for an invalid scheme or device.
     """
 def device_difference(certified: palpate._core.device.DeviceProfile, device: palpate._core.device.DeviceProfile) -> str:
     """

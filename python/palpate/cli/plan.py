@@ -14,6 +14,7 @@ from ..model import load_model
 from ..model.model_file import certificate_record
 from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, profile_file
 from ..planning.candidates import CANDIDATES
+from ..planning.plan import PLAN_WORDS
 from ..planning.search import plan as choose
 from ..verdict import Verdict
 from .exit_status import end_with, finishing
@@ -158,6 +159,15 @@ def _list_examples(*, as_json: bool) -> None:
     show_default="0.1",
     help="Largest accepted force error, as a share of the range of the force.",
 )
+@click.option(
+    "--no-energy-account",
+    "energy_account",
+    is_flag=True,
+    flag_value=False,
+    default=True,
+    show_default=False,
+    help="Choose proved slopes only, not steeper ones that the energy account holds.",
+)
 @accept_model_option
 @plot_option("the root locus of the explicit structure over its damping")
 @click.option(
@@ -222,6 +232,8 @@ def _result(
     return {
         "structure": plan.structure,
         "verdict": str(verdict),
+        "word": PLAN_WORDS[certificate.verdict],
+        "energy_account": None if plan.account is None else _account(plan),
         "force_error_share": error.share,
         "force_error_rms_share": error.rms_share,
         "force_error": {"largest": error.largest, "rms": error.rms},
@@ -235,6 +247,13 @@ def _result(
         "slope_behind_coupling": slope,
         "seconds": seconds,
     }
+
+
+def _account(plan: Plan) -> dict[str, Any]:
+    """Returns the numbers of the energy account that holds a plan."""
+    use = plan.account
+    assert use is not None
+    return {**use.to_dict(), "proved_ratio": plan.proved_ratio}
 
 
 def _summary(

@@ -5,17 +5,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
+from .._core.rendering import default_play_radius
 from .._core.simulation import TestRig
-from ..errors import command_word
+from .._core.stability import device_difference
 from ..model import Model, load_model
-from ..planning import Plan, force_error, force_range, hand_for, judge, rig_for
+from ..planning import DeviceProfile, Plan, force_error, force_range, hand_for, judge, rig_for
 from ..planning import simulate as render
+from ..planning.device_profile import require_unit
 from ..planning.simulation import covered_text, holding_hand
+from ..verdict import Verdict, usable
 from .exit_status import end_with, finishing
 from .figures import drawing, picture_rendering
 from .printing import (
@@ -26,6 +30,7 @@ from .printing import (
     progress,
     talk,
 )
+from .profiles import ProfileName, device_for
 from .verb import (
     PATH,
     accept_model_option,
@@ -38,25 +43,15 @@ from .verb import (
 )
 
 
-def _refuse_device(ctx: click.Context, param: click.Parameter, device: str | None) -> None:
-    """Refuses a device: it is part of the plan in the model file."""
-    if device is not None:
-        raise click.UsageError(
-            "the device comes from the plan in the model file: run palpate plan MODEL.json --device "
-            f"{command_word(device)} -o MODEL.json first",
-            ctx,
-        )
-
-
 @verb("palpate simulate press.json --structure direct --duration-s 4 -o rendered.csv")
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
 @scheme_options
 @click.option(
     "--device",
-    hidden=True,
-    expose_value=False,
-    callback=_refuse_device,
-    help="Refused: the plan has the device.",
+    type=ProfileName(),
+    default=None,
+    show_default="that of the plan, else a knob",
+    help="Profile of a device, or the name of an example; it needs no certificate.",
 )
 @click.option("--duration-s", type=float, default=4.0, help="Simulated time [s].")
 @click.option(
@@ -74,6 +69,7 @@ def _refuse_device(ctx: click.Context, param: click.Parameter, device: str | Non
 @json_option
 def simulate(
     model_file: Path,
+    device: str | None,
     duration_s: float,
     hold_at: float | None,
     output: Path | None,
@@ -88,27 +84,31 @@ def simulate(
     The hand sweeps through the model's domain twice in four seconds, as far as the device holds the force. An
     angle is rendered on a knob with a 16-bit encoder at 1 kHz; for other units the knob is scaled to the
     model's travel and force. A model with a plan is rendered as planned, on the device that it was certified
-    for, unless a structure is given.
+    for, unless a structure is given. --device renders it on any other device, without a certificate: the
+    structure of the plan, or directly.
     A simulation shows one case; it does not prove stability.
     """
     require_writable(plot, recording=output, force=force, inputs=(model_file,))
     model = load_model(model_file).require_use(model_file, accepted=accept_model)
     rig = rig_for(model)
-    plan = _chosen_plan(model, rig, scheme)
-    device = rig.device if plan.certificate is None else plan.certificate.device
-    talk(f"read {model_file}: {sized(model)}; rendering on the simulated device {device.id}")
-    hand = hand_for(plan, device) if hold_at is None else holding_hand(plan, hold_at)
-    ticks = max(duration_s / device.period_s, 1.0)
+    other = None if device is None else device_for(model, device)
+    plan = _chosen_plan(model, rig, scheme, other)
+    simulated = other or (rig.device if plan.certificate is None else plan.certificate.device)
+    talk(f"read {model_file}: {sized(model)}; rendering on the simulated device {simulated.id}")
+    hand = hand_for(plan, simulated) if hold_at is None else holding_hand(plan, hold_at)
+    ticks = max(duration_s / simulated.period_s, 1.0)
     with progress("simulating") as shown:
         rendered = render(
             plan,
-            device,
+            simulated,
             hand,
             duration_s,
             lambda tick: shown(f"{100 * tick / ticks:.1f} %"),
         )
     error = force_error(plan, rendered)
     verdict = model.verdict + judge(plan, rendered, error)
+    if other is not None and plan.certificate is None:
+        verdict += Verdict((usable(f"nothing is proved on {other.id}: this is one simulated motion"),))
     status_counts = Counter(rendered.columns["status"])
     span = force_range(plan)
     share = error.end / span if span > 0 else None
@@ -144,7 +144,7 @@ def simulate(
                 {
                     "structure": plan.description,
                     "duration": f"{number(duration_s)} s",
-                    "handle": covered_text(plan, device, rendered),
+                    "handle": covered_text(plan, simulated, rendered),
                     "force error, end of tick": f"{number(error.end)} {unit} RMS"
                     + ("" if share is None else f", {100 * share:.3g} % of the object's force range"),
                     "force error, mean of a tick": f"{number(error.mean)} {unit} RMS",
@@ -160,14 +160,27 @@ def simulate(
     end_with(verdict)
 
 
-def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any]) -> Plan:
-    """Returns the requested plan, else the plan in the model file, else the default plan, with a note."""
+def _chosen_plan(model: Model, rig: TestRig, scheme: Mapping[str, Any], device: DeviceProfile | None) -> Plan:
+    """Returns the requested plan, else the plan in the model file, else the default plan, with a note.
+
+    On another device than that of the plan the plan has no certificate, and a model without a plan is
+    rendered directly.
+    """
+    if device is not None:
+        require_unit(device, model.units["position"])
     if all(value is None or value is False for value in scheme.values()):
         if model.plan is not None:
-            return Plan.of(model)
-        if not model.of_velocity and model.memory is None:
+            plan = Plan.of(model)
+            certified = None if plan.certificate is None else plan.certificate.device
+            is_other = device is not None and certified is not None and device_difference(certified, device)
+            return replace(plan, certificate=None) if is_other else plan
+        if device is not None:
+            scheme = {"structure": "direct"}
+        elif not model.of_velocity and model.memory is None:
             talk(
                 "the model has no plan: the default coupling makes it softer; "
                 "'palpate plan' finds a rendering without this error"
             )
+    if device is not None and not scheme.get("play_radius"):
+        scheme = {**scheme, "play_radius": default_play_radius(model, device.encoder_step) or None}
     return Plan(model, rig.scheme(model, **scheme))

@@ -9,7 +9,7 @@ device property that must be better. `search` runs these steps. `simulation` ren
 from .. import _core
 from .._core.device import OnDevice
 from .._core.rendering import Scheme, explicit_slope_limit
-from .._core.simulation import Hand, TestRig
+from .._core.simulation import AccountUse, Hand, TestRig
 from .._core.stability import Certificate, Inequality
 from ..arguments import named_arguments
 from .device_profile import EXAMPLES, DeviceProfile, example_profiles, mechanical_units, profile_file
@@ -30,6 +30,7 @@ from .simulation import (
 __all__ = [
     "ACCEPTED_FORCE_ERROR",
     "EXAMPLES",
+    "AccountUse",
     "Certificate",
     "Comparison",
     "DeviceProfile",

@@ -6,15 +6,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .._core.device import DeviceProfile
 from .._core.model import ForceModel
 from .._core.portable import ExportedModel
 from .._core.rendering import Scheme, compensated_share, default_play_radius
+from .._core.simulation import account_use
 from .._core.stability import (
     Certificate,
     certify,
+    certify_with_account,
     explicit_scheme,
     force_bounds,
     passive_shift,
@@ -32,7 +34,7 @@ from .limited_network import (
     scale_hysteresis,
     sliding_slopes,
 )
-from .plan import static_force_error, with_network
+from .plan import LIMITED, static_force_error, with_network
 
 _COUPLING_DAMPING_SHARE = 0.2
 """Default coupling damping of the implicit and energy-consistent structures [share of the device's
@@ -52,6 +54,14 @@ accepted [longest time between samples of the device]
 
 _LEAST_HYSTERESIS = 1.0 / 64.0
 """Least factor by which a plan may multiply the hysteresis h to make it renderable [-]"""
+
+
+_ACCOUNT_RATIOS = (4.0, 3.0, 2.0, 1.5)
+"""Tried slopes of a rendering that the energy account holds, the steepest first [slopes of a proof]. Above 4
+the account acts in ordinary presses"""
+
+_MOST_ACTING = 0.01
+"""Share of the ticks of simulated presses in which the energy account may act [-]"""
 
 
 @dataclass(frozen=True)
@@ -89,6 +99,8 @@ class Task:
     predict: int | None = None
     """Number of previous position samples that the prediction uses. 0: no prediction; None: chosen by the
     plan"""
+    energy_account: bool = True
+    """True if the energy account may hold a rendering that is not proved"""
     may_limit: bool = True
     """True if a network with limited slopes may be rendered in place of the identified model"""
 
@@ -216,6 +228,45 @@ def _direct_limited(task: Task) -> Candidate | Refusal:
     return _predicted(task.certified(task.direct_scheme(limited), limited), task)
 
 
+def _held(task: Task) -> Candidate | Refusal:
+    """Renders directly, held by the energy account, with the steepest slopes at which the account acts in
+    less than 1 % of the ticks of simulated presses."""
+    if refusal := task.not_direct() or task.only_direct():
+        return refusal
+    if not task.may_limit:
+        return _NOT_LIMITED
+    if not task.energy_account:
+        return Refusal("the energy account is switched off")
+    if task.device.renderer == "device":
+        return Refusal("the program on a motor controller has no energy account")
+    refusal = _no_slope(task.device)
+    if renderable_slopes(task.device, model=task.model)[1] <= 0.0:
+        return refusal
+    for ratio in _ACCOUNT_RATIOS:
+        # The slopes that are proved on this device are `ratio` times those that are proved on the true device
+        stronger = replace(task, device=_times(task.device, ratio), predict=0)
+        found = _direct(stronger)
+        if isinstance(found, Refusal) or found.certificate.refused:
+            found = _direct_limited(stronger)
+        if isinstance(found, Refusal):
+            refusal = found
+            continue
+        certificate = found.certificate
+        if not certificate.refused:
+            certificate = certify_with_account(found.rendered, found.scheme, task.device)
+        if certificate.refused:
+            refusal = Refusal(certificate.reason)
+            continue
+        share = account_use(found.rendered, found.scheme, task.device).share
+        if share < _MOST_ACTING:
+            return Candidate(found.rendered, certificate)
+        refusal = Refusal(
+            f"with {ratio:g} times the proved slopes the energy account acts in {100.0 * share:.3g} % of the "
+            f"ticks of simulated presses, must be below {100.0 * _MOST_ACTING:g} %"
+        )
+    return refusal
+
+
 def _massless(task: Task) -> Candidate | Refusal:
     """Renders the model as a massless virtual object behind a coupling. A model without hysteresis has
     limited slopes and is compensated for the spring of the coupling."""
@@ -332,12 +383,20 @@ class CandidateStructure:
     use: str
     """Rendering or purpose of the structure, in a few words"""
     propose: Propose
+    reduces_error: bool = False
+    """True if the structure is also tried when the force error of a proved rendering is not accepted, and is
+    chosen if its own is smaller"""
 
 
 CANDIDATES: Mapping[str, CandidateStructure] = {
     "direct": CandidateStructure("the identified model", _direct),
-    "direct, slope limited": CandidateStructure(
+    LIMITED: CandidateStructure(
         "the nearest force that the device can render", _of_position(_direct_limited)
+    ),
+    "direct, held by the energy account": CandidateStructure(
+        "a steeper force, if the force error of the proved one is not accepted",
+        _of_position(_held),
+        reduces_error=True,
     ),
     "massless": CandidateStructure(
         "behind a virtual coupling, if a coupling is required", _of_position(_massless)
@@ -383,6 +442,12 @@ def _no_slope(device: DeviceProfile) -> Refusal:
         f"device damping {device.viscous_damping:.4g} {damping}, encoder step {device.encoder_step:.4g} "
         f"{device.position_unit}, force step {device.force_step:.4g} {force}"
     )
+
+
+def _times(device: DeviceProfile, ratio: float) -> DeviceProfile:
+    """Returns the device that renders slopes that are `ratio` times as steep."""
+    names = ("viscous_damping", "coulomb_friction", "force_step")
+    return DeviceProfile(**device.to_dict() | {name: ratio * getattr(device, name) for name in names})
 
 
 def _slope_unit(device: DeviceProfile) -> str:

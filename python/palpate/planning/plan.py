@@ -13,9 +13,15 @@ import numpy as np
 from .._core.device import DeviceProfile
 from .._core.io import checked_certificate, scheme_of
 from .._core.model import ForceModel
-from .._core.rendering import Scheme, solver_name
-from .._core.simulation import motion_driven
-from .._core.stability import Certificate, certify, device_difference, slope_behind_coupling
+from .._core.rendering import Scheme, default_play_radius, solver_name
+from .._core.simulation import AccountUse, account_use, motion_driven, resting_oscillation
+from .._core.stability import (
+    Certificate,
+    certify,
+    certify_with_account,
+    device_difference,
+    slope_behind_coupling,
+)
 from .._typing import Float1D, Float2D
 from ..arguments import instance_of
 from ..errors import InputError
@@ -28,15 +34,25 @@ from .device_profile import mechanical_units
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_CERTIFICATE = {
-    "certified": "certified",
-    "stable-locally": "stable (local) only",
-    "refused": "refused",
+PLAN_WORDS = {
+    "certified": "proved",
+    "held-by-account": "held by the energy account",
+    "stable-locally": "stable near rest, nothing proved",
+    "refused": "not renderable",
 }
-"""Maps the verdict of a certificate to its words."""
+"""Maps the verdict of a certificate to the word for the plan."""
+
+LIMITED = "direct, slope limited"
+"""Name of the candidate structure with limited slopes"""
 
 ACCEPTED_FORCE_ERROR = 0.1
 """Default limit of the force error [share of the range of the identified force]"""
+
+_FORCE_SHARES = (0.125, 0.25, 0.5, 1.0)
+"""Tried shares of the identified force with which a resting finger may oscillate, the smallest first [-]"""
+
+_FORCES = ("weight", "linear", "bias", "weight_hysteresis", "linear_hysteresis", "bias_hysteresis")
+"""Arguments of a force model that are proportional to its force"""
 
 _MOST_ADVISED_ERROR = 0.5
 """Largest force error that a verdict advises to accept [share of the range]; with more the object is lost"""
@@ -122,6 +138,61 @@ class Plan:
         """Felt force minus identified force for a handle at rest, caused by a limited network and a soft
         coupling."""
         return static_force_error(self.model, self.rendered, self.scheme)
+
+    @property
+    def held_by_account(self) -> bool:
+        """True if only the energy account limits the energy that a hand takes out."""
+        return self.certificate is not None and self.certificate.held_by_account
+
+    @cached_property
+    def account(self) -> AccountUse | None:
+        """Numbers of the energy account and its effect on simulated presses; None if it does not hold the
+        plan."""
+        if self.certificate is None or not self.held_by_account:
+            return None
+        return account_use(self.rendered, self.scheme, self.certificate.device)
+
+    @property
+    def proved_ratio(self) -> float:
+        """Slopes of the rendered model divided by the slopes that would be proved: the device property that
+        is needed divided by the one that the device has."""
+        assert self.certificate is not None
+        lines = certify(self.rendered, self.scheme, self.certificate.device).inequalities
+        return max((line.right / line.left for line in lines if line.left > 0.0), default=0.0)
+
+    @cached_property
+    def oscillation_text(self) -> str:
+        """Smallest tried share of the identified force with which a resting finger oscillates in simulation,
+        in words."""
+        text = "no structure is proved stable on this device"
+        if self.certificate is None or self.model.of_velocity or self.model.memory is not None:
+            return text
+        device, unit = self.certificate.device, self._units()["position"]
+        direct = Scheme(structure="direct", play_radius=default_play_radius(self.model, device.encoder_step))
+        forces = {name: getattr(self.model, name) for name in _FORCES}
+        forces = {name: np.asarray(force) for name, force in forces.items() if force is not None}
+        for share in _FORCE_SHARES:
+            scaled = with_network(self.model, **{name: share * force for name, force in forces.items()})
+            found = resting_oscillation(scaled, direct, device)
+            if found.amplitude:
+                part = "" if share == 1.0 else f"with {_percent(share)} of the force "
+                return (
+                    f"{text}, and {part}a finger of 10 g that rests at {found.position:.3g}{unit} oscillates "
+                    f"by {found.amplitude:.2g}{unit} at {found.frequency_hz:.3g} Hz in simulation"
+                )
+        return f"{text}; in simulation a resting finger of 10 g did not oscillate"
+
+    def account_rows(self) -> dict[str, str]:
+        """Returns the numbers of the energy account that holds the plan for display, by name."""
+        use, unit = self.account, self._units()["position"]
+        if use is None:
+            return {}
+        speed = f"{use.largest_speed:.3g}{unit + '/s' if unit else ''}"
+        return {
+            "energy account": f"a hand takes at most {1e3 * use.energy:.3g} mJ, in motions up to {speed}",
+            "slopes": f"up to {self.proved_ratio:.2g} times those of a proof",
+            "account acts": f"in at most {_percent(use.share)} of the ticks of simulated presses",
+        }
 
     @property
     def force_error_text(self) -> str:
@@ -232,9 +303,10 @@ class Plan:
             stiffness = self._units()["stiffness"]
             rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {slope:.4g}{stiffness}"
         rows["force error"] = self.force_error_text
-        rows["certificate"] = _CERTIFICATE[certificate.verdict]
+        rows["certificate"] = PLAN_WORDS[certificate.verdict]
         if not certificate.refused:
-            rows["certificate"] += f", for up to {1e3 * certificate.longest_period_s:.4g} ms between samples"
+            rows["certificate"] += f", samples up to {1e3 * certificate.longest_period_s:.4g} ms apart"
+        rows |= self.account_rows()
         if certificate.device.renderer == "device":
             rate_hz = 1.0 / certificate.device.period_s
             rows["runs on"] = f"the motor controller of {certificate.device.id} at {rate_hz:.6g} Hz"
@@ -314,7 +386,8 @@ class Plan:
 
     def certified_for(self, device: DeviceProfile) -> Plan:
         """Returns the plan with its certificate on a device; the certificate can be refused."""
-        return replace(self, certificate=certify(self.rendered, self.scheme, device))
+        prove = certify_with_account if self.held_by_account else certify
+        return replace(self, certificate=prove(self.rendered, self.scheme, device))
 
     def check_for(self, device: DeviceProfile) -> None:
         """Refuses a plan that would diverge on a device, and a device that is not the one of the certificate.
@@ -337,7 +410,13 @@ class Plan:
         if self.certificate.refused:
             cure = f". The object {self.needs}" if self.needs else ""
             reason = "" if self.needs else f": {self.certificate.reason}"
-            return (no(f"no structure can render the model on this device{cure}{reason}"),)
+            return (no(f"not renderable: {self.oscillation_text}{cure}{reason}"),)
+        if self.held_by_account:
+            reason = next((line for line in self.refused if line.startswith(LIMITED)), "")
+            accepted = self.force_error.share <= self.accept_force_error
+            cure = f". For a proof of passivity the object {self.needs}" if self.needs and accepted else ""
+            held = "held by the energy account, passivity is not proved"
+            return (usable(f"{held} ({reason}){cure}" if reason else f"{held}{cure}"),)
         if not self.certificate.certified:
             cure = f". For a certificate the object {self.needs}" if self.needs else ""
             return (

@@ -50,6 +50,7 @@ def plan(
     play_radius: float | None = None,
     predict: int | Literal["auto", "off"] = "auto",
     accept_force_error: float = ACCEPTED_FORCE_ERROR,
+    energy_account: bool = True,
 ) -> Plan:
     """Chooses the first candidate structure that is not refused for a model on a device.
 
@@ -82,6 +83,9 @@ def plan(
     accept_force_error : float
         Largest accepted difference of the felt from the identified force, as a share of the range of the
         identified force.
+    energy_account : bool
+        If the force error of the proved rendering is not accepted, also tries slopes up to 4 times the proved
+        ones, held by the energy account, and takes the smaller error.
 
     Returns
     -------
@@ -127,6 +131,7 @@ def plan(
         object_damping=model.damping if object_damping is None else object_damping,
         play_radius=play_radius,
         predict=samples,
+        energy_account=energy_account,
     )
     if model.of_velocity and (task.coupling or task.dynamic):
         raise InputError(
@@ -143,24 +148,13 @@ def plan(
             f"predict is {samples}: must be 0 (off) with a coupling, mass, damping, velocity input or "
             "memory; a prediction is certified only for direct rendering of a force of position"
         )
-    refused: list[str] = []
-    chosen: Candidate | None = None
-    for name, candidate in CANDIDATES.items():
-        outcome = candidate.propose(task)
-        if isinstance(outcome, Refusal):
-            refused.append(f"{name}: {outcome.reason}")
-            continue
-        chosen = outcome
-        if not chosen.certificate.refused:
-            break
-        refused.append(f"{name}: {chosen.certificate.reason}")
-    assert chosen is not None  # at least one of the direct and the explicit structure always applies
+    chosen, refused = choose(task, accept_force_error)
     identified = chosen.rendered is task.model
     planned = Plan(
         model,
         chosen.scheme,
         chosen.certificate,
-        tuple(refused),
+        refused,
         None if identified else model.with_network(**network_of(chosen.rendered)),
         accept_force_error,
     )
@@ -168,6 +162,47 @@ def plan(
     if stable_only or planned.verdict.level == "no":
         planned = replace(planned, needs=needed(task, accept_force_error, certified=stable_only))
     return planned
+
+
+def choose(task: Task, accept_force_error: float) -> tuple[Candidate, tuple[str, ...]]:
+    """Returns the candidate for a task that is not refused, and the refused structures with their reasons.
+
+    If all are refused, returns the last candidate with a certificate. `accept_force_error` is the largest
+    accepted force error [share of the range].
+    """
+    refused: list[str] = []
+    chosen: Candidate | None = None
+    found = ""
+    for name, candidate in CANDIDATES.items():
+        if found and not (candidate.reduces_error and _error(task, chosen) > accept_force_error):
+            continue
+        outcome = candidate.propose(task)
+        if isinstance(outcome, Refusal) or outcome.certificate.refused:
+            refused.append(f"{name}: {_reason(outcome)}")
+            chosen = outcome if isinstance(outcome, Candidate) and not found else chosen
+            continue
+        if found:
+            before, after = _error(task, chosen), _error(task, outcome)
+            keeps = before <= after
+            refused.append(
+                f"{name if keeps else found}: the force error is {100.0 * max(before, after):.3g} % of the "
+                f"range, and {100.0 * min(before, after):.3g} % with {found if keeps else name}"
+            )
+            if keeps:
+                continue
+        chosen, found = outcome, name
+    assert chosen is not None  # at least one of the direct and the explicit structure always applies
+    return chosen, tuple(refused)
+
+
+def _error(task: Task, candidate: Candidate | None) -> float:
+    """Returns the force error of a candidate, as a share of the range of the identified force."""
+    assert candidate is not None
+    return static_force_error(task.model, candidate.rendered, candidate.scheme).share
+
+
+def _reason(outcome: Candidate | Refusal) -> str:
+    return outcome.reason if isinstance(outcome, Refusal) else outcome.certificate.reason
 
 
 def _samples_of(predict: object) -> int | None:

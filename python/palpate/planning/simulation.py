@@ -116,7 +116,8 @@ def simulate(
 ) -> Recording:
     """Renders a plan in closed loop and virtual time, with simulated device, hand and controller.
 
-    The handle starts at rest at 0, or at the end of the model's domain that is nearest to it.
+    The handle starts at rest at 0, or at the end of the model's domain that is nearest to it. A plan that the
+    energy account holds is limited by it, every other plan by the force limit only.
 
     Parameters
     ----------
@@ -152,7 +153,14 @@ def simulate(
     plan.check_for(device)
     start = float(np.clip(0.0, plan.model.lower[0], plan.model.upper[0]))
     trace = _core.simulation.simulate(
-        plan.rendered, plan.scheme, device, hand, duration, start_position=start, progress=progress
+        plan.rendered,
+        plan.scheme,
+        device,
+        hand,
+        duration,
+        start_position=start,
+        energy_account=plan.held_by_account,
+        progress=progress,
     )
     recording = Recording.from_arrays(
         trace["position"],
@@ -322,6 +330,10 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
         (outside, "were outside the domain of the model: identify the model over a larger range"),
         (unsolved, "had no unique solution of the load line: choose the structure with palpate plan"),
         (status["Limited"], "limited the force to that of the device: a stronger device is needed"),
+        (
+            status["EnergyLimited"],
+            "limited the force by the energy account: choose a device with more damping",
+        ),
     ):
         if count > tolerated_change * ticks:
             findings.append(usable(f"{count} of {ticks} ticks ({100 * count / ticks:.3g} %) {sentence}"))

@@ -67,6 +67,11 @@ MEANINGS = {
         "damping",
         "The viscous damping of the device must absorb the energy that the linearised rendering feeds in.",
     ),
+    "account-force": (
+        "energy",
+        "The energy account must be able to hold the largest force of the object at rest.",
+    ),
+    "account-renderer": ("rate", "A motor controller has no energy account."),
     "velocity-coupling": (
         "damping",
         "No proof covers a force that depends on velocity behind a coupling.",
@@ -87,6 +92,8 @@ BASES = {
 
 VERDICTS = {
     "certified": "The certificate holds: a hand cannot take more energy out of the device than it put in.",
+    "held-by-account": "The energy account holds: a hand cannot take more energy out of the device than E_0, "
+    "in any motion.",
     "stable-locally": "The linearised system is stable near each equilibrium; nothing is proved about its "
     "energy.",
     "refused": "The certificate is refused: an inequality does not hold, or no bound is known.",
@@ -122,6 +129,8 @@ SYMBOLS = {
     "gamma": "largest change of the rendered force per error of the position",
     "epsilon": "largest error of the force by the program that renders it",
     "e": "increase of the slope of the hysteresis by a step of the encoder",
+    "E_F": "largest energy that the largest force can take in one period",
+    "W": "largest energy that the object stores",
     "f": "force of the model; f' is its slope",
     "g": "mean force of press and release; g' is its slope",
     "h": "half the difference between press and release force; h' is its slope",

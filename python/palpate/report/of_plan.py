@@ -153,5 +153,7 @@ def _unit(kind: str, position: str) -> str:
         "force": force,
         "position": position,
         "stiffness": f"{force}/{position}",
+        "energy": "J",
+        "rate": "Hz",
     }
     return units.get(kind, "").replace("*", "·")

@@ -142,7 +142,7 @@ class Subject:
         if self.plan.certificate is None:
             return NO_CERTIFICATE
         if self.plan.certificate.refused:
-            return "no structure can render the model on this device"
+            return "no structure is proved stable on this device"
         try:
             device = self.plan.certificate.device
             rendered = simulate(self.plan, device, hand_for(self.plan, device), RENDERED_S)

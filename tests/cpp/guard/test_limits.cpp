@@ -12,7 +12,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/guard/energy_tank.hpp"
 #include "palpate/guard/limit_cycle_detector.hpp"
 #include "palpate/guard/passivity_observer.hpp"
 #include "palpate/guard/read_motion.hpp"
@@ -404,56 +403,6 @@ TEST(LimitCycleDetector, ASwingEndsAtItsFarthestPosition) {
         detector.watch(0.02 * (phase < 5 ? phase : 10 - phase), phase < 5 ? 1.0 : 0.0);
     }
     EXPECT_GE(detector.limit_cycles(), 2U);
-}
-
-TEST(EnergyTank, ActsOnlyBeyondTheStoredEnergy) {
-    EnergyTank tank{{.stored = {.within = 2.0}}};
-    tank.book(-4.0, 0.5);
-    EXPECT_EQ(tank.given(), 2.0);
-    double force = 3.0;
-    EXPECT_EQ(tank.apply(force), Status::Ok) << "exactly at the bound";
-    tank.book(-0.125, 2.0);
-    EXPECT_EQ(tank.apply(force), Status::EnergyLimited);
-    EXPECT_EQ(force, 1.5);
-    force = 0.0;
-    EXPECT_EQ(tank.apply(force), Status::Ok) << "zero force is not changed";
-    tank.book(-3.0, 1.0);
-    for (double sent : {-3.0, 3.0}) {
-        EXPECT_EQ(tank.apply(sent), Status::EnergyLimited);
-        EXPECT_EQ(sent, 0.0) << "the reserve is used";
-    }
-    tank.book(4.0, 1.0);
-    EXPECT_EQ(tank.given(), 1.25);
-    EXPECT_EQ(tank.most_given(), 5.25);
-    tank.book(4.0, 1.0);
-    EXPECT_EQ(tank.given(), 0.0) << "the object takes no credit for more than it gave";
-}
-
-TEST(EnergyTank, CountsLossesOnlyBeyondTheUncreditedMotion) {
-    const TankSettings settings{{.within = 9.0}, 0.5, 0.25, 0.125, 0.5};
-    for (const double sign : {-1.0, 1.0}) {
-        EnergyTank tank{settings};
-        tank.book(-sign * 8.0, sign * 0.125);
-        EXPECT_EQ(tank.given(), 1.0);
-        tank.book(-sign * 16.0, sign * 0.0625);
-        EXPECT_EQ(tank.given(), 2.0);
-        tank.book(-sign * 8.0, sign * 0.625);
-        EXPECT_EQ(tank.given(), 7.0 - (0.5 * 0.25 / 0.5 + 0.25 * 0.5));
-    }
-}
-
-TEST(EnergyTank, VisitedPositionsRaiseItsBound) {
-    EnergyTank tank{{.stored = {.within = 1.0, .lower = 0.0, .upper = 1.0, .force_limit = 2.0}}};
-    tank.book(-3.0, 1.0);
-    double force = 1.0;
-    EXPECT_EQ(tank.apply(force), Status::EnergyLimited);
-    tank.visit(2.0, 2.0);
-    force = 1.0;
-    EXPECT_EQ(tank.apply(force), Status::Ok);
-    EXPECT_EQ(tank.stored().most(), 3.0);
-    tank.book(-0.125, 1.0);
-    EXPECT_EQ(tank.apply(force), Status::EnergyLimited);
-    EXPECT_EQ(force, 0.5) << "the reserve is a quarter of the energy within the domain";
 }
 
 TEST(StoredEnergy, AddsTheFarthestPositionOfHandleAndObjectOnEachSide) {

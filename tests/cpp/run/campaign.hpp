@@ -191,11 +191,11 @@ inline std::string run_scene(std::uint64_t seed, Totals& totals) {
                         loop, period_s, random_clock_faults(random, ticks, period_s, totals), invariants,
                         [](const TickRecord&) {});
         broken = invariants.broken();
-        // A certificate without delay proves that the tank never acts, except with the energy of the start ramp
+        // A certificate without delay proves that the account never acts, except with the energy of the start ramp
         const auto limited = report.ticks_by_status[static_cast<std::size_t>(Status::EnergyLimited)];
         if (broken.empty() && follows_certificate && faults.empty() && scene.device.delay_s == 0.0 &&
             guards.ramp_s == 0.0 && limited > 0) {
-            broken = "the energy tank reduces forces of a certified run";
+            broken = "the energy account limits forces of a certified run";
         }
         if (!broken.empty()) {
             broken += ", run " + std::to_string(run) + (follows_certificate ? ", certified" : "");
@@ -238,9 +238,8 @@ inline std::ostream& operator<<(std::ostream& out, const Totals& totals) {
     out << "\nexits: time up " << totals.by_exit[0] << ", guard " << totals.by_exit[2] << ", device fault "
         << totals.by_exit[3] << ", rate " << totals.by_exit[4] << ", certificate " << totals.by_exit[5];
     return out << "\nlargest force " << totals.extremes.force << " of the limit, slew "
-               << totals.extremes.slew << " of the limit, energy above the stored energy "
-               << totals.extremes.tank << " of the allowed energy, " << totals.extremes.evaluations
-               << " evaluations in a tick\n";
+               << totals.extremes.slew << " of the limit, energy taken " << totals.extremes.taken
+               << " of E0, " << totals.extremes.evaluations << " evaluations in a tick\n";
 }
 
 }  // namespace palpate::test

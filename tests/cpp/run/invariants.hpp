@@ -31,13 +31,13 @@ struct ClockFault {
 struct Extremes {
     double force = 0.0;  ///< largest force / force limit [-]
     double slew = 0.0;   ///< largest increase of the force / slew limit [-]
-    double tank = 0.0;   ///< largest energy given above the stored energy / energy allowed by the tank [-]
+    double taken = 0.0;  ///< largest energy that the hand took / E0 of the energy account [-]
     std::int32_t evaluations = 0;
 
     void add(const Extremes& other) {
         force = std::max(force, other.force);
         slew = std::max(slew, other.slew);
-        tank = std::max(tank, other.tank);
+        taken = std::max(taken, other.taken);
         evaluations = std::max(evaluations, other.evaluations);
     }
 };
@@ -57,7 +57,7 @@ class Invariants {
     /// States that the motor makes other forces than the commands, so that no force limits its energy.
     void motor_does_not_obey() { motor_obeys_ = false; }
 
-    /// Sets the guards of the running controller, whose energy tank and limit cycles are compared.
+    /// Sets the guards of the running controller, whose energy account and limit cycles are compared.
     void watch(const Guards& guards) { guards_ = &guards; }
 
     void woke(const Wake& wake) noexcept {
@@ -96,7 +96,7 @@ class Invariants {
         require(sends_force(record.status) || sent_ == 0.0, "a tick without force sends a force");
         check_reading(record.status);
         check_limits(record);
-        check_tank(record.status);
+        check_account(record.status);
         bad_in_a_row_ = sends_force(record.status) ? 0 : bad_in_a_row_ + 1;
         has_ended_ = is_final(record.status) || bad_in_a_row_ > loop_.tolerated;
         extremes_.evaluations = std::max(extremes_.evaluations, record.evaluations);
@@ -164,7 +164,7 @@ class Invariants {
         extremes_.force = std::max(extremes_.force, std::abs(sent_) / limit);
         if (settings_.slew_s > 0.0) {
             const double step = limit / (settings_.slew_s * loop_.rate_hz);
-            // The energy tank may reduce the force faster, towards zero
+            // The energy account may reduce the force faster, towards zero
             const double above = sent_ - std::max(0.0, last_sent_);
             const double below = std::min(0.0, last_sent_) - sent_;
             const double share = std::max(above, below) / step;
@@ -179,47 +179,39 @@ class Invariants {
         }
     }
 
-    /// The energy given, computed from positions and forces at the device, stays within stored energy and reserve.
-    void check_tank(Status status) noexcept {
-        if (!settings_.energy_tank) {
-            return;
-        }
+    /// The hand takes at most E0. The energy is summed from readings and forces at the device, with the largest one
+    /// that the readings allow. It is unknown after a tick without a valid reading.
+    void check_account(Status status) noexcept {
         const bool is_interrupted =
             !is_valid_ || status == Status::Timeout || status == Status::Lost || is_final(status);
-        if (is_interrupted) {
-            proved_ = std::numeric_limits<double>::quiet_NaN();
+        is_known_ = is_known_ && !is_interrupted && motor_obeys_ && std::isfinite(reading_.applied);
+        if (!settings_.energy_account || !is_known_) {
             return;
         }
+        const double step = settings_.certified ? 0.0 : device_.encoder_step;
         const double radius = settings_.certified ? 0.5 * device_.encoder_step : 0.0;
         const double before = proved_;
         proved_ = std::isnan(before)
                       ? reading_.position
                       : std::clamp(before, reading_.position - radius, reading_.position + radius);
-        const double moved = proved_ - before;
-        if (std::isfinite(moved * reading_.applied)) {
+        const StoredEnergy& stored = guards_->account.stored();
+        if (std::isnan(before)) {
+            start_ = stored.most();
+        } else {
+            const double late = device_.delay_fraction();
+            const double mean = late * applied_ + (1.0 - late) * reading_.applied;
             const double share = settings_.certified ? 1.0 : uncertified_credit;
-            const double credited =
-                std::max(0.0, std::abs(moved) - (settings_.certified ? 0.0 : device_.encoder_step));
-            const double lost =
-                share * credited *
-                (settings_.device_damping * credited * loop_.rate_hz + settings_.device_friction);
-            const double given = given_ - reading_.applied * moved - lost;
-            most_work_ = std::max(most_work_, given - given_);
-            given_ = std::max(0.0, given);
+            const double way = std::abs(proved_ - before) + step;
+            const double period = 1.0 / loop_.rate_hz + device_.jitter_s;
+            put_in_ += mean * (proved_ - before) + 0.5 * step * std::abs(mean - mean_) +
+                       share * way * (settings_.device_damping * way / period + settings_.device_friction);
+            mean_ = mean;
         }
-        const StoredEnergy& stored = guards_->tank.stored();
-        const double reserve = 0.25 * stored.within();
-        const double excess = given_ - stored.most();
-        const double rounding = 1e-9 * (stored.most() + given_);
-        if (excess > rounding && std::isfinite(reserve)) {
-            const double factor = std::max(0.0, 1.0 - (excess - rounding) / reserve);
-            require(std::abs(sent_) <= settings_.force_limit * factor * (1.0 + 1e-9),
-                    "the energy tank does not limit the force");
-            // Forces sent before the tank was empty may still act
-            const double allowed = reserve + (device_.late_samples() + 2) * most_work_;
-            require(!motor_obeys_ || excess <= allowed + rounding,
-                    "the rendering gives more energy than the tank allows");
-            extremes_.tank = std::max(extremes_.tank, excess / allowed);
+        applied_ = reading_.applied;
+        const double taken = -put_in_ - 0.5 * step * std::abs(mean_);
+        require(!(taken > start_ * (1.0 + 1e-9)), "the hand takes more energy than the account allows");
+        if (std::isfinite(start_) && start_ > 0.0) {
+            extremes_.taken = std::max(extremes_.taken, taken / start_);
         }
     }
 
@@ -252,8 +244,11 @@ class Invariants {
     std::uint64_t sequence_ = 0;  ///< number and position of the last valid reading
     double position_ = 0.0;
     double proved_ = std::numeric_limits<double>::quiet_NaN();
-    double given_ = 0.0;      ///< energy given since the last tick in which it was zero [J]
-    double most_work_ = 0.0;  ///< most energy given in one tick [J]
+    bool is_known_ = true;  ///< true if every tick had a valid reading
+    double start_ = 0.0;    ///< E0 of the energy account [J]
+    double put_in_ = 0.0;   ///< largest energy that the hand can have put in [J]
+    double applied_ = 0.0;  ///< force of the motor at the last reading, and its mean over the period before
+    double mean_ = 0.0;
 };
 
 /// A device whose exchanges are checked.

@@ -166,8 +166,8 @@ Guards all_guards() {
     for (int k = 0; k < 14; ++k) {
         guards.limit_cycle.watch(k % 2 == 0 ? 0.0 : 1.0, 0.0);
     }
-    guards.tank = EnergyTank{{.stored = {.within = 8.0}}};
-    guards.tank.book(1.0, -9.0);  // 9 J given: half of the reserve of 2 J is used
+    // With B = b / T = 1 the force F takes at most F^2 / 4 J in a tick
+    guards.account = EnergyAccount{{.stored = {.within = 3.0625}, .device_damping = 1e-3}};
     return guards;
 }
 
@@ -183,17 +183,17 @@ TEST(Controller, ReportsTheFirstOfItsStatusesInTheirOrder) {
         (void)controller.start();
         return controller.tick();
     };
-    // Limited to 10, scaled by 0.7, by half a ramp, limited to a change of 1, and halved by the tank
+    // Limited to 10, scaled by 0.7, by half a ramp, limited to a change of 1; the account allows 2 sqrt(3.0625) = 3.5
     EXPECT_EQ(tick().status, Status::MaxIterations);
-    EXPECT_NEAR(tick().command.force, 0.5, 1e-12);
+    EXPECT_NEAR(tick().command.force, 1.0, 1e-12);
     next.status = Status::Ok;
     EXPECT_EQ(tick().status, Status::Ramp);
     guards.slew.largest_step = infinity;
-    EXPECT_NEAR(tick().command.force, 10.0 * 0.7 * 0.5 * 0.5, 1e-12);
+    EXPECT_NEAR(tick().command.force, 10.0 * 0.7 * 0.5, 1e-12);
     guards.ramp = {};
     EXPECT_EQ(tick().status, Status::EnergyLimited);
-    EXPECT_NEAR(tick().command.force, 10.0 * 0.7 * 0.5, 1e-12);
-    guards.tank = {};
+    EXPECT_NEAR(tick().command.force, 3.5, 1e-12);
+    guards.account = {};
     EXPECT_EQ(tick().status, Status::LimitCycleScaled);
     EXPECT_NEAR(tick().command.force, 10.0 * 0.7, 1e-12);
     guards.limit_cycle = {};
@@ -213,7 +213,8 @@ TEST(Controller, AddsUpTheWorkOfTheMotorBetweenValidReadings) {
     Rendered next{0.0, 5.0, 0, Status::Ok, false};
     std::vector<double> resets;
     Guards guards{.ramp = {2, 0}};
-    guards.tank = EnergyTank{{.stored = {.within = 1.0, .lower = 0.0, .upper = 2.0, .force_limit = 10.0}}};
+    guards.account =
+        EnergyAccount{{.stored = {.within = 1.0, .lower = 0.0, .upper = 2.0, .force_limit = 10.0}}};
     Controller controller{device, ChosenStructure{&next, &resets}, guards};
     const auto then = [&](double position, double applied, Status status = Status::Ok) {
         device.next.position = position;
@@ -235,11 +236,11 @@ TEST(Controller, AddsUpTheWorkOfTheMotorBetweenValidReadings) {
     then(-0.5, 2.0);  // absorbed 0.25 * 2; the force that is not a number does not count
     EXPECT_DOUBLE_EQ(controller.guards().observer.energy(), -1.0 + 2.0 + 0.5);
     EXPECT_DOUBLE_EQ(controller.guards().observer.least(), -1.0);
-    EXPECT_DOUBLE_EQ(controller.guards().tank.most_given(), 1.0);
     EXPECT_DOUBLE_EQ(controller.guards().ramp_observer.energy(), 1.0);
-    EXPECT_DOUBLE_EQ(controller.guards().tank.stored().most(), 1.0 + 10.0 * 3.0) << "the object is at 5";
+    EXPECT_DOUBLE_EQ(controller.guards().account.stored().most(), 1.0 + 10.0 * 3.0) << "the object is at 5";
     (void)controller.tick();
-    EXPECT_DOUBLE_EQ(controller.guards().tank.stored().most(), 1.0 + 10.0 * 3.5) << "the handle is at -0.5";
+    EXPECT_DOUBLE_EQ(controller.guards().account.stored().most(), 1.0 + 10.0 * 3.5)
+        << "the handle is at -0.5";
 }
 
 TEST(Controller, LimitsTheForceOfATickToTheGivenLimit) {
@@ -385,7 +386,7 @@ std::vector<State> states() {
             {"limited", then(running, times(6, {"fast"})), true},
             {"slewing back", then(running, times(6, {"fast", "fast back"})), true},
             {"almost frozen", then(running, then(times(1, {"fast"}), times(9, {"rest"})))},
-            {"tank empty", then(running, times(30, {"fast", "motor gives energy"})), true},
+            {"account empty", then(running, times(30, {"fast", "motor gives energy"})), true},
             {"limit cycle", then(running, times(12, {"fast", "creep", "fast back", "back"})), true}};
 }
 
@@ -542,7 +543,7 @@ TEST(Controller, EventsReachEveryState) {
         expects(Status::Ramp);
         if (name == "limited" || name == "slewing back") {
             expects(Status::Limited);
-        } else if (name == "tank empty") {
+        } else if (name == "account empty") {
             expects(Status::EnergyLimited);
         } else if (name == "limit cycle") {
             expects(Status::LimitCycleScaled);

@@ -443,7 +443,7 @@ TEST(RunLoop, ReportsTheEnergyOfRampAndRunSeparately) {
     };
     LoopRun run;
     run.guards.ramp = {3, 0};
-    run.guards.tank = EnergyTank{{.stored = {.within = 40.0, .force_limit = 5.0}}};
+    run.guards.account = EnergyAccount{{.stored = {.within = 40.0, .force_limit = 5.0}}};
     run.settings.duration_s = 0.007;
     run.clock = regular(7);
     run.device.readings.clear();

@@ -27,6 +27,7 @@
 #include "palpate/io/model_file.hpp"
 #include "palpate/simulation/simulated_device.hpp"
 #include "palpate/simulation/test_rig.hpp"
+#include "palpate/stability/account_certificate.hpp"
 #include "support.hpp"
 
 namespace palpate {
@@ -85,6 +86,34 @@ TEST(PrepareRendering, KeepsAllGuardsIfThePlanIsOnlyStable) {
     EXPECT_EQ(certified(job).rfind("no: the certificate is stable-locally: ", 0), 0U) << certified(job);
     ASSERT_EQ(job.notes.size(), 1U);
     EXPECT_EQ(job.notes.front().rfind("uncertified: the certificate is stable-locally: ", 0), 0U);
+}
+
+TEST(PrepareRendering, APlanThatTheAccountHoldsNeedsTheAccount) {
+    PlannedModel model = stored("certificate_massless.json");
+    model.name = "key.json";
+    model.certificate = certify_with_account(model.planned(), *model.plan, model.certificate->device);
+    ASSERT_TRUE(model.certificate->held_by_account()) << model.certificate->reason;
+    for (const bool simulated : {false, true}) {
+        RenderOptions options;
+        const RenderJob job = prepared(model, simulated, options);
+        EXPECT_FALSE(job.guards.certified) << "the account must count steps and nine tenths of the losses";
+        EXPECT_TRUE(job.guards.energy_account);
+        EXPECT_EQ(job.guards.slew_s, 0.0);
+        EXPECT_EQ(job.session.loop.tolerated, 0U);
+        EXPECT_EQ(job.session.loop.longest_period_s, model.certificate->longest_period_s);
+        EXPECT_EQ(certified(job), "held-by-account");
+        EXPECT_TRUE(job.notes.empty());
+        options.energy_account = false;
+        if (simulated) {
+            EXPECT_EQ(certified(prepared(model, true, options)),
+                      "no: it is held by the energy account, which is switched off");
+        } else {
+            EXPECT_EQ(
+                test::refusal([&] { (void)prepared(model, false, options); }),
+                "key.json cannot be rendered: it is held by the energy account, which is switched off; make "
+                "a certificate with 'palpate plan', or set uncertified to render without a certificate");
+        }
+    }
 }
 
 /// A difference between the device and that of the certificate.
@@ -215,7 +244,7 @@ TEST(RenderOptions, ChangeThePlanIfTheySetOneOfItsNumbers) {
     RenderOptions options;
     options.largest_speed = 5.0;
     options.ramp_s = 1.0;
-    options.energy_tank = false;
+    options.energy_account = false;
     EXPECT_FALSE(changes_plan(options));
 }
 
@@ -352,7 +381,7 @@ TEST(ChosenGuards, AreThoseOfTheOptionsOtherwiseOfTheDevice) {
     EXPECT_EQ(chosen.ramp_s, GuardSettings{}.ramp_s);
     EXPECT_EQ(chosen.frozen_s, GuardSettings{}.frozen_s);
     EXPECT_EQ(chosen.device_damping, 0.25);
-    EXPECT_TRUE(chosen.energy_tank);
+    EXPECT_TRUE(chosen.energy_account);
 
     RenderOptions options;
     options.force_limit = 1.5;
@@ -360,14 +389,14 @@ TEST(ChosenGuards, AreThoseOfTheOptionsOtherwiseOfTheDevice) {
     options.slew_s = 0.125;
     options.ramp_s = 0.75;
     options.frozen_s = 0.5;
-    options.energy_tank = false;
+    options.energy_account = false;
     const GuardSettings own = detail::chosen_guards(options, *device);
     EXPECT_EQ(own.force_limit, 1.5);
     EXPECT_EQ(own.largest_speed, 7.0);
     EXPECT_EQ(own.slew_s, 0.125);
     EXPECT_EQ(own.ramp_s, 0.75);
     EXPECT_EQ(own.frozen_s, 0.5);
-    EXPECT_FALSE(own.energy_tank);
+    EXPECT_FALSE(own.energy_account);
 }
 
 TEST(ChosenGuards, RefuseAForceThatTheDeviceDoesNotMake) {
@@ -810,7 +839,7 @@ TEST(Render, OnlyWatchesADeviceThatRenders) {
     EXPECT_EQ(summary.notes.size(), 1U);
     EXPECT_FALSE(summary.kept[249].extrapolated);
     EXPECT_TRUE(summary.kept[250].extrapolated);
-    EXPECT_TRUE(std::isinf(summary.report.loop.most_stored)) << "the host has no energy tank";
+    EXPECT_TRUE(std::isinf(summary.report.loop.most_stored)) << "the host has no energy account";
 
     rendering.options.largest_speed = 599.0;
     rendering.sinks.kept.clear();

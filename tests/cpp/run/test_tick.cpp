@@ -140,9 +140,9 @@ std::vector<Input> inputs() {
 /// Most instructions of a tick, in the order of `all_variants`: 1.2 times the numbers counted with g++ 12.2, -O1, glibc
 /// 2.36 and the AVX-512 kernels, for all ticks of `inputs`. With -O3 a tick needs fewer.
 constexpr std::array<std::uint64_t, 18> most_instructions{
-    840,    // direct, position
+    1080,   // direct, position
     1240,   // direct, hysteresis
-    950,    // direct, predicted
+    1190,   // direct, predicted
     1400,   // direct, predicted hysteresis
     1230,   // massless, position
     4900,   // massless, hysteresis
@@ -150,7 +150,7 @@ constexpr std::array<std::uint64_t, 18> most_instructions{
     1530,   // implicit, position
     6380,   // implicit, hysteresis
     1830,   // implicit, compensated
-    830,    // explicit, position
+    1080,   // explicit, position
     1690,   // explicit, hysteresis
     2750,   // explicit, compensated
     3510,   // energy-consistent, position

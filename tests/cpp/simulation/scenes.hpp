@@ -21,7 +21,7 @@ namespace palpate::test {
 
 /// Continues a simulation after each tick.
 inline constexpr auto to_the_end = [](const Tick& /*tick*/, const Motion& /*handle*/,
-                                      const EnergyAccount& /*account*/) { return true; };
+                                      const EnergyBalance& /*account*/) { return true; };
 
 /// A hand that takes hold of a resting handle some time after the start, so that the first forces of a device with
 /// delay find the object at rest.

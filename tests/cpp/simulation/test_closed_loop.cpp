@@ -39,7 +39,7 @@ double open_balance(const DeviceProfile& device, double start_velocity, const Cl
 
 // Energy account: the work of the hand equals the energy of the motor, the losses, and the increase
 // of the handle's kinetic energy.
-TEST(EnergyAccount, BalancesToRoundingForEveryHand) {
+TEST(EnergyBalance, BalancesToRoundingForEveryHand) {
     test::Random random{11};
     double worst = 0.0;
     for (int k = 0; k < test::cases(200); ++k) {
@@ -67,7 +67,7 @@ TEST(ClosedLoop, LimitsTheForceByDefaultToTheLimitOfTheDevice) {
         device.force_limit = limit;
         double largest = 0.0;
         (void)closed_loop(Direct{Spring{40.0}}, device, PassiveHand{}, 3, {20, 0.5, 0.0, {}},
-                          [&](const Tick& tick, const Motion& /*handle*/, const EnergyAccount& /*account*/) {
+                          [&](const Tick& tick, const Motion& /*handle*/, const EnergyBalance& /*account*/) {
                               largest = std::max(largest, tick.command.force);
                               return true;
                           });
@@ -75,7 +75,7 @@ TEST(ClosedLoop, LimitsTheForceByDefaultToTheLimitOfTheDevice) {
     }
 }
 
-TEST(EnergyAccount, BalancesForAMassMuchLargerThanTheDevice) {
+TEST(EnergyBalance, BalancesForAMassMuchLargerThanTheDevice) {
     DeviceProfile device;
     device.viscous_damping = 0.02;
     const ClosedLoopEnd end = closed_loop(Direct{Spring{40.0}}, device, PassiveHand{0.0, 0.0, 100.0, 0.0},

@@ -101,7 +101,7 @@ TEST(CertifiedScenes, DoNotOscillateWithPassiveHands) {
         const double first = scene.held + moving({scene.start, 0.0});
         double most = 0.0;
         (void)test::run(scene, hand, ticks, substeps,
-                        [&](const Tick& /*tick*/, const Motion& handle, const EnergyAccount& /*account*/) {
+                        [&](const Tick& /*tick*/, const Motion& handle, const EnergyBalance& /*account*/) {
                             most = std::max(most, moving(handle));
                             return true;
                         });

@@ -65,7 +65,7 @@ def test_a_refused_plan_is_shown_with_its_reason(folder: Path, capsys: pytest.Ca
     capsys.readouterr()
     assert main(["report", "m.json", "--device", "ruined.toml", "-o", "report.html"]) == 1
     printed = capsys.readouterr().out
-    assert printed.startswith("verdict: no\n  no structure can render the model on this device. ")
+    assert printed.startswith("verdict: no\n  not renderable: no structure is proved stable on this device")
     assert "left out, certificate" not in printed
     page = Path("report.html").read_text(encoding="utf-8")
     assert "does not hold" in page

@@ -14,11 +14,11 @@ import pytest
 
 from models_by_hand import keyswitch_by_hand, model_by_hand, relaxing_by_hand
 from palpate import Recording, _core, load_model, read_recording, simulate
-from palpate._core.device import DeviceProfile
 from palpate._core.rendering import Scheme
 from palpate._core.simulation import Hand
 from palpate.cli import demo as demo_module
 from palpate.cli.main import main
+from palpate.planning import DeviceProfile, example_profiles
 
 JSON_FIELDS = ["verdict", "structure", "duration_s", "ticks", "force_error_end", "force_error_instant"]
 JSON_FIELDS += [
@@ -350,13 +350,34 @@ def test_the_demo_refuses_a_folder_that_cannot_be_created_before_the_work(
         assert error.count("\n") == 1
 
 
-def test_a_device_is_refused_because_it_comes_from_the_plan(
+def test_every_device_is_simulated_without_a_certificate(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["simulate", "m.json", "--device", "bench-knob"]) == 2
-    message = capsys.readouterr().err
-    assert "the device comes from the plan in the model file" in message
-    assert "palpate plan MODEL.json --device bench-knob -o MODEL.json" in message
+    for name, (file, _) in example_profiles().items():
+        device = DeviceProfile.load(file)
+        if device.position_unit != "rad":
+            continue
+        arguments = ["simulate", "m.json", "--device", name, "--duration-s", "0.5", "-o", f"{name}.csv"]
+        assert main([*arguments, "--json"]) in (0, 1), name
+        result = json.loads(capsys.readouterr().out)
+        assert f"nothing is proved on {device.id}: this is one simulated motion" in result["verdict"]
+        assert result["structure"] == "direct"
+        assert result["ticks"] == round(0.5 / device.period_s), name
+
+
+def test_a_plan_keeps_its_certificate_on_its_own_device_only(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", "m.json", "--device", "bench-knob", "-o", "p.json"]) == 0
+    capsys.readouterr()
+    for name, is_other in (("bench-knob", False), ("smartknob", True)):
+        main(["simulate", "p.json", "--device", name, "--json"])
+        assert ("nothing is proved" in json.loads(capsys.readouterr().out)["verdict"]) is is_other
+
+
+def test_a_device_in_another_unit_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "m.json", "--device", "touch"]) == 2
+    assert "position_unit of the device touch is m: must be rad" in capsys.readouterr().err
 
 
 def test_the_positions_that_the_hand_reached_are_printed(

@@ -103,14 +103,6 @@ def test_a_model_without_certificate_is_suggested_to_the_plan(
     assert pasted(command, tmp_path) == words
 
 
-def test_a_device_of_a_simulation_is_suggested_to_the_plan(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    command = suggested(capsys, ["simulate", str(MODEL), f"--device={name}"], "palpate plan")
-    words = ["plan", "MODEL.json", "--device", name, "-o", "MODEL.json"]
-    assert pasted(command.removesuffix(" first"), tmp_path) == words
-
-
 def test_a_column_is_suggested_as_one_word(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

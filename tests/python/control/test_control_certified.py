@@ -68,7 +68,7 @@ def test_the_planned_network_is_rendered_and_with_a_chosen_structure_the_identif
     limited: Path, tmp_path: Path
 ) -> None:
     stored = load_model(limited)
-    arguments = ["--duration-s", 3, "--slew-s", 0, "--no-energy-tank"]
+    arguments = ["--duration-s", 3, "--slew-s", 0, "--no-energy-account"]
     for options, rendered in (([], stored.planned), (["--structure", "direct", "--rate-hz", 100], stored)):
         record = tmp_path / f"rendered{len(options)}.csv"
         completed = control(limited, *arguments, *options, "--record", record)

@@ -182,7 +182,7 @@ def test_every_open_controller_renders_a_stiffer_spring_than_the_host(name: str)
     rate = min(8e3, device.on_device.highest_rate_hz or 8e3)
     spring = model_by_hand(weight=[0.0], linear=[0.6 * device.viscous_damping / device.period_s])
     host, controller = (
-        plan(spring, device, predict="off"),
+        plan(spring, device, predict="off", energy_account=False),
         plan(spring, device, on_device=rate, predict="off"),
     )
     assert right_side(controller, "damping-hold") < device.viscous_damping

@@ -185,7 +185,7 @@ def test_a_device_that_no_realistic_rate_helps_gets_a_bound_and_a_scale_instead_
                 there_and_back * float(scale[2]), force, direction=side, units={"position": "m", "force": "N"}
             )
         )
-        assert plan(scaled, weak).verdict.level == level
+        assert plan(scaled, weak, energy_account=False).verdict.level == level
 
 
 def test_a_rate_is_advised_with_the_place_where_it_can_run() -> None:
@@ -213,7 +213,7 @@ def test_a_profile_with_a_motor_controller_is_advised_to_run_the_model_there(del
 
 def test_friction_and_encoder_are_named_where_they_are_the_limit() -> None:
     coarse = DeviceProfile(id="coarse", coulomb_friction=1e-3, encoder_step=1e-3)
-    chosen = plan(model_by_hand(), coarse)
+    chosen = plan(model_by_hand(), coarse, energy_account=False)
     assert chosen.verdict.level == "no"
     assert "needs device friction f_c >= 0.00" in chosen.needs
     assert " b >= " not in chosen.needs
@@ -275,11 +275,12 @@ def test_an_error_of_a_few_percent_is_usable_and_below_the_noticeable_good() -> 
 
 
 def test_plan_with_large_force_error_is_stored_only_if_accepted() -> None:
-    chosen = plan(keyswitch_by_hand(), "touch")
+    chosen = plan(keyswitch_by_hand(), "touch", energy_account=False)
     assert chosen.verdict.level == "no"
     with pytest.raises(InputError, match=r"a plan with verdict no is not stored: the force error"):
         chosen.stored()
-    again = plan(keyswitch_by_hand(), "touch", accept_force_error=chosen.force_error.share)
+    largest = chosen.force_error.share
+    again = plan(keyswitch_by_hand(), "touch", accept_force_error=largest, energy_account=False)
     assert again.verdict.level == "usable"
     assert Plan.of(again.stored()).verdict == again.verdict
 

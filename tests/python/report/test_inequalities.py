@@ -22,7 +22,8 @@ def words_in(file: str, of: str) -> set[str]:
 
 def test_every_inequality_of_the_core_has_a_meaning_and_a_unit() -> None:
     text = "".join(file.read_text(encoding="utf-8") for file in STABILITY.glob("*_inequalities.hpp"))
-    text += (STABILITY / "certificate.hpp").read_text(encoding="utf-8")
+    for name in ("certificate.hpp", "account_certificate.hpp"):
+        text += (STABILITY / name).read_text(encoding="utf-8")
     ids = set(re.findall(r'"([a-z]+(?:-[a-z]+)+)"', text)) - words_in("certificate.hpp", "Verdict")
     assert ids == set(MEANINGS)
     assert all(_unit(kind, "rad") for kind, _ in MEANINGS.values())

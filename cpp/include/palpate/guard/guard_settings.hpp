@@ -25,41 +25,54 @@ struct GuardSettings {
     double frozen_speed = 0.3;
     /// If the position is constant for this time directly after fast motion, the encoder is frozen; 0: no check [s]
     double frozen_s = 0.05;
-    bool energy_tank = true;  ///< true: an energy tank limits the energy that the rendering may give
+    bool energy_account = true;  ///< true: an energy account limits the energy that a hand can take out
     /// An oscillation is a limit cycle only if the force changes by at least this much in each swing between two
     /// reversals; 0: limit cycles are not detected [N or N*m]
     double limit_cycle_force = 0.05;
     double device_damping = 0.0;   ///< device damping b [N*s/m or N*m*s/rad]
     double device_friction = 0.0;  ///< Coulomb friction f_c of the device [N or N*m]
     double encoder_step = 0.0;     ///< encoder step of the device [m or rad]
-    /// true: a certificate holds for this run. The energy tank then uses the motion that encoder readings prove, counts
-    /// all damping and friction of the device, and includes the energy that the virtual object stores outside the
-    /// domain.
+    double force_step = 0.0;       ///< force step of the device [N or N*m]
+    double delay_s = 0.0;          ///< delay from a reading to its force [s]
+    double jitter_s = 0.0;         ///< longest time between two readings, minus the period [s]
+    /// true: a certificate holds for this run. The energy account then uses the motion that encoder readings prove,
+    /// counts all damping and friction of the device, and includes the energy that the virtual object stores outside
+    /// the domain.
     bool certified = false;
     /// Largest delay of the applied force, `Reading::delay`; a longer delay ends the run [s]
     double longest_delay_s = std::numeric_limits<double>::infinity();
 };
 
+/// Sets the numbers of the device that the guards use.
+inline void use_device(GuardSettings& guards, const DeviceProfile& device) noexcept {
+    guards.force_limit = device.force_limit;
+    guards.device_damping = device.viscous_damping;
+    guards.device_friction = device.coulomb_friction;
+    guards.encoder_step = device.encoder_step;
+    guards.force_step = device.force_step;
+    guards.delay_s = device.delay_s;
+    guards.jitter_s = device.jitter_s;
+}
+
 /// Returns the default guard settings for a device. Speeds and the force of a limit cycle are scaled by the length and
 /// the stiffness of the model.
 [[nodiscard]] inline GuardSettings guards_for(const ModelScale& scale, const DeviceProfile& device) noexcept {
     GuardSettings guards;
-    guards.force_limit = device.force_limit;
     guards.largest_speed *= scale.length;
     // Below a speed of one encoder step per sample, a moving handle can give equal readings; the factor 3 is a reserve.
     guards.frozen_speed =
         std::max(guards.frozen_speed * scale.length, 3.0 * device.encoder_step / device.period_s);
     guards.limit_cycle_force *= scale.length * scale.stiffness();
-    guards.device_damping = device.viscous_damping;
-    guards.device_friction = device.coulomb_friction;
-    guards.encoder_step = device.encoder_step;
+    use_device(guards, device);
     return guards;
 }
 
 /// Largest allowed `ramp_s` and `frozen_s`, so that each number of samples fits an integer [s].
 inline constexpr double longest_guard_s = 3600.0;
 
-/// Without a certificate, the energy tank counts this part (90 %) of the losses by device damping and Coulomb friction.
+/// Without a certificate, the energy account counts this part (90 %) of the losses by device damping and Coulomb
+/// friction. With all of it a steady limit cycle, which gives exactly the energy that the device dissipates, would not
+/// decay.
 inline constexpr double uncertified_credit = 0.9;
 
 /// Lowest frequency of a limit cycle [Hz]: slower oscillations of the handle can come from a hand.
@@ -85,6 +98,9 @@ inline void validate(const GuardSettings& settings) {
     require_rule("device_damping", settings.device_damping, Rule::NotNegative);
     require_rule("device_friction", settings.device_friction, Rule::NotNegative);
     require_rule("encoder_step", settings.encoder_step, Rule::NotNegative);
+    require_rule("force_step", settings.force_step, Rule::NotNegative);
+    require_rule("delay_s", settings.delay_s, Rule::NotNegative);
+    require_rule("jitter_s", settings.jitter_s, Rule::NotNegative);
     require_field(settings.longest_delay_s >= 0.0, "longest_delay_s", settings.longest_delay_s, ">= 0");
 }
 

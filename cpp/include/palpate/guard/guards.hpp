@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "palpate/guard/energy_tank.hpp"
+#include "palpate/guard/energy_account.hpp"
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/guard/limit_cycle_detector.hpp"
 #include "palpate/guard/limits.hpp"
@@ -29,8 +29,8 @@ struct Guards {
     LimitCycleDetector limit_cycle{};
     ForceRamp ramp{};                   ///< start ramp: increases the force from zero
     SlewLimit slew{};                   ///< limits the change of the force from tick to tick
-    EnergyTank tank{};                  ///< limits the energy that the rendering may give
-    ReadMotion motion{};                ///< computes the motion of the handle for the energy accounts
+    EnergyAccount account{};            ///< limits the energy that a hand can take out
+    ReadMotion motion{};                ///< computes the motion of the handle for the sums of energy
     PassivityObserver ramp_observer{};  ///< sums the energy that the rendering absorbs during the start ramp
     PassivityObserver observer{};       ///< sums the energy that the rendering absorbs after the start ramp
 };
@@ -89,6 +89,26 @@ struct Guards {
     return stored;
 }
 
+/// Returns the settings of an energy account without a bound of the stored energy. The inequalities of a certificate
+/// include the steps of encoder and force.
+[[nodiscard]] inline AccountSettings account_settings(const GuardSettings& settings,
+                                                      double period_s) noexcept {
+    DeviceProfile device;
+    device.period_s = period_s;
+    device.delay_s = settings.delay_s;
+    const double longest_period = period_s + settings.jitter_s;
+    const double share = settings.certified ? 1.0 : uncertified_credit;
+    return {.includes_start_outside = settings.certified,
+            .device_damping = share * settings.device_damping,
+            .device_friction = share * settings.device_friction,
+            .encoder_step = settings.certified ? 0.0 : settings.encoder_step,
+            .force_step = settings.certified ? 0.0 : settings.force_step,
+            .longest_step = settings.largest_speed * longest_period + settings.encoder_step,
+            .whole_delay = device.whole_delay_samples(),
+            .delay_fraction = device.delay_fraction() * period_s / longest_period,
+            .period_s = longest_period};
+}
+
 /// Returns all guards for the rendering of a model on a device.
 [[nodiscard]] inline Guards guards_of(const GuardSettings& settings, const ForceModel& model,
                                       const Scheme& scheme, double period_s) {
@@ -100,17 +120,10 @@ struct Guards {
     guards.ramp = force_ramp(settings, period_s);
     guards.slew = slew_limit(settings, period_s);
     guards.motion = ReadMotion{settings.certified ? settings.encoder_step : 0.0};
-    if (settings.energy_tank) {
-        StoredEnergySettings stored = stored_energy(model, scheme, settings.force_limit, period_s);
-        if (!settings.certified) {
-            stored = {.within = stored.within};
-        }
-        const double share = settings.certified ? 1.0 : uncertified_credit;
-        guards.tank = EnergyTank{{.stored = stored,
-                                  .device_damping = share * settings.device_damping,
-                                  .device_friction = share * settings.device_friction,
-                                  .uncredited_motion = settings.certified ? 0.0 : settings.encoder_step,
-                                  .period_s = period_s}};
+    if (settings.energy_account) {
+        AccountSettings account = account_settings(settings, period_s);
+        account.stored = stored_energy(model, scheme, settings.force_limit, period_s);
+        guards.account = EnergyAccount{account};
     }
     if (settings.limit_cycle_force > 0.0) {
         guards.limit_cycle =

@@ -54,8 +54,10 @@ class Controller {
             tick.status = limit_force(tick.rendered, tick.command.force, reading_status);
         } else {
             guards_.motion.interrupt();
+            guards_.account.interrupt();
         }
         guards_.slew.sent(tick.command.force);
+        guards_.account.sent(tick.command.force);
         reading_ = device_.exchange(tick.command);
         return tick;
     }
@@ -78,19 +80,19 @@ class Controller {
     [[nodiscard]] const Guards& guards() const noexcept { return guards_; }
 
   private:
-    /// Adds the work of the last tick to the energy accounts, if the positions before and after the tick are valid. The
-    /// start ramp can give energy once, so a separate account counts the ticks of the ramp.
+    /// Adds the last tick to the energy account, and its work to the sums of energy if the positions before and after
+    /// the tick are valid. The start ramp can give energy once, so a separate sum counts the ticks of the ramp.
     void observe(double object) noexcept {
         const double moved = guards_.motion.to(reading_.position);
-        guards_.tank.visit(reading_.position, object);
+        guards_.account.visit(reading_.position, object);
+        guards_.account.book(reading_.applied, moved);
         if (std::isfinite(moved * reading_.applied)) {
-            guards_.tank.book(reading_.applied, moved);
             (guards_.ramp.is_over() ? guards_.observer : guards_.ramp_observer).book(reading_.applied, moved);
         }
     }
 
     /// Applies the guards to the force in this order: force limit, scaling after a limit cycle, start ramp, slew limit,
-    /// energy tank. The force limit comes first: a force that is clipped and then scaled is passive, but a force of a
+    /// energy account. The force limit comes first: a force that is clipped and then scaled is passive, but a force of a
     /// periodic model that is scaled and then clipped can be active. The force limit also replaces numbers that are not
     /// finite. A failed step sends zero force at once: the limits of its change do not apply.
     [[nodiscard]] Status limit_force(const Rendered& rendered, double& force,
@@ -106,9 +108,9 @@ class Controller {
         const Status cycle_scaled = guards_.limit_cycle.apply(force);
         const Status ramped = guards_.ramp.apply(force);
         const Status slewed = guards_.slew.apply(force);
-        const Status energy_limited = guards_.tank.apply(force);
+        const Status energy_limited = guards_.account.apply(force);
         guards_.limit_cycle.watch(reading_.position, force);
-        // The first status in this list that is not Ok is reported; the energy tank comes before the force limit.
+        // The first status in this list that is not Ok is reported; the energy account comes before the force limit.
         for (const Status status : {rendered.status, ramped, energy_limited, cycle_scaled, limited, slewed}) {
             if (status != Status::Ok) {
                 return status;

@@ -209,7 +209,7 @@ void run_loop(Control& controller, const LoopSettings& settings, Clock& clock,
     report.longest_delay = controller.reading_guard().longest_delay();
     report.given_in_ramp = 0.0 - controller.guards().ramp_observer.least();  // subtraction from 0.0 avoids -0
     report.given = 0.0 - controller.guards().observer.least();
-    report.most_stored = controller.guards().tank.stored().most();
+    report.most_stored = controller.guards().account.stored().most();
     report.limit_cycles = controller.guards().limit_cycle.limit_cycles();
 }
 

@@ -72,7 +72,7 @@ struct RenderOptions : RunOptions {
     std::optional<std::uint64_t> tolerated;
     double ramp_s = GuardSettings{}.ramp_s;
     double frozen_s = GuardSettings{}.frozen_s;
-    bool energy_tank = true;
+    bool energy_account = true;
     bool uncertified = false;
     bool accept_model = false;        ///< true: a model with the verdict no is rendered
     std::vector<std::string> faults;  ///< faults that the simulated device must produce, for tests
@@ -140,8 +140,22 @@ struct RenderJob {
     return model.certificate && !options.uncertified && !changes_plan(options);
 }
 
+/// Returns true if the certificate limits the energy that a hand can take out.
+[[nodiscard]] inline bool proves_energy(const Certificate& certificate) noexcept {
+    return certificate.certified() || certificate.held_by_account();
+}
+
+/// Returns the reason why a rendering that is held by the energy account must not run without it; otherwise "".
+[[nodiscard]] inline std::string account_reason(const RenderOptions& options,
+                                                const Certificate& certificate) {
+    return certificate.held_by_account() && !options.energy_account
+               ? "it is held by the energy account, which is switched off"
+               : "";
+}
+
 /// Returns the reason why no proof holds for a run on a simulated device; empty if the certificate of the model holds
-/// and its verdict is `Certified`. A certificate with the verdict `StableLocally` proves nothing about the energy.
+/// and its verdict is `Certified` or `HeldByAccount`. A certificate with the verdict `StableLocally` proves nothing about
+/// the energy.
 [[nodiscard]] inline std::string uncertified_reason(const RenderOptions& options, const PlannedModel& model) {
     if (!model.certificate) {
         return "the model has no certificate";
@@ -153,9 +167,9 @@ struct RenderJob {
         return "the options change the plan";
     }
     const Certificate& certificate = *model.certificate;
-    return certificate.certified() ? ""
-                                   : "the certificate is " + std::string(name_of(certificate.verdict)) +
-                                         ": " + certificate.reason;
+    return proves_energy(certificate) ? account_reason(options, certificate)
+                                      : "the certificate is " + std::string(name_of(certificate.verdict)) +
+                                            ": " + certificate.reason;
 }
 
 namespace detail {
@@ -173,8 +187,11 @@ namespace detail {
         return "has no certificate";
     }
     const DeviceProfile& certified = model.certificate->device;
-    if (!model.certificate->certified()) {
+    if (!proves_energy(*model.certificate)) {
         return "is not certified: " + model.certificate->reason;
+    }
+    if (const std::string reason = account_reason(options, *model.certificate); !reason.empty()) {
+        return "cannot be rendered: " + reason;
     }
     if (certified.id != device.id) {
         return "is certified for the device " + certified.id + ", not for " + device.id;
@@ -213,7 +230,7 @@ namespace detail {
     guards.slew_s = options.slew_s.value_or(guards.slew_s);
     guards.ramp_s = options.ramp_s;
     guards.frozen_s = options.frozen_s;
-    guards.energy_tank = options.energy_tank;
+    guards.energy_account = options.energy_account;
     validate(guards);
     if (!device.profile.makes(guards.force_limit)) {
         refuse("force_limit is " + readable(guards.force_limit) + ": must be at most " +
@@ -227,14 +244,15 @@ namespace detail {
 inline constexpr double certified_rate_share = 0.99;
 
 /// Sets guards and control loop to the values of the certificate: force limit, least rate, longest time between two
-/// ticks, longest delay of a force, and the device's damping and friction for the energy tank. Disables the slew limit, and lets the loop end
-/// after the first tick without a force, because the proofs of the certificate include neither.
+/// ticks, longest delay of a force, and the numbers of the device for the energy account. Disables the slew limit, and
+/// lets the loop end after the first tick without a force, because the proofs of the certificate include neither.
 inline void apply_certificate(const Certificate& certificate, GuardSettings& guards, LoopSettings& loop) {
-    guards.certified = true;
+    guards.certified = certificate.certified();
     guards.slew_s = 0.0;
-    guards.force_limit = certificate.device.force_limit;
-    guards.device_damping = certificate.device.viscous_damping;
-    guards.device_friction = certificate.device.coulomb_friction;
+    // The device may have finer encoder steps than the certificate
+    const double encoder_step = guards.encoder_step;
+    use_device(guards, certificate.device);
+    guards.encoder_step = encoder_step;
     loop.tolerated = 0;
     loop.lowest_rate_share = std::max(loop.lowest_rate_share, certified_rate_share);
     loop.longest_period_s = certificate.longest_period_s;
@@ -340,7 +358,7 @@ inline std::string open_sinks(const RunOptions& options, const RecordUnits& unit
     }
     job.metadata = device.metadata;
     job.metadata.emplace_back("certified", !reason.empty() ? "no: " + reason
-                                           : device.simulated
+                                           : device.simulated || model.certificate->held_by_account()
                                                ? std::string(name_of(model.certificate->verdict))
                                                : "yes");
     if (on_device) {

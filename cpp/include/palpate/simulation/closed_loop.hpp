@@ -66,7 +66,7 @@ struct ClosedLoopSettings {
 
 /// Result of a simulated run: energies, position and velocity of the handle at two times, and number of ticks.
 struct ClosedLoopEnd {
-    EnergyAccount energy;
+    EnergyBalance energy;
     Motion at_first_force;  ///< motion of the handle at the end of the delay, rounded up to whole ticks
     Motion handle;          ///< position and velocity of the handle at the end of the run
     std::size_t ticks = 0;  ///< number of ticks of the run
@@ -129,12 +129,12 @@ inline constexpr std::size_t most_simulated_ticks = 3'600'000;
     return static_cast<std::size_t>(ticks);
 }
 
-/// Renders a model on a simulated device with a hand, in simulated time. Calls `each(number)` after every tick; an
-/// exception of `each` ends the simulation.
+/// Renders a model on a simulated device with a hand, in simulated time, limited by `guards`. Calls `each(number)` after
+/// every tick; an exception of `each` ends the simulation.
 template <class Each>
 [[nodiscard]] Trace simulate(const ForceModel& model, const Scheme& scheme, const DeviceProfile& profile,
-                             const Hand& hand, std::size_t ticks, int substeps, double start_position,
-                             Each&& each) {
+                             const Hand& hand, const Guards& guards, std::size_t ticks, int substeps,
+                             double start_position, Each&& each) {
     validate(scheme, model, profile.period_s);
     detail::require(
         ticks <= most_simulated_ticks,
@@ -160,16 +160,17 @@ template <class Each>
         return true;
     };
     SimulatedDevice device{profile, hand, substeps, start_position};
-    (void)closed_loop(device, make_structure(model, scheme, profile.period_s, profile.force_limit),
-                      Guards{.limit = {profile.force_limit}}, ticks, add);
+    (void)closed_loop(device, make_structure(model, scheme, profile.period_s, profile.force_limit), guards,
+                      ticks, add);
     return trace;
 }
 
-/// Renders a model on a simulated device and returns its trace: `simulate` without the function `each`.
+/// Renders a model on a simulated device, with its force limit only, and returns the trace.
 [[nodiscard]] inline Trace simulate(const ForceModel& model, const Scheme& scheme,
                                     const DeviceProfile& profile, const Hand& hand, std::size_t ticks,
                                     int substeps = usual_substeps, double start_position = 0.0) {
-    return simulate(model, scheme, profile, hand, ticks, substeps, start_position, [](std::size_t) {});
+    return simulate(model, scheme, profile, hand, Guards{.limit = {profile.force_limit}}, ticks, substeps,
+                    start_position, [](std::size_t) {});
 }
 
 /// Returns the force that a scheme renders while the device follows a recorded motion. Calls `each(k)` before every

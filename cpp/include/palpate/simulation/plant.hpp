@@ -68,9 +68,9 @@ struct MountedObject {
     }
 };
 
-/// Energies since the simulated device was opened. The account counts the work of the hand on the handle, which
+/// Energies since the simulated device was opened. The balance counts the work of the hand on the handle, which
 /// includes the losses of the handle: hand = motor + dissipated + increase of the handle's kinetic energy.
-struct EnergyAccount {
+struct EnergyBalance {
     double hand = 0.0;        ///< work of the hand on the handle [J]
     double motor = 0.0;       ///< work of the handle against the motor [J]
     double dissipated = 0.0;  ///< energy lost by damping and friction [J]
@@ -129,7 +129,7 @@ class Midpoint : public PlainPlant {
     }
 
     /// Returns the energies since the device was opened.
-    [[nodiscard]] const EnergyAccount& account() const noexcept { return account_; }
+    [[nodiscard]] const EnergyBalance& account() const noexcept { return account_; }
 
   private:
     /// The rounding errors of the energies are at most this factor times `throughput` [-]
@@ -146,7 +146,7 @@ class Midpoint : public PlainPlant {
         account_.dissipated += 0.5 * (handle.inertia + grip.mass) * squared;
     }
 
-    EnergyAccount account_;
+    EnergyBalance account_;
 };
 
 }  // namespace palpate

@@ -33,11 +33,14 @@ enum class Verdict : std::uint8_t {
     Certified,
     StableLocally,  ///< the linearised rendering is stable; it is not proved that the rendering is passive
     Refused,
+    /// Held by the energy account, proved: in no motion of the handle does a hand take more energy out than E0, the
+    /// energy that the object can store
+    HeldByAccount,
 };
 
 template <>
 inline constexpr auto words_of<Verdict> =
-    std::array<std::string_view, 3>{"certified", "stable-locally", "refused"};
+    std::array<std::string_view, 4>{"certified", "stable-locally", "refused", "held-by-account"};
 
 /// Result of the checks of a rendering (model, structure with its numbers, device): all inequalities with both sides,
 /// and the verdict.
@@ -54,6 +57,8 @@ struct Certificate {
 
     /// Returns true if it is proved that the rendering is passive.
     [[nodiscard]] bool certified() const noexcept { return verdict == Verdict::Certified; }
+    /// Returns true if the energy that a hand takes is limited by the energy account only.
+    [[nodiscard]] bool held_by_account() const noexcept { return verdict == Verdict::HeldByAccount; }
 };
 
 template <>
@@ -63,7 +68,7 @@ inline constexpr auto fields_of<Certificate> = std::tuple{
     Field<&Certificate::device>{"device", "Device for which the certificate holds."},
     Field<&Certificate::bounds>{"bounds", "Bounds of the rendered force, compensation included."},
     Field<&Certificate::inequalities>{"inequalities", "All inequalities with both sides."},
-    Field<&Certificate::verdict>{"verdict", "certified, stable-locally or refused."},
+    Field<&Certificate::verdict>{"verdict", "certified, held-by-account, stable-locally or refused."},
     Field<&Certificate::longest_period_s>{
         "longest_period_s",
         "Longest time between two samples for which every inequality holds [s]; 0 if one does not hold.",

@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "palpate/model/force_model.hpp"
+#include "palpate/stability/account_certificate.hpp"
 #include "palpate/stability/certificate.hpp"
 
 namespace palpate {
@@ -131,7 +132,10 @@ namespace detail {
         require(std::string("certificate has an invalid plan: ") + error.what());
     }
     require(detail::narrower_bound(stored.bounds, bounds));
-    Certificate now = certify_rendered(stored.bounds, stored.scheme, stored.device);
+    Certificate now = stored.held_by_account()
+                          ? certify_with_account(model, stored.scheme, stored.device)
+                          : certify_rendered(stored.bounds, stored.scheme, stored.device);
+    now.bounds = stored.bounds;
     if (now.verdict == Verdict::Refused && stored.verdict == now.verdict) {
         require("certificate.verdict is \"refused\": must be \"certified\" or \"stable-locally\", " +
                 now.reason);

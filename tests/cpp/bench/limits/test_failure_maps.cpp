@@ -215,7 +215,7 @@ bool generates(const ForceModel& model, const DeviceProfile& device) {
             const ClosedLoopEnd end =
                 closed_loop(make_structure(model, scheme, device.period_s, device.force_limit), device, hand,
                             ticks, {2, start, 0.0, unguarded},
-                            [](const Tick&, const Motion&, const EnergyAccount&) { return true; });
+                            [](const Tick&, const Motion&, const EnergyBalance&) { return true; });
             if (end.energy.motor + end.energy.dissipated < -held - 1e-9 * end.energy.throughput) {
                 return true;
             }
