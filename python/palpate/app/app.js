@@ -1,0 +1,151 @@
+(() => {
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const drawn = {};  // name of a chart -> { key, views }
+  let colours, queue = Promise.resolve(), waiting = 0, slid = null;
+  const element = (id) => document.getElementById(id);
+  const say = (text) => { element("status").textContent = text; };
+
+  // Requests follow each other, so that each sees the state that the one before left.
+  function send(path, body, doing = "Working ...") {
+    waiting += 1;
+    document.body.setAttribute("aria-busy", "true");
+    say(doing);
+    const done = queue.then(() => fetch(path, { method: "POST", body })).then(async (answer) => {
+      const content = await answer.json();
+      waiting -= 1;
+      if (!waiting) { document.body.removeAttribute("aria-busy"); say("Ready"); }
+      await show(content);
+    }).catch((error) => {
+      waiting = 0;
+      document.body.removeAttribute("aria-busy");
+      say(`palpate does not answer: start palpate app again. (${error.message})`);
+    });
+    queue = done;
+    return done;
+  }
+  const known = () => Object.values(drawn).map((each) => each.key);
+  const act = (action, given = {}) => send("act", JSON.stringify({ action, given, known: known() }),
+    action === "identify" || action === "cure" ? "Identifying, this takes some seconds ..." : "Working ...");
+
+  async function show({ parts, charts, colours: found }) {
+    colours = found;
+    const focused = document.activeElement?.id;
+    document.body.dataset.empty = String(!("reading" in parts));
+    for (const part of document.querySelectorAll("[id^=part-]")) {
+      const html = parts[part.id.slice(5)] ?? "";
+      // A slider that is being moved keeps its place.
+      if (part.dataset.html === html || part.querySelector("input[type=range]:focus")) continue;
+      const open = [...part.querySelectorAll("details")].filter((each) => each.open).map((each) => each.id);
+      const fields = [...part.querySelectorAll(".marks input")].map((each) => [each.id, each.value]);
+      part.innerHTML = html;
+      part.dataset.html = html;
+      for (const id of open) element(id)?.setAttribute("open", "");
+      for (const [id, value] of fields) if (element(id)) element(id).value = value;
+    }
+    for (const section of document.querySelectorAll("[data-needs]")) {
+      section.hidden = !parts[section.dataset.needs];
+    }
+    element("refusal")?.focus();
+    if (focused && document.activeElement === document.body) element(focused)?.focus();
+    for (const figure of document.querySelectorAll("[id^=figure-]")) {
+      await draw(figure, figure.id.slice(7), charts[figure.id.slice(7)] ?? { key: "" });
+    }
+    document.documentElement.dataset.shown = String(Number(document.documentElement.dataset.shown ?? 0) + 1);
+  }
+
+  function refuse(sentence) {
+    const shown = document.createElement("p");
+    shown.className = "verdict no";
+    shown.tabIndex = -1;
+    shown.textContent = sentence;
+    element("part-message").replaceChildren(shown);
+    element("part-message").dataset.html = "";
+    shown.focus();
+    say("Not done");
+  }
+
+  async function draw(figure, name, { key, item, html, select }) {
+    if ((drawn[name]?.key ?? "") === key) return;
+    drawn[name]?.views?.clear();
+    delete drawn[name];
+    figure.innerHTML = html ?? "";
+    if (!item) return;
+    const views = await Bokeh.embed.embed_item(item);
+    drawn[name] = { key, views };
+    const roots = views.roots.map((each) => each.model);
+    paintCharts(colours[dark.matches ? "dark" : "light"], roots);
+    if (select && roots[0].document) {
+      roots[0].document.on_event("selectiongeometry", ({ geometry }) => {
+        if (geometry.x0 === undefined) return;
+        const ends = [geometry.x0, geometry.x1].sort((a, b) => a - b);
+        ["from", "to"].forEach((end, k) => { element(`${name}-${end}`).value = String(Number(ends[k].toPrecision(5))); });
+        element(`correct-${name}`).open = true;
+        say("Marked: now say what it is.");
+      });
+    }
+  }
+  dark.addEventListener("change", () => {
+    for (const { views } of Object.values(drawn)) {
+      paintCharts(colours[dark.matches ? "dark" : "light"], views.roots.map((each) => each.model));
+    }
+  });
+
+  const fieldsOf = (form) => (form ? Object.fromEntries(new FormData(form)) : {});
+  document.addEventListener("click", async (event) => {
+    const button = event.target.closest("button");
+    if (!button) return;
+    if (button.dataset.action) {
+      act(button.dataset.action, { ...fieldsOf(button.closest("form")), ...JSON.parse(button.dataset.given ?? "{}") });
+    } else if (button.dataset.copy) {
+      await navigator.clipboard.writeText(element(button.dataset.copy).textContent.trim());
+      say("Copied");
+    } else if (button.dataset.download) {
+      await queue;
+      say("Writing ...");
+      const answer = await fetch(`file/${button.dataset.download}`);
+      if (!answer.ok) { refuse(await answer.text()); return; }
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(await answer.blob());
+      link.download = decodeURIComponent(answer.headers.get("X-Name"));
+      link.click();
+      say(`${link.download} is in your downloads`);
+    }
+  });
+  document.addEventListener("submit", (event) => event.preventDefault());
+  document.addEventListener("change", (event) => {
+    const target = event.target, form = target.closest("form[data-action]");
+    if (target.id === "file") add(target.files);
+    else if (target.dataset.action) act(target.dataset.action, { [target.name]: target.value });
+    else if (form) act(form.dataset.action, fieldsOf(form));
+  });
+  document.addEventListener("input", ({ target }) => {
+    if (target.type !== "range" || !target.dataset.field) return;
+    const value = target.dataset.base * 30 ** target.value;
+    const text = `${Number(value.toPrecision(4))} ${target.dataset.unit}`;
+    document.querySelector(`output[for="${target.id}"]`).textContent = text;
+    target.setAttribute("aria-valuetext", text);
+    const first = slid === null;  // while one answer is awaited, only the newest place is kept
+    slid = { field: target.dataset.field, value };
+    if (first) queue.then(() => { const given = slid; slid = null; act("change-device", given); });
+  });
+  document.addEventListener("keydown", (event) => {
+    const typing = event.target.matches("input[size], textarea");
+    if ((event.ctrlKey || event.metaKey) && event.key === "z" && !typing) { event.preventDefault(); act("undo"); }
+  });
+
+  function add(files) {
+    for (const file of files) send(`add?name=${encodeURIComponent(file.name)}`, file, `Reading ${file.name} ...`);
+    element("file").value = "";
+  }
+  for (const kind of ["dragenter", "dragover", "dragleave", "drop"]) {
+    document.addEventListener(kind, (event) => {
+      if (!event.dataTransfer?.types.includes("Files")) return;
+      event.preventDefault();
+      document.body.classList.toggle("dragging", kind === "dragenter" || kind === "dragover");
+      if (kind === "drop") add(event.dataTransfer.files);
+    });
+  }
+  Bokeh.set_log_level("warn");
+  setInterval(() => fetch("pulse").catch(() => say("palpate has ended: start palpate app again.")), 2000);
+  act("refresh");
+})();

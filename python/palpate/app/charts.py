@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Charts of the page, in the units of the recording's file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._typing import Float1D
+from ..model import Model
+from ..model.model_display import force_curves
+from ..planning import Plan
+from ..plotting.look import Scale, scale_for, strokes
+from ..recording import Recording
+from ..recording.motion import ordered_strokes
+from ..recording.roles import ROLE_NAMES, Role, roles_of
+from ..report.charts import Chart, Panel
+from ..report.of_comparison import LINE_MARKS, Compared
+from ..verdict import FORCE_JND
+
+DOTS = {"press": "dots", "release": "open-dots", "": "dots"}
+"""Marks of recorded rows by stroke"""
+
+ROLE_MARKS = {Role.APPROACH: "strip-1", Role.REST: "strip-2", Role.HOLD: "strip-3"}
+"""Marks of the rows that are not fitted, by role"""
+
+LEFT_OUT_MARK = "strip-4"
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Scales of position and force, in the units of the file."""
+
+    x: Scale
+    y: Scale
+
+    @classmethod
+    def of(cls, recording: Recording) -> Axes:
+        """Returns the scales of a recording."""
+        units, of_file = recording.units, recording.file_units
+        return cls(
+            scale_for(units["position"], recording.position, of_file=of_file.get("position")),
+            scale_for(units["force"], recording.force, of_file=of_file.get("force")),
+        )
+
+    def panel(self, height: int, *, force: str = "force", above: Panel | None = None) -> Panel:
+        """Returns a panel of force over position."""
+        return Panel(self.x.label("position"), self.y.label(force), height, above=above)
+
+
+def recorded(recording: Recording) -> Chart:
+    """Draws force over position: press and release in two colours, rows that are not fitted in grey."""
+    axes = Axes.of(recording)
+    panel = axes.panel(320)
+    role = roles_of(recording, float(recording.position.max()))
+    x, y = axes.x.factor * recording.position, axes.y.factor * recording.force
+    waiting = role != Role.MOVING
+    panel.dots(x[waiting], y[waiting], "soft-dots", "not fitted")
+    direction = ordered_strokes(recording) if recording.direction is None else recording.direction
+    for name, rows in strokes(direction, len(recording)):
+        shown = rows & ~waiting
+        panel.dots(x[shown], y[shown], DOTS[name], name or "recorded")
+    panel.select()
+    return Chart("Recorded force over position.", panel)
+
+
+def course_axis(recording: Recording) -> tuple[str, Float1D]:
+    """Returns the label and the values of the axis along a recording: its time, else its row numbers."""
+    if recording.time is None:
+        return "row", np.arange(len(recording), dtype=np.float64)
+    return "time [s]", recording.time
+
+
+def course(whole: Recording, used: NDArray[np.bool_]) -> Chart:
+    """Draws force and position in recorded order, with shades for the roles of the rows.
+
+    `used` (n,) is True for the rows that the user has not left out.
+    """
+    axes = Axes.of(whole)
+    name, at = course_axis(whole)
+    force = Panel(name, axes.y.label("force"), 180)
+    force.line(at, axes.y.factor * whole.force, "thin", "force", hover=False)
+    position = Panel(name, axes.x.label("position"), 130, above=force)
+    position.line(at, axes.x.factor * whole.position, "second", "position", hover=False)
+    role = roles_of(whole, float(whole.position.max()))
+    shades = [(used & (role == each), mark, ROLE_NAMES[each]) for each, mark in ROLE_MARKS.items()]
+    for rows, mark, text in [*shades, (~used, LEFT_OUT_MARK, "left out by you")]:
+        for number, panel in enumerate((force, position)):
+            panel.strips(*_runs(rows, at), mark, "" if number else text)
+    for panel in (force, position):
+        panel.select()
+    return Chart("Force and position in recorded order; shaded rows are not fitted.", force, position)
+
+
+def _runs(rows: NDArray[np.bool_], at: Float1D) -> tuple[Float1D, Float1D]:
+    """Returns start and end of each run of rows that are True."""
+    edges = np.flatnonzero(np.diff(rows, prepend=False, append=False))
+    return at[edges[::2]], at[edges[1::2] - 1]
+
+
+def modelled(compared: Compared) -> Chart:
+    """Draws the model over the recorded dots; below, the difference in just noticeable differences."""
+    axes = Axes.of(compared.recording)
+    x, y = axes.x.factor * compared.position, axes.y.factor * compared.force
+    noticed = differences(compared)
+    above = axes.panel(320)
+    for name, rows in compared.strokes():
+        above.dots(x[rows], y[rows], DOTS[name], f"recorded, {name}" if name else "recorded")
+    noticed_rows = np.abs(noticed) > 1.0
+    below = Panel(axes.x.label("position"), "difference [JND]", 170, above=above)
+    if one_curve(compared.subject.model):
+        at, forces = force_curves(compared.subject.model)
+        for name, force in forces.items():
+            line = axes.x.factor * at, axes.y.factor * force
+            above.line(*line, LINE_MARKS[name], f"model, {name}" if name else "model")
+    else:
+        above.dots(x, axes.y.factor * compared.found.force, "soft-dots", "model")
+    for name, rows in compared.strokes():
+        below.dots(x[rows & ~noticed_rows], noticed[rows & ~noticed_rows], DOTS[name])
+    below.dots(x[noticed_rows], noticed[noticed_rows], "outside", "a hand feels the difference")
+    for level in (-1.0, 1.0):
+        below.level(level, "dotted", "1 just noticeable difference (JND)")
+    return Chart(
+        "Recorded force and model over position; below, recorded minus modelled force in just noticeable "
+        "differences.",
+        above,
+        below,
+    )
+
+
+def one_curve(model: Model) -> bool:
+    """Returns True if position and stroke alone determine the force of a model."""
+    return model.dimension == 1 and model.mass is None and model.damping is None and model.memory is None
+
+
+def differences(compared: Compared) -> Float1D:
+    """Returns recorded minus modelled force (n,) in just noticeable differences."""
+    perceptible = np.maximum(FORCE_JND * np.abs(compared.force), compared.found.jnd_floor)
+    return np.asarray(-compared.found.residual / perceptible)
+
+
+def lost(plan: Plan, recording: Recording) -> Chart:
+    """Draws the identified force and the one that the device can give; the lost part is shaded."""
+    axes = Axes.of(recording)
+    x, identified, rendered = plan.forces_at_rest()
+    panel = axes.panel(300)
+    at = axes.x.factor * x
+    names = ("press", "release") if len(identified) == 2 else ("",)
+    for name, full, left in zip(names, axes.y.factor * identified, axes.y.factor * rendered, strict=True):
+        suffix = f", {name}" if name else ""
+        panel.band(at, np.minimum(full, left), np.maximum(full, left), "lost on this device")
+        panel.line(at, full, LINE_MARKS[name], f"object{suffix}")
+        panel.line(at, left, "thin", "on the device", hover=False)
+    return Chart("Force of the object and of the device at rest, over position.", panel)
+
+
+def together(models: Sequence[tuple[str, Model]], recording: Recording) -> Chart:
+    """Draws the press force of several models in one picture."""
+    axes = Axes.of(recording)
+    panel = axes.panel(320)
+    for number, (name, model) in enumerate(models):
+        at, forces = force_curves(model)
+        force = next(iter(forces.values()))
+        panel.line(axes.x.factor * at, axes.y.factor * force, f"class-{number % 8}", name)
+    return Chart("Press force of all objects over position.", panel)

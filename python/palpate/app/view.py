@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts of the page as HTML, and its charts, for the present state of a session."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..model import Model
+from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, profile_file
+from ..recording import Recording
+from ..recording.units import FORCE_UNITS, POSITION_UNITS, TIME_UNITS, UNITS
+from ..report import page as report_page
+from ..report.charts import Chart
+from ..report.page import COLOURS, bokeh, chart_library, templates_in
+from ..verdict import Verdict
+from .charts import course, course_axis, differences, lost, modelled, recorded
+from .session import CACHED, Refusal, Session
+from .state import Entry, OptionTable, commands_of, text_of
+
+SLIDER_FACTOR = 30.0
+"""A slider reaches from the value of the profile divided by this factor to the value times it [-]."""
+
+TEMPLATES = (Path(__file__).parent, Path(report_page.__file__).parent)
+"""Folders of the templates; the style and the colours are those of a report"""
+
+
+@dataclass(frozen=True)
+class Slider:
+    """Slider for one property of the device."""
+
+    field: str
+    name: str
+    unit: str
+    value: float
+    """Value in `unit`"""
+    base: float
+    """Value of the profile, in the middle of the slider"""
+
+    @property
+    def place(self) -> float:
+        """Place of the slider, from -1 to 1."""
+        return math.log(self.value / self.base) / math.log(SLIDER_FACTOR)
+
+
+class View:
+    """Makes the answer to each request of the page: changed parts as HTML, changed charts as JSON."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self._templates = templates_in(*TEMPLATES)
+        self._parts = self._templates.get_template("parts.html").module
+        self._chart = lru_cache(CACHED)(self._chart_of)
+
+    def page(self) -> str:
+        """Returns the page without its parts, which it requests."""
+        text: str = self._templates.get_template("app.html").render(colours=COLOURS)
+        return text
+
+    def style(self) -> str:
+        """Returns the style sheet."""
+        text: str = self._templates.get_template("app.css").render(colours=COLOURS)
+        return text
+
+    def script(self) -> str:
+        """Returns the scripts of the page."""
+        paint = (TEMPLATES[1] / "paint.js").read_text(encoding="utf-8")
+        return f"{paint}\n{(TEMPLATES[0] / 'app.js').read_text(encoding='utf-8')}"
+
+    def library(self) -> str:
+        """Returns the script that draws the charts."""
+        return chart_library()
+
+    def answer(self, known: Collection[str], message: str = "") -> dict[str, Any]:
+        """Returns all parts and charts; a chart whose key is in `known` is left out, because the page has it.
+
+        `message` is a refusal of the last action.
+        """
+        entry = self.session.state.entry
+        parts: dict[str, str] = {
+            "message": self._render("message", message, self._cures(message, entry)) if message else "",
+            "history": self._render("history", self.session.can_undo),
+            "objects": self._render("objects", self.session.state),
+        }
+        charts: dict[str, Any] = {}
+        if entry is not None:
+            parts |= self._recording_parts(entry)
+            parts |= {
+                "model": self._model_part(entry),
+                **self._device_parts(entry),
+                "export": self._export_part(entry),
+            }
+            charts = self._charts(entry, known)
+        return {"parts": parts, "charts": charts, "colours": COLOURS}
+
+    def _render(self, name: str, *values: Any) -> str:
+        return str(getattr(self._parts, name)(*values))
+
+    def _cures(self, sentence: str, entry: Entry | None) -> list[dict[str, Any]]:
+        """Returns the buttons for the options that a sentence advises."""
+        if entry is None:
+            return []
+        line = self.session.command_line
+        tables: list[OptionTable] = [line.identify, line.plan]
+        found = {}
+        for table in tables:
+            for options in table.cures(sentence):
+                words = [word for option in options for word in option]
+                found[tuple(words)] = {
+                    "words": words,
+                    "text": ", ".join(" ".join(option).replace("-", " ").strip() for option in options),
+                }
+        return list(found.values())
+
+    def _judged(self, verdict: Verdict, entry: Entry) -> dict[str, Any]:
+        """Returns a verdict for a template: its level, and each reason with its cures."""
+        reasons = [(each, self._cures(each, entry)) for each in verdict.reasons]
+        return {"level": verdict.level, "reasons": reasons}
+
+    def _refused(self, refusal: Refusal, entry: Entry) -> dict[str, Any]:
+        return {"level": "no", "reasons": [(refusal.sentence, self._cures(refusal.sentence, entry))]}
+
+    def _recording_parts(self, entry: Entry) -> dict[str, str]:
+        recording = self.session.recording(entry)
+        refused = isinstance(recording, Refusal)
+        judged = (
+            self._refused(recording, entry)
+            if isinstance(recording, Refusal)
+            else self._judged(recording.verdict, entry)
+        )
+        notes = () if isinstance(recording, Refusal) else recording.notes
+        summary = "" if isinstance(recording, Refusal) else f"{len(recording)} rows"
+        chosen = dict(each[:2] for each in entry.options if len(each) == 2 and each[0] != "--units")
+        stated = dict(each[1].rpartition("=")[::2] for each in entry.options if each[0] == "--units")
+        roles = []
+        for role, units in (("position", POSITION_UNITS), ("force", FORCE_UNITS), ("time", TIME_UNITS)):
+            found = "" if isinstance(recording, Refusal) else recording.source.columns.get(role, "")
+            column = chosen.get(f"--{role}", "")
+            symbol = ""
+            if isinstance(recording, Recording) and role in recording.file_units:
+                symbol = recording.file_units[role].shown
+            roles.append(
+                {
+                    "role": role,
+                    "found": found,
+                    "column": column,
+                    "symbol": symbol,
+                    "unit": stated.get(column or found, ""),
+                    "units": [name for name, each in UNITS.items() if each.si in units],
+                }
+            )
+        direction = {"found": "", "column": chosen.get("--direction", "")}
+        if isinstance(recording, Recording):
+            direction["found"] = recording.source.columns.get("direction", "")
+        return {
+            "reading": self._render("reading", entry, summary, judged, notes),
+            "columns": self._render("columns", self.session.column_names(entry), roles, direction, refused),
+            "marks-curve": "" if refused else self._render("marks_curve", self._unit(entry, "position")),
+            "marks-course": "" if refused else self._render("marks_course", self._course_name(entry)),
+            "corrections": self._render("corrections", [*entry.options, *entry.plan_options]),
+        }
+
+    def _unit(self, entry: Entry, role: str) -> str:
+        recording = self.session.recording(entry)
+        return recording.file_unit(role).shown if isinstance(recording, Recording) else ""
+
+    def _course_name(self, entry: Entry) -> str:
+        whole = self.session.whole(entry)
+        return course_axis(whole)[0] if isinstance(whole, Recording) else "row"
+
+    def _model_part(self, entry: Entry) -> str:
+        model, recording = self.session.model(entry), self.session.recording(entry)
+        if model is None or isinstance(recording, Refusal):
+            return self._render("no_model", isinstance(recording, Refusal))
+        if isinstance(model, Refusal):
+            return self._render("model", self._refused(model, entry), "", {}, [])
+        compared = self.session.compared(entry)
+        assert compared is not None
+        noticed = differences(compared)
+        worst = int(np.argmax(np.abs(noticed)))
+        position, force = recording.file_unit("position"), recording.file_unit("force")
+        place = (
+            f"The largest difference is {abs(noticed[worst]):.2g} just noticeable differences, at "
+            f"{position.text(float(compared.position[worst]))}: recorded "
+            f"{force.text(float(compared.force[worst]))}, model "
+            f"{force.text(float(compared.found.force[worst]))}."
+        )
+        numbers = {
+            "kind": model.kind.replace("_", " and "),
+            "size": f"{model.terms}, {model.n_parameters} parameters",
+            "not felt": f"{compared.found.within_jnd:.0%} of the rows",
+            "error": f"RMS {force.text(compared.found.rmse)}",
+        }
+        if model.period is not None:
+            numbers["repeats every"] = position.text(model.period)
+        return self._render(
+            "model", self._judged(model.verdict, entry), place, numbers, model.notes["identification"]
+        )
+
+    def _device_parts(self, entry: Entry) -> dict[str, str]:
+        model = self.session.model(entry)
+        if not isinstance(model, Model):
+            return {"device": "", "plan": ""}
+        unit = model.units["position"]
+        names = [
+            name
+            for name, (file, _) in example_profiles().items()
+            if unit in ("", DeviceProfile.load(file).position_unit)
+        ]
+        names += sorted(each.name for each in self.session.folder.glob("*.toml"))
+        sliders = self._sliders(entry) if entry.device else []
+        device = self._render("device", names, entry, sliders)
+        found = self.session.plan(entry)
+        if found is None:
+            return {"device": device, "plan": ""}
+        if isinstance(found, Refusal):
+            return {"device": device, "plan": self._render("plan", self._refused(found, entry), {})}
+        judged = self._judged(model.verdict + found.verdict, entry)
+        return {"device": device, "plan": self._render("plan", judged, found.summary() | found.settings())}
+
+    def _sliders(self, entry: Entry) -> list[Slider]:
+        profile, device = DeviceProfile.load(profile_file(entry.device)), self.session.device(entry)
+        unit = profile.position_unit
+        _, damping, _ = mechanical_units(unit)
+        found = [
+            Slider("viscous_damping", "Damping", damping, device.viscous_damping, profile.viscous_damping),
+            Slider("rate_hz", "Rate", "Hz", 1.0 / device.period_s, 1.0 / profile.period_s),
+            Slider("encoder_step", "Encoder step", unit, device.encoder_step, profile.encoder_step),
+        ]
+        return [each for each in found if each.base > 0.0]
+
+    def _export_part(self, entry: Entry) -> str:
+        has_model = isinstance(self.session.model(entry), Model)
+        plan = self.session.plan(entry)
+        planned = isinstance(plan, Plan) and plan.verdict.level != "no"
+        commands = [text_of(each) for each in commands_of(entry, self.session.command_line.reading)]
+        return self._render("export", entry, has_model, planned, commands)
+
+    def _charts(self, entry: Entry, known: Collection[str]) -> dict[str, Any]:
+        recording, model = self.session.recording(entry), self.session.model(entry)
+        plan = self.session.plan(entry)
+        reading = tuple(each for each in entry.options if each[0] in self.session.command_line.reading)
+        keys: dict[str, tuple[Any, ...] | None] = dict.fromkeys(CHARTS)
+        if isinstance(recording, Recording):
+            keys |= {"curve": (entry.file, reading), "course": (entry.file, reading)}
+        if isinstance(model, Model):
+            keys["model"] = (entry.file, entry.options)
+        if isinstance(plan, Plan):
+            keys["plan"] = (entry,)
+        answer = {}
+        for name, key in keys.items():
+            text = "" if key is None else f"{name} {key}"
+            if text in known or key is None:
+                answer[name] = {"key": text}
+            else:
+                answer[name] = {"key": text, **json.loads(self._chart(name, entry, text))}
+        return answer
+
+    def _chart_of(self, name: str, entry: Entry, key: str) -> str:
+        """Returns the HTML around a chart and its content for the library, as JSON."""
+        chart = CHARTS[name](self.session, entry)
+        item = bokeh("embed").json_item(chart.layout(), f"chart-{name}")
+        return json.dumps(
+            {"item": item, "html": self._render("figure", name, chart), "select": name in SELECTED}
+        )
+
+
+SELECTED = ("curve", "course")
+"""Charts on which the mouse selects an interval"""
+
+
+def _curve(session: Session, entry: Entry) -> Chart:
+    return recorded(session.recording(entry))  # type: ignore[arg-type]
+
+
+def _course(session: Session, entry: Entry) -> Chart:
+    whole = session.whole(entry)
+    assert isinstance(whole, Recording)
+    return course(whole, session.used(entry, whole))
+
+
+def _model(session: Session, entry: Entry) -> Chart:
+    compared = session.compared(entry)
+    assert compared is not None
+    return modelled(compared)
+
+
+def _plan(session: Session, entry: Entry) -> Chart:
+    plan, recording = session.plan(entry), session.recording(entry)
+    assert isinstance(plan, Plan)
+    assert isinstance(recording, Recording)
+    return lost(plan, recording)
+
+
+CHARTS: dict[str, Callable[[Session, Entry], Chart]] = {
+    "curve": _curve,
+    "course": _course,
+    "model": _model,
+    "plan": _plan,
+}
+"""Charts of the page by name"""
