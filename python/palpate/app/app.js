@@ -75,7 +75,7 @@
     const roots = views.roots.map((each) => each.model);
     paintCharts(colours[dark.matches ? "dark" : "light"], roots);
     if (select && roots[0].document) {
-      roots[0].document.on_event("selectiongeometry", ({ geometry }) => {
+      roots[0].document.on_event("selectiongeometry", (_, { geometry }) => {
         if (geometry.x0 === undefined) return;
         const ends = [geometry.x0, geometry.x1].sort((a, b) => a - b);
         ["from", "to"].forEach((end, k) => { element(`${name}-${end}`).value = String(Number(ends[k].toPrecision(5))); });

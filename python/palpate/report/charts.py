@@ -205,6 +205,7 @@ class Panel:
         tool = bokeh("models").BoxSelectTool(dimensions="width", renderers=[], persistent=True)
         self.plot.add_tools(tool)
         self.plot.toolbar.active_drag = tool
+        self.plot.subscribed_events = {"selectiongeometry"}
 
     def level(self, value: float, mark: str, text: str = "") -> None:
         """Draws a horizontal line across the panel."""

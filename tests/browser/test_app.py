@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate app in headless Chromium: from a dropped file to a C header, corrections, undo, reload, keyboard."""
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from chromium import PROGRAM, Page, chromium
+from palpate.cli.main import main
+from palpate.recording.sample import sample_recording
+from test_report_page import TEXT_BEYOND_THE_WINDOW
+
+pytestmark = pytest.mark.skipif(PROGRAM is None, reason="needs chromium: apt-get install chromium")
+
+WIDTHS = {"phone": 390, "desk": 1280}
+"""Width of the window [px]"""
+
+HEIGHT = 900
+
+LONGEST_WAIT_S = 30.0
+
+
+class App:
+    """The page of a running palpate app."""
+
+    def __init__(self, page: Page, address: str, downloads: Path) -> None:
+        self.page, self.address, self.downloads = page, address, downloads
+
+    def open(self) -> None:
+        """Loads the page."""
+        self.page.call("Page.navigate", url=self.address)
+        self.page.wait("Number(document.documentElement.dataset.shown ?? 0) > 0")
+
+    def after(self, work: Any, *given: Any) -> None:
+        """Does some work and waits until the page shows its result."""
+        shown = self.page.run("Number(document.documentElement.dataset.shown)")
+        work(*given)
+        self.page.wait(
+            f"Number(document.documentElement.dataset.shown) > {shown} && !document.body.ariaBusy"
+        )
+
+    def click(self, selector: str) -> None:
+        """Clicks an element and waits until the page shows the result."""
+        self.after(self.page.click, selector)
+
+    def text(self, part: str) -> str:
+        """Returns the text of a part of the page."""
+        return str(self.page.run(f"document.getElementById('part-{part}').textContent"))
+
+    def commands(self) -> list[str]:
+        """Returns the command lines that the page shows."""
+        return str(self.page.run("document.getElementById('commands').textContent")).strip().splitlines()
+
+    def download(self, kind: str, name: str) -> bytes:
+        """Downloads a file and returns its content."""
+        self.page.click(f"[data-download={kind}]")
+        deadline = time.monotonic() + LONGEST_WAIT_S
+        while not (file := self.downloads / name).exists():
+            assert time.monotonic() < deadline, self.text("message")
+            time.sleep(0.05)
+        return file.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    with chromium(tmp_path_factory.mktemp("profile")) as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Writes a simulated recording and returns its file."""
+    file = tmp_path_factory.mktemp("recordings") / "knob.csv"
+    sample_recording(seed=1, duration_s=3.0).write(file)
+    return file
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """Starts the program and yields the address of its page."""
+    command = [sys.executable, "-m", "palpate", "app", "--no-browser", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            yield json.loads(process.stdout.readline())["address"]
+        finally:
+            process.terminate()
+            _, messages = process.communicate()
+    assert process.returncode == 0, messages
+    assert messages.splitlines()[-1] == "The app has ended."
+
+
+@pytest.fixture
+def app(address: str, browser: Page, tmp_path: Path) -> Iterator[App]:
+    """Yields the page without a recording. It must cause no error and no request to another address."""
+    browser.size(WIDTHS["desk"], HEIGHT)
+    browser.media(dark=False)
+    browser.downloads_to(tmp_path)
+    browser.problems.clear()
+    browser.requests.clear()
+    found = App(browser, address, tmp_path)
+    found.open()
+    while browser.run("document.querySelector('[data-action=forget]') !== null"):
+        found.click("[data-action=forget]")
+    yield found
+    assert browser.problems == []
+    assert [each for each in browser.requests if not each.startswith((address, "data:", "blob:"))] == []
+    browser.call("Page.navigate", url="about:blank")
+
+
+def test_a_dropped_file_becomes_the_files_of_the_shown_commands(
+    app: App, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app.after(app.page.drop, recording)
+    app.click("#identify")
+    assert "good" in app.text("model")
+    app.after(app.page.choose, "device", "bench-knob")
+    assert "good" in app.text("plan")
+    made = {name: app.download(kind, name) for kind, name in (("model", "knob.json"), ("header", "knob.h"))}
+    assert b"palpate" in app.download("report", "knob.html")
+    commands = app.commands()
+    folder = tmp_path / "commands"
+    folder.mkdir()
+    (folder / recording.name).write_bytes(recording.read_bytes())
+    monkeypatch.chdir(folder)
+    for command in commands:
+        assert main(command.split()[1:]) == 0, command
+    for name, content in made.items():
+        assert (folder / name).read_bytes() == content, name
+    assert (folder / "knob.html").exists()
+
+
+def test_a_dragged_stretch_is_left_out_and_undo_brings_it_back(app: App, recording: Path) -> None:
+    app.after(app.page.drop, recording)
+    app.page.run("document.getElementById('chart-course').scrollIntoView({block: 'center'})")
+    left, top, right, _ = app.page.box("chart-course")
+    app.page.drag((left + 0.4 * (right - left), top + 60), (left + 0.6 * (right - left), top + 60))
+    app.page.wait("document.getElementById('course-to').value !== ''")
+    app.click("[data-action=mark-course]")
+    assert "--leave-out" in app.commands()[0]
+    assert "left out" in app.text("reading")
+    app.click("#undo")
+    assert "--leave-out" not in app.commands()[0]
+
+
+def test_a_refused_file_is_read_after_a_click_on_its_cure(app: App, tmp_path: Path) -> None:
+    position = np.linspace(0.0, 4.0, 200)
+    rows = "\n".join(f"{x:.4f},{2.0 * x:.4f}" for x in [*position, *position[::-1]])
+    (tmp_path / "bare.csv").write_text(f"travel,load\n{rows}\n", encoding="utf-8")
+    app.after(app.page.drop, tmp_path / "bare.csv")
+    assert "no" in app.text("reading")
+    app.click("#part-reading .cure")
+    assert "--units" in app.commands()[0]
+    assert "400 rows" in app.text("reading")
+
+
+def test_a_reloaded_page_shows_the_same_recording_and_model(app: App, recording: Path) -> None:
+    app.after(app.page.drop, recording)
+    app.click("#identify")
+    before = app.text("model"), app.commands()
+    app.open()
+    assert (app.text("model"), app.commands()) == before
+
+
+def test_the_keyboard_alone_identifies_and_changes_the_device(app: App, recording: Path) -> None:
+    app.after(app.page.drop, recording)
+
+    def focus(element: str) -> None:
+        for _ in range(60):
+            app.page.press("Tab")
+            if app.page.run("document.activeElement.id") == element:
+                return
+        raise AssertionError(f"Tab does not reach {element}")
+
+    focus("identify")
+    app.after(app.page.press, "Enter")
+    focus("device")
+    app.after(app.page.choose, "device", "bench-knob")
+    focus("slider-viscous_damping")
+    app.after(app.page.press, "ArrowRight")
+    assert "--device knob-bench-knob.toml" in app.commands()[1]
+    assert app.page.run("document.activeElement.id") == "slider-viscous_damping"
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_page_fits_the_window_and_every_control_has_a_name(
+    width: str, app: App, recording: Path
+) -> None:
+    app.page.size(WIDTHS[width], HEIGHT, phone=width == "phone")
+    app.after(app.page.drop, recording)
+    app.click("#identify")
+    app.after(app.page.choose, "device", "bench-knob")
+    assert app.page.run("document.documentElement.scrollWidth") == WIDTHS[width]
+    assert app.page.run(TEXT_BEYOND_THE_WINDOW) == []
+    nodes = app.page.call("Accessibility.getFullAXTree")["nodes"]
+    controls = ("button", "combobox", "textbox", "slider", "link")
+    unnamed = [
+        each["nodeId"]
+        for each in nodes
+        if not each["ignored"]
+        and each["role"]["value"] in controls
+        and not each.get("name", {}).get("value")
+    ]
+    assert unnamed == []
+    small = app.page.run(
+        "[...document.querySelectorAll('button, select')].map(e => e.getBoundingClientRect())"
+        ".filter(b => b.height && b.height < 44).length"
+    )
+    assert small == 0
