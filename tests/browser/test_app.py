@@ -2,6 +2,7 @@
 """palpate app in headless Chromium: from a dropped file to a C header, corrections, undo, reload, keyboard."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -18,6 +19,12 @@ from palpate.recording.sample import sample_recording
 from test_report_page import TEXT_BEYOND_THE_WINDOW
 
 pytestmark = pytest.mark.skipif(PROGRAM is None, reason="needs chromium: apt-get install chromium")
+
+ROOT = Path(__file__).parents[2]
+
+CONTROL = Path(os.environ.get("PALPATE_CONTROL", ROOT / "build" / "control" / "palpate-control"))
+
+needs_control = pytest.mark.skipif(not CONTROL.exists(), reason="needs palpate-control, run make control")
 
 WIDTHS = {"phone": 390, "desk": 1280}
 """Width of the window [px]"""
@@ -42,9 +49,7 @@ class App:
         """Does some work and waits until the page shows its result."""
         shown = self.page.run("Number(document.documentElement.dataset.shown)")
         work(*given)
-        self.page.wait(
-            f"Number(document.documentElement.dataset.shown) > {shown} && !document.body.ariaBusy"
-        )
+        self.page.wait(f"Number(document.documentElement.dataset.shown) > {shown} && !document.body.ariaBusy")
 
     def click(self, selector: str) -> None:
         """Clicks an element and waits until the page shows the result."""
@@ -86,7 +91,9 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def address() -> Iterator[str]:
     """Starts the program and yields the address of its page."""
     command = [sys.executable, "-m", "palpate", "app", "--no-browser", "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    found = {"PATH": f"{CONTROL.parent}{os.pathsep}{os.environ['PATH']}"}
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, **streams, text=True, env={**os.environ, **found}) as process:
         try:
             assert process.stdout is not None
             yield json.loads(process.stdout.readline())["address"]
@@ -190,9 +197,7 @@ def test_the_keyboard_alone_identifies_and_changes_the_device(app: App, recordin
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_the_page_fits_the_window_and_every_control_has_a_name(
-    width: str, app: App, recording: Path
-) -> None:
+def test_the_page_fits_the_window_and_every_control_has_a_name(width: str, app: App, recording: Path) -> None:
     app.page.size(WIDTHS[width], HEIGHT, phone=width == "phone")
     app.after(app.page.drop, recording)
     app.click("#identify")
@@ -204,9 +209,7 @@ def test_the_page_fits_the_window_and_every_control_has_a_name(
     unnamed = [
         each["nodeId"]
         for each in nodes
-        if not each["ignored"]
-        and each["role"]["value"] in controls
-        and not each.get("name", {}).get("value")
+        if not each["ignored"] and each["role"]["value"] in controls and not each.get("name", {}).get("value")
     ]
     assert unnamed == []
     small = app.page.run(
@@ -214,3 +217,32 @@ def test_the_page_fits_the_window_and_every_control_has_a_name(
         ".filter(b => b.height && b.height < 44).length"
     )
     assert small == 0
+
+
+def test_a_simulated_rendering_moves_the_cursor(app: App, recording: Path) -> None:
+    app.after(app.page.drop, recording)
+    app.click("#identify")
+    app.after(app.page.choose, "device", "bench-knob")
+    app.click("#simulate")
+    assert "good" in app.text("feel")
+    app.page.run(
+        "(e => { e.value = 0.4; e.dispatchEvent(new Event('input', {bubbles: true})); })"
+        "(document.getElementById('moment'))"
+    )
+    before = app.page.run("document.getElementById('readout').textContent")
+    assert "rad" in before
+    app.page.click("#play")
+    app.page.wait(f"document.getElementById('readout').textContent !== {before!r}")
+
+
+@needs_control
+def test_stop_ends_a_started_device_with_zero_force(app: App, recording: Path) -> None:
+    app.after(app.page.drop, recording)
+    app.click("#identify")
+    app.after(app.page.choose, "device", "bench-knob")
+    assert "5 N·m" in app.text("feel")
+    app.click("#start")
+    app.page.wait("document.getElementById('readout').textContent.includes('force')")
+    app.click("#stop")
+    assert "zero force sent and confirmed" in app.text("feel")
+    assert app.download("felt", "knob-felt.csv").startswith(b"#")

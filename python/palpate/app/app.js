@@ -64,14 +64,14 @@
     say("Not done");
   }
 
-  async function draw(figure, name, { key, item, html, select }) {
+  async function draw(figure, name, { key, item, html, select, frames, units }) {
     if ((drawn[name]?.key ?? "") === key) return;
     drawn[name]?.views?.clear();
     delete drawn[name];
     figure.innerHTML = html ?? "";
     if (!item) return;
     const views = await Bokeh.embed.embed_item(item);
-    drawn[name] = { key, views };
+    drawn[name] = { key, views, frames, units };
     const roots = views.roots.map((each) => each.model);
     paintCharts(colours[dark.matches ? "dark" : "light"], roots);
     if (select && roots[0].document) {
@@ -90,12 +90,61 @@
     }
   });
 
+  // The cursor is where the handle is: of the simulated rendering that is played, or of the running device.
+  let playing = false, running = false;
+  function moveTo(x, y) {
+    for (const { model } of drawn.feel?.views.roots ?? []) {
+      for (const each of model.references()) {
+        if (each.name === "cursor") each.data_source.data = { x: [x], y: [y] };
+      }
+    }
+    const [ofX, ofY] = (drawn.feel?.units ?? ["", ""]).map((each) => each.replace("*", "·"));
+    element("readout").textContent = `position ${x.toPrecision(3)} ${ofX}, force ${y.toPrecision(3)} ${ofY}`;
+  }
+  function showMoment(share) {
+    const [time, x, y] = drawn.feel.frames, k = Math.round(share * (time.length - 1));
+    moveTo(x[k], y[k]);
+  }
+  function play() {
+    const begin = performance.now() - 1000 * element("moment").value * drawn.feel.frames[0].at(-1);
+    const step = (now) => {
+      const slider = element("moment"), times = drawn.feel?.frames?.[0];
+      if (!playing || !slider || !times) { playing = false; return; }
+      slider.value = Math.min(1, (now - begin) / 1000 / times.at(-1));
+      showMoment(slider.value);
+      if (slider.value < 1) requestAnimationFrame(step);
+      else { playing = false; element("play").textContent = "Play"; slider.value = 0; }
+    };
+    requestAnimationFrame(step);
+  }
+  async function pulse() {
+    try {
+      const { running: now, ended, at } = await (await fetch("pulse")).json();
+      if (now && at) { moveTo(...at); say("The device is running"); }
+      if (running && !now) { say(`The device has stopped: ${ended}`); act("refresh"); }
+      running = now;
+    } catch (error) {
+      say("palpate has ended: start palpate app again.");
+    }
+    setTimeout(pulse, running ? 100 : 1000);
+  }
+
   const fieldsOf = (form) => (form ? Object.fromEntries(new FormData(form)) : {});
   document.addEventListener("click", async (event) => {
     const button = event.target.closest("button");
     if (!button) return;
     if (button.dataset.action) {
       act(button.dataset.action, { ...fieldsOf(button.closest("form")), ...JSON.parse(button.dataset.given ?? "{}") });
+    } else if ("play" in button.dataset) {
+      playing = !playing;
+      button.textContent = playing ? "Pause" : "Play";
+      if (playing) play();
+    } else if ("start" in button.dataset) {
+      playing = false;
+      send(`start?device=${encodeURIComponent(element("connection").value)}`, "", "Starting the device ...");
+    } else if ("stop" in button.dataset) {  // does not wait for other requests
+      const { refused } = await (await fetch("stop", { method: "POST" })).json();
+      if (refused) refuse(refused);
     } else if (button.dataset.copy) {
       await navigator.clipboard.writeText(element(button.dataset.copy).textContent.trim());
       say("Copied");
@@ -119,6 +168,7 @@
     else if (form) act(form.dataset.action, fieldsOf(form));
   });
   document.addEventListener("input", ({ target }) => {
+    if (target.id === "moment") { playing = false; showMoment(target.value); }
     if (target.type !== "range" || !target.dataset.field) return;
     const value = target.dataset.base * 30 ** target.value;
     const text = `${Number(value.toPrecision(4))} ${target.dataset.unit}`;
@@ -146,6 +196,6 @@
     });
   }
   Bokeh.set_log_level("warn");
-  setInterval(() => fetch("pulse").catch(() => say("palpate has ended: start palpate app again.")), 2000);
+  pulse();
   act("refresh");
 })();

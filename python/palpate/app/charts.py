@@ -157,6 +157,39 @@ def lost(plan: Plan, recording: Recording) -> Chart:
     return Chart("Force of the object and of the device at rest, over position.", panel)
 
 
+FRAME_S = 1.0 / 60.0
+"""Time between two pictures of a rendering that is played [s]"""
+
+
+def cursor(plan: Plan, recording: Recording) -> Chart:
+    """Draws the force on the device with a cursor, which the page moves."""
+    axes = Axes.of(recording)
+    x, _, rendered = plan.forces_at_rest()
+    panel = axes.panel(260)
+    names = ("press", "release") if len(rendered) == 2 else ("",)
+    for name, force in zip(names, rendered, strict=True):
+        line = axes.x.factor * x, axes.y.factor * force
+        panel.line(*line, LINE_MARKS[name], f"rendered, {name}" if name else "rendered", hover=False)
+    panel.cursor("handle")
+    return Chart("Force on the device over position; the cursor is the handle.", panel)
+
+
+def frames(rendered: Recording, axes: Axes) -> list[list[float]]:
+    """Returns time [s], position and force of the pictures of a rendering, in the units of the axes."""
+    period = rendered.sample_period
+    assert period is not None
+    assert rendered.time is not None
+    rows = slice(None, None, max(1, round(FRAME_S / period)))
+    return [
+        np.round(values[rows], 5).tolist()
+        for values in (
+            rendered.time - rendered.time[0],
+            axes.x.factor * rendered.position,
+            axes.y.factor * rendered.force,
+        )
+    ]
+
+
 def together(models: Sequence[tuple[str, Model]], recording: Recording) -> Chart:
     """Draws the press force of several models in one picture."""
     axes = Axes.of(recording)

@@ -87,6 +87,7 @@ async def _serve(session: Session, port: int, idle_s: float, opened: Callable[[s
             await asyncio.sleep(min(0.1, idle_s))
     finally:
         http.stop()
+        session.live.stop()
 
 
 class _Server:
@@ -124,6 +125,14 @@ class _Server:
         """Adds a file and returns the parts of the page."""
         return self.answer(lambda: self.session.add_file(name, content))
 
+    def stopped(self) -> dict[str, str]:
+        """Stops the device; returns the refusal, which is empty if it has ended."""
+        try:
+            self.session.live.stop()
+        except InputError as error:
+            return {"refused": sentence_of(error)}
+        return {"refused": ""}
+
     def exported(self, kind: str) -> File:
         """Returns a file for the downloads of the browser."""
         with self.session.lock:
@@ -139,7 +148,7 @@ def _handler(server: _Server) -> Any:
         "style.css": ("text/css", server.view.style),
         "script.js": ("text/javascript", server.view.script),
         "library.js": ("text/javascript", server.view.library),
-        "pulse": ("text/plain", lambda: ""),
+        "pulse": ("application/json", lambda: json.dumps(server.view.ticked())),
     }
 
     class Handler(RequestHandler):
@@ -170,6 +179,11 @@ def _handler(server: _Server) -> Any:
             if path == "add":
                 name = self.get_query_argument("name")
                 self.finish(await in_thread(lambda: server.added(name, body)))
+            elif path == "stop":  # does not wait for other work
+                self.finish(await in_thread(server.stopped))
+            elif path == "start":
+                device = self.get_query_argument("device")
+                self.finish(await in_thread(lambda: server.answer(lambda: server.session.start(device))))
             elif path == "act":
                 self.finish(await in_thread(lambda: server.acted(body)))
             else:

@@ -24,7 +24,9 @@ from ..recording.files import free_name
 from ..recording.formats import open_table
 from ..report import Subject, report_of
 from ..report.of_comparison import Compared
+from ..report.subject import Rendering
 from .charts import course_axis
+from .live import PROGRAM, Live
 from .state import Entry, Option, OptionTable, State, changed, with_change
 
 CACHED = 64
@@ -92,10 +94,12 @@ class Session:
         self.folder = folder
         self.command_line = command_line
         self.lock = threading.Lock()
+        self.live = Live()
         self._history = [State()]
         self._read = lru_cache(CACHED)(lambda *key: tried(lambda: command_line.read(*key)))
         self._identified = lru_cache(CACHED)(self._identify)
         self._planned = lru_cache(CACHED)(self._plan)
+        self._rendered = lru_cache(CACHED)(self._render)
         self._compared = lru_cache(CACHED)(self._compare)
         self.column_names = lru_cache(CACHED)(self._column_names)
 
@@ -226,6 +230,39 @@ class Session:
         )
         return found
 
+    def rendering(self, entry: Entry) -> Rendering | Refusal | None:
+        """Returns the plan rendered on a simulated device with a simulated hand; None if it is not wanted."""
+        return self._rendered(entry) if entry.played and isinstance(self.plan(entry), Plan) else None
+
+    def _render(self, entry: Entry) -> Rendering | Refusal:
+        plan, recording = self.plan(entry), self.recording(entry)
+        assert isinstance(plan, Plan)
+        assert isinstance(recording, Recording)
+        found = replace(Subject.of(plan.model), plan=plan).rendering
+        return Refusal(found) if isinstance(found, str) else found
+
+    def start(self, device: str) -> None:
+        """Starts a device with the model that is shown; palpate-control checks the certificate.
+
+        Raises
+        ------
+        InputError
+            There is no plan, the program is not installed, or a device is running.
+        """
+        entry = self.entry
+        if not isinstance(self.plan(entry), Plan):
+            raise InputError("there is no plan yet: choose a device profile")
+        if device.startswith("-"):
+            raise InputError(f"device is {device!r}: must be the name of a device")
+        self.saved_model(entry)
+        self.live.start(self.live_command(entry, device))
+
+    @staticmethod
+    def live_command(entry: Entry, device: str) -> list[str]:
+        """Returns the command that renders the model of an entry on a device until it is stopped."""
+        record = ["--record", f"{entry.stem}-felt.csv", "--force"]
+        return [PROGRAM, f"{entry.stem}.json", "--device", device, "--duration-s", "inf", *record]
+
     def compared(self, entry: Entry) -> Compared | None:
         """Returns the rows of the recording compared with the model; None without both."""
         return self._compared(Entry(entry.file, entry.options, entry.identified))
@@ -275,8 +312,8 @@ class Session:
         if kind == "profile":
             target = self.folder / entry.profile
             self.device(entry).save(target)
-        elif kind == "recording":
-            target = self.folder / entry.file
+        elif kind in ("recording", "felt"):
+            target = self.folder / (entry.file if kind == "recording" else f"{entry.stem}-felt.csv")
         else:
             target = self.saved_model(entry)
             if kind == "report":
@@ -400,7 +437,7 @@ def _device(session: Session, given: Mapping[str, Any]) -> None:
     name = str(given["device"])
     if name:
         DeviceProfile.load(profile_file(name))
-    session.change(device=name, changes=(), plan_options=())
+    session.change(device=name, changes=(), plan_options=(), played=False)
 
 
 def _change_device(session: Session, given: Mapping[str, Any]) -> None:
@@ -408,7 +445,7 @@ def _change_device(session: Session, given: Mapping[str, Any]) -> None:
     field, value = str(given["field"]), _number(given, "value", str(given["field"]))
     if field == "rate_hz" and value > 0.0:
         field, value = "period_s", 1.0 / value
-    changed_entry = with_change(session.entry, {field: value})
+    changed_entry = with_change(replace(session.entry, played=False), {field: value})
     session.device(changed_entry)
     session.become(session.state.with_entry(changed_entry))
 
@@ -433,5 +470,6 @@ ACTIONS: dict[str, Callable[[Session, Mapping[str, Any]], None]] = {
     "identify": lambda session, given: session.change(identified=True),
     "device": _device,
     "change-device": _change_device,
+    "play": lambda session, given: session.change(played=True),
 }
 """Actions of the page by name"""

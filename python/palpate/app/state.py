@@ -39,6 +39,9 @@ class Entry:
     plan_options: tuple[Option, ...] = ()
     """Options of `palpate plan`"""
 
+    played: bool = False
+    """True if the rendering on a simulated device is wanted"""
+
     @property
     def stem(self) -> str:
         """Name of the recording without its ending; the files that are made from it have this name."""

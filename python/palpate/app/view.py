@@ -20,8 +20,10 @@ from ..recording.units import FORCE_UNITS, POSITION_UNITS, TIME_UNITS, UNITS
 from ..report import page as report_page
 from ..report.charts import Chart
 from ..report.page import COLOURS, bokeh, chart_library, templates_in
+from ..report.subject import Rendering
 from ..verdict import Verdict
-from .charts import course, course_axis, differences, lost, modelled, recorded
+from .charts import Axes, course, course_axis, cursor, differences, frames, lost, modelled, recorded
+from .live import connections
 from .session import CACHED, Refusal, Session
 from .state import Entry, OptionTable, commands_of, text_of
 
@@ -95,6 +97,7 @@ class View:
             parts |= {
                 "model": self._model_part(entry),
                 **self._device_parts(entry),
+                "feel": self._feel_part(entry),
                 "export": self._export_part(entry),
             }
             charts = self._charts(entry, known)
@@ -236,6 +239,37 @@ class View:
         ]
         return [each for each in found if each.base > 0.0]
 
+    def _feel_part(self, entry: Entry) -> str:
+        plan, rendering = self.session.plan(entry), self.session.rendering(entry)
+        if not isinstance(plan, Plan) or plan.verdict.level == "no" or plan.certificate is None:
+            return ""
+        unit = plan.model.units["force"].replace("*", "·")
+        limit = f"{plan.certificate.device.force_limit:.4g} {unit}"
+        judged = None
+        if isinstance(rendering, Rendering):
+            judged = self._judged(rendering.verdict, entry)
+        elif rendering is not None:
+            judged = self._refused(rendering, entry)
+        live = self.session.live
+        names = connections()
+        command = text_of(self.session.live_command(entry, names[-1]))
+        recorded = (self.session.folder / f"{entry.stem}-felt.csv").exists()
+        return self._render("feel", judged, names, limit, live.is_running, live.ended, command, recorded)
+
+    def ticked(self) -> dict[str, Any]:
+        """Returns the newest tick of a running device in the units of the page, and how it ended."""
+        live, entry = self.session.live, self.session.state.entry
+        tick, recording = live.latest(), None if entry is None else self.session.recording(entry)
+        found: dict[str, Any] = {"running": live.is_running, "ended": live.ended}
+        if tick and isinstance(recording, Recording):
+            axes = Axes.of(recording)
+            position, force = (
+                next(value for name, value in tick.items() if name.startswith(f"{start}_"))
+                for start in ("position", "applied")
+            )
+            found["at"] = [axes.x.factor * position, axes.y.factor * force]
+        return found
+
     def _export_part(self, entry: Entry) -> str:
         has_model = isinstance(self.session.model(entry), Model)
         plan = self.session.plan(entry)
@@ -254,6 +288,7 @@ class View:
             keys["model"] = (entry.file, entry.options)
         if isinstance(plan, Plan):
             keys["plan"] = (entry,)
+            keys["feel"] = (entry,)
         answer = {}
         for name, key in keys.items():
             text = "" if key is None else f"{name} {key}"
@@ -267,9 +302,14 @@ class View:
         """Returns the HTML around a chart and its content for the library, as JSON."""
         chart = CHARTS[name](self.session, entry)
         item = bokeh("embed").json_item(chart.layout(), f"chart-{name}")
-        return json.dumps(
-            {"item": item, "html": self._render("figure", name, chart), "select": name in SELECTED}
-        )
+        answer = {"item": item, "html": self._render("figure", name, chart), "select": name in SELECTED}
+        recording, rendering = self.session.recording(entry), self.session.rendering(entry)
+        if name == "feel" and isinstance(recording, Recording):
+            axes = Axes.of(recording)
+            answer["units"] = [axes.x.unit, axes.y.unit]
+            if isinstance(rendering, Rendering):
+                answer["frames"] = frames(rendering.recording, axes)
+        return json.dumps(answer)
 
 
 SELECTED = ("curve", "course")
@@ -292,6 +332,13 @@ def _model(session: Session, entry: Entry) -> Chart:
     return modelled(compared)
 
 
+def _feel(session: Session, entry: Entry) -> Chart:
+    plan, recording = session.plan(entry), session.recording(entry)
+    assert isinstance(plan, Plan)
+    assert isinstance(recording, Recording)
+    return cursor(plan, recording)
+
+
 def _plan(session: Session, entry: Entry) -> Chart:
     plan, recording = session.plan(entry), session.recording(entry)
     assert isinstance(plan, Plan)
@@ -304,5 +351,6 @@ CHARTS: dict[str, Callable[[Session, Entry], Chart]] = {
     "course": _course,
     "model": _model,
     "plan": _plan,
+    "feel": _feel,
 }
 """Charts of the page by name"""

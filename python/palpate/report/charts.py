@@ -189,6 +189,15 @@ class Panel:
         drawn = self.plot.quad("left", "right", "y", "zero", source=source, fill_alpha=0.75, **colours)
         self._add(drawn, "bars", text, "mouse")
 
+    def cursor(self, text: str) -> None:
+        """Draws one large dot that a script moves; it is named "cursor"."""
+        source = self._source(x=np.empty(0), y=np.empty(0))
+        drawn = self.plot.scatter("x", "y", source=source, size=16, fill_alpha=0.9, **_coloured(
+            fill="alarm", line="paper"
+        ))  # fmt: skip
+        drawn.name = "cursor"
+        self._add(drawn, "cursor", text, "")
+
     def strips(self, left: Float1D, right: Float1D, mark: str, text: str = "") -> None:
         """Shades the panel between `left` and `right`, over its whole height."""
         if not len(left):
