@@ -25,7 +25,7 @@
   }
   const known = () => Object.values(drawn).map((each) => each.key);
   const act = (action, given = {}) => send("act", JSON.stringify({ action, given, known: known() }),
-    action === "identify" || action === "cure" ? "Identifying, this takes some seconds ..." : "Working ...");
+    ["identify", "cure", "edit"].includes(action) ? "Identifying, this takes some seconds ..." : "Working ...");
 
   async function show({ parts, charts, colours: found }) {
     colours = found;
@@ -74,7 +74,8 @@
     drawn[name] = { key, views, frames, units };
     const roots = views.roots.map((each) => each.model);
     paintCharts(colours[dark.matches ? "dark" : "light"], roots);
-    if (select && roots[0].document) {
+    if (name === "edit") roots[0].document.on_event("panend", () => dragged(roots[0]));
+    if (select) {
       roots[0].document.on_event("selectiongeometry", (_, { geometry }) => {
         if (geometry.x0 === undefined) return;
         const ends = [geometry.x0, geometry.x1].sort((a, b) => a - b);
@@ -83,6 +84,18 @@
         say("Marked: now say what it is.");
       });
     }
+  }
+  // A handle that was dragged fills the fields of the form.
+  function dragged(model) {
+    const { x, y } = [...model.references()].find((each) => each.name === "handles").data_source.data;
+    const fill = (name, value) => {
+      const field = element(`edit-${name}`);
+      if (field && Number(field.value) !== Number(value.toPrecision(4))) field.value = String(Number(value.toPrecision(4)));
+    };
+    fill("peak-position", x[0]); fill("peak-force", y[0]);
+    fill("click-travel", x[1] - x[0]); fill("contact-force", y[1]);
+    if (x.length > 2) fill("stop-position", x[2]);
+    say("Now make the edited object.");
   }
   dark.addEventListener("change", () => {
     for (const { views } of Object.values(drawn)) {

@@ -17,9 +17,11 @@ from ..plotting.look import Scale, scale_for, strokes
 from ..recording import Recording
 from ..recording.motion import ordered_strokes
 from ..recording.roles import ROLE_NAMES, Role, roles_of
+from ..recording.units import Unit
 from ..report.charts import Chart, Panel
 from ..report.of_comparison import LINE_MARKS, Compared
 from ..verdict import FORCE_JND
+from .designer import Curves
 
 DOTS = {"press": "dots", "release": "open-dots", "": "dots"}
 """Marks of recorded rows by stroke"""
@@ -32,10 +34,16 @@ LEFT_OUT_MARK = "strip-4"
 
 @dataclass(frozen=True)
 class Axes:
-    """Scales of position and force, in the units of the file."""
+    """Scales of position and force: in the units of the file, or in SI units with a prefix."""
 
     x: Scale
     y: Scale
+
+    def unit(self, role: str) -> Unit:
+        """Returns the unit of the axis of "position" or "force", for texts and fields."""
+        scale = self.x if role == "position" else self.y
+        symbol = scale.unit.replace("*", "·")
+        return Unit(symbol, symbol, 1.0 / scale.factor)
 
     @classmethod
     def of(cls, recording: Recording) -> Axes:
@@ -188,6 +196,28 @@ def frames(rendered: Recording, axes: Axes) -> list[list[float]]:
             axes.y.factor * rendered.force,
         )
     ]
+
+
+def design(curves: Curves, before: Curves | None, recording: Recording) -> Chart:
+    """Draws the curves of an object with handles at peak, contact and stop, which the mouse drags.
+
+    `before` are the curves before they were edited.
+    """
+    axes = Axes.of(recording)
+    panel = axes.panel(300)
+
+    def line(found: Curves, force: Float1D, mark: str, text: str) -> None:
+        panel.line(axes.x.factor * found.position, axes.y.factor * force, mark, text, hover=False)
+
+    if before is not None:
+        line(before, before.press, "dotted", "before, press")
+    line(curves, curves.press, "line", "press")
+    if not np.array_equal(curves.press, curves.release):
+        line(curves, curves.release, "dashed", "release")
+    if curves.click is not None:
+        places = [*curves.click, *([curves.stop] if "stop position" in curves.numbers() else [])]
+        panel.handles(axes.x.factor * curves.position[places], axes.y.factor * curves.press[places])
+    return Chart("Force over position; drag a handle: peak, end of the drop, stop.", panel)
 
 
 def together(models: Sequence[tuple[str, Model]], recording: Recording) -> Chart:

@@ -25,7 +25,8 @@ from ..recording.formats import open_table
 from ..report import Subject, report_of
 from ..report.of_comparison import Compared
 from ..report.subject import Rendering
-from .charts import course_axis
+from .charts import Axes, course_axis
+from .designer import HYSTERESIS, Curves, editable, edited, recording_of
 from .live import PROGRAM, Live
 from .state import Entry, Option, OptionTable, State, changed, with_change
 
@@ -423,11 +424,11 @@ def _mark_curve(session: Session, given: Mapping[str, Any]) -> None:
     recording = session.recording(session.entry)
     if isinstance(recording, Refusal):
         raise InputError(recording.sentence)
-    unit = recording.file_unit("position")
+    unit = Axes.of(recording).unit("position")
     first = _number(given, "from", "from")
     if given["kind"] == "period":
         length = abs(_number(given, "to", "to") - first)
-        session.set_options([("--period", f"{length:.6g}{unit.symbol if unit.si else ''}")])
+        session.set_options([("--period", f"{length:.6g}{unit.symbol}")])
     else:
         session.set_options([("--fixed-force", repr(first * unit.factor), "0")])
 
@@ -450,6 +451,36 @@ def _change_device(session: Session, given: Mapping[str, Any]) -> None:
     session.become(session.state.with_entry(changed_entry))
 
 
+def _edit(session: Session, given: Mapping[str, Any]) -> None:
+    """Makes an edited object from the numbers of the form, as a recording that is shown and identified."""
+    entry, model, recording = session.entry, session.model(session.entry), session.recording(session.entry)
+    if not isinstance(model, Model) or isinstance(recording, Refusal):
+        raise InputError("there is no model to edit yet: identify one")
+    curves = Curves.of(model)
+    now = curves.numbers()
+    wanted, changes = dict[str, float](), list[str]()
+    for name in editable(curves):
+        unit = Axes.of(recording).unit(now[name][1])
+        before, after = unit.text(now[name][0]), f"{_number(given, name, name):.4g} {unit.shown}".rstrip()
+        if after != before:
+            wanted[name] = _number(given, name, name) * unit.factor
+            changes.append(f"{name} {after} in place of {before}")
+    if given.get(HYSTERESIS):
+        wanted[HYSTERESIS] = _number(given, HYSTERESIS, HYSTERESIS) / 100.0
+        if wanted[HYSTERESIS] != 1.0:
+            changes.append(f"hysteresis {100.0 * wanted[HYSTERESIS]:g} % of the former one")
+    if not changes:
+        raise InputError("no number was changed: change one, then make the edited object")
+    result = edited(curves, wanted)
+    name = free_name(f"{entry.stem}-edited", ".csv", {each.name for each in session.folder.iterdir()})
+    recording_of(result, model, ", ".join(changes)).write(session.folder / name)
+    options = () if model.period is None else (("--period", repr(float(np.ptp(result.position)))),)
+    made = Entry(
+        name, options, identified=True, device=entry.device, changes=entry.changes, origin=entry.file
+    )
+    session.become(session.state.with_entry(made))
+
+
 def _show(session: Session, given: Mapping[str, Any]) -> None:
     """Shows another recording."""
     for number, each in enumerate(session.state.entries):
@@ -470,6 +501,7 @@ ACTIONS: dict[str, Callable[[Session, Mapping[str, Any]], None]] = {
     "identify": lambda session, given: session.change(identified=True),
     "device": _device,
     "change-device": _change_device,
+    "edit": _edit,
     "play": lambda session, given: session.change(played=True),
 }
 """Actions of the page by name"""

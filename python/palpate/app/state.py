@@ -39,6 +39,8 @@ class Entry:
     plan_options: tuple[Option, ...] = ()
     """Options of `palpate plan`"""
 
+    origin: str = ""
+    """Recording whose model was edited to make this one; empty if it was not edited"""
     played: bool = False
     """True if the rendering on a simulated device is wanted"""
 

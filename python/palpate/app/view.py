@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..model import Model
 from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, profile_file
 from ..recording import Recording
@@ -22,7 +24,22 @@ from ..report.charts import Chart
 from ..report.page import COLOURS, bokeh, chart_library, templates_in
 from ..report.subject import Rendering
 from ..verdict import Verdict
-from .charts import Axes, course, course_axis, cursor, differences, frames, lost, modelled, recorded
+from ..verification.metrics import compare
+from .charts import (
+    Axes,
+    course,
+    course_axis,
+    cursor,
+    design,
+    differences,
+    frames,
+    lost,
+    modelled,
+    one_curve,
+    recorded,
+    together,
+)
+from .designer import Curves, editable
 from .live import connections
 from .session import CACHED, Refusal, Session
 from .state import Entry, OptionTable, commands_of, text_of
@@ -98,6 +115,8 @@ class View:
                 "model": self._model_part(entry),
                 **self._device_parts(entry),
                 "feel": self._feel_part(entry),
+                "edit": self._edit_part(entry),
+                "compare": self._compare_part(entry),
                 "export": self._export_part(entry),
             }
             charts = self._charts(entry, known)
@@ -172,7 +191,7 @@ class View:
 
     def _unit(self, entry: Entry, role: str) -> str:
         recording = self.session.recording(entry)
-        return recording.file_unit(role).shown if isinstance(recording, Recording) else ""
+        return Axes.of(recording).unit(role).shown if isinstance(recording, Recording) else ""
 
     def _course_name(self, entry: Entry) -> str:
         whole = self.session.whole(entry)
@@ -188,7 +207,7 @@ class View:
         assert compared is not None
         noticed = differences(compared)
         worst = int(np.argmax(np.abs(noticed)))
-        position, force = recording.file_unit("position"), recording.file_unit("force")
+        position, force = map(Axes.of(recording).unit, ("position", "force"))
         place = (
             f"The largest difference is {abs(noticed[worst]):.2g} just noticeable differences, at "
             f"{position.text(float(compared.position[worst]))}: recorded "
@@ -238,6 +257,49 @@ class View:
             Slider("encoder_step", "Encoder step", unit, device.encoder_step, profile.encoder_step),
         ]
         return [each for each in found if each.base > 0.0]
+
+    def _curves(self, file: str) -> Curves | None:
+        """Returns the curves of the object of a recording; None if it has no model with curves."""
+        for entry in self.session.state.entries:
+            if entry.file == file:
+                model = self.session.model(entry)
+                if isinstance(model, Model) and one_curve(model):
+                    return Curves.of(model)
+        return None
+
+    def _edit_part(self, entry: Entry) -> str:
+        curves, before, recording = (
+            self._curves(entry.file),
+            self._curves(entry.origin),
+            self.session.recording(entry),
+        )
+        if curves is None or isinstance(recording, Refusal):
+            return ""
+        units = {role: Axes.of(recording).unit(role) for role in ("position", "force")}
+
+        def text(number: tuple[float, str]) -> str:
+            value, kind = number
+            if kind in units:
+                return units[kind].text(value)
+            return f"{1e3 * value:.4g} mJ" if kind == "work" else f"{value:.0%}"
+
+        now = curves.numbers()
+        earlier = {} if before is None else before.numbers()
+        rows = [
+            (name, text(earlier[name]) if name in earlier else "", text(value)) for name, value in now.items()
+        ]
+        fields = []
+        for name in editable(curves):
+            unit = units[now[name][1]]
+            fields.append((name, f"{now[name][0] / unit.factor:.4g}", unit.shown))
+        has_loop = not np.array_equal(curves.press, curves.release)
+        return self._render(
+            "edit", rows, before is not None, fields, has_loop, recording.metadata.get("edited", "")
+        )
+
+    def _compare_part(self, entry: Entry) -> str:
+        rows = [(name, f"{felt:.2g}", f"{share:.0%}") for name, felt, share in similar(self.session, entry)]
+        return self._render("compare", entry.file, rows) if rows else ""
 
     def _feel_part(self, entry: Entry) -> str:
         plan, rendering = self.session.plan(entry), self.session.rendering(entry)
@@ -289,6 +351,12 @@ class View:
         if isinstance(plan, Plan):
             keys["plan"] = (entry,)
             keys["feel"] = (entry,)
+        if self._curves(entry.file) is not None:
+            keys["edit"] = (entry.file, entry.options, entry.origin)
+            if similar(self.session, entry):
+                keys["compare"] = tuple(
+                    (each.file, each.options, each.identified) for each in self.session.state.entries
+                )
         answer = {}
         for name, key in keys.items():
             text = "" if key is None else f"{name} {key}"
@@ -332,6 +400,42 @@ def _model(session: Session, entry: Entry) -> Chart:
     return modelled(compared)
 
 
+def similar(session: Session, entry: Entry) -> list[tuple[str, float, float]]:
+    """Returns the other objects that can be compared, the most similar first.
+
+    Each has its name, the largest difference of the force [JND], and the share of the travel on which a hand
+    feels the difference.
+    """
+    model, found = session.model(entry), list[tuple[str, float, float]]()
+    if not isinstance(model, Model) or not one_curve(model):
+        return []
+    for each in session.state.entries:
+        other = session.model(each)
+        if each.file != entry.file and isinstance(other, Model) and one_curve(other):
+            with suppress(InputError):
+                strokes = compare(model, other)
+                share = max(stroke.noticed_share for stroke in strokes)
+                found.append((each.file, max(stroke.worst for stroke in strokes), share))
+    return sorted(found, key=lambda each: (each[2], each[1]))
+
+
+def _edit(session: Session, entry: Entry) -> Chart:
+    model, recording = session.model(entry), session.recording(entry)
+    assert isinstance(model, Model)
+    assert isinstance(recording, Recording)
+    before = [session.model(each) for each in session.state.entries if each.file == entry.origin]
+    origin = Curves.of(before[0]) if before and isinstance(before[0], Model) else None
+    return design(Curves.of(model), origin, recording)
+
+
+def _compare(session: Session, entry: Entry) -> Chart:
+    names = [entry.file, *(name for name, *_ in similar(session, entry))]
+    models = {each.file: session.model(each) for each in session.state.entries}
+    recording = session.recording(entry)
+    assert isinstance(recording, Recording)
+    return together([(name, found) for name in names if isinstance(found := models[name], Model)], recording)
+
+
 def _feel(session: Session, entry: Entry) -> Chart:
     plan, recording = session.plan(entry), session.recording(entry)
     assert isinstance(plan, Plan)
@@ -352,5 +456,7 @@ CHARTS: dict[str, Callable[[Session, Entry], Chart]] = {
     "model": _model,
     "plan": _plan,
     "feel": _feel,
+    "edit": _edit,
+    "compare": _compare,
 }
 """Charts of the page by name"""

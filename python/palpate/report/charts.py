@@ -198,6 +198,20 @@ class Panel:
         drawn.name = "cursor"
         self._add(drawn, "cursor", text, "")
 
+    def handles(self, x: Float1D, y: Float1D) -> None:
+        """Draws dots that the mouse drags; they are named "handles", and the page receives their places."""
+        source = self._source(x=np.asarray(x), y=np.asarray(y))
+        source.data = {"x": [float(each) for each in x], "y": [float(each) for each in y]}
+        drawn = self.plot.scatter(
+            "x", "y", source=source, size=18, fill_alpha=0.85, **_coloured(fill="first", line="paper")
+        )
+        drawn.name = "handles"
+        tool = bokeh("models").PointDrawTool(renderers=[drawn], add=False)
+        self.plot.add_tools(tool)
+        self.plot.toolbar.active_drag = tool
+        self.plot.subscribed_events = {"panend"}
+        self._add(drawn, "handles", "drag to edit", "")
+
     def strips(self, left: Float1D, right: Float1D, mark: str, text: str = "") -> None:
         """Shades the panel between `left` and `right`, over its whole height."""
         if not len(left):
