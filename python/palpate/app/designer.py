@@ -106,7 +106,8 @@ def edited(curves: Curves, wanted: Mapping[str, float]) -> Curves:
     """Returns curves whose numbers have the wanted values in SI; the other numbers stay.
 
     Between peak, contact and stop, positions are stretched linearly. Up to the peak the press force is
-    scaled; behind it its change is interpolated linearly, and it ends at the stop. The hysteresis is scaled.
+    scaled. Behind it its change is interpolated linearly; at the stop it is that of the peak. The hysteresis
+    is scaled.
 
     Raises
     ------
@@ -136,8 +137,8 @@ def edited(curves: Curves, wanted: Mapping[str, float]) -> Curves:
         else:
             old, new = [*old, x[-1]], [*new, end]
         ratio = want["peak force"] / now["peak force"]
-        higher = want["peak force"] - now["peak force"], want["contact force"] - now["contact force"]
-        offset = np.interp(x, [x[peak], x[contact], x[curves.stop]], [*higher, 0.0])
+        higher = [want[name] - now[name] for name in ("peak force", "contact force", "peak force")]
+        offset = np.interp(x, old[1 : len(old) - 1], higher[: len(old) - 2])
         press = np.where(x <= x[peak], press * ratio, press + offset)
     if not (np.diff(new) > 0.0).all():
         raise InputError(
