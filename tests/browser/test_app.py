@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate app in headless Chromium: from a dropped file to a C header, corrections, undo, reload, keyboard."""
+"""palpate app in headless Chromium: a dropped file to a C header, corrections, undo, reload, keyboard."""
 
 import json
 import os
@@ -246,3 +246,60 @@ def test_stop_ends_a_started_device_with_zero_force(app: App, recording: Path) -
     app.click("#stop")
     assert "zero force sent and confirmed" in app.text("feel")
     assert app.download("felt", "knob-felt.csv").startswith(b"#")
+
+
+def test_a_dragged_peak_makes_an_edited_object_that_is_compared_with_the_first(
+    app: App, tmp_path: Path
+) -> None:
+    x = np.linspace(0.0, 4.0, 200)
+    force = np.interp(x, [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.5, 0.2, 0.3, 2.0])
+    rows = "\n".join(f"{a:.4f},{b:.5f}" for a, b in zip(x, force, strict=True))
+    (tmp_path / "switch.csv").write_text(f"travel_mm,force_N\n{rows}\n", encoding="utf-8")
+    app.after(app.page.drop, tmp_path / "switch.csv")
+    app.click("#identify")
+    app.page.run("document.getElementById('chart-edit').scrollIntoView({block: 'center'})")
+    place = app.page.run(
+        "(() => { const of = (view) => [view, ...(view.child_views ?? []).flatMap(of)];"
+        "const figure = [...Bokeh.index.roots].flatMap(of).find((each) => each.model.type === 'Figure'"
+        " && each.model.renderers.some((one) => one.name === 'handles'));"
+        "const { x, y } = figure.model.renderers.find((one) => one.name === 'handles').data_source.data;"
+        "const box = figure.el.getBoundingClientRect();"
+        "const { x_scale, y_scale } = figure.frame;"
+        "return [box.left + x_scale.compute(x[0]), box.top + y_scale.compute(y[0])];"
+        "})()"
+    )
+    before = float(app.page.run("document.getElementById('edit-peak-force').value"))
+    app.page.drag((place[0], place[1]), (place[0], place[1] - 30.0))
+    app.page.wait(f"document.getElementById('edit-peak-force').value > {before + 0.05}")
+    app.click("#make-edited")
+    assert "Edited" in app.text("edit")
+    assert "switch-edited.csv" in app.text("objects")
+    assert "switch.csv" in app.text("compare")
+    assert app.commands()[0] == "palpate identify switch-edited.csv -o switch-edited.json"
+    assert app.download("recording", "switch-edited.csv").startswith(b"# edited: peak force")
+
+
+def test_one_marked_repeat_is_the_period(app: App, tmp_path: Path) -> None:
+    angle = np.linspace(0.0, 40.0, 400)
+    rows = "\n".join(f"{a:.4f},{np.sin(np.radians(36.0 * a)):.5f}" for a in angle)
+    (tmp_path / "detents.csv").write_text(f"angle_deg,torque_mNm\n{rows}\n", encoding="utf-8")
+    app.after(app.page.drop, tmp_path / "detents.csv")
+    app.page.run("document.getElementById('correct-curve').open = true")
+    for end, value in (("from", "5"), ("to", "15")):
+        app.page.run(f"document.getElementById('curve-{end}').focus()")
+        app.page.type(value)
+    app.click("[data-action=mark-curve]")
+    assert app.commands()[0] == "palpate identify detents.csv --period 10deg -o detents.json"
+    app.click("#identify")
+    assert "10 deg" in app.text("model")
+
+
+def test_columns_and_units_are_choices(app: App, tmp_path: Path) -> None:
+    rows = "\n".join(f"{0.01 * k:.3f},{0.02 * k:.3f},{k}" for k in range(100))
+    (tmp_path / "two.csv").write_text(f"travel_mm,other_mm,load\n{rows}\n", encoding="utf-8")
+    app.after(app.page.drop, tmp_path / "two.csv")
+    for element, value in (("column-position", "other_mm"), ("column-force", "load"), ("unit-force", "gf")):
+        app.after(app.page.choose, element, value)
+    command = "palpate identify two.csv --position other_mm --force load --units load=gf -o two.json"
+    assert app.commands()[0] == command
+    assert "100 rows" in app.text("reading")

@@ -6,6 +6,7 @@ from __future__ import annotations
 import inspect
 import os
 import shutil
+import sys
 import tempfile
 import webbrowser
 from collections.abc import Sequence
@@ -23,10 +24,11 @@ from ..planning import DeviceProfile, Plan
 from ..planning.search import plan as choose
 from ..recording import Recording, read_recording
 from ..recording.files import require_file
+from ..verdict import GOOD
 from .exit_status import terminated_as_interrupted
 from .identify import _require_unit_of_period, identify
 from .plan import plan
-from .printing import echo, print_json, talk
+from .printing import print_json, print_numbers, print_verdict, talk
 from .verb import PATH, READING_NAMES, json_option, verb
 
 _PLAN_NAMES = {*inspect.signature(choose).parameters, "accept_model"} - {"model", "device", "on_device"}
@@ -100,12 +102,16 @@ def app(recording_file: Path | None, port: int, browser: bool, idle_s: float, as
 
             def opened(address: str) -> None:
                 if as_json:
-                    print_json({"address": address})
+                    print_json({"verdict": str(GOOD), "address": address})
                 else:
-                    echo(f"palpate app: {address}")
-                    talk("Open this address in a browser on this computer. Ctrl-C ends the app.")
-                if browser:
-                    webbrowser.open(address)
+                    print_verdict(GOOD)
+                    print_numbers({"address": address})
+                sys.stdout.flush()
+                talk("Open the address in a browser on this computer. Ctrl-C ends the app.")
+                if browser:  # other users could read the address in the command line of the browser
+                    start_page = Path(name) / "start.html"
+                    start_page.write_text(f'<meta http-equiv="refresh" content="0; url={address}">')
+                    webbrowser.open(start_page.as_uri())
 
             with terminated_as_interrupted():
                 serve(session, port=port, idle_s=idle_s, opened=opened)

@@ -24,9 +24,14 @@ class Served:
         self.process, self.address = process, urlsplit(address)
 
     def request(
-        self, method: str, path: str = "", body: bytes | None = None, headers: Mapping[str, str] | None = None,
-        *, token: str | None = None,
-    ) -> tuple[int, bytes, Mapping[str, str]]:  # fmt: skip
+        self,
+        method: str,
+        path: str = "",
+        body: bytes | None = None,
+        headers: Mapping[str, str] | None = None,
+        *,
+        token: str | None = None,
+    ) -> tuple[int, bytes, Mapping[str, str]]:
         """Returns status, content and headers of an answer."""
         assert self.address.hostname is not None
         connection = HTTPConnection(self.address.hostname, self.address.port, timeout=60)

@@ -41,7 +41,8 @@ def test_the_options_with_values_that_a_sentence_advises_are_found(
         ([("--rows", "0:5")], ("--leave-out", "1:2"), [("--rows", "0:5"), ("--leave-out", "1:2")]),
         ([("--leave-out", "1:2")], ("--leave-out", "3:4"), [("--leave-out", "1:2"), ("--leave-out", "3:4")]),
         ([("--leave-out", "1:2")], ("--leave-out", "1:2"), [("--leave-out", "1:2")]),
-        ([("--units", "a=mm"), ("--units", "b=N")], ("--units", "a=m"), [("--units", "b=N"), ("--units", "a=m")]),
+        ([("--units", "a=mm")], ("--units", "a=m"), [("--units", "a=m")]),
+        ([("--units", "a=mm")], ("--units", "b=N"), [("--units", "a=mm"), ("--units", "b=N")]),
         ([("--monotone",)], ("--no-monotone",), [("--no-monotone",)]),
     ],
 )  # fmt: skip
