@@ -42,7 +42,7 @@ _HEADERS = {
 
 
 def serve(
-    session: Session, *, port: int = 0, idle_s: float = float("inf"), opened: Callable[[str], None]
+    session: Session, *, port: int = 0, idle_s: float = float("inf"), opened: Callable[[str, str], None]
 ) -> None:
     """Serves the page until it is interrupted, or no page was open for `idle_s` [s].
 
@@ -53,8 +53,9 @@ def serve(
         Port on 127.0.0.1; 0 takes a free one.
     idle_s : float
         Time without a request after which the server ends [s].
-    opened : function of the address
-        Called when the server listens.
+    opened : function of two addresses
+        Called when the server listens, with the address of the page, and one that leads there once: other
+        users can read it in the command line of the browser.
 
     Raises
     ------
@@ -64,7 +65,7 @@ def serve(
     asyncio.run(_serve(session, port, idle_s, opened))
 
 
-async def _serve(session: Session, port: int, idle_s: float, opened: Callable[[str], None]) -> None:
+async def _serve(session: Session, port: int, idle_s: float, opened: Callable[[str, str], None]) -> None:
     try:
         from tornado.httpserver import HTTPServer
         from tornado.netutil import bind_sockets
@@ -77,12 +78,12 @@ async def _serve(session: Session, port: int, idle_s: float, opened: Callable[[s
     except OSError as error:
         raise InputError(f"port {port} of {ADDRESS} cannot be used: {error.strerror}") from None
     port = sockets[0].getsockname()[1]
-    server = _Server(session, token, f"{ADDRESS}:{port}")
+    server = Server(session, token, f"{ADDRESS}:{port}")
     application = Application([(r"/([^/]*)/(.*)", _handler(server))], log_function=lambda handler: None)
     http = HTTPServer(application, max_body_size=MOST_BYTES, max_buffer_size=MOST_BYTES)
     http.add_sockets(sockets)
     try:
-        opened(f"http://{ADDRESS}:{port}/{token}/")
+        opened(*(f"http://{ADDRESS}:{port}/{each}/" for each in (token, server.once)))
         while time.monotonic() - server.last_request_s < idle_s:
             await asyncio.sleep(min(0.1, idle_s))
     finally:
@@ -90,18 +91,30 @@ async def _serve(session: Session, port: int, idle_s: float, opened: Callable[[s
         session.live.stop()
 
 
-class _Server:
+class Server:
     """What all requests share."""
 
     def __init__(self, session: Session, token: str, host: str) -> None:
         self.session, self.token, self.host = session, token, host
         self.view = View(session)
         self.last_request_s = time.monotonic()
+        self.once = secrets.token_urlsafe(24)
+        """Token that leads to the page; it is valid for the first request only"""
 
-    def allows(self, token: str, host: str, origin: str | None) -> bool:
-        """Returns True for a request that knows the token and comes from the page itself."""
-        known = hmac.compare_digest(token.encode(), self.token.encode())
-        return known and host == self.host and origin in (None, f"http://{self.host}")
+    def redeems(self, token: str) -> bool:
+        """Returns True for the first request with the token that is valid once."""
+        is_valid = hmac.compare_digest(token.encode(), self.once.encode())
+        if is_valid:
+            self.once = secrets.token_urlsafe(24)
+        return is_valid
+
+    def knows(self, token: str) -> bool:
+        """Returns True for the token of the page."""
+        return hmac.compare_digest(token.encode(), self.token.encode())
+
+    def is_own(self, host: str, origin: str | None) -> bool:
+        """Returns True for a request to this computer that no page from elsewhere sent."""
+        return host == self.host and origin in (None, f"http://{self.host}")
 
     def answer(self, work: Callable[[], None], known: Collection[str] = ()) -> dict[str, Any]:
         """Does some work and returns the parts of the page, without the charts that it knows.
@@ -139,7 +152,7 @@ class _Server:
             return self.session.exported(kind)
 
 
-def _handler(server: _Server) -> Any:
+def _handler(server: Server) -> Any:
     """Returns the class that handles requests."""
     from tornado.web import HTTPError, RequestHandler
 
@@ -160,7 +173,11 @@ def _handler(server: _Server) -> Any:
 
         def prepare(self) -> None:
             token = self.request.path.split("/")[1]
-            if not server.allows(token, self.request.host, self.request.headers.get("Origin")):
+            is_own = server.is_own(self.request.host, self.request.headers.get("Origin"))
+            if is_own and server.redeems(token):
+                self.redirect(f"/{server.token}/")
+                return
+            if not is_own or not server.knows(token):
                 raise HTTPError(403)
             server.last_request_s = time.monotonic()
 

@@ -100,7 +100,7 @@ def app(recording_file: Path | None, port: int, browser: bool, idle_s: float, as
             if recording_file is not None:
                 session.add_file(recording_file.name, Path(recording_file.name).read_bytes())
 
-            def opened(address: str) -> None:
+            def opened(address: str, once: str) -> None:
                 if as_json:
                     print_json({"verdict": str(GOOD), "address": address})
                 else:
@@ -108,10 +108,8 @@ def app(recording_file: Path | None, port: int, browser: bool, idle_s: float, as
                     print_numbers({"address": address})
                 sys.stdout.flush()
                 talk("Open the address in a browser on this computer. Ctrl-C ends the app.")
-                if browser:  # other users could read the address in the command line of the browser
-                    start_page = Path(name) / "start.html"
-                    start_page.write_text(f'<meta http-equiv="refresh" content="0; url={address}">')
-                    webbrowser.open(start_page.as_uri())
+                if browser:
+                    webbrowser.open(once)
 
             with terminated_as_interrupted():
                 serve(session, port=port, idle_s=idle_s, opened=opened)

@@ -14,7 +14,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
-pytest.importorskip("bokeh")
+from palpate.app.server import Server
+from palpate.app.session import Session
+from palpate.cli.app import CommandLine
 
 
 class Served:
@@ -65,6 +67,15 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 def test_the_address_is_local_and_has_a_long_token(served: Served) -> None:
     assert served.address.hostname == "127.0.0.1"
     assert len(served.address.path.strip("/")) >= 32
+
+
+def test_the_address_that_the_browser_gets_leads_to_the_page_only_once() -> None:
+    server = Server(Session(Path(), CommandLine()), "token", "127.0.0.1:1")
+    once = server.once
+    assert not server.redeems("another")
+    assert not server.redeems("token")
+    assert server.redeems(once)
+    assert not server.redeems(once)
 
 
 @pytest.mark.parametrize("path", ["", "script.js", "library.js", "pulse", "file/model"])
