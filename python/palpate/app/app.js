@@ -1,5 +1,6 @@
 (() => {
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const finger = window.matchMedia("(pointer: coarse)").matches;
   const drawn = {};  // name of a chart -> { key, views }
   let colours, queue = Promise.resolve(), waiting = 0, slid = null;
   const element = (id) => document.getElementById(id);
@@ -74,6 +75,11 @@
     drawn[name] = { key, views, frames, units };
     const roots = views.roots.map((each) => each.model);
     paintCharts(colours[dark.matches ? "dark" : "light"], roots);
+    // A finger scrolls the page over a chart; the fields below it do what a mouse does by dragging.
+    for (const tool of finger ? roots.flatMap((root) => root.toolbar.tools) : []) {
+      const each = tool.tools?.[0] ?? tool;
+      if (["BoxSelectTool", "PointDrawTool"].includes(each.type)) each.active = tool.active = false;
+    }
     if (name === "edit") roots[0].document.on_event("panend", () => dragged(roots[0]));
     if (select) {
       roots[0].document.on_event("selectiongeometry", (_, { geometry }) => {
