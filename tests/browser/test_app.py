@@ -33,6 +33,19 @@ HEIGHT = 900
 
 LONGEST_WAIT_S = 30.0
 
+FIGURE_WITH_HANDLES = """
+window.all = (view) => [view, ...(view.child_views ?? []).flatMap(all)];
+window.handles = (view) => (view.model.renderers ?? []).find((each) => each.name === "handles");
+window.figure = [...Bokeh.index.roots].flatMap(all).find(handles);
+"""
+"""Script that finds the chart whose handles the mouse drags"""
+
+PLACE_OF_THE_PEAK = """
+(({ left, top }, { x, y }, { x_scale, y_scale }) => [left + x_scale.compute(x[0]), top + y_scale.compute(y[0])])
+(figure.el.getBoundingClientRect(), handles(figure).data_source.data, figure.frame)
+"""
+"""Expression for the place of the first handle in the window [px]"""
+
 
 class App:
     """The page of a running palpate app."""
@@ -133,6 +146,11 @@ def test_a_dropped_file_becomes_the_files_of_the_shown_commands(
     made = {name: app.download(kind, name) for kind, name in (("model", "knob.json"), ("header", "knob.h"))}
     assert b"palpate" in app.download("report", "knob.html")
     commands = app.commands()
+    permissions = ["clipboardReadWrite", "clipboardSanitizedWrite"]
+    app.page.call("Browser.grantPermissions", permissions=permissions)
+    app.page.click("#copy")
+    app.page.wait("document.getElementById('status').textContent === 'Copied'")
+    assert app.page.run("navigator.clipboard.readText()").splitlines() == commands
     folder = tmp_path / "commands"
     folder.mkdir()
     (folder / recording.name).write_bytes(recording.read_bytes())
@@ -153,8 +171,9 @@ def test_a_dragged_stretch_is_left_out_and_undo_brings_it_back(app: App, recordi
     app.click("[data-action=mark-course]")
     assert "--leave-out" in app.commands()[0]
     assert "left out" in app.text("reading")
-    app.click("#undo")
+    app.after(lambda: app.page.press("z", control=True))
     assert "--leave-out" not in app.commands()[0]
+    assert app.page.run("document.getElementById('undo').disabled") is False
 
 
 def test_a_refused_file_is_read_after_a_click_on_its_cure(app: App, tmp_path: Path) -> None:
@@ -258,16 +277,8 @@ def test_a_dragged_peak_makes_an_edited_object_that_is_compared_with_the_first(
     app.after(app.page.drop, tmp_path / "switch.csv")
     app.click("#identify")
     app.page.run("document.getElementById('chart-edit').scrollIntoView({block: 'center'})")
-    place = app.page.run(
-        "(() => { const of = (view) => [view, ...(view.child_views ?? []).flatMap(of)];"
-        "const figure = [...Bokeh.index.roots].flatMap(of).find((each) => each.model.type === 'Figure'"
-        " && each.model.renderers.some((one) => one.name === 'handles'));"
-        "const { x, y } = figure.model.renderers.find((one) => one.name === 'handles').data_source.data;"
-        "const box = figure.el.getBoundingClientRect();"
-        "const { x_scale, y_scale } = figure.frame;"
-        "return [box.left + x_scale.compute(x[0]), box.top + y_scale.compute(y[0])];"
-        "})()"
-    )
+    app.page.run(FIGURE_WITH_HANDLES)
+    place = app.page.run(PLACE_OF_THE_PEAK)
     before = float(app.page.run("document.getElementById('edit-peak-force').value"))
     app.page.drag((place[0], place[1]), (place[0], place[1] - 30.0))
     app.page.wait(f"document.getElementById('edit-peak-force').value > {before + 0.05}")

@@ -12,10 +12,11 @@
     document.body.setAttribute("aria-busy", "true");
     say(doing);
     const done = queue.then(() => fetch(path, { method: "POST", body })).then(async (answer) => {
-      const content = await answer.json();
+      const content = await (answer.ok ? answer.json() : answer.text());
       waiting -= 1;
       if (!waiting) { document.body.removeAttribute("aria-busy"); say("Ready"); }
-      await show(content);
+      if (answer.ok) await show(content);
+      else refuse(content);
     }).catch((error) => {
       waiting = 0;
       document.body.removeAttribute("aria-busy");

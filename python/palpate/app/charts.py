@@ -18,7 +18,7 @@ from ..recording import Recording
 from ..recording.motion import ordered_strokes
 from ..recording.roles import ROLE_NAMES, Role, roles_of
 from ..recording.units import Unit
-from ..report.charts import Chart, Panel
+from ..report.charts import MOST_DOTS, Chart, Panel
 from ..report.of_comparison import LINE_MARKS, Compared
 from ..verdict import FORCE_JND
 from .designer import Curves
@@ -67,12 +67,16 @@ def recorded(recording: Recording) -> Chart:
     x, y = axes.x.factor * recording.position, axes.y.factor * recording.force
     waiting = role != Role.MOVING
     panel.dots(x[waiting], y[waiting], "soft-dots", "not fitted")
-    direction = ordered_strokes(recording) if recording.direction is None else recording.direction
-    for name, rows in strokes(direction, len(recording)):
+    for name, rows in strokes(direction_of(recording), len(recording)):
         shown = rows & ~waiting
         panel.dots(x[shown], y[shown], DOTS[name], name or "recorded")
     panel.select()
     return Chart("Recorded force over position.", panel)
+
+
+def direction_of(recording: Recording) -> NDArray[np.int8] | None:
+    """Returns the direction of the rows (n,), recorded or from their order; None if it is not known."""
+    return ordered_strokes(recording) if recording.direction is None else recording.direction
 
 
 def course_axis(recording: Recording) -> tuple[str, Float1D]:
@@ -90,9 +94,9 @@ def course(whole: Recording, used: NDArray[np.bool_]) -> Chart:
     axes = Axes.of(whole)
     name, at = course_axis(whole)
     force = Panel(name, axes.y.label("force"), 180)
-    force.line(at, axes.y.factor * whole.force, "thin", "force", hover=False)
+    force.line(*thinned_line(at, axes.y.factor * whole.force), "thin", "force", hover=False)
     position = Panel(name, axes.x.label("position"), 130, above=force)
-    position.line(at, axes.x.factor * whole.position, "second", "position", hover=False)
+    position.line(*thinned_line(at, axes.x.factor * whole.position), "second", "position", hover=False)
     role = roles_of(whole, float(whole.position.max()))
     shades = [(used & (role == each), mark, ROLE_NAMES[each]) for each, mark in ROLE_MARKS.items()]
     for rows, mark, text in [*shades, (~used, LEFT_OUT_MARK, "left out by you")]:
@@ -101,6 +105,22 @@ def course(whole: Recording, used: NDArray[np.bool_]) -> Chart:
     for panel in (force, position):
         panel.select()
     return Chart("Force and position in recorded order; shaded rows are not fitted.", force, position)
+
+
+def thinned_line(at: Float1D, values: Float1D) -> tuple[Float1D, Float1D]:
+    """Returns at most about MOST_DOTS points of a line (n,).
+
+    The least and the largest value of each block of rows stay, so that no single wrong reading disappears.
+    """
+    blocks = MOST_DOTS // 2
+    if len(at) <= MOST_DOTS:
+        return at, values
+    size = -(-len(at) // blocks)
+    padded = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
+    first = size * np.arange(len(padded))
+    rows = np.sort(np.stack([first + padded.argmin(axis=1), first + padded.argmax(axis=1)]), axis=0)
+    rows = np.unique(np.minimum(rows, len(at) - 1))
+    return at[rows], values[rows]
 
 
 def _runs(rows: NDArray[np.bool_], at: Float1D) -> tuple[Float1D, Float1D]:
@@ -114,23 +134,28 @@ def modelled(compared: Compared) -> Chart:
     axes = Axes.of(compared.recording)
     x, y = axes.x.factor * compared.position, axes.y.factor * compared.force
     noticed = differences(compared)
+    direction = direction_of(compared.recording)
+    kept = None if direction is None else direction[compared.found.rows]
+    groups = list(strokes(kept, len(x)))
     above = axes.panel(320)
-    for name, rows in compared.strokes():
+    for name, rows in groups:
         above.dots(x[rows], y[rows], DOTS[name], f"recorded, {name}" if name else "recorded")
     noticed_rows = np.abs(noticed) > 1.0
     below = Panel(axes.x.label("position"), "difference [JND]", 170, above=above)
     if one_curve(compared.subject.model):
+        text = "model at rest" if is_dynamic(compared.subject.model) else "model"
         at, forces = force_curves(compared.subject.model)
         for name, force in forces.items():
             line = axes.x.factor * at, axes.y.factor * force
-            above.line(*line, LINE_MARKS[name], f"model, {name}" if name else "model")
+            above.line(*line, LINE_MARKS[name], ", ".join(filter(None, (text, name))))
     else:
         above.dots(x, axes.y.factor * compared.found.force, "soft-dots", "model")
-    for name, rows in compared.strokes():
+    for name, rows in groups:
         below.dots(x[rows & ~noticed_rows], noticed[rows & ~noticed_rows], DOTS[name])
     below.dots(x[noticed_rows], noticed[noticed_rows], "outside", "a hand feels the difference")
     for level in (-1.0, 1.0):
-        below.level(level, "dotted", "1 just noticeable difference (JND)")
+        ends = np.array([x.min(), x.max()])
+        below.line(ends, np.full(2, level), "dotted", "1 just noticeable difference (JND)", hover=False)
     return Chart(
         "Recorded force and model over position; below, recorded minus modelled force in just noticeable "
         "differences.",
@@ -140,8 +165,13 @@ def modelled(compared: Compared) -> Chart:
 
 
 def one_curve(model: Model) -> bool:
-    """Returns True if position and stroke alone determine the force of a model."""
-    return model.dimension == 1 and model.mass is None and model.damping is None and model.memory is None
+    """Returns True if position and stroke alone determine the force of a model at rest."""
+    return model.dimension == 1 and model.memory is None
+
+
+def is_dynamic(model: Model) -> bool:
+    """Returns True if the force also depends on the motion by a mass or a damping."""
+    return model.mass is not None or model.damping is not None
 
 
 def differences(compared: Compared) -> Float1D:

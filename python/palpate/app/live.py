@@ -27,6 +27,9 @@ TELEMETRY_HZ = 20
 DESERTED_S = 5.0
 """Time without a request after which the device is stopped [s]; an open page sends ten requests a second."""
 
+RUN_S = 600.0
+"""Longest duration of a run, so that it also ends if this program is killed [s]"""
+
 STOP_S = 10.0
 """Longest time that the program may need to send zero force and close the device [s]"""
 
@@ -133,7 +136,7 @@ class Live:
         """Stops the program when no page is open, and keeps what it printed last."""
         while process.poll() is None:
             if time.monotonic() - self._seen_s > DESERTED_S:
-                with suppress(InputError):  # the page is closed; nobody could read the message
+                with suppress(InputError):  # the page is closed, so no user reads the message
                     self.stop()
             time.sleep(0.1)
         assert process.stdout is not None

@@ -217,6 +217,14 @@ def _handler(server: Server) -> Any:
             self.set_header("X-Name", quote(file.name))
             self.finish(file.content)
 
+        def write_error(self, status_code: int, **given: Any) -> None:
+            """Answers a request that failed with one sentence."""
+            error = given["exc_info"][1]
+            if not isinstance(error, HTTPError):
+                self.finish(f"this is a defect of palpate, please report it: {type(error).__name__}: {error}")
+            else:
+                self.finish(f"the request is refused ({status_code}): use the page of palpate app")
+
         def log_exception(self, *error: Any) -> None:
             """Prints nothing for a refused request; the answer states the reason."""
             if not issubclass(error[0], HTTPError):

@@ -27,7 +27,7 @@ from ..report.of_comparison import Compared
 from ..report.subject import Rendering
 from .charts import Axes, course_axis
 from .designer import HYSTERESIS, Curves, editable, edited, recording_of
-from .live import PROGRAM, Live
+from .live import PROGRAM, RUN_S, Live
 from .state import Entry, Option, OptionTable, State, changed, with_change
 
 CACHED = 64
@@ -260,9 +260,9 @@ class Session:
 
     @staticmethod
     def live_command(entry: Entry, device: str) -> list[str]:
-        """Returns the command that renders the model of an entry on a device until it is stopped."""
+        """Returns the command that renders the model of an entry on a device."""
         record = ["--record", f"{entry.stem}-felt.csv", "--force"]
-        return [PROGRAM, f"{entry.stem}.json", "--device", device, "--duration-s", "inf", *record]
+        return [PROGRAM, f"{entry.stem}.json", "--device", device, "--duration-s", f"{RUN_S:g}", *record]
 
     def compared(self, entry: Entry) -> Compared | None:
         """Returns the rows of the recording compared with the model; None without both."""

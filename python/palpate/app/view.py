@@ -33,6 +33,7 @@ from .charts import (
     design,
     differences,
     frames,
+    is_dynamic,
     lost,
     modelled,
     one_curve,
@@ -40,7 +41,7 @@ from .charts import (
     together,
 )
 from .designer import Curves, editable
-from .live import connections
+from .live import RUN_S, connections
 from .session import CACHED, Refusal, Session
 from .state import Entry, OptionTable, commands_of, text_of
 
@@ -293,12 +294,15 @@ class View:
             unit = units[now[name][1]]
             fields.append((name, f"{now[name][0] / unit.factor:.4g}", unit.shown))
         has_loop = not np.array_equal(curves.press, curves.release)
-        return self._render(
-            "edit", rows, before is not None, fields, has_loop, recording.metadata.get("edited", "")
-        )
+        model = self.session.model(entry)
+        left_out = isinstance(model, Model) and is_dynamic(model)
+        changes = recording.metadata.get("edited", "")
+        return self._render("edit", rows, before is not None, fields, has_loop, changes, left_out)
 
     def _compare_part(self, entry: Entry) -> str:
-        rows = [(name, f"{felt:.2g}", f"{share:.0%}") for name, felt, share in similar(self.session, entry)]
+        rows = [
+            (name, f"{largest:.2g}", f"{share:.0%}") for name, largest, share in similar(self.session, entry)
+        ]
         return self._render("compare", entry.file, rows) if rows else ""
 
     def _feel_part(self, entry: Entry) -> str:
@@ -316,6 +320,7 @@ class View:
         names = connections()
         command = text_of(self.session.live_command(entry, names[-1]))
         recorded = (self.session.folder / f"{entry.stem}-felt.csv").exists()
+        limit += f", and a run ends after {RUN_S / 60.0:g} minutes"
         return self._render("feel", judged, names, limit, live.is_running, live.ended, command, recorded)
 
     def ticked(self) -> dict[str, Any]:
