@@ -37,11 +37,13 @@ FIGURE_WITH_HANDLES = """
 window.all = (view) => [view, ...(view.child_views ?? []).flatMap(all)];
 window.handles = (view) => (view.model.renderers ?? []).find((each) => each.name === "handles");
 window.figure = [...Bokeh.index.roots].flatMap(all).find(handles);
+null;
 """
 """Script that finds the chart whose handles the mouse drags"""
 
 PLACE_OF_THE_PEAK = """
-(({ left, top }, { x, y }, { x_scale, y_scale }) => [left + x_scale.compute(x[0]), top + y_scale.compute(y[0])])
+(({ left, top }, { x, y }, { x_scale: across, y_scale: down }) =>
+  [left + across.compute(x[0]), top + down.compute(y[0])])
 (figure.el.getBoundingClientRect(), handles(figure).data_source.data, figure.frame)
 """
 """Expression for the place of the first handle in the window [px]"""
