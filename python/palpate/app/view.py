@@ -355,7 +355,8 @@ class View:
             keys["model"] = (entry.file, entry.options)
         if isinstance(plan, Plan):
             keys["plan"] = (entry,)
-            keys["feel"] = (entry,)
+            if entry.played or self.session.live.is_running:
+                keys["feel"] = (entry,)
         if self._curves(entry.file) is not None:
             keys["edit"] = (entry.file, entry.options, entry.origin)
             if similar(self.session, entry):
