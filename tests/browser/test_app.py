@@ -264,7 +264,8 @@ def test_stop_ends_a_started_device_with_zero_force(app: App, recording: Path) -
     assert "5 N·m" in app.text("feel")
     app.click("#start")
     app.page.wait("document.getElementById('readout').textContent.includes('force')")
-    app.click("#stop")
+    app.page.click("#stop")
+    app.page.wait("document.getElementById('part-feel').textContent.includes('Last run')")
     assert "zero force sent and confirmed" in app.text("feel")
     assert app.download("felt", "knob-felt.csv").startswith(b"#")
 

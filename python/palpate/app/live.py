@@ -73,8 +73,8 @@ class Live:
 
     @property
     def is_running(self) -> bool:
-        """True while the program runs."""
-        return self._process is not None and self._process.poll() is None
+        """True from the start of the program until its ending is known."""
+        return self._process is not None and not self.ended
 
     def start(self, command: Sequence[str]) -> None:
         """Starts the program with this command line; its telemetry is added.
