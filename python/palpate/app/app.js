@@ -190,7 +190,7 @@
   document.addEventListener("input", ({ target }) => {
     if (target.id === "moment") { playing = false; showMoment(target.value); }
     if (target.type !== "range" || !target.dataset.field) return;
-    const value = target.dataset.base * 30 ** target.value;
+    const value = target.dataset.base * target.dataset.factor ** target.value;
     const text = `${Number(value.toPrecision(4))} ${target.dataset.unit}`;
     document.querySelector(`output[for="${target.id}"]`).textContent = text;
     target.setAttribute("aria-valuetext", text);

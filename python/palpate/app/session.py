@@ -31,7 +31,10 @@ from .live import PROGRAM, RUN_S, Live
 from .state import Entry, Option, OptionTable, State, changed, with_change
 
 CACHED = 64
-"""Number of recordings, models and plans that are kept, so that undo shows the earlier ones at once"""
+"""Number of models, plans and charts that are kept, so that undo shows the earlier ones at once"""
+
+RECORDINGS_CACHED = 8
+"""Number of recordings that are kept; they can be large"""
 
 
 class CommandLine(Protocol):
@@ -97,11 +100,11 @@ class Session:
         self.lock = threading.Lock()
         self.live = Live()
         self._history = [State()]
-        self._read = lru_cache(CACHED)(lambda *key: tried(lambda: command_line.read(*key)))
+        self._read = lru_cache(RECORDINGS_CACHED)(lambda *key: tried(lambda: command_line.read(*key)))
         self._identified = lru_cache(CACHED)(self._identify)
         self._planned = lru_cache(CACHED)(self._plan)
         self._rendered = lru_cache(CACHED)(self._render)
-        self._compared = lru_cache(CACHED)(self._compare)
+        self._compared = lru_cache(RECORDINGS_CACHED)(self._compare)
         self.column_names = lru_cache(CACHED)(self._column_names)
 
     @property
@@ -154,7 +157,11 @@ class Session:
             path = self.folder / plain
         path.write_bytes(content)
         if path.suffix.lower() == ".toml":
-            DeviceProfile.load(plain)
+            try:
+                DeviceProfile.load(plain)
+            except InputError:
+                path.unlink()
+                raise
             self.change(device=plain, changes=(), plan_options=())
         else:
             known = {each.file: each for each in self.state.entries}
@@ -264,15 +271,16 @@ class Session:
         record = ["--record", f"{entry.stem}-felt.csv", "--force"]
         return [PROGRAM, f"{entry.stem}.json", "--device", device, "--duration-s", f"{RUN_S:g}", *record]
 
-    def compared(self, entry: Entry) -> Compared | None:
+    def compared(self, entry: Entry) -> Compared | Refusal | None:
         """Returns the rows of the recording compared with the model; None without both."""
         return self._compared(Entry(entry.file, entry.options, entry.identified))
 
-    def _compare(self, entry: Entry) -> Compared | None:
+    def _compare(self, entry: Entry) -> Compared | Refusal | None:
         model, recording = self.model(entry), self.recording(entry)
         if not isinstance(model, Model) or not isinstance(recording, Recording):
             return None
-        return Compared.of(Subject.of(model).compared_with(recording))
+        found: Compared | Refusal = tried(lambda: Compared.of(Subject.of(model).compared_with(recording)))
+        return found
 
     def _column_names(self, entry: Entry) -> list[str]:
         """Returns the columns of the file, in order, also if the recording is refused."""

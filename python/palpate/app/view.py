@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,6 +21,7 @@ from ..recording import Recording
 from ..recording.units import FORCE_UNITS, POSITION_UNITS, TIME_UNITS, UNITS
 from ..report import page as report_page
 from ..report.charts import Chart
+from ..report.of_comparison import Compared
 from ..report.page import COLOURS, bokeh, chart_library, templates_in
 from ..report.subject import Rendering
 from ..verdict import Verdict
@@ -48,6 +49,9 @@ from .state import Entry, OptionTable, commands_of, text_of
 SLIDER_FACTOR = 30.0
 """A slider reaches from the value of the profile divided by this factor to the value times it [-]."""
 
+ROLES = {"position": POSITION_UNITS, "force": FORCE_UNITS, "time": TIME_UNITS, "direction": ()}
+"""Roles of columns that the user can choose, with the SI units of each"""
+
 TEMPLATES = (Path(__file__).parent, Path(report_page.__file__).parent)
 """Folders of the templates; the style and the colours are those of a report"""
 
@@ -67,7 +71,12 @@ class Slider:
     @property
     def place(self) -> float:
         """Place of the slider, from -1 to 1."""
-        return math.log(self.value / self.base) / math.log(SLIDER_FACTOR)
+        return math.log(self.value / self.base) / math.log(self.factor)
+
+    @property
+    def factor(self) -> float:
+        """Ratio of the value at the end of the slider to that in the middle."""
+        return SLIDER_FACTOR
 
 
 class View:
@@ -152,51 +161,44 @@ class View:
 
     def _recording_parts(self, entry: Entry) -> dict[str, str]:
         recording = self.session.recording(entry)
-        refused = isinstance(recording, Refusal)
-        judged = (
-            self._refused(recording, entry)
-            if isinstance(recording, Refusal)
-            else self._judged(recording.verdict, entry)
-        )
-        notes = () if isinstance(recording, Refusal) else recording.notes
-        summary = "" if isinstance(recording, Refusal) else f"{len(recording)} rows"
-        chosen = dict(each[:2] for each in entry.options if len(each) == 2 and each[0] != "--units")
+        corrections = self._render("corrections", [*entry.options, *entry.plan_options])
+        columns = self._columns_part(entry, recording)
+        if isinstance(recording, Refusal):
+            reading = self._render("reading", "", self._refused(recording, entry), ())
+            return {"reading": reading, "columns": columns, "corrections": corrections}
+        judged = self._judged(recording.verdict, entry)
+        return {
+            "reading": self._render("reading", f"{len(recording)} rows", judged, recording.notes),
+            "columns": columns,
+            "marks-curve": self._render("marks_curve", Axes.of(recording).unit("position").shown),
+            "marks-course": self._render("marks_course", course_axis(recording)[0]),
+            "corrections": corrections,
+        }
+
+    def _columns_part(self, entry: Entry, recording: Recording | Refusal) -> str:
+        """Returns the choices of columns and units; the first choice of each is what the program found."""
+        found: Mapping[str, str] = {}
+        symbols = {}
+        if isinstance(recording, Recording):
+            found = recording.source.columns
+            symbols = {role: unit.shown for role, unit in recording.file_units.items()}
+        chosen = {each[0]: each[1] for each in entry.options if len(each) == 2}
         stated = dict(each[1].rpartition("=")[::2] for each in entry.options if each[0] == "--units")
         roles = []
-        for role, units in (("position", POSITION_UNITS), ("force", FORCE_UNITS), ("time", TIME_UNITS)):
-            found = "" if isinstance(recording, Refusal) else recording.source.columns.get(role, "")
+        for role, units in ROLES.items():
             column = chosen.get(f"--{role}", "")
-            symbol = ""
-            if isinstance(recording, Recording) and role in recording.file_units:
-                symbol = recording.file_units[role].shown
             roles.append(
                 {
                     "role": role,
-                    "found": found,
+                    "found": found.get(role, ""),
                     "column": column,
-                    "symbol": symbol,
-                    "unit": stated.get(column or found, ""),
+                    "symbol": symbols.get(role, ""),
+                    "unit": stated.get(column or found.get(role, ""), ""),
                     "units": [name for name, each in UNITS.items() if each.si in units],
                 }
             )
-        direction = {"found": "", "column": chosen.get("--direction", "")}
-        if isinstance(recording, Recording):
-            direction["found"] = recording.source.columns.get("direction", "")
-        return {
-            "reading": self._render("reading", entry, summary, judged, notes),
-            "columns": self._render("columns", self.session.column_names(entry), roles, direction, refused),
-            "marks-curve": "" if refused else self._render("marks_curve", self._unit(entry, "position")),
-            "marks-course": "" if refused else self._render("marks_course", self._course_name(entry)),
-            "corrections": self._render("corrections", [*entry.options, *entry.plan_options]),
-        }
-
-    def _unit(self, entry: Entry, role: str) -> str:
-        recording = self.session.recording(entry)
-        return Axes.of(recording).unit(role).shown if isinstance(recording, Recording) else ""
-
-    def _course_name(self, entry: Entry) -> str:
-        whole = self.session.whole(entry)
-        return course_axis(whole)[0] if isinstance(whole, Recording) else "row"
+        is_open = isinstance(recording, Refusal)
+        return self._render("columns", self.session.column_names(entry), roles, is_open)
 
     def _model_part(self, entry: Entry) -> str:
         model, recording = self.session.model(entry), self.session.recording(entry)
@@ -205,7 +207,10 @@ class View:
         if isinstance(model, Refusal):
             return self._render("model", self._refused(model, entry), "", {}, [])
         compared = self.session.compared(entry)
-        assert compared is not None
+        notes = model.notes["identification"]
+        if not isinstance(compared, Compared):
+            reason = "" if compared is None else compared.sentence
+            return self._render("model", self._judged(model.verdict, entry), reason, {}, notes)
         noticed = differences(compared)
         worst = int(np.argmax(np.abs(noticed)))
         position, force = map(Axes.of(recording).unit, ("position", "force"))
@@ -223,9 +228,7 @@ class View:
         }
         if model.period is not None:
             numbers["repeats every"] = position.text(model.period)
-        return self._render(
-            "model", self._judged(model.verdict, entry), place, numbers, model.notes["identification"]
-        )
+        return self._render("model", self._judged(model.verdict, entry), place, numbers, notes)
 
     def _device_parts(self, entry: Entry) -> dict[str, str]:
         model = self.session.model(entry)
@@ -351,7 +354,7 @@ class View:
         keys: dict[str, tuple[Any, ...] | None] = dict.fromkeys(CHARTS)
         if isinstance(recording, Recording):
             keys |= {"curve": (entry.file, reading), "course": (entry.file, reading)}
-        if isinstance(model, Model):
+        if isinstance(model, Model) and isinstance(self.session.compared(entry), Compared):
             keys["model"] = (entry.file, entry.options)
         if isinstance(plan, Plan):
             keys["plan"] = (entry,)
@@ -402,7 +405,7 @@ def _course(session: Session, entry: Entry) -> Chart:
 
 def _model(session: Session, entry: Entry) -> Chart:
     compared = session.compared(entry)
-    assert compared is not None
+    assert isinstance(compared, Compared)
     return modelled(compared)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import palpate
 from palpate.app.charts import thinned_line
 from palpate.app.session import Session
 from palpate.app.state import commands_of, text_of
@@ -128,3 +129,28 @@ def test_a_long_recording_is_drawn_by_few_points_with_every_extreme_value(sessio
     assert len(at) <= 2500
     assert {5.0, -5.0} <= set(values)
     assert (np.diff(at) > 0.0).all()
+
+
+def test_a_dropped_profile_becomes_the_device_and_a_broken_one_is_not_kept(session: Session) -> None:
+    with pytest.raises(InputError, match=r"broken\.toml"):
+        session.add_file("broken.toml", b"id = ")
+    assert not (session.folder / "broken.toml").exists()
+    session.act("device", {"device": "bench-knob"})
+    session.act("change-device", {"field": "encoder_step", "value": "1e-3"})
+    profile = session.exported("profile")
+    session.act("undo", {})
+    session.add_file("my-knob.toml", profile.content)
+    assert session.device(session.entry).encoder_step == 1e-3
+
+
+def test_a_model_with_the_verdict_no_is_planned_only_after_it_is_accepted(session: Session) -> None:
+    random = np.random.default_rng(1)
+    rows = "\n".join(f"{0.01 * k:.2f},{random.normal():.4f}" for k in range(200))
+    session.add_file("noise.csv", f"angle_rad,torque_Nm\n{rows}\n".encode())
+    session.act("identify", {})
+    session.act("device", {"device": "bench-knob"})
+    plan = View(session).answer(())["parts"]["plan"]
+    assert "the verdict of noise.json is no" in plan.lower()
+    assert "--accept-model" in plan
+    session.act("cure", {"words": ["--accept-model"]})
+    assert isinstance(session.plan(session.entry), palpate.Plan)
