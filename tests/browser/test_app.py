@@ -210,7 +210,7 @@ def test_the_keyboard_alone_identifies_and_changes_the_device(app: App, recordin
     focus("identify")
     app.after(app.page.press, "Enter")
     focus("device")
-    app.after(app.page.choose, "device", "bench-knob")
+    app.after(app.page.press, "ArrowDown")
     focus("slider-viscous_damping")
     app.after(app.page.press, "ArrowRight")
     assert "--device knob-bench-knob.toml" in app.commands()[1]

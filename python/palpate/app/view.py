@@ -341,6 +341,8 @@ class View:
         return found
 
     def _export_part(self, entry: Entry) -> str:
+        if isinstance(self.session.recording(entry), Refusal):
+            return ""
         has_model = isinstance(self.session.model(entry), Model)
         plan = self.session.plan(entry)
         planned = isinstance(plan, Plan) and plan.verdict.level != "no"
