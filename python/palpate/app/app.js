@@ -139,7 +139,8 @@
   }
   async function pulse() {
     try {
-      const { running: now, ended, at } = await (await fetch("pulse")).json();
+      const { progress, running: now, ended, at } = await (await fetch("pulse")).json();
+      if (progress) say(progress);
       if (now && at) { moveTo(...at); say("The device is running"); }
       if (running && !now) { say(`The device has stopped: ${ended}`); act("refresh"); }
       running = now;

@@ -43,6 +43,7 @@ class CommandLine(Protocol):
     reading: OptionTable
     identify: OptionTable
     plan: OptionTable
+    progress: str
 
     def read(self, file: str, options: Sequence[Option]) -> Recording:
         """Reads a recording as `palpate identify` does."""

@@ -330,7 +330,11 @@ class View:
         """Returns the newest tick of a running device in the units of the page, and how it ended."""
         live, entry = self.session.live, self.session.state.entry
         tick, recording = live.latest(), None if entry is None else self.session.recording(entry)
-        found: dict[str, Any] = {"running": live.is_running, "ended": live.ended}
+        found: dict[str, Any] = {
+            "progress": self.session.command_line.progress,
+            "running": live.is_running,
+            "ended": live.ended,
+        }
         if tick and isinstance(recording, Recording):
             axes = Axes.of(recording)
             position, force = (

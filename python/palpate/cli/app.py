@@ -19,6 +19,7 @@ import click
 from ..app import Option, OptionTable, Session, serve, words_of
 from ..identification import identify as identify_model
 from ..identification.options import RESERVED_INPUTS, IdentifyOptions
+from ..identification.search.evidence import reporting_to
 from ..model import Model
 from ..planning import DeviceProfile, Plan
 from ..planning.search import plan as choose
@@ -41,6 +42,8 @@ class CommandLine:
     reading = OptionTable(identify, READING_NAMES)
     identify = OptionTable(identify, {*READING_NAMES, *(each.name for each in fields(IdentifyOptions))})
     plan = OptionTable(plan, _PLAN_NAMES)
+    progress = ""
+    """How far an identification is; empty if none runs"""
 
     def read(self, file: str, options: Sequence[Option]) -> Recording:
         """Reads a recording as `palpate identify` does."""
@@ -55,7 +58,15 @@ class CommandLine:
         settings = {each.name: given[each.name] for each in fields(IdentifyOptions)}
         settings["period"], unit = settings["period"] or (None, "")
         _require_unit_of_period(unit, recording.units["position"])
-        return identify_model(recording, **settings)
+
+        def report(name: str, wavelets: int) -> None:
+            self.progress = f"Identifying: {name}, {wavelets} wavelets"
+
+        try:
+            with reporting_to(report):
+                return identify_model(recording, **settings)
+        finally:
+            self.progress = ""
 
     def plan_of(self, model: Model, file: str, device: DeviceProfile, options: Sequence[Option]) -> Plan:
         """Plans a model as `palpate plan` does."""
