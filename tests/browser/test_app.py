@@ -263,9 +263,11 @@ def test_stop_ends_a_started_device_with_zero_force(app: App, recording: Path) -
     app.after(app.page.choose, "device", "bench-knob")
     assert "5 N·m" in app.text("feel")
     app.click("#start")
-    app.page.wait("document.getElementById('readout').textContent.includes('force')")
+    ended = "document.getElementById('part-feel').textContent.includes('Last run')"
+    # On a busy machine a guard of palpate-control may end the run before.
+    app.page.wait(f"document.getElementById('readout').textContent.includes('force') || {ended}")
     app.page.click("#stop")
-    app.page.wait("document.getElementById('part-feel').textContent.includes('Last run')")
+    app.page.wait(ended)
     assert "zero force sent and confirmed" in app.text("feel")
     assert app.download("felt", "knob-felt.csv").startswith(b"#")
 

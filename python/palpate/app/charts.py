@@ -20,6 +20,7 @@ from ..recording.roles import ROLE_NAMES, Role, roles_of
 from ..recording.units import Unit
 from ..report.charts import MOST_DOTS, Chart, Panel
 from ..report.of_comparison import LINE_MARKS, Compared
+from ..report.subject import Subject
 from ..verdict import FORCE_JND
 from .designer import Curves
 
@@ -212,7 +213,7 @@ def cursor(plan: Plan, recording: Recording) -> Chart:
     return Chart("Force on the device over position; the cursor is the handle.", panel)
 
 
-def frames(rendered: Recording, axes: Axes) -> list[list[float]]:
+def frames(rendered: Recording, subject: Subject, axes: Axes) -> list[list[float]]:
     """Returns time [s], position and force of the pictures of a rendering, in the units of the axes."""
     period = rendered.sample_period
     assert period is not None
@@ -222,7 +223,7 @@ def frames(rendered: Recording, axes: Axes) -> list[list[float]]:
         np.round(values[rows], 5).tolist()
         for values in (
             rendered.time - rendered.time[0],
-            axes.x.factor * rendered.position,
+            axes.x.factor * subject.folded(rendered.position),
             axes.y.factor * rendered.force,
         )
     ]

@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..devices import find_devices
+from ..devices import DeviceError, find_devices
 from ..errors import InputError
 
 PROGRAM = "palpate-control"
@@ -52,11 +52,12 @@ def program() -> str:
 
 
 def connections() -> list[str]:
-    """Returns the devices that palpate-control can open: a simulated one, and those that are connected."""
+    """Returns the devices that palpate-control can open: a simulated one, those on USB, an Inverse3."""
     try:
-        return ["simulated", *(f"usb:{each.serial}" for each in find_devices())]
-    except (InputError, OSError, RuntimeError):  # without pyusb or the right to look
-        return ["simulated", "usb"]
+        usb = [f"usb:{each.serial}" for each in find_devices()]
+    except (DeviceError, InputError):  # without pyusb, libusb or the right to look
+        usb = ["usb"]
+    return ["simulated", *usb, "inverse3"]
 
 
 class Live:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -25,7 +25,8 @@ from ..recording.formats import open_table
 from ..report import Subject, report_of
 from ..report.of_comparison import Compared
 from ..report.subject import Rendering
-from .charts import Axes, course_axis
+from ..verification.metrics import compare
+from .charts import Axes, course_axis, one_curve
 from .designer import HYSTERESIS, Curves, editable, edited, recording_of
 from .live import PROGRAM, RUN_S, Live
 from .state import Entry, Option, OptionTable, State, changed, with_change
@@ -282,6 +283,31 @@ class Session:
             return None
         found: Compared | Refusal = tried(lambda: Compared.of(Subject.of(model).compared_with(recording)))
         return found
+
+    def curves(self, file: str) -> Curves | None:
+        """Returns the curves of the object of a recording; None if it has no model with curves."""
+        for entry in self.state.entries:
+            if entry.file == file and isinstance(model := self.model(entry), Model) and one_curve(model):
+                return Curves.of(model)
+        return None
+
+    def similar(self, entry: Entry) -> list[tuple[str, float, float]]:
+        """Returns the other objects that can be compared, the most similar first.
+
+        Each has its name, the largest difference of the force [JND], and the share of the travel on which a
+        hand feels the difference.
+        """
+        model, found = self.model(entry), list[tuple[str, float, float]]()
+        if not isinstance(model, Model):
+            return []
+        for each in self.state.entries:
+            other = self.model(each)
+            if each.file != entry.file and isinstance(other, Model):
+                strokes = tried(partial(compare, model, other))
+                if not isinstance(strokes, Refusal):
+                    share = max(stroke.noticed_share for stroke in strokes)
+                    found.append((each.file, max(stroke.worst for stroke in strokes), share))
+        return sorted(found, key=lambda each: (each[2], each[1]))
 
     def _column_names(self, entry: Entry) -> list[str]:
         """Returns the columns of the file, in order, also if the recording is refused."""

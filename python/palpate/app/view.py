@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Collection, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -14,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..model import Model
 from ..planning import DeviceProfile, Plan, example_profiles, mechanical_units, profile_file
 from ..recording import Recording
@@ -23,9 +21,8 @@ from ..report import page as report_page
 from ..report.charts import Chart
 from ..report.of_comparison import Compared
 from ..report.page import COLOURS, bokeh, chart_library, templates_in
-from ..report.subject import Rendering
+from ..report.subject import Rendering, Subject
 from ..verdict import Verdict
-from ..verification.metrics import compare
 from .charts import (
     Axes,
     course,
@@ -37,11 +34,10 @@ from .charts import (
     is_dynamic,
     lost,
     modelled,
-    one_curve,
     recorded,
     together,
 )
-from .designer import Curves, editable
+from .designer import editable
 from .live import RUN_S, connections
 from .session import CACHED, Refusal, Session
 from .state import Entry, OptionTable, commands_of, text_of
@@ -262,21 +258,9 @@ class View:
         ]
         return [each for each in found if each.base > 0.0]
 
-    def _curves(self, file: str) -> Curves | None:
-        """Returns the curves of the object of a recording; None if it has no model with curves."""
-        for entry in self.session.state.entries:
-            if entry.file == file:
-                model = self.session.model(entry)
-                if isinstance(model, Model) and one_curve(model):
-                    return Curves.of(model)
-        return None
-
     def _edit_part(self, entry: Entry) -> str:
-        curves, before, recording = (
-            self._curves(entry.file),
-            self._curves(entry.origin),
-            self.session.recording(entry),
-        )
+        curves, before = self.session.curves(entry.file), self.session.curves(entry.origin)
+        recording = self.session.recording(entry)
         if curves is None or isinstance(recording, Refusal):
             return ""
         units = {role: Axes.of(recording).unit(role) for role in ("position", "force")}
@@ -303,9 +287,8 @@ class View:
         return self._render("edit", rows, before is not None, fields, has_loop, changes, left_out)
 
     def _compare_part(self, entry: Entry) -> str:
-        rows = [
-            (name, f"{largest:.2g}", f"{share:.0%}") for name, largest, share in similar(self.session, entry)
-        ]
+        found = self.session.similar(entry)
+        rows = [(name, f"{largest:.2g}", f"{share:.0%}") for name, largest, share in found]
         return self._render("compare", entry.file, rows) if rows else ""
 
     def _feel_part(self, entry: Entry) -> str:
@@ -341,7 +324,11 @@ class View:
                 next(value for name, value in tick.items() if name.startswith(f"{start}_"))
                 for start in ("position", "applied")
             )
-            found["at"] = [axes.x.factor * position, axes.y.factor * force]
+            assert entry is not None
+            plan = self.session.plan(entry)
+            if isinstance(plan, Plan):
+                position = Subject.of(plan.model).folded(position)
+            found["at"] = [axes.x.factor * float(position), axes.y.factor * force]
         return found
 
     def _export_part(self, entry: Entry) -> str:
@@ -366,12 +353,12 @@ class View:
             keys["plan"] = (entry,)
             if entry.played or self.session.live.is_running:
                 keys["feel"] = (entry,)
-        if self._curves(entry.file) is not None:
-            keys["edit"] = (entry.file, entry.options, entry.origin)
-            if similar(self.session, entry):
-                keys["compare"] = tuple(
-                    (each.file, each.options, each.identified) for each in self.session.state.entries
-                )
+        if self.session.curves(entry.file) is not None:
+            shown = [each for each in self.session.state.entries if each.identified]
+            all_models = tuple((each.file, each.options) for each in shown)
+            keys["edit"] = (entry.file, entry.origin, all_models)
+            if self.session.similar(entry):
+                keys["compare"] = (entry.file, all_models)
         answer = {}
         for name, key in keys.items():
             text = "" if key is None else f"{name} {key}"
@@ -390,8 +377,8 @@ class View:
         if name == "feel" and isinstance(recording, Recording):
             axes = Axes.of(recording)
             answer["units"] = [axes.x.unit, axes.y.unit]
-            if isinstance(rendering, Rendering):
-                answer["frames"] = frames(rendering.recording, axes)
+            if isinstance(rendering, Rendering) and isinstance(plan := self.session.plan(entry), Plan):
+                answer["frames"] = frames(rendering.recording, Subject.of(plan.model), axes)
         return json.dumps(answer)
 
 
@@ -415,36 +402,15 @@ def _model(session: Session, entry: Entry) -> Chart:
     return modelled(compared)
 
 
-def similar(session: Session, entry: Entry) -> list[tuple[str, float, float]]:
-    """Returns the other objects that can be compared, the most similar first.
-
-    Each has its name, the largest difference of the force [JND], and the share of the travel on which a hand
-    feels the difference.
-    """
-    model, found = session.model(entry), list[tuple[str, float, float]]()
-    if not isinstance(model, Model) or not one_curve(model):
-        return []
-    for each in session.state.entries:
-        other = session.model(each)
-        if each.file != entry.file and isinstance(other, Model) and one_curve(other):
-            with suppress(InputError):
-                strokes = compare(model, other)
-                share = max(stroke.noticed_share for stroke in strokes)
-                found.append((each.file, max(stroke.worst for stroke in strokes), share))
-    return sorted(found, key=lambda each: (each[2], each[1]))
-
-
 def _edit(session: Session, entry: Entry) -> Chart:
-    model, recording = session.model(entry), session.recording(entry)
-    assert isinstance(model, Model)
+    curves, recording = session.curves(entry.file), session.recording(entry)
+    assert curves is not None
     assert isinstance(recording, Recording)
-    before = [session.model(each) for each in session.state.entries if each.file == entry.origin]
-    origin = Curves.of(before[0]) if before and isinstance(before[0], Model) else None
-    return design(Curves.of(model), origin, recording)
+    return design(curves, session.curves(entry.origin), recording)
 
 
 def _compare(session: Session, entry: Entry) -> Chart:
-    names = [entry.file, *(name for name, *_ in similar(session, entry))]
+    names = [entry.file, *(name for name, *_ in session.similar(entry))]
     models = {each.file: session.model(each) for each in session.state.entries}
     recording = session.recording(entry)
     assert isinstance(recording, Recording)
