@@ -88,13 +88,14 @@ class Live:
         with self._lock:
             if self.is_running:
                 raise InputError("a device is running: stop it first")
+            file = program()
             listening = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             listening.bind(("127.0.0.1", 0))
             listening.setblocking(False)
             port = listening.getsockname()[1]
             telemetry = ["--telemetry-port", str(port), "--telemetry-hz", str(TELEMETRY_HZ)]
             self._process = subprocess.Popen(
-                [program(), *command[1:], *telemetry],
+                [file, *command[1:], *telemetry],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
