@@ -141,9 +141,9 @@ class Live:
                 with suppress(InputError):  # the page is closed, so no user reads the message
                     self.stop()
             time.sleep(0.1)
-        assert process.stdout is not None
-        lines = [" ".join(line.split()) for line in process.stdout.read().splitlines()]
+        output, _ = process.communicate()
+        lines = [" ".join(line.split()) for line in output.splitlines()]
         ending = [line.removeprefix("ended ") for line in lines if line.startswith(("ended ", "error: "))]
-        self.ended = (ending or lines or ["the program has ended"])[0]
         self._socket = None
         listening.close()
+        self.ended = (ending or lines or ["the program has ended"])[0]

@@ -43,7 +43,7 @@ class CommandLine:
     identify = OptionTable(identify, {*READING_NAMES, *(each.name for each in fields(IdentifyOptions))})
     plan = OptionTable(plan, _PLAN_NAMES)
     progress = ""
-    """How far an identification is; empty if none runs"""
+    """Progress of the running identification, as a sentence; empty if none runs"""
 
     def read(self, file: str, options: Sequence[Option]) -> Recording:
         """Reads a recording as `palpate identify` does."""
