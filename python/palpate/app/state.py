@@ -171,10 +171,11 @@ def _words(text: str) -> list[str]:
     return words
 
 
-def commands_of(entry: Entry, reading: OptionTable) -> list[list[str]]:
+def commands_of(entry: Entry, reading: OptionTable, *, exports: bool) -> list[list[str]]:
     """Returns the command lines that make the files of an entry in the folder of its recording.
 
-    `reading` are the options that read a recording; the report needs them too.
+    `reading` are the options that read a recording; the report needs them too. `exports` is True if there is
+    a plan that can be exported.
     """
     model, page, header = (f"{entry.stem}.{suffix}" for suffix in ("json", "html", "h"))
     commands = [["palpate", "identify", entry.file, *words_of(entry.options), "-o", model]]
@@ -183,7 +184,7 @@ def commands_of(entry: Entry, reading: OptionTable) -> list[list[str]]:
         commands.append(["palpate", "plan", model, *planned, "-o", model])
     read_with = words_of(each for each in entry.options if each[0] in reading)
     commands.append(["palpate", "report", model, entry.file, *read_with, "-o", page])
-    if entry.device:
+    if exports:
         commands.append(["palpate", "export", model, "--c", "-o", header])
     return commands
 

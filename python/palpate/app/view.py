@@ -337,7 +337,8 @@ class View:
         has_model = isinstance(self.session.model(entry), Model)
         plan = self.session.plan(entry)
         planned = isinstance(plan, Plan) and plan.verdict.level != "no"
-        commands = [text_of(each) for each in commands_of(entry, self.session.command_line.reading)]
+        reading = self.session.command_line.reading
+        commands = [text_of(each) for each in commands_of(entry, reading, exports=planned)]
         return self._render("export", entry, has_model, planned, commands)
 
     def _charts(self, entry: Entry, known: Collection[str]) -> dict[str, Any]:
