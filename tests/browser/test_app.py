@@ -190,6 +190,7 @@ def test_a_refused_file_is_read_after_a_click_on_its_cure(app: App, tmp_path: Pa
 
 
 def test_a_reloaded_page_shows_the_same_recording_and_model(app: App, recording: Path) -> None:
+    app.page.size(WIDTHS["phone"], HEIGHT, phone=True)
     app.after(app.page.drop, recording)
     app.click("#identify")
     before = app.text("model"), app.commands()
@@ -319,3 +320,15 @@ def test_columns_and_units_are_choices(app: App, tmp_path: Path) -> None:
     command = "palpate identify two.csv --position other_mm --force load --units load=gf -o two.json"
     assert app.commands()[0] == command
     assert "100 rows" in app.text("reading")
+
+
+def test_a_finger_scrolls_the_page_over_the_charts(app: App, recording: Path) -> None:
+    app.after(app.page.drop, recording)
+    app.page.call("Emulation.setTouchEmulationEnabled", enabled=True)
+    app.open()
+    tools = "Bokeh.documents.flatMap((each) => [...each.roots()[0].references()])"
+    chosen = f"{tools}.filter((each) => each.type === 'BoxSelectTool').map((each) => each.active)"
+    active = app.page.run(chosen)
+    app.page.call("Emulation.setTouchEmulationEnabled", enabled=False)
+    assert active
+    assert not any(active)

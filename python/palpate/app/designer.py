@@ -6,8 +6,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import scipy
 
 from .._typing import Float1D
@@ -15,6 +17,7 @@ from ..errors import InputError
 from ..model import Model
 from ..model.model_display import force_curves
 from ..recording import Recording
+from ..recording.units import Unit
 from ..verdict import FORCE_JND
 
 POSITIONS = 801
@@ -148,6 +151,20 @@ def edited(curves: Curves, wanted: Mapping[str, float]) -> Curves:
     return Curves(np.interp(x, old, new), press, press - loop)
 
 
+def write_recording(recording: Recording, units: Mapping[str, Unit], path: Path) -> None:
+    """Writes an edited recording in the units of "position" and "force" of the file that was edited."""
+    if not all(unit.symbol for unit in units.values()):
+        recording.write(path)
+        return
+    columns = {
+        f"{role} [{unit.symbol}]": getattr(recording, role) / unit.factor for role, unit in units.items()
+    }
+    if recording.direction is not None:
+        columns["direction"] = recording.direction
+    rows = pd.DataFrame(columns).to_csv(index=False)
+    path.write_text(f"# edited: {recording.metadata['edited']}\n{rows}", encoding="utf-8")
+
+
 def recording_of(curves: Curves, model: Model, changes: str) -> Recording:
     """Returns edited curves as a recording, which is marked as edited."""
     one_curve = np.array_equal(curves.press, curves.release)
@@ -156,7 +173,7 @@ def recording_of(curves: Curves, model: Model, changes: str) -> Recording:
         strokes.append((curves.position[::-1], curves.release[::-1], -1))
     position, force = (np.concatenate([each[k] for each in strokes]) for k in (0, 1))
     direction = np.concatenate([np.full(len(each[0]), each[2]) for each in strokes])
-    files = ", ".join(model.data.files)
+    files = ", ".join(model.data.files) or "arrays"
     return Recording.from_arrays(
         position,
         force,

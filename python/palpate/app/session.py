@@ -27,7 +27,7 @@ from ..report.of_comparison import Compared
 from ..report.subject import Rendering
 from ..verification.metrics import compare
 from .charts import Axes, course_axis, one_curve
-from .designer import HYSTERESIS, Curves, editable, edited, recording_of
+from .designer import HYSTERESIS, Curves, editable, edited, recording_of, write_recording
 from .live import PROGRAM, RUN_S, Live
 from .state import Entry, Option, OptionTable, State, changed, with_change
 
@@ -508,7 +508,8 @@ def _edit(session: Session, given: Mapping[str, Any]) -> None:
         raise InputError("no number was changed: change one, then make the edited object")
     result = edited(curves, wanted)
     name = free_name(f"{entry.stem}-edited", ".csv", {each.name for each in session.folder.iterdir()})
-    recording_of(result, model, ", ".join(changes)).write(session.folder / name)
+    units = {role: recording.file_unit(role) for role in ("position", "force")}
+    write_recording(recording_of(result, model, ", ".join(changes)), units, session.folder / name)
     options = () if model.period is None else (("--period", repr(float(np.ptp(result.position)))),)
     made = Entry(
         name, options, identified=True, device=entry.device, changes=entry.changes, origin=entry.file

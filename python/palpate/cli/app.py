@@ -36,6 +36,10 @@ _PLAN_NAMES = {*inspect.signature(choose).parameters, "accept_model"} - {"model"
 """Parameters of `palpate plan` that the page may set"""
 
 
+_DESKTOP = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+"""Variables of which a desktop sets one; without them a browser would open in the terminal, and block it"""
+
+
 class CommandLine:
     """The verbs identify and plan: what they do with options, without reading or writing other files."""
 
@@ -119,7 +123,7 @@ def app(recording_file: Path | None, port: int, browser: bool, idle_s: float, as
                     print_numbers({"address": address})
                 sys.stdout.flush()
                 talk("Open the address in a browser on this computer. Ctrl-C ends the app.")
-                if browser:
+                if browser and any(map(os.environ.get, _DESKTOP)):
                     webbrowser.open(once)
 
             with terminated_as_interrupted():

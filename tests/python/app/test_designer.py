@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Designer's numbers of a force curve, and curves that are changed by them."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import palpate
-from palpate.app.designer import Curves, edited, recording_of
+from palpate.app.designer import Curves, edited, recording_of, write_recording
 from palpate.errors import InputError
+from palpate.recording.units import UNITS
 
 NUMBERS = {
     "peak force": 0.6,
@@ -80,3 +84,16 @@ def test_an_edited_object_is_identified_with_its_numbers() -> None:
 
 def model_of(curves: Curves) -> palpate.Model:
     return palpate.identify(curves.position, curves.press)
+
+
+def test_an_edited_recording_keeps_the_units_of_the_file(tmp_path: Path) -> None:
+    made = recording_of(switch(), model_of(switch()), "peak force 60 gf")
+    made = replace(made, units={"position": "m", "force": "N"})
+    write_recording(made, {"position": UNITS["mm"], "force": UNITS["gf"]}, tmp_path / "edited.csv")
+    read = palpate.read_recording(tmp_path / "edited.csv")
+    assert read.source.columns["force"] == "force [gf]"
+    assert read.metadata["edited"] == made.metadata["edited"]
+    np.testing.assert_allclose(read.position, made.position, atol=1e-12)
+    np.testing.assert_allclose(read.force, made.force, atol=1e-12)
+    assert read.direction is not None
+    np.testing.assert_array_equal(read.direction, made.direction)
