@@ -1,6 +1,7 @@
 (() => {
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const finger = window.matchMedia("(pointer: coarse)").matches;
+  const ENDED = "palpate has ended: start palpate app again.";
   const drawn = {};  // name of a chart -> { key, views }
   let colours, queue = Promise.resolve(), waiting = 0, slid = null;
   const element = (id) => document.getElementById(id);
@@ -11,16 +12,16 @@
     waiting += 1;
     document.body.setAttribute("aria-busy", "true");
     say(doing);
-    const done = queue.then(() => fetch(path, { method: "POST", body })).then(async (answer) => {
-      const content = await (answer.ok ? answer.json() : answer.text());
-      waiting -= 1;
-      if (!waiting) { document.body.removeAttribute("aria-busy"); say("Ready"); }
-      if (answer.ok) await show(content);
-      else refuse(content);
+    const asked = queue.then(() => fetch(path, { method: "POST", body }).catch(() => null));
+    const done = asked.then(async (answer) => {
+      const content = await (answer?.ok ? answer.json() : answer?.text());
+      if (!(waiting -= 1)) document.body.removeAttribute("aria-busy");
+      say(answer ? "Ready" : ENDED);
+      if (answer?.ok) await show(content);
+      else if (answer) refuse(content);
     }).catch((error) => {
-      waiting = 0;
-      document.body.removeAttribute("aria-busy");
-      say(`palpate does not answer: start palpate app again. (${error.message})`);
+      console.error(error);
+      refuse(`this is a defect of the page, please report it: ${error.message}`);
     });
     queue = done;
     return done;
@@ -77,9 +78,8 @@
     const roots = views.roots.map((each) => each.model);
     paintCharts(colours[dark.matches ? "dark" : "light"], roots);
     // A finger scrolls the page over a chart; the fields below it do what a mouse does by dragging.
-    for (const tool of finger ? roots.flatMap((root) => root.toolbar.tools) : []) {
-      const each = tool.tools?.[0] ?? tool;
-      if (["BoxSelectTool", "PointDrawTool"].includes(each.type)) each.active = tool.active = false;
+    for (const tool of finger ? roots.flatMap((root) => [...root.references()]) : []) {
+      if (["BoxSelectTool", "PointDrawTool"].includes((tool.tools?.[0] ?? tool).type)) tool.active = false;
     }
     if (name === "edit") roots[0].document.on_event("panend", () => dragged(roots[0]));
     if (select) {
@@ -139,13 +139,13 @@
   }
   async function pulse() {
     try {
-      const { progress, running: now, ended, at } = await (await fetch("pulse")).json();
+      const { progress, running: now, ended: how, at } = await (await fetch("pulse")).json();
       if (progress) say(progress);
       if (now && at) { moveTo(...at); say("The device is running"); }
-      if (running && !now) { say(`The device has stopped: ${ended}`); act("refresh"); }
+      if (running && !now) { say(`The device has stopped: ${how}`); act("refresh"); }
       running = now;
     } catch (error) {
-      say("palpate has ended: start palpate app again.");
+      say(ENDED);
     }
     setTimeout(pulse, running ? 100 : 1000);
   }
