@@ -7,12 +7,12 @@
   const element = (id) => document.getElementById(id);
   const say = (text) => { element("status").textContent = text; };
 
-  // Requests follow each other, so that each sees the state that the one before left.
+  // Requests follow each other, so that each sees the state that the one before left. `body` is called when sent.
   function send(path, body, doing = "Working ...") {
     waiting += 1;
     document.body.setAttribute("aria-busy", "true");
     say(doing);
-    const asked = queue.then(() => fetch(path, { method: "POST", body }).catch(() => null));
+    const asked = queue.then(() => fetch(path, { method: "POST", body: body() }).catch(() => null));
     const done = asked.then(async (answer) => {
       const content = await (answer?.ok ? answer.json() : answer?.text());
       if (!(waiting -= 1)) document.body.removeAttribute("aria-busy");
@@ -27,7 +27,7 @@
     return done;
   }
   const known = () => Object.values(drawn).map((each) => each.key);
-  const act = (action, given = {}) => send("act", JSON.stringify({ action, given, known: known() }),
+  const act = (action, given = {}) => send("act", () => JSON.stringify({ action, given, known: known() }),
     ["identify", "cure", "edit"].includes(action) ? "Identifying, this takes some seconds ..." : "Working ...");
 
   async function show({ parts, charts, colours: found }) {
@@ -162,7 +162,7 @@
       if (playing) play();
     } else if ("start" in button.dataset) {
       playing = false;
-      send(`start?device=${encodeURIComponent(element("connection").value)}`, "", "Starting the device ...");
+      send(`start?device=${encodeURIComponent(element("connection").value)}`, () => "", "Starting the device ...");
     } else if ("stop" in button.dataset) {  // does not wait for other requests
       const { refused } = await (await fetch("stop", { method: "POST" })).json();
       if (refused) refuse(refused);
@@ -205,7 +205,7 @@
   });
 
   function add(files) {
-    for (const file of files) send(`add?name=${encodeURIComponent(file.name)}`, file, `Reading ${file.name} ...`);
+    for (const file of files) send(`add?name=${encodeURIComponent(file.name)}`, () => file, `Reading ${file.name} ...`);
     element("file").value = "";
   }
   for (const kind of ["dragenter", "dragover", "dragleave", "drop"]) {
