@@ -38,12 +38,10 @@
       const html = parts[part.id.slice(5)] ?? "";
       // A slider that is being moved keeps its place.
       if (part.dataset.html === html || part.querySelector("input[type=range]:focus")) continue;
-      const open = [...part.querySelectorAll("details")].filter((each) => each.open).map((each) => each.id);
-      const fields = [...part.querySelectorAll(".marks input")].map((each) => [each.id, each.value]);
+      const open = [...part.querySelectorAll("details[open]:not([data-given])")].map((each) => each.id);
       part.innerHTML = html;
       part.dataset.html = html;
       for (const id of open) element(id)?.setAttribute("open", "");
-      for (const [id, value] of fields) if (element(id)) element(id).value = value;
     }
     for (const section of document.querySelectorAll("[data-needs]")) {
       section.hidden = !parts[section.dataset.needs];
@@ -155,7 +153,9 @@
     const button = event.target.closest("button");
     if (!button) return;
     if (button.dataset.action) {
-      act(button.dataset.action, { ...fieldsOf(button.closest("form")), ...JSON.parse(button.dataset.given ?? "{}") });
+      const form = button.closest("form");
+      await act(button.dataset.action, { ...fieldsOf(form), ...JSON.parse(button.dataset.given ?? "{}") });
+      if (!element("refusal")) form?.reset();
     } else if ("play" in button.dataset) {
       playing = !playing;
       button.textContent = playing ? "Pause" : "Play";
