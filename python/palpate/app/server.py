@@ -219,8 +219,8 @@ def _handler(server: Server) -> Any:
 
         def write_error(self, status_code: int, **given: Any) -> None:
             """Answers a request that failed with one sentence."""
-            error = given["exc_info"][1]
-            if not isinstance(error, HTTPError):
+            error = given.get("exc_info", (None, None))[1]
+            if error is not None and not isinstance(error, HTTPError):
                 self.finish(f"this is a defect of palpate, please report it: {type(error).__name__}: {error}")
             else:
                 self.finish(f"the request is refused ({status_code}): use the page of palpate app")
