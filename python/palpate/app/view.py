@@ -83,6 +83,7 @@ class View:
         self._templates = templates_in(*TEMPLATES)
         self._parts = self._templates.get_template("parts.html").module
         self._chart = lru_cache(CACHED)(self._chart_of)
+        self._identified_parts = lru_cache(CACHED)(self._parts_without_device)
 
     def page(self) -> str:
         """Returns the page without its parts, which it requests."""
@@ -116,9 +117,11 @@ class View:
         }
         charts: dict[str, Any] = {}
         if entry is not None:
-            parts |= self._recording_parts(entry)
+            without_device = Entry(
+                entry.file, entry.options, entry.identified, plan_options=entry.plan_options
+            )
+            parts |= self._identified_parts(without_device)
             parts |= {
-                "model": self._model_part(entry),
                 **self._device_parts(entry),
                 "feel": self._feel_part(entry),
                 "edit": self._edit_part(entry),
@@ -154,6 +157,9 @@ class View:
 
     def _refused(self, refusal: Refusal, entry: Entry) -> dict[str, Any]:
         return {"level": "no", "reasons": [(refusal.sentence, self._cures(refusal.sentence, entry))]}
+
+    def _parts_without_device(self, entry: Entry) -> dict[str, str]:
+        return {**self._recording_parts(entry), "model": self._model_part(entry)}
 
     def _recording_parts(self, entry: Entry) -> dict[str, str]:
         recording = self.session.recording(entry)
