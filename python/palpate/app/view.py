@@ -45,6 +45,15 @@ from .state import Entry, OptionTable, commands_of, text_of
 SLIDER_FACTOR = 30.0
 """A slider reaches from the value of the profile divided by this factor to the value times it [-]."""
 
+KINDS = {
+    "position": "is the same for press and release",
+    "hysteresis": "differs between press and release",
+    "memory": "relaxes while the object is held",
+    "position_velocity": "depends on the speed",
+    "general": "depends on several columns",
+}
+"""What the force does, by the kind of a model"""
+
 ROLES = {"position": POSITION_UNITS, "force": FORCE_UNITS, "time": TIME_UNITS, "direction": ()}
 """Roles of columns that the user can choose, with the SI units of each"""
 
@@ -223,10 +232,10 @@ class View:
             f"{force.text(float(compared.found.force[worst]))}."
         )
         numbers = {
-            "kind": model.kind.replace("_", " and "),
-            "size": f"{model.terms}, {model.n_parameters} parameters",
-            "not felt": f"{compared.found.within_jnd:.0%} of the rows",
+            "the force": KINDS[model.kind],
+            "a hand feels no difference": f"{compared.found.within_jnd:.0%} of the rows",
             "error": f"RMS {force.text(compared.found.rmse)}",
+            "size": f"{model.terms}, {model.n_parameters} parameters",
         }
         if model.period is not None:
             numbers["repeats every"] = position.text(model.period)
