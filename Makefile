@@ -206,10 +206,11 @@ format: setup
 stubs: setup
 	$(python) tools/stubs.py
 
-# The example output in README.md and docs/, and the figure of README.md.
+# The example output in README.md and docs/, the figure of README.md, and that of the app, which needs Chromium.
 output: setup
 	$(python) tools/example_output.py
 	$(python) tools/readme_figure.py
+	$(python) tools/app_figure.py
 
 clean:
 	rm -rf build dist demo docs/gallery docs/generated .venv .pytest_cache .mypy_cache .ruff_cache

@@ -105,7 +105,7 @@ struct SpringDamper {
             int tick = 0;
             (void)closed_loop(
                 SpringDamper{stiffness, 0.0, T}, device, hand, 404, {2, 0.0, 0.0, bench::unguarded},
-                [&](const Tick& /*tick*/, const Motion& /*handle*/, const palpate::EnergyAccount& account) {
+                [&](const Tick& /*tick*/, const Motion& /*handle*/, const palpate::EnergyBalance& account) {
                     whole = account.motor + account.dissipated;
                     half = ++tick == 204 ? whole : half;
                     return true;

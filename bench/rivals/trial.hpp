@@ -166,7 +166,7 @@ struct Trial {
                 stored = rendering.object.force.at(now.start.position).integral - lowest;
                 acts = now.force != 0.0;
             }
-            const palpate::EnergyAccount& account = device.plant().account();
+            const palpate::EnergyBalance& account = device.plant().account();
             const double given = -(account.motor + account.dissipated) - stored - 1e-9 * account.throughput;
             most = std::isfinite(now.end.position) ? std::max(most, given)
                                                    : std::numeric_limits<double>::infinity();

@@ -86,6 +86,45 @@ class Page:
     def _mouse(self, kind: str, at: tuple[float, float], **button: Any) -> None:
         self.call("Input.dispatchMouseEvent", type=kind, x=at[0], y=at[1], **button)
 
+    def click(self, selector: str) -> None:
+        """Scrolls to the first element of a CSS selector and clicks its middle."""
+        self.run(f"document.querySelector({selector!r}).scrollIntoView({{block: 'center'}})")
+        x, y = self.run(
+            "(b => [b.left + b.width / 2, b.top + b.height / 2])"
+            f"(document.querySelector({selector!r}).getBoundingClientRect())"
+        )
+        self._mouse("mousePressed", (x, y), button="left", clickCount=1)
+        self._mouse("mouseReleased", (x, y), button="left", clickCount=1)
+
+    def press(self, key: str, *, control: bool = False) -> None:
+        """Presses and releases a key of the keyboard, such as Tab, Enter or ArrowRight."""
+        code = {"Tab": 9, "Enter": 13, "ArrowRight": 39, "ArrowDown": 40}.get(key, ord(key[0].upper()))
+        given = {"key": key, "windowsVirtualKeyCode": code, "modifiers": 2 if control else 0}
+        text = {"text": "\r"} if key == "Enter" else {}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **given, **text)
+        self.call("Input.dispatchKeyEvent", type="keyUp", **given)
+
+    def type(self, text: str) -> None:
+        """Types text into the element with the focus."""
+        self.call("Input.insertText", text=text)
+
+    def drop(self, file: Path, at: tuple[float, float] = (200.0, 200.0)) -> None:
+        """Drops a file on a place in the window [px]."""
+        data = {"items": [], "files": [str(file)], "dragOperationsMask": 1}
+        for kind in ("dragEnter", "dragOver", "drop"):
+            self.call("Input.dispatchDragEvent", type=kind, x=at[0], y=at[1], data=data)
+
+    def choose(self, element: str, value: str) -> None:
+        """Chooses a value of the select element with this id."""
+        self.run(
+            f"(e => {{ e.value = {value!r}; e.dispatchEvent(new Event('change', {{bubbles: true}})); }})"
+            f"(document.getElementById({element!r}))"
+        )
+
+    def downloads_to(self, folder: Path) -> None:
+        """Writes downloads to a folder."""
+        self.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
+
     def media(self, *, dark: bool, paper: bool = False) -> None:
         """Sets the colour scheme that the reader prefers, and the screen or paper."""
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}

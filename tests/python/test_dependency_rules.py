@@ -20,10 +20,10 @@ MODULE_ORDER = ["recording", "model", "identification", "verification", "plannin
 
 # Modules of the package that may import any module except cli; only the module cli imports them. A method
 # `plot` may also import `plotting`, which draws its object.
-SIDE_MODULES = {"plotting", "baselines", "report", "export"}
+SIDE_MODULES = {"plotting", "baselines", "report", "export", "app"}
 
-# A report uses the units, labels and strokes of plotting.
-SIDE_IMPORTS = {"report": {"plotting"}}
+# A report uses the units, labels and strokes of plotting; the page uses these, reports and exports.
+SIDE_IMPORTS = {"report": {"plotting"}, "app": {"plotting", "report", "export"}}
 
 # Folder of C++ headers -> folders whose headers it may include, besides its own, status.hpp and fields.
 INCLUDES = {

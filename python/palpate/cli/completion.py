@@ -49,6 +49,7 @@ def completes(group: click.Group) -> bool:
 
 def suffixes_of(placeholder: str) -> tuple[str, ...]:
     """Returns the suffixes of files for the placeholder of a parameter in the help."""
+    placeholder = placeholder.strip("[]")  # an argument that may be left out
     if placeholder.startswith("RECORDING"):
         return RECORDINGS
     if placeholder == "PNG":

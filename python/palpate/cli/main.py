@@ -29,6 +29,7 @@ _VERBS = {
     "show": "Print a model or a recording.",
     "report": "Write one HTML page about a model.",
     "export": "Write a model or a recording for other programs.",
+    "app": "Open a page in the browser for all steps.",
     "demo": "Identify, verify and render a simulated sample.",
 }
 """Verbs with their lines in the help. The file of a verb is imported only when the verb is used."""

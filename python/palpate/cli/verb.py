@@ -30,7 +30,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 PATH = FileName(path_type=Path)
 
 READING_NAMES = ("position", "force", "time", "direction", "units", "negate", "torque_constant", "rows",
-                 "zero", "force_late_s", "invalid", "columns", "decimal", "part")  # fmt: skip
+                 "leave_out", "zero", "force_late_s", "invalid", "columns", "decimal", "part")  # fmt: skip
 """Arguments of `read_recording` that are also options of the command line."""
 
 _SCHEME = Scheme()
@@ -102,6 +102,14 @@ def _row_range(
     except ValueError:
         message = f"{value!r} must be START:STOP, such as 100:5000, counted from 0"
         raise click.BadParameter(message, ctx, param) from None
+
+
+def _row_ranges(
+    ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
+) -> tuple[tuple[int | None, int | None], ...]:
+    """Parses several START:STOP."""
+    ranges = (_row_range(ctx, param, value) for value in values)
+    return tuple(each for each in ranges if each is not None)
 
 
 def _zero(
@@ -195,6 +203,13 @@ _READING = options(
         help=_about("torque_constant"),
     ),
     _rows("--rows", help=_about("rows")),
+    expert_option(
+        "--leave-out",
+        metavar="START:STOP",
+        callback=_row_ranges,
+        multiple=True,
+        help=f"{_about('leave_out')} Repeatable.",
+    ),
     _rows("--zero", metavar="START:STOP|air", callback=_zero, help=_about("zero")),
     expert_option(
         "--invalid", type=click.Choice(["refuse", "drop"]), default="refuse", help=_about("invalid")

@@ -27,6 +27,7 @@ from ..identification.network.basis import Basis
 from ..identification.network.constraints import domain_bounds, impose, slope_limited
 from ..identification.network.fitted import FittedNetwork
 from ..identification.network.separable import Block, SeparableProblem
+from ..identification.threads import one_thread
 from .plan import SAMPLES, strokes, with_network
 
 LONGEST_PLAY = 0.1
@@ -126,7 +127,8 @@ def limit_slopes(model: ForceModel, low: float, high: float) -> ForceModel | Non
     """
     travel = float(model.upper[0] - model.lower[0])
     for smoothing, restoring in _ATTEMPTS:
-        limited = _limited_once(model, low, high, smoothing * travel, restoring)
+        with one_thread():
+            limited = _limited_once(model, low, high, smoothing * travel, restoring)
         if limited is None:
             continue
         found = sliding_slopes(limited)

@@ -220,9 +220,15 @@ class Conversion:
         return columns | {_si_name(column): column.name for column in choice.inputs}
 
     def checked(
-        self, table: Places, cells: Mapping[str, Cells], first: int = 0
+        self,
+        table: Places,
+        cells: Mapping[str, Cells],
+        first: int = 0,
+        unwanted: NDArray[np.bool_] | None = None,
     ) -> tuple[RowCheck, Int8Vector | None]:
-        """Checks the rows of a table from row `first` on; returns the check and the direction of every row.
+        """Checks the rows of a table from row `first` on, except those that `unwanted` (n,) marks.
+
+        Returns the check and the direction of every row.
 
         Raises
         ------
@@ -230,6 +236,8 @@ class Conversion:
             A row cannot be used and rows may not be dropped, or its direction is not known.
         """
         check = RowCheck(self.name, table, first, len(cells[self.choice.position.name]), self.drop)
+        if unwanted is not None:
+            check.kept &= ~unwanted
         if self.status is not None:
             check.leave_out_other_forces(cells[self.status])
         for name in self.numbers:
@@ -276,6 +284,7 @@ def converted(
     file: Path | None = None,
     direction: str | None,
     rows: Range | None = None,
+    leave_out: Sequence[Range] = (),
     zero: Range | Literal["air"] | None = None,
     torque_constant: float | None = None,
     **options: Any,
@@ -289,7 +298,7 @@ def converted(
         Name of the table, for messages.
     file : Path, optional
         The file of the table. Without it the source is the fingerprint of the arrays.
-    direction, rows, zero, torque_constant, options
+    direction, rows, leave_out, zero, torque_constant, options
         Those of `read_recording`.
     """
     conversion = Conversion.of(table, name, direction=direction, **options)
@@ -320,7 +329,12 @@ def converted(
     if (start, stop) != (0, total):
         notes.append(f"rows {start} to {stop - 1} of 0 to {total - 1} are used")
         cells = {each: column[start:stop] for each, column in cells.items()}
-    check, directions = conversion.checked(table, cells, start)
+    unwanted = np.zeros(total, dtype=np.bool_)
+    for each in leave_out:
+        first, last = _row_range(name, each, total)
+        unwanted[first:last] = True
+        notes.append(f"rows {first} to {last - 1} are left out")
+    check, directions = conversion.checked(table, cells, start, unwanted[start:stop])
     if not check.kept.all():
         cells = {each: column[check.kept] for each, column in cells.items()}
         directions = None if directions is None else directions[check.kept]
@@ -357,7 +371,7 @@ def converted(
     time = None if choice.time is None else conversion.si(choice.time, cells)
     inputs = [conversion.si(column, cells) for column in choice.inputs]
     used = {*conversion.numbers, conversion.direction}
-    is_part = (start, stop) != (0, total)
+    is_part = (start, stop) != (0, total) or unwanted.any()
     return {
         "position": x,
         "force": f,

@@ -54,6 +54,7 @@ def read_recording(
     torque_constant: float | None = None,
     negate: Sequence[str] = (),
     rows: tuple[int | None, int | None] | None = None,
+    leave_out: Sequence[tuple[int | None, int | None]] = (),
     zero: tuple[int | None, int | None] | Literal["air"] | None = None,
     force_late_s: float | Literal["auto"] = 0.0,
     invalid: Literal["refuse", "drop"] = "refuse",
@@ -96,6 +97,8 @@ def read_recording(
         Invert the sign of position, force or a column. A column is given by its name and must be used.
     rows : (start, stop), optional
         Use only these rows, counted from 0. The range excludes stop; None leaves an end open.
+    leave_out : sequence of (start, stop)
+        Leave out these rows, such as a bad stretch or a hold. Each range is counted as `rows`.
     zero : (start, stop) or "air", optional
         Rows without contact; their mean force is subtracted. The range is counted as `rows`; "air" are the
         rows before the contact.
@@ -140,6 +143,7 @@ def read_recording(
         "torque_constant": torque_constant,
         "negate": negate,
         "rows": rows,
+        "leave_out": leave_out,
         "zero": zero,
         "drop": invalid == "drop",
     }

@@ -51,6 +51,14 @@ _LINES |= {
 }
 
 
+_STRIPS = {
+    "strip-1": ("first", 0.15),
+    "strip-2": ("good", 0.22),
+    "strip-3": ("second", 0.22),
+    "strip-4": ("alarm", 0.25),
+}
+"""Colour and opacity of shaded intervals by mark"""
+
 _MANTISSAS = ((0.7, (1, 2, 3, 5, 7)), (1.5, (1, 2, 5)), (2.5, (1, 3)), (np.inf, (1,)))
 """First digits of the ticks of a logarithmic axis, by the largest number of decades of its values"""
 
@@ -180,6 +188,47 @@ class Panel:
         colours = _coloured(fill="first", line="paper")
         drawn = self.plot.quad("left", "right", "y", "zero", source=source, fill_alpha=0.75, **colours)
         self._add(drawn, "bars", text, "mouse")
+
+    def cursor(self, text: str) -> None:
+        """Draws one large dot that a script moves; it is named "cursor"."""
+        source = self._source(x=np.empty(0), y=np.empty(0))
+        drawn = self.plot.scatter("x", "y", source=source, size=16, fill_alpha=0.9, **_coloured(
+            fill="alarm", line="paper"
+        ))  # fmt: skip
+        drawn.name = "cursor"
+        self._add(drawn, "cursor", text, "")
+
+    def handles(self, x: Float1D, y: Float1D) -> None:
+        """Draws dots that the mouse drags; they are named "handles", and the page receives their places."""
+        source = self._source(x=np.asarray(x), y=np.asarray(y))
+        source.data = {"x": [float(each) for each in x], "y": [float(each) for each in y]}
+        drawn = self.plot.scatter(
+            "x", "y", source=source, size=18, fill_alpha=0.85, **_coloured(fill="first", line="paper")
+        )
+        drawn.name = "handles"
+        tool = bokeh("models").PointDrawTool(renderers=[drawn], add=False)
+        self.plot.add_tools(tool)
+        self.plot.toolbar.active_drag = tool
+        self.plot.subscribed_events = {"panend"}
+        self._add(drawn, "handles", "drag to edit", "")
+
+    def strips(self, left: Float1D, right: Float1D, mark: str, text: str = "") -> None:
+        """Shades the panel between `left` and `right`, over its whole height."""
+        if not len(left):
+            return
+        drawn = self.plot.vstrip(
+            "left", "right", source=self._source(left=left, right=right), fill_alpha=_STRIPS[mark][1],
+            line_color=None, **_coloured(fill=_STRIPS[mark][0]),
+        )  # fmt: skip
+        drawn.level = "underlay"
+        self._add(drawn, mark, text, "")
+
+    def select(self) -> None:
+        """Lets the mouse select an interval of the horizontal axis; the page receives its ends."""
+        tool = bokeh("models").BoxSelectTool(dimensions="width", renderers=[], persistent=True)
+        self.plot.add_tools(tool)
+        self.plot.toolbar.active_drag = tool
+        self.plot.subscribed_events = {"selectiongeometry"}
 
     def level(self, value: float, mark: str, text: str = "") -> None:
         """Draws a horizontal line across the panel."""

@@ -105,39 +105,58 @@ def bokeh(module: str) -> Any:
 
 def html_of(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     """Returns the page. It contains the chart library and fetches nothing."""
-    resources, embed = bokeh("resources"), bokeh("embed")
-    jinja2 = import_module("jinja2")
+    embed = bokeh("embed")
     charts = [chart for section in sections for chart in section.charts]
     for number, chart in enumerate(charts, 1):
         chart.number = number
     items = [embed.json_item(chart.layout(), f"chart-{chart.number}") for chart in charts]
+    text: str = (
+        templates_in(Path(__file__).parent)
+        .get_template("page.html")
+        .render(
+            title=title,
+            subtitle=subtitle,
+            sections=sections,
+            colours=COLOURS,
+            library=unescaped(chart_library()),
+            data=script_json({"colours": COLOURS, "charts": items}),
+        )
+    )
+    return text
+
+
+def chart_library() -> str:
+    """Returns the JavaScript that draws the charts."""
+    inline = bokeh("resources").Resources(mode="inline", components=["bokeh"])
+    return "\n".join(inline.js_raw)
+
+
+def unescaped(text: str) -> Any:
+    """Returns text that a template does not escape."""
+    return import_module("jinja2").utils.markupsafe.Markup(text)
+
+
+def templates_in(*folders: Path) -> Any:
+    """Returns the Jinja environment of templates in these folders. It escapes every text."""
+    jinja2 = import_module("jinja2")
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        loader=jinja2.FileSystemLoader(folders),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    markup = jinja2.utils.markupsafe
+    escape = jinja2.utils.markupsafe.escape
 
     def unbroken(text: str) -> Any:
         """Returns text as HTML in which a line does not break inside an option such as --inputs."""
-        return markup.Markup(_OPTION.sub(r'<span class="option">\g<0></span>', str(markup.escape(text))))
+        return unescaped(_OPTION.sub(r'<span class="option">\g<0></span>', str(escape(text))))
 
     environment.filters["unbroken"] = unbroken
-    inline = resources.Resources(mode="inline", components=["bokeh"])
-    text: str = environment.get_template("page.html").render(
-        title=title,
-        subtitle=subtitle,
-        sections=sections,
-        colours=COLOURS,
-        library=markup.Markup("\n".join(inline.js_raw)),
-        data=markup.Markup(_script_json({"colours": COLOURS, "charts": items})),
-    )
-    return text
+    return environment
 
 
-def _script_json(value: Any) -> str:
+def script_json(value: Any) -> Any:
     """Returns JSON that cannot end the script element that contains it."""
     text = json.dumps(value, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    return unescaped(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))

@@ -25,13 +25,13 @@ from test_every_verb import VERBS
 LONGEST_S = 120
 """A command on these small files that takes longer is a hang [s]."""
 
-KEPT_OUT = {"--install-udev-rule", "--scheduler"}
-"""Options that change the machine, or wait for another one."""
+KEPT_OUT = {"--install-udev-rule", "--scheduler", "--browser"}
+"""Options that change the machine, open a window, or wait for another machine."""
 
-ENDLESS = {"--duration-s", "--seconds", "--jobs", "--settle-s"}
+ENDLESS = {"--duration-s", "--seconds", "--jobs", "--settle-s", "--idle-s"}
 """Options whose large values are long work, which is not a hang."""
 
-SLOW = ("demo", "report", "render")
+SLOW = ("demo", "report", "render", "app")
 """Verbs that take a second or more."""
 
 TEXTS = "m.json|a.csv|missing.csv|folder|broken.json|empty.csv|out.json|rad|N|mm|position_rad|force_N*m|x=N|:"

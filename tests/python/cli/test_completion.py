@@ -65,6 +65,7 @@ CASES = [
     (["plan", "m.json", "--device", "bench"], ["bench-knob"]),
     (["plan", "m.json", "--device", "d"], ["d.toml"]),
     (["plan", "--examples", "--dev"], ["--device"]),
+    (["app", ""], ["a.csv", "a.parquet"]),
     (["identify", "in"], ["compopt", "-o", "default"]),
     (["demo", "-o", ""], ["compopt", "-o", "dirnames"]),
 ]

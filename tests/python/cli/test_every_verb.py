@@ -26,6 +26,7 @@ VERBS = {
     "show": "show m.json",
     "report": "report m.json a.csv -o report.html",
     "export": "export m.json --c --uncertified --encoder-step 1e-4 --force-limit 2 -o knob.h",
+    "app": "app --no-browser --idle-s 0.1",
     "demo": "demo -o demo",
 }
 """Command lines for the tests, one for each verb; each command ends quickly."""

@@ -53,8 +53,8 @@ CASES = {
 SLOW = {"check-device", "demo"}
 """Commands that take more than three seconds; fewer faults of them are tested."""
 
-WITHOUT_FILES = {"devices"}
-"""Verbs that write no file. The udev rule of devices is tested in devices/test_udev.py."""
+WITHOUT_FILES = {"app", "devices"}
+"""Verbs that name no file to write. devices/test_udev.py tests the udev rule of devices."""
 
 INPUTS = {
     "model_file", "recording_file", "recording_files", "file", "other_file", "object_file", "profile",

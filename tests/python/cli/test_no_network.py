@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No verb and no run of palpate-control opens a network socket, except for the Inverse3 and for telemetry.
+"""No verb and no run of palpate-control opens a network socket, except for the Inverse3, telemetry and `app`.
 
 A filter of the kernel ends a program with SIGSYS when it calls socket() for IPv4 or IPv6. The filter also
 holds for the threads and the child processes of the program.
@@ -83,7 +83,7 @@ def test_the_filter_ends_a_program_that_opens_a_network_socket(family: str, tmp_
     assert local.returncode == 0, local.stderr
 
 
-@pytest.mark.parametrize("verb", sampled(VERBS, "identify", "plan", "render"))
+@pytest.mark.parametrize("verb", sampled(sorted(VERBS.keys() - {"app"}), "identify", "plan", "render"))
 def test_no_verb_opens_a_network_socket(verb: str, folder: Path) -> None:
     completed = run([sys.executable, "-m", "palpate", *VERBS[verb].split()], folder)
     assert completed.returncode in (0, 1), completed.stderr

@@ -165,6 +165,27 @@ def test_rows_outside_the_selection_are_not_checked(csv_file: Write) -> None:
     assert "line 23" in refusal(path, rows=(2, 22))
 
 
+def test_rows_that_are_left_out_are_neither_used_nor_checked(csv_file: Write) -> None:
+    lines = [f"{0.1 * k:.1f},{k},{k}" for k in range(40)]
+    lines[6] = "0.6,x,y"
+    path = csv_file("time_s,depth_mm,force_N", lines)
+    recording = read_recording(path, leave_out=[(5, 10), (38, None)])
+    np.testing.assert_allclose(recording.force, [*range(5), *range(10, 38)])
+    assert {"rows 5 to 9 are left out", "rows 38 to 39 are left out"} <= set(recording.notes)
+    np.testing.assert_allclose(read_recording(path, rows=(2, None), leave_out=[(0, 7)]).force, range(7, 40))
+    assert "line 8" in refusal(path, leave_out=[(10, 20)])
+    with pytest.raises(InputError, match="rows 30:50 are outside the 40 rows of the file"):
+        read_recording(path, leave_out=[(30, 50)])
+
+
+def test_strokes_around_a_left_out_stretch_stay_those_of_the_motion(csv_file: Write) -> None:
+    depth = [*range(30), *range(29, -1, -1)]
+    path = csv_file("time_s,depth_mm,force_N", [f"{0.1 * k:.1f},{x},{x}" for k, x in enumerate(depth)])
+    recording = read_recording(path, leave_out=[(20, 40)])
+    assert len(recording.motion.position) == 60
+    np.testing.assert_array_equal(recording.motion.rows, [*range(20), *range(40, 60)])
+
+
 def test_a_recording_of_ten_rows_is_accepted(csv_file: Write) -> None:
     assert len(read_recording(csv_file(HEADER, rows(10)))) == 10
 
