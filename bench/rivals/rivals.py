@@ -80,7 +80,7 @@ def cell(numbers: Sequence[float], form: Callable[[float], str] = number) -> str
 
 
 def name_of(method: Mapping[str, Any]) -> str:
-    """Returns the name with * for a method of the package, + for one that is not yet in the package."""
+    """Returns the name with * for a method of the package, + for a further one of this project."""
     return str(method["name"]) + (" *" if method["in_package"] else " +" if method["ours"] else "")
 
 
