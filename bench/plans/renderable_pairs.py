@@ -46,9 +46,8 @@ class Pair:
     """[share of the range]"""
     ratio: float | None
     """slopes / proved slopes, if the energy account holds the plan"""
-    shares: list[float] | None
-    """share of the ticks in which the account acts: presses at 10, 30, 100, 300 mm/s, rest at the largest
-    force, rest at the steepest slope"""
+    acting: float | None
+    """largest share of the ticks of a press or rest in which the account acts"""
 
 
 def recordings(folder: Path) -> list[tuple[str, Path]]:
@@ -86,7 +85,7 @@ def planned(kind: str, name: str, model: Model, device: DeviceProfile) -> Pair:
         verdicts[chosen.certificate.verdict] if accepted else "no",
         plan.force_error.share,
         None if account is None else plan.proved_ratio,
-        None if account is None else list(account.shares),
+        None if account is None else account.share,
     )
 
 
@@ -109,7 +108,9 @@ def tables(pairs: list[Pair], omitted: list[str]) -> dict[str, str]:
     total = [pair.word for pair in pairs]
     counts.append(("all", "all", *(str(total.count(word)) for word in WORDS), str(len(total))))
     renderable = sum(word != "no" for word in total)
-    acting = max((max(pair.shares) for pair in pairs if pair.shares and pair.word != "no"), default=0.0)
+    acting = max(
+        (pair.acting for pair in pairs if pair.acting is not None and pair.word != "no"), default=0.0
+    )
     machine = where()
     return {
         "where": "Measured by `python bench/plans/renderable_pairs.py --to docs`: "

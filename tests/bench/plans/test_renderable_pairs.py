@@ -42,7 +42,7 @@ def test_the_account_holds_a_pair_only_with_an_accepted_error_and_few_limited_ti
     for pair in json.loads(NUMBERS.read_text(encoding="utf-8")):
         if pair["word"] == "by account":
             assert pair["force_error"] <= 0.1
-            assert max(pair["shares"]) < 0.01
+            assert pair["acting"] < 0.01
             assert 1.0 < pair["ratio"] < 4.2
 
 
