@@ -304,6 +304,26 @@ TEST(Guards, AnAccountUsesTheNumbersOfTheDevice) {
     EXPECT_EQ(certified.force_step, 0.0);
 }
 
+// Without known losses the errors of the readings would use up the account, although nothing moves by itself.
+TEST(Guards, WithoutKnownLossesTheAccountLimitsTheForceOnlyInItsLastQuarter) {
+    GuardSettings settings = settings_of(false);
+    settings.device_damping = settings.device_friction = 0.0;
+    EnergyAccount account = guards_of(settings, spring(3.0), scheme_of(StructureKind::Direct), 0.25).account;
+    const double stored = account.stored().within();
+    account.visit(0.0, 0.0);
+    account.book(0.0, nan);
+    for (int k = 0; k < 1000; ++k) {
+        account.book(k % 2 == 0 ? 1.0 : -1.0, 0.0);
+        account.sent(0.0);
+    }
+    EXPECT_DOUBLE_EQ(account.left(), stored);
+    double force = settings.force_limit;
+    EXPECT_EQ(account.apply(force), Status::Ok);
+    account.book(-0.8 * stored, 1.0);
+    EXPECT_EQ(account.apply(force), Status::EnergyLimited);
+    EXPECT_NEAR(force, 0.8 * settings.force_limit, 1e-9);
+}
+
 TEST(Guards, CanBeSwitchedOff) {
     GuardSettings settings = settings_of(false);
     settings.energy_account = false;

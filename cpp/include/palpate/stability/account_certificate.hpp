@@ -40,8 +40,8 @@ namespace palpate {
     certificate.bounds = rendered_bounds(model, scheme, device);
     const EnergyAccount account = account_of(model, scheme, device);
     const double stored = account.stored().within();
-    std::vector<Inequality> lines{{"account-force", "energy account against the largest force",
-                                   "2 W >= E_F", 2.0 * stored,
+    std::vector<Inequality> lines{{"account-force", "energy account against the largest force", "2 W >= E_F",
+                                   2.0 * stored,
                                    account.most_taken(largest_resting_force(model, device.force_limit)),
                                    Basis::Proved, "docs/certificate.md"}};
     if (device.renderer) {
