@@ -304,7 +304,7 @@ TEST(Guards, AnAccountUsesTheNumbersOfTheDevice) {
     EXPECT_EQ(certified.force_step, 0.0);
 }
 
-// Without known losses the errors of the readings would use up the account, although nothing moves by itself.
+// Without known losses the errors of the readings would use up the account, although nothing moves alone.
 TEST(Guards, WithoutKnownLossesTheAccountLimitsTheForceOnlyInItsLastQuarter) {
     GuardSettings settings = settings_of(false);
     settings.device_damping = settings.device_friction = 0.0;
