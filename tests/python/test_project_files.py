@@ -105,9 +105,10 @@ def test_every_download_of_cmake_has_a_checksum() -> None:
 
 
 def test_the_ci_of_a_change_runs_the_commands_of_the_workflows() -> None:
-    commands = re.findall(r"^make .+$", (ROOT / ".ci" / "run").read_text(encoding="utf-8"), re.MULTILINE)
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    commands = re.findall(r"^(make [^>\n]+?)(?: >.*)?$", script, re.MULTILINE)
     workflows = "".join(path.read_text(encoding="utf-8") for path in (GITHUB / "workflows").glob("*.yml"))
-    assert commands
+    assert len(commands) == 4
     assert all(f"- run: {command}\n" in workflows for command in commands)
 
 
