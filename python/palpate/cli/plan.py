@@ -264,8 +264,9 @@ def _summary(
     After the verdict no it has only what fails.
     """
     rows, refused = plan.summary(), plan.verdict.level == "no"
-    if refused and certificate.certified:
-        del rows["certificate"]
+    if refused and not certificate.refused:
+        passed = {"certificate", *plan.account_rows()}
+        rows = {name: text for name, text in rows.items() if name not in passed}
     _, damping, force = mechanical_units(device.position_unit)
     units = {"b": ("device damping", damping), "f_c": ("device friction", force)}
     lines = [] if certificate.refused else certificate.inequalities

@@ -317,6 +317,10 @@ def test_the_verdict_comes_first_and_the_file_that_is_written_or_not_is_named(
             re.sub(" +", " ", next(line for line in lines if line.startswith("written")))
             == f"written {written}"
         )
+        passed = [
+            line for line in lines if line.startswith(("certificate", "energy account", "account acts"))
+        ]
+        assert bool(passed) == (level != "no")
     assert Path("p.json").exists()
     assert not Path("q.json").exists()
 
