@@ -323,9 +323,15 @@ def _too_steep(task: Task, need: str, scaled: DeviceProfile | None) -> str:
     _, _, force = mechanical_units(device.position_unit)
     position = device.position_unit
     steepest, rendered = sliding_bounds(model).steepest, renderable_slopes(device)[1]
+    x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
+    force_at_x = strokes(model, x)
+    stroke, at = np.unravel_index(np.argmax(np.gradient(force_at_x, x, axis=1)), force_at_x.shape)
+    of_stroke = f" of the {('press', 'release')[stroke]}" if model.hysteretic else ""
+    slope_unit = f"{force}/{position}"
     sentences = [
-        f"is too steep for this device: its slope is up to {_plain(steepest)} {force}/{position}, and the "
-        f"device renders {_plain(rendered)} {force}/{position} at {1.0 / device.period_s:.6g} Hz"
+        f"is too steep for this device: its slope is up to {_plain(steepest)} {slope_unit} at {x[at]:.4g} "
+        f"{position}{of_stroke}, and the device renders {_plain(rendered)} {slope_unit} at "
+        f"{1.0 / device.period_s:.6g} Hz"
     ]
     if need:
         sentences.append(
@@ -333,8 +339,6 @@ def _too_steep(task: Task, need: str, scaled: DeviceProfile | None) -> str:
         )
     if scaled is not None:
         factor = scaled.inertia / device.inertia
-        x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
-        force_at_x = strokes(model, x)
         weaker = max(math.sqrt(factor), float(np.abs(force_at_x).max()) / device.force_limit)
         longer = max(factor / weaker, 1.0)
         force_range, travel = float(np.ptp(force_at_x)) / weaker, float(x[-1] - x[0]) * longer

@@ -163,12 +163,15 @@ def test_a_device_that_no_realistic_rate_helps_gets_a_bound_and_a_scale_instead_
     assert "a rate of" not in sentence
     assert "--accept-force-error" not in sentence, "nearly the whole force would be missing"
     slopes = re.search(
-        r"is too steep for this device: its slope is up to (\S+) N/m, and the device renders (\S+) N/m at "
-        r"1000 Hz",
+        r"is too steep for this device: its slope is up to (\S+) N/m at (\S+) m(?: of the (\w+))?, and the "
+        r"device renders (\S+) N/m at 1000 Hz",
         sentence,
     )
     assert slopes
-    assert float(slopes[1]) > 10.0 * float(slopes[2])
+    assert float(slopes[1]) > 10.0 * float(slopes[4])
+    x = float(slopes[2]) + np.array([-1e-6, 1e-6])
+    side = {"press": 1.0, "release": -1.0}.get(str(slopes[3]))
+    assert np.diff(model.force(x, direction=side))[0] / 2e-6 == pytest.approx(float(slopes[1]), rel=0.05)
     limit = re.search(r"Even at 60000 Hz, .*, it needs device damping b >= (\S+) N\*s/m", sentence)
     assert limit
     scale = re.search(
