@@ -135,7 +135,8 @@ double implicit_damping(const mjModel* m, int dof) {
 
 void compute(const mjModel* m, mjData* d, int instance, int /*capability*/) {
     if (m->opt.integrator == mjINT_RK4) {
-        mju_error("palpate.joint_force: the integrator is RK4: must be Euler, implicit, implicitfast or discrete");
+        mju_error(
+            "palpate.joint_force: the integrator is RK4: must be Euler, implicit, implicitfast or discrete");
     }
     Instance& on_joint = instance_in(d, instance);
     const int dof = m->jnt_dofadr[on_joint.joint];
