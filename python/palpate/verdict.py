@@ -7,6 +7,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
+import numpy as np
+
+from ._typing import Float1D
 from .errors import InputError
 
 Level = Literal["good", "usable", "no"]
@@ -128,3 +131,8 @@ def usable(sentence: str) -> Finding:
 def no(sentence: str) -> Finding:
     """Returns a finding of the level "no" with this sentence: the result must not be used."""
     return Finding("no", sentence)
+
+
+def force_jnd(force: Float1D, floor: float) -> Float1D:
+    """Returns the just noticeable difference of forces (n,): 7 % of each, but at least `floor`."""
+    return np.maximum(FORCE_JND * np.abs(force), floor)

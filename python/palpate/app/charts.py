@@ -21,7 +21,7 @@ from ..recording.units import Unit
 from ..report.charts import MOST_DOTS, Chart, Panel
 from ..report.of_comparison import LINE_MARKS, Compared
 from ..report.subject import Subject
-from ..verdict import FORCE_JND
+from ..verdict import force_jnd
 from .designer import Curves
 
 DOTS = {"press": "dots", "release": "open-dots", "": "dots"}
@@ -177,7 +177,7 @@ def is_dynamic(model: Model) -> bool:
 
 def differences(compared: Compared) -> Float1D:
     """Returns recorded minus modelled force (n,) in just noticeable differences."""
-    perceptible = np.maximum(FORCE_JND * np.abs(compared.force), compared.found.jnd_floor)
+    perceptible = force_jnd(compared.force, compared.found.jnd_floor)
     return np.asarray(-compared.found.residual / perceptible)
 
 

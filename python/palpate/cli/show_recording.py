@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import listed
 from ..recording import Recording
 from ..recording.checks import quality_findings
-from ..recording.motion import GAP_RATIO, cycles_of, ordered_strokes
+from ..recording.motion import GAP_RATIO, cycles_of, directions_of
 from ..recording.parts import Part, SeveralPartsError
 from ..recording.roles import counts_text, informative, role_counts, roles_of
 from ..verdict import Verdict
@@ -83,7 +83,7 @@ def _print_parts(parts: Sequence[Part]) -> None:
 
 def _strokes(recording: Recording) -> dict[str, int] | None:
     """Returns the numbers of press and release strokes; None if neither direction nor order shows strokes."""
-    direction = ordered_strokes(recording) if recording.direction is None else recording.direction
+    direction = directions_of(recording)
     if direction is None or not direction.any():
         return None
     moving = direction[direction != 0]

@@ -251,9 +251,9 @@ def tables_of(grid: Grid) -> list[Block]:
 
 def whole_grid(grid: Grid) -> Block:
     """Returns the rows of a grid without a table; its first row of numbers, if it has one, is the header."""
-    texts = _padded(list(map(_texts, grid.rows)))
     row = next((start for start, stop in _data_runs(grid) if stop - start >= LEAST_CONSECUTIVE_ROWS), 0)
-    header = first_row_as_header(texts[row:])
+    names = _texts(grid.rows[row])
+    header = first_row_as_header([names + [""] * (grid.kinds.shape[1] - len(names))])
     columns = tuple(range(len(header.names)))
     above, rows = tuple(reversed(grid.rows[:row])), np.arange(row + 1, len(grid.rows))
     return Block(grid, header, row, columns, (0, len(columns)), above, rows)

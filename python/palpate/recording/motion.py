@@ -139,12 +139,17 @@ def ordered_strokes(recording: Recording) -> Int8Vector | None:
     return None if direction is None else direction[motion.rows]
 
 
+def directions_of(recording: Recording) -> Int8Vector | None:
+    """Returns the directions (n,) that a recording states, else those of the order of its rows."""
+    return ordered_strokes(recording) if recording.direction is None else recording.direction
+
+
 def cycles_of(recording: Recording) -> list[slice]:
     """Returns the rows of each cycle of a recording: a press and the release behind it, with their holds.
 
     Without a column of directions they are those of the order of rows.
     """
-    direction = ordered_strokes(recording) if recording.direction is None else recording.direction
+    direction = directions_of(recording)
     if direction is None:
         return []
     moving = np.flatnonzero(direction)

@@ -13,7 +13,7 @@ from .._typing import Float1D, Int8Vector
 from ..errors import InputError
 from ..model import Model
 from ..recording.units import Unit
-from ..verdict import FORCE_FLOOR, FORCE_JND, Finding, usable
+from ..verdict import FORCE_FLOOR, FORCE_JND, Finding, force_jnd, usable
 
 STIFFNESS_JND = 0.23
 """Just noticeable difference of stiffness, as a share of the stiffness (Jones and Hunter 1990: about 23
@@ -73,8 +73,7 @@ def force_floor(force: Float1D) -> float:
 def within_force_jnd(reference: Float1D, error: Float1D) -> NDArray[np.bool_]:
     """Returns True for samples with an error of at most 7 % of the local force, or at most the
     smallest just noticeable difference."""
-    allowed = np.maximum(FORCE_JND * np.abs(reference), force_floor(reference))
-    return np.asarray(np.abs(error) <= allowed)
+    return np.asarray(np.abs(error) <= force_jnd(reference, force_floor(reference)))
 
 
 def share_within_force_jnd(reference: Float1D, error: Float1D) -> float:
@@ -222,7 +221,7 @@ def mean_forces(
         rows = np.bincount(cell[of_stroke])
         sums = [np.bincount(cell[of_stroke], each[of_stroke]) for each in (position, reference, force)]
         at, recorded, modelled = (each[rows > 0] / rows[rows > 0] for each in sums)
-        perceptible = np.maximum(FORCE_JND * np.abs(recorded), force_floor(reference))
+        perceptible = force_jnd(recorded, force_floor(reference))
         strokes.append(Stroke(names[sign], at, recorded, modelled, perceptible))
     return tuple(strokes)
 
@@ -267,6 +266,5 @@ def compare(first: Model, second: Model) -> tuple[Stroke, ...]:
     strokes = []
     for name, direction in directions.items():
         one, two = (model.force(position, direction=direction) for model in (first, second))
-        perceptible = np.maximum(FORCE_JND * np.abs(one), force_floor(one))
-        strokes.append(Stroke(name, position, one, two, perceptible))
+        strokes.append(Stroke(name, position, one, two, force_jnd(one, force_floor(one))))
     return tuple(strokes)

@@ -118,9 +118,9 @@ class Verification:
     @property
     def strokes(self) -> tuple[Stroke, ...]:
         """Recorded and modelled force along each stroke, as means over cells of the positions"""
-        compared = self.compared
-        side = self.prediction.side if compared.direction is None else compared.direction
-        return mean_forces(compared.position, side, compared.force, self.force)
+        recording, rows = self.recording, self.rows
+        side = self.prediction.side if recording.direction is None else recording.direction[rows]
+        return mean_forces(recording.position[rows], side, recording.force[rows], self.force)
 
     @property
     def file_units(self) -> tuple[Unit, Unit]:

@@ -15,7 +15,7 @@ from ...recording import Recording
 from ...recording.checks import findings_of
 from ...recording.motion import noise_band, strokes_from_order
 from ...recording.roles import counts_text, role_counts
-from ...verdict import FORCE_FLOOR, FORCE_JND, Finding, Verdict, no, usable
+from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
 from ..data.rows import period_notes
 from ..decision import latest
@@ -154,7 +154,7 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
         np.bincount(group, values, 2 * PLACES) / count for values in (residual, data.force[rows], residual**2)
     )
     error = np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count - 1, 1))
-    jnd = np.maximum(FORCE_JND * np.abs(force), _floor(best) or 1.0)
+    jnd = force_jnd(force, _floor(best) or 1.0)
     noticed = np.where(count > 2, (np.abs(mean) - PLACE_ERRORS * error) / jnd, 0.0)
     worst = int(np.argmax(noticed))
     if noticed[worst] <= MOST_JND:

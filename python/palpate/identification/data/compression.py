@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._typing import Float1D, Float2D
-from ...verdict import FORCE_FLOOR, FORCE_JND
+from ...verdict import FORCE_FLOOR, force_jnd
 from .limits import NO_LIMITS, RowLimits, distinct_rows
 
 SIDE_LEVELS = 16
@@ -283,7 +283,7 @@ class HeldOutRows:
     def in_jnd(self, errors: Float1D) -> Float1D:
         """Returns errors (k,) in just noticeable differences: 7 % of the local force, at least 1 % of the
         largest force."""
-        return np.asarray(errors / np.maximum(FORCE_JND * np.abs(self.force), self._floor))
+        return np.asarray(errors / force_jnd(self.force, self._floor))
 
     @property
     def _floor(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..._typing import Float1D
 from ...recording import Recording
-from ...recording.motion import ordered_strokes
+from ...recording.motion import directions_of
 
 LEAST_CORRELATION = 0.5
 """Correlation of the force with itself, one period apart, from which a periodic model is tried [-]."""
@@ -65,7 +65,7 @@ def revolution_of(recordings: Sequence[Recording]) -> float | None:
 def _press(recordings: Sequence[Recording]) -> tuple[Float1D, Float1D]:
     """Returns positions and forces of the press strokes of recordings; empty if the direction is not known or
     the force has further inputs."""
-    ways = [each.direction if each.direction is not None else ordered_strokes(each) for each in recordings]
+    ways = [directions_of(each) for each in recordings]
     if any(way is None or len(each.input_names) for way, each in zip(ways, recordings, strict=True)):
         return np.zeros(0), np.zeros(0)
     press = np.concatenate([way > 0 for way in ways if way is not None])

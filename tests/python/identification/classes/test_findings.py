@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The reported error is the error of the rows; findings name forces that no input explains."""
 
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import palpate
-from conftest import sampled
+from conftest import measured_data, sampled
 from imperfect import Array, noise, recorded, strokes, sweep, wall
 from palpate import WaveletNetworkRegressor
 
@@ -154,7 +153,7 @@ def test_a_zero_that_cannot_be_felt_to_move_gives_no_finding(count: int, drift: 
     assert "the zero of the force or the object changed" not in verdict
 
 
-DATA = Path(os.environ.get("PALPATE_DATA", "../shared/data"))
+DATA = measured_data() or Path("no measured data")
 
 
 def relaxation() -> tuple[Array, Array, Array]:
