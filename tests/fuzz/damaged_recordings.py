@@ -20,6 +20,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import zlib
 from collections import Counter
@@ -61,6 +62,10 @@ def arrays() -> dict[str, Any]:
     }
 
 
+_ONE_WRITER = threading.Lock()
+"""`savemat` keeps the tag of a matrix in a variable that all its calls share."""
+
+
 def _mat(compressed: bool, form: str = "5") -> bytes:
     from scipy.io import savemat
     from scipy.sparse import csc_array
@@ -74,7 +79,8 @@ def _mat(compressed: bool, form: str = "5") -> bytes:
     else:
         parts = np.array(["a", np.arange(3), {"b": 1}, np.empty((0, 0))], dtype=object)
         content["more"] = {"parts": parts, "probe": {"name": "p", "list": [1, 2]}}
-    savemat(stream, content, do_compression=compressed, format=form)
+    with _ONE_WRITER:
+        savemat(stream, content, do_compression=compressed, format=form)
     return stream.getvalue()
 
 
