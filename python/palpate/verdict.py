@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-import numpy as np
-
-from ._typing import Float1D
 from .errors import InputError
+
+if TYPE_CHECKING:  # the commands' help reads this file, and must not load numpy
+    from ._typing import Float1D
 
 Level = Literal["good", "usable", "no"]
 """Levels of a verdict, from best to worst."""
@@ -135,4 +135,4 @@ def no(sentence: str) -> Finding:
 
 def force_jnd(force: Float1D, floor: float) -> Float1D:
     """Returns the just noticeable difference of forces (n,): 7 % of each, but at least `floor`."""
-    return np.maximum(FORCE_JND * np.abs(force), floor)
+    return (FORCE_JND * abs(force)).clip(min=floor)
