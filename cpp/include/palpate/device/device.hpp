@@ -11,9 +11,12 @@
 namespace palpate {
 
 /// Command to a device: the force of the virtual object against the handle. A force > 0 pushes the handle towards
-/// smaller positions, out of the object.
+/// smaller positions, out of the object. A device whose controller holds a line applies
+/// force + stiffness (x - position) at the handle's position x until the next command; other devices hold the force.
 struct Command {
-    double force = 0.0;  ///< force on the handle [N or N*m]
+    double force = 0.0;      ///< force on the handle, at `position` [N or N*m]
+    double position = 0.0;   ///< x0, position at which the line has the force [m or rad]
+    double stiffness = 0.0;  ///< kappa, slope of the line; 0: the force is held [N/m or N*m/rad]
 };
 
 /// One sample of a device: position and velocity of the handle, forces, time, and the number of the sample.
