@@ -29,6 +29,7 @@ from ..identification.options import (
 )
 from ..identification.search.evidence import reporting_to
 from ..model import Model
+from ..model.model_file import CONTINUATIONS
 from ..recording import Recording
 from ..recording.files import CELL_BYTES, TooLargeError, require_memory
 from ..recording.formats import is_read_in_parts
@@ -440,12 +441,11 @@ def _outside_text(model: Model, recordings: Sequence[Recording]) -> dict[str, st
         return {"period": f"the force repeats every {unit.text(model.period)}"}
     if len(model.inputs) > 1:
         return {}
-    words = {"free": "falls to zero", "linear": "continues straight"}
     leaves = " (the tool leaves)" if model.below == "free" else ""
     low, high = (float(end[0]) for end in model.domain)
     return {
-        "outside": f"below {unit.text(low)}: {words[model.below]}{leaves}; "
-        f"above {unit.text(high)}: {words[model.above]}"
+        "outside": f"below {unit.text(low)}: {CONTINUATIONS[model.below]}{leaves}; "
+        f"above {unit.text(high)}: {CONTINUATIONS[model.above]}"
     }
 
 

@@ -16,6 +16,7 @@ from .._typing import Float1D, Float2D
 from ..arguments import parameter_texts, shown
 from ..errors import InputError
 from ..model import Model
+from ..model.steepest_slope import ROWS_KEY, SteepestSlope
 from ..recording import Recording, Source, read_recording
 from ..recording.reading import RecordingLike, recordings_from
 from ..recording.roles import informative, role_counts
@@ -157,6 +158,9 @@ def identify(
     if left_out := sum(map(len, recordings)) - len(rows.force):
         dropped["left out"] = left_out
     model.notes["roles"] = role_counts(rows.roles) | dropped
+    if (steepest := SteepestSlope.of(model)) is not None:
+        on_it = rows.fitted & steepest.rows(rows.domain[:, 0], known)
+        model.notes[ROWS_KEY] = int(np.count_nonzero(on_it))
     return model
 
 

@@ -123,6 +123,9 @@ def _lines(content: dict[str, Any], indent: str) -> str:
 if TYPE_CHECKING:
     from .model import Model
 
+CONTINUATIONS = {"free": "falls to zero", "linear": "continues straight"}
+"""Maps the name of the continuation of a force to words"""
+
 
 def describe(model: Model) -> str:
     """Returns verdict, terms, domain, units and fit of a model as text."""

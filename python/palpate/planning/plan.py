@@ -27,7 +27,8 @@ from ..arguments import instance_of
 from ..errors import InputError
 from ..html_table import Curve, html_table
 from ..model import Model
-from ..model.model_file import certificate_record
+from ..model.model_file import CONTINUATIONS, certificate_record
+from ..model.steepest_slope import SteepestSlope
 from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
 from .device_profile import mechanical_units
 
@@ -302,7 +303,11 @@ class Plan:
         if slope < steepest:
             stiffness = self._units()["stiffness"]
             rows["stiffness"] = f"slopes up to {steepest:.4g} are felt as up to {slope:.4g}{stiffness}"
+        if (place := SteepestSlope.of(self.model)) is not None:
+            rows["steepest slope"] = place.text(self.model)
         rows["force error"] = self.force_error_text
+        if self.model.period is None and self.model.dimension == 1:
+            rows["below contact"] = f"the force {CONTINUATIONS[self.model.below]}"
         rows["certificate"] = PLAN_WORDS[certificate.verdict]
         if not certificate.refused:
             rows["certificate"] += f", samples up to {1e3 * certificate.longest_period_s:.4g} ms apart"
@@ -331,8 +336,16 @@ class Plan:
             samples = "sample" if scheme.predict == 1 else f"{scheme.predict} samples"
             rows["prediction"] = f"half a sample ahead, from the previous {samples}"
         if scheme.play_radius:
-            rows["play radius"] = f"{scheme.play_radius:.4g}{units['position']}"
+            rows["play radius"] = self._play_text(units["position"])
         return rows
+
+    def _play_text(self, unit: str) -> str:
+        """Returns the play radius and its effect on the force after a reversal, in words."""
+        radius = self.scheme.play_radius
+        step = 0.0 if self.certificate is None else self.certificate.device.encoder_step
+        usual = default_play_radius(with_network(self.model, play_radius=None), step)
+        text = f"{radius:.4g}{unit}: after a reversal the force changes over {2.0 * radius:.4g}{unit}"
+        return f"{text}, usually over {2.0 * usual:.4g}{unit}" if radius > usual > 0.0 else text
 
     def _units(self) -> dict[str, str]:
         """Returns the unit of each kind of quantity with a space before it; empty text without units."""
@@ -434,13 +447,14 @@ class Plan:
             return ()
         unit = self.model.units["force"] or "in the model's unit"
         difference = (
-            f"the force error is up to {error.largest:.3g} {unit}, {_percent(error.share)} of the force range"
+            f"the largest force error at rest is {error.largest:.3g} {unit}, {_percent(error.share)} of the "
+            "force range"
         )
-        if error.share <= ACCEPTED_FORCE_ERROR:
-            return (usable(difference),)
-        if error.share <= self.accept_force_error:
-            return (usable(f"{difference}; at most {_percent(self.accept_force_error)} is accepted"),)
         cause = f". The object {self.needs}" if self.needs else ""
+        if error.share <= ACCEPTED_FORCE_ERROR:
+            return (usable(f"{difference}{cause}"),)
+        if error.share <= self.accept_force_error:
+            return (usable(f"{difference}; at most {_percent(self.accept_force_error)} is accepted{cause}"),)
         share = math.ceil(100.0 * error.share) / 100.0
         accept = (
             f". To accept this error, give --accept-force-error {share:g} (in Python accept_force_error)"

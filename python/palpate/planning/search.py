@@ -19,6 +19,7 @@ from .._core.rendering import most_prediction_taps
 from ..arguments import instance_of, real_of
 from ..errors import InputError
 from ..model import Model
+from ..model.steepest_slope import SteepestSlope
 from .candidates import CANDIDATES, Candidate, Refusal, Task
 from .device_profile import find_profile, mechanical_units, require_unit
 from .limited_network import renderable_slopes, sliding_bounds
@@ -161,6 +162,8 @@ def plan(
     stable_only = not (chosen.certificate.certified or chosen.certificate.refused)
     if stable_only or planned.verdict.level == "no":
         planned = replace(planned, needs=needed(task, accept_force_error, certified=stable_only))
+    elif planned.limited is not None:
+        planned = replace(planned, needs=_wider_play(task))
     return planned
 
 
@@ -185,8 +188,9 @@ def choose(task: Task, accept_force_error: float) -> tuple[Candidate, tuple[str,
             before, after = _error(task, chosen), _error(task, outcome)
             keeps = before <= after
             refused.append(
-                f"{name if keeps else found}: the force error is {100.0 * max(before, after):.3g} % of the "
-                f"range, and {100.0 * min(before, after):.3g} % with {found if keeps else name}"
+                f"{name if keeps else found}: the largest force error at rest is "
+                f"{100.0 * max(before, after):.3g} % of the range, and "
+                f"{100.0 * min(before, after):.3g} % with {found if keeps else name}"
             )
             if keeps:
                 continue
@@ -275,6 +279,8 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
     certified : bool
         True if a plan that is only stable is not enough.
     """
+    if wider := _wider_play(task):
+        return wider
     names = _candidates(task)
     device = task.device
     task = replace(task, may_limit=False, predict=task.predict or 0)
@@ -313,6 +319,23 @@ def needed(task: Task, accept_force_error: float, *, certified: bool) -> str:
     return ""
 
 
+def _wider_play(task: Task) -> str:
+    """Returns the least play radius with which the identified model is proved in direct rendering, if the
+    caller or the model gives a smaller one; else an empty text."""
+    given = task.play_radius or task.model.play_radius
+    if not given or task.coupling or task.dynamic or not task.model.hysteretic:
+        return ""
+    free = replace(task, model=with_network(task.model, play_radius=None), play_radius=None)
+    found = CANDIDATES["direct"].propose(free)
+    if isinstance(found, Refusal) or not found.certificate.certified:
+        return ""
+    radius, unit = _rounded(math.ceil, found.scheme.play_radius), task.device.position_unit
+    return (
+        f"needs a play radius of {radius:g} {unit} (has {given:.3g}): give --play-radius {radius:g}, and "
+        f"after a reversal the force changes over {2.0 * radius:.3g} {unit}"
+    )
+
+
 def _too_steep(task: Task, need: str, scaled: DeviceProfile | None) -> str:
     """Returns the reason why no realistic device of this kind renders an object, and the scale that helps.
 
@@ -325,13 +348,12 @@ def _too_steep(task: Task, need: str, scaled: DeviceProfile | None) -> str:
     steepest, rendered = sliding_bounds(model).steepest, renderable_slopes(device)[1]
     x = np.linspace(model.lower[0], model.upper[0], SAMPLES)
     force_at_x = strokes(model, x)
-    stroke, at = np.unravel_index(np.argmax(np.gradient(force_at_x, x, axis=1)), force_at_x.shape)
-    of_stroke = f" of the {('press', 'release')[stroke]}" if model.hysteretic else ""
+    place = SteepestSlope.of(model)
     slope_unit = f"{force}/{position}"
     sentences = [
-        f"is too steep for this device: its slope is up to {_plain(steepest)} {slope_unit} at {x[at]:.4g} "
-        f"{position}{of_stroke}, and the device renders {_plain(rendered)} {slope_unit} at "
-        f"{1.0 / device.period_s:.6g} Hz"
+        f"is too steep for this device: its slope is up to {_plain(steepest)} {slope_unit}"
+        f"{'' if place is None else f' at {place.place(position)}'}, and the device renders "
+        f"{_plain(rendered)} {slope_unit} at {1.0 / device.period_s:.6g} Hz"
     ]
     if need:
         sentences.append(

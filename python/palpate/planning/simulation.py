@@ -315,7 +315,7 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
         level = no if share > plan.accept_force_error else usable
         findings.append(
             level(
-                f"the force error is {100 * share:.3g} % of the object's force range, above "
+                f"the RMS force error in motion is {100 * share:.3g} % of the object's force range, above "
                 f"{100 * _TOLERATED_ERROR_SHARE:.3g} %: "
                 + (
                     "choose a structure with palpate plan, or a stiffer coupling"

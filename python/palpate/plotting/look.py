@@ -50,7 +50,7 @@ def label(name: str, unit: str) -> str:
 _PREFIXES = ((1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "\u00b5"), (1e-9, "n"))
 """SI prefixes, the largest first."""
 
-_PREFIXED = ("m", "N", "N*m", "A")
+_PREFIXED = ("m", "N", "N*m", "A", "J")
 """Units that can have every SI prefix. An angle has no prefix above 1, other units have no prefix."""
 
 

@@ -68,7 +68,13 @@ class Curve:
 
 def curves_of(subject: Subject) -> list[Curve]:
     """Returns the force of the model over its domain and the recorded positions; empty if position does not
-    determine the force."""
+    determine the force. The force of a model with memory is drawn at the rows of a recording; without one,
+    its force at rest."""
+    return [] if subject.model.memory is not None and subject.recording is not None else at_rest(subject)
+
+
+def at_rest(subject: Subject) -> list[Curve]:
+    """Returns the curves of `curves_of`, also for a model with memory: its force at rest."""
     model = subject.model
     if model.dimension > 1 or model.mass is not None or model.damping is not None:
         return []
@@ -163,10 +169,11 @@ def force_curve(subject: Subject) -> Section:
         description = "Recorded and modelled force over position; below, the residuals (recorded minus model)"
     sentences = [] if compared is not None else [f"Without dots: {NO_RECORDING}."]
     if compared is not None and not curves:
+        further = "memory" if subject.model.memory is not None else "mass or damping"
         sentences.append(
             "The force does not depend on position alone, so the model is drawn at the recorded rows: its "
             f"inputs are {', '.join(subject.model.inputs)}"
-            + (", with mass or damping." if subject.model.dimension == 1 else ".")
+            + (f", with {further}." if subject.model.dimension == 1 else ".")
         )
     if (band := subject.model.band) is not None:
         sentences.append(_band_sentence(band, compared))
@@ -177,9 +184,14 @@ def force_curve(subject: Subject) -> Section:
         )
     else:
         sentences.append(f"Without band: {subject.uncertainty}.")
+    if curves and subject.model.units["position"] == "rad":
+        panels.append(_energy_panel(subject, panels[-1]))
+        description += "; at the bottom, the energy stored in the object"
     charts = [Chart(f"{description}.", *panels)]
     if compared is not None and not curves:
         charts.append(_modelled_over_recorded(compared))
+        if compared.recording.time is not None:
+            charts.append(_along_recording(compared, compared.recording.time))
     return Section(key, title, explanation, sentences, charts)
 
 
@@ -207,6 +219,32 @@ def _modelled_over_recorded(compared: Compared) -> Chart:
     ends = y.factor * np.array([compared.force.min(), compared.force.max()])
     panel.line(ends, ends, "line", "equal forces", hover=False)
     return Chart("Modelled force over recorded force; in a good model the dots lie on the line.", panel)
+
+
+def _along_recording(compared: Compared, time: Float1D) -> Chart:
+    """Returns recorded and modelled force over time."""
+    at, recorded, modelled = thinned(
+        time[compared.found.rows], compared.force, compared.found.force, most=MOST_DOTS
+    )
+    y = compared.y
+    panel = Panel("time [s]", y.label("force"), 260)
+    panel.dots(at, y.factor * recorded, "soft-dots", "recorded")
+    panel.line(at, y.factor * modelled, "line", "model")
+    return Chart("Recorded and modelled force over time.", panel)
+
+
+def _energy_panel(subject: Subject, above: Panel) -> Panel:
+    """Returns the energy that the object stores, of the mean force of press and release, over its angle."""
+    model = subject.model
+    x = np.linspace(float(model.lower[0]), float(model.upper[0]), CURVE_POSITIONS)
+    energy = np.mean([model.energy(x, direction=np.full(len(x), side)) for side in (1.0, -1.0)], axis=0)
+    energy -= energy.min()
+    compared = Compared.of(subject)
+    angle = scale_for("rad", x) if compared is None else compared.x
+    stored = scale_for("J", energy)
+    panel = Panel(angle.label("position"), stored.label("energy"), 180, above=above)
+    panel.line(angle.factor * x, stored.factor * energy, "line")
+    return panel
 
 
 def _force_panel(subject: Subject, curves: list[Curve], compared: Compared | None) -> Panel:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,7 +16,7 @@ from ..identification.options import CHOICES
 from ..model import Model
 from ..plotting.look import scale_for
 from .charts import CLASS_MARKS, Chart, Panel
-from .of_comparison import LINE_MARKS, curves_of
+from .of_comparison import LINE_MARKS, at_rest
 from .page import Section
 from .subject import Subject
 from .words import amount, counted, date_text, interval, percent
@@ -65,7 +64,7 @@ def wavelets(subject: Subject) -> Section:
     at, parts = _wavelet_curves(model)
     ends = np.array([lower, upper])
     straight = model.linear[0] * ends + model.bias
-    curves = curves_of(subject)
+    curves = at_rest(subject)
     x = scale_for(model.units["position"], ends)
     y = scale_for(model.units["force"], straight, *(curve.force for curve in curves))
     z = scale_for(model.units["force"], *parts)
@@ -196,7 +195,7 @@ def provenance(subject: Subject) -> Section:
             *(f"{name}: {value}" for name, value in recording.metadata.items()),
         ]
     for name, note in model.notes.items():
-        if name != _VERDICT_NOTE and (lines := _lines(note)):
+        if name != _VERDICT_NOTE and (lines := [_text(each) for each in _listed(note)]):
             facts[name.replace("_", " ")] = lines
     explanation = (
         "With these files, columns and versions the result can be repeated; a file is the same if its "
@@ -227,7 +226,15 @@ def _domain(model: Model) -> list[str]:
     return lines
 
 
-def _lines(note: Any) -> list[str]:
-    """Returns a note of a model file as lines of text."""
-    given = note if isinstance(note, list) else [note]
-    return [each if isinstance(each, str) else json.dumps(each) for each in given]
+def _listed(note: Any) -> list[Any]:
+    """Returns the entries of a note of a model file; none if it has no content."""
+    return note if isinstance(note, list) else [] if note is None else [note]
+
+
+def _text(note: Any) -> str:
+    """Returns a note in words: "press: 900, release: 850" for a mapping."""
+    if isinstance(note, dict):
+        return ", ".join(f"{str(name).replace('_', ' ')}: {_text(each)}" for name, each in note.items())
+    if isinstance(note, list):
+        return ", ".join(map(_text, note))
+    return f"{note:.4g}" if isinstance(note, float) else str(note)

@@ -178,7 +178,10 @@ def test_the_verdict_follows_the_share_of_the_force_error(
         assert level == ("no" if share > 0.1 else "usable" if share > 0.02 else "good"), share
         assert code == (1 if level == "no" else 0)
         if level != "good":
-            assert f"the force error is {100 * share:.3g} % of the object's force range" in result["verdict"]
+            assert (
+                f"the RMS force error in motion is {100 * share:.3g} % of the object's force range"
+                in result["verdict"]
+            )
     assert levels["10"] == ("no", 1)
     assert levels["100"] == ("usable", 0)
     assert levels["3000"] == ("good", 0)

@@ -162,7 +162,7 @@ def test_a_plan_with_the_verdict_no_is_refused(tmp_path: Path, capsys: pytest.Ca
     model, header = MODELS / "certificate_stable.json", tmp_path / "soft.h"
     assert main(["export", str(model), "--c", "--uncertified", "-o", str(header)]) == 2
     refusal = capsys.readouterr().err
-    assert "the verdict of the plan is no: the force error is up to 0.586 N*m" in refusal
+    assert "the verdict of the plan is no: the largest force error at rest is 0.586 N*m" in refusal
     assert "Plan the model for another device, or give --accept-model" in refusal
     assert not header.exists()
 

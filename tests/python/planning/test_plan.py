@@ -447,7 +447,7 @@ def test_the_settings_of_a_plan_have_units() -> None:
     assert rotary["coupling"] == "K_c = 70 N*m/rad, B_c = 0.1 N*m*s/rad"
     assert rotary["object"] == "mass 0.001 kg*m^2, damping 0.5 N*m*s/rad"
     linear = Plan(keyswitch_by_hand(), Scheme(structure="direct", play_radius=1e-4)).settings()
-    assert linear["play radius"] == "0.0001 m"
+    assert linear["play radius"].startswith("0.0001 m: after a reversal the force changes over 0.0002 m")
     for samples, text in ((1, "the previous sample"), (4, "the previous 4 samples")):
         ahead = Plan(model_by_hand(), Scheme(structure="direct", predict=samples)).settings()
         assert ahead["prediction"] == f"half a sample ahead, from {text}"

@@ -54,7 +54,7 @@ def test_the_account_holds_a_model_whose_proved_force_error_is_not_accepted() ->
     assert held.force_error.share < 0.5 * proved.force_error.share
     assert 1.0 < held.proved_ratio <= 4.0 * 1.02
     assert held.account.share < 0.01
-    assert "direct, slope limited: the force error is " in str(held.verdict)
+    assert "direct, slope limited: the largest force error at rest is " in str(held.verdict)
     rows = held.summary()
     assert rows["certificate"] == "held by the energy account, samples up to 1.1 ms apart"
     assert rows["energy account"].startswith(f"a hand takes at most {1e3 * held.account.energy:.3g} mJ")

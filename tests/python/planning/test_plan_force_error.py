@@ -31,6 +31,7 @@ from palpate import (
 from palpate._core.model import fingerprint
 from palpate.cli.main import main
 from palpate.planning import OnDevice, example_profiles
+from palpate.planning.device_profile import find_profile
 from test_plan import SMOOTH, WEAK, slide
 
 
@@ -68,7 +69,7 @@ def test_plan_with_large_force_error_is_refused_and_the_model_file_is_unchanged(
     before = Path("k.json").read_bytes()
     assert main(["plan", "k.json", "--device", "phantom-premium-1.0", "-o", "k.json", "--json"]) == 1
     printed = json.loads(capsys.readouterr().out)
-    assert printed["verdict"].startswith("no: the force error is up to 1.2")
+    assert printed["verdict"].startswith("no: the largest force error at rest is 1.2")
     assert printed["force_error_share"] > 0.9
     assert printed["written"] is None
     assert Path("k.json").read_bytes() == before
@@ -280,7 +281,7 @@ def test_an_error_of_a_few_percent_is_usable_and_below_the_noticeable_good() -> 
 def test_plan_with_large_force_error_is_stored_only_if_accepted() -> None:
     chosen = plan(keyswitch_by_hand(), "touch", energy_account=False)
     assert chosen.verdict.level == "no"
-    with pytest.raises(InputError, match=r"a plan with verdict no is not stored: the force error"):
+    with pytest.raises(InputError, match=r"a plan with verdict no is not stored: the largest force error"):
         chosen.stored()
     largest = chosen.force_error.share
     again = plan(keyswitch_by_hand(), "touch", accept_force_error=largest, energy_account=False)
@@ -393,3 +394,29 @@ def test_plot_of_a_plan_draws_identified_and_rendered_force_at_rest() -> None:
         "felt at rest: direct, release",
     ]
     np.testing.assert_array_equal(strokes.lines[0].get_ydata(), strokes.lines[2].get_ydata())
+
+
+def test_a_plan_names_the_steepest_slope_with_the_rows_on_it() -> None:
+    x, dx = np.linspace(0.0, 0.004, 800, retstep=True)
+    force = 0.5 + 100.0 * x + 1.0 / (1.0 + np.exp(-(x - 0.003) / 1e-4))
+    noise = np.random.default_rng(3).normal(0.0, 1e-3, len(x))
+    model = identify(Recording.from_arrays(x, force + noise, units={"position": "m", "force": "N"}))
+    text = plan(model, slide(50.0)).summary()["steepest slope"]
+    found = re.fullmatch(r"(\S+) N/m at (\S+) m, known from (\d+) rows", text)
+    assert found
+    slope = np.gradient(force, dx)
+    assert float(found[1]) == pytest.approx(slope.max(), rel=0.05)
+    assert float(found[2]) == pytest.approx(0.003, abs=2e-5)
+    assert int(found[3]) == pytest.approx(np.count_nonzero(slope > 0.5 * slope.max()), abs=5)
+
+
+def test_the_least_play_radius_is_advised_and_sufficient() -> None:
+    model = keyswitch_by_hand(play_radius=1e-5)
+    coil = find_profile("voice-coil")
+    advised = re.search(r"give --play-radius (\S+), and after", str(plan(model, coil).verdict))
+    assert advised
+    radius = float(advised[1])
+    proved = plan(model, coil, play_radius=radius)
+    assert (proved.structure, proved.limited, proved.verdict.level) == ("direct", None, "good")
+    assert f"after a reversal the force changes over {2.0 * radius:.4g} m" in proved.settings()["play radius"]
+    assert plan(model, coil, play_radius=0.95 * radius).limited is not None

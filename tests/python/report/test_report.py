@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import palpate
-from models_by_hand import keyswitch_by_hand, model_by_hand
+from models_by_hand import keyswitch_by_hand, model_by_hand, relaxing_by_hand
 from palpate import DeviceProfile, InputError, Model, Recording
 from palpate.planning import example_profiles
 from palpate.report import Subject, report_of, write_report
@@ -361,3 +361,43 @@ def test_a_line_does_not_break_inside_an_option() -> None:
 
 def test_one_wavelet_is_not_plural() -> None:
     assert (counted(1, "wavelet"), counted(2, "wavelet")) == ("1 wavelet", "2 wavelets")
+
+
+def test_notes_of_the_file_are_words_and_no_json(planned: Model) -> None:
+    model = Model.from_dict(planned.to_dict())
+    model.notes["roles"] = {"moving": 590, "left out": 10}
+    model.notes["setup"] = [{"screw": 0.123456, "cells": [1, 2]}, None]
+    text = parsed(model).text["provenance"]
+    assert "moving: 590, left out: 10" in text
+    assert "screw: 0.1235, cells: 1, 2" in text
+    assert not set('{}"') & set(text)
+
+
+def labels(section: str, subject: Subject) -> list[str]:
+    """Returns the labels of the vertical axes of a section."""
+    found = next(each for each in sections_of(subject) if each.key == section)
+    return [panel.plot.yaxis.axis_label for chart in found.charts for panel in chart.panels]
+
+
+@pytest.mark.parametrize("hysteresis", [True, False])
+def test_the_energy_of_a_rotary_object_is_drawn_over_its_angle(*, hysteresis: bool) -> None:
+    extra = {"weight_hysteresis": [0.0], "bias_hysteresis": 0.1, "linear_hysteresis": [0.0]}
+    rotary = model_by_hand(units={"position": "rad", "force": "N*m"}, **(extra if hysteresis else {}))
+    linear = model_by_hand(units={"position": "m", "force": "N"})
+    assert any(label.startswith("energy [") for label in labels("force-curve", Subject.of(rotary)))
+    assert not any(label.startswith("energy [") for label in labels("force-curve", Subject.of(linear)))
+
+
+def test_a_model_with_memory_is_drawn_along_the_recording() -> None:
+    model = relaxing_by_hand()
+    time = np.arange(600) * 1e-3
+    x = np.interp(time, [0.0, 0.1, 0.5, 0.6], [0.0, 1.0, 1.0, 0.0]) * float(model.upper[0])
+    force, _ = model.force_over_time(time, x)
+    relaxing = Recording.from_arrays(x, force, time, units=model.units)
+    subject = Subject.of(model).compared_with(relaxing)
+    section = next(each for each in sections_of(subject) if each.key == "force-curve")
+    over_time = section.charts[-1].panels[0].plot
+    assert over_time.xaxis.axis_label == "time [s]"
+    drawn = [each.data_source.data["y"] for each in over_time.renderers]
+    assert np.ptp(drawn[0] - drawn[1]) < 1e-6 * np.ptp(drawn[0])
+    assert "with memory" in " ".join(section.sentences)
