@@ -151,6 +151,8 @@ test-full: setup control examples $(stamps)/simulators
 	$(call part,$(MAKE) --no-print-directory fuzz)
 	$(call part,$(MAKE) --no-print-directory test-packages)
 	$(call part,$(python) -m pytest tests/usb tests/simulators)
+	$(system_packages) windows
+	$(call part,tools/windows_tests.sh)
 	$(system_packages) browser
 	$(system_packages) portable
 	$(call part,$(parallel_pytest) -m "")

@@ -9,6 +9,9 @@ include(CheckPIESupported)
 check_pie_supported(LANGUAGES CXX)
 
 function(palpate_harden target)
+  if(MSVC)
+    return() # these are flags of GCC and clang
+  endif()
   # The last two protect jumps and returns: the first on x86-64, the second on aarch64. clang only warns of a flag that
   # it does not use on this processor.
   set(CMAKE_REQUIRED_FLAGS -Werror)
@@ -24,5 +27,7 @@ function(palpate_harden target)
   target_compile_options(${target} PRIVATE "$<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=3>")
   target_compile_definitions(${target} PRIVATE _GLIBCXX_ASSERTIONS)
   set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-  target_link_options(${target} PRIVATE LINKER:-z,relro LINKER:-z,now LINKER:-z,noexecstack)
+  if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
+    target_link_options(${target} PRIVATE LINKER:-z,relro LINKER:-z,now LINKER:-z,noexecstack)
+  endif()
 endfunction()

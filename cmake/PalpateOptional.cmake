@@ -4,6 +4,9 @@
 palpate_find_or_fetch(
   nlohmann_json https://github.com/nlohmann/json/releases/download/v3.11.2/json.tar.xz
   8c4b26bf4b422252e13f332bc5e388ec0ab5c3443d24399acb675e68278d341f 3.9)
+if(PALPATE_BUILD_CONTROL STREQUAL "AUTO" AND NOT CMAKE_SYSTEM_NAME STREQUAL "Linux")
+  set(PALPATE_BUILD_CONTROL OFF) # live control needs Linux
+endif()
 if(PALPATE_BUILD_CONTROL STREQUAL "AUTO")
   find_package(CLI11 2.1 QUIET)
   if(NOT CLI11_FOUND)

@@ -5,6 +5,10 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
 add_library(palpate_options INTERFACE)
 
+if(MSVC)
+  target_compile_options(palpate_options INTERFACE /W4 /utf-8 /bigobj)
+  return()
+endif()
 # Files that are compiled as one share a scope, in which a local name of one file may be a global name of another.
 target_compile_options(
   palpate_options INTERFACE -Wall -Wextra -Wpedantic -Wnon-virtual-dtor -Woverloaded-virtual

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the missing Debian or Ubuntu packages, or prints one line with the packages to install.
 #
-#   tools/system_packages.sh PYTHON build|control|test-cpp|docs|guest|browser|portable|fuzz|coverage
+#   tools/system_packages.sh PYTHON build|control|test-cpp|docs|guest|browser|portable|windows|fuzz|coverage
 set -euo pipefail
 
 python=$1
@@ -63,6 +63,12 @@ assert os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' 
         [ -e /usr/include/newlib ] || echo libnewlib-arm-none-eabi
         command -v qemu-system-arm >/dev/null || echo qemu-system-arm
         command -v clang >/dev/null || echo clang
+    fi
+    if [ "$purpose" = windows ]; then
+        # for the tests that are compiled for Windows and run under Wine
+        command -v x86_64-w64-mingw32-g++-posix >/dev/null || echo g++-mingw-w64-x86-64-posix
+        [ -e /usr/lib/wine/wine64 ] || echo wine64
+        [ -e /usr/src/googletest ] || echo googletest
     fi
     if [ "$purpose" = fuzz ]; then
         missing_clang fuzzes

@@ -10,9 +10,12 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "bindings.hpp"
-#include "palpate/io/growing_file.hpp"
 #include "palpate/io/parse_model.hpp"
 #include "palpate/io/plan_file.hpp"
+
+#ifdef __linux__
+#include "palpate/io/growing_file.hpp"
+#endif
 
 namespace palpate::bindings {
 
@@ -120,12 +123,16 @@ void bind_io(py::module_& module) {
     module.def(
         "follow_links",
         [](const std::filesystem::path& path) {
+#ifdef __linux__
             std::string target;
             if (const std::string reason = palpate::detail::follow_links(path.string(), target);
                 !reason.empty()) {
                 throw std::invalid_argument{reason};
             }
             return std::filesystem::path{target};
+#else
+            return std::filesystem::weakly_canonical(path);
+#endif
         },
         "path"_a,
         "Returns the file to which a chain of symbolic links leads; the file may be missing. Raises\n"

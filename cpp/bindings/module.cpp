@@ -42,5 +42,7 @@ PYBIND11_MODULE(_core, module) {
     submodule("portable", "Models as tables for programs in C.", bind_portable);
     submodule("io", "Model files.", bind_io);
     submodule("simulation", "Rendering in virtual time on a simulated device.", bind_simulation);
+#ifdef __linux__
     submodule("run", "Rendering and measuring in real time.", bind_run);
+#endif
 }

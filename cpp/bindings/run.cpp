@@ -205,8 +205,6 @@ py::dict measure_in_python(const std::optional<ForceModel>& object, const std::s
 }  // namespace
 
 void bind_run(py::module_& module) {
-    module.attr("tolerated_change") = detail::tolerated_change;
-    module.attr("smallest_domain_share") = detail::smallest_domain_share;
     module.attr("usual_telemetry_hz") = Telemetry::usual_hz;
     py::class_<LoopSettings>(module, "LoopSettings", "Default rate, duration and least rate of a run.")
         .def(py::init<>())

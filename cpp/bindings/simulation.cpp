@@ -93,6 +93,8 @@ py::dict rendered_along(const Array& samples, const char* name, double period_s,
 }  // namespace
 
 void bind_simulation(py::module_& module) {
+    module.attr("tolerated_change") = tolerated_change;
+    module.attr("smallest_domain_share") = smallest_domain_share;
     py::class_<Hand> hand(module, "Hand",
                           "Simulated hand: a spring to a target that moves between lower and upper, and\n"
                           "a damper between handle and ground.");

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-/// Includes all headers of palpate that need no third-party library.
+/// Includes all headers of palpate that need no third-party library; those of live control only on Linux.
 
 #include "palpate/device/packet_stream.hpp"
 #include "palpate/dynamics/filters.hpp"
 #include "palpate/fields/escaped.hpp"
 #include "palpate/portable/export_check.hpp"
-#include "palpate/realtime/wake_up.hpp"
-#include "palpate/run/measure.hpp"
 #include "palpate/simulation/faulty_device.hpp"
 #include "palpate/simulation/force_error.hpp"
 #include "palpate/simulation/press.hpp"
@@ -16,3 +14,9 @@
 #include "palpate/stability/certificate_check.hpp"
 #include "palpate/stability/renderable_slopes.hpp"
 #include "palpate/version.hpp"
+
+// Live control needs the clock and the scheduler of Linux; all other headers work on every system.
+#ifdef __linux__
+#include "palpate/realtime/wake_up.hpp"
+#include "palpate/run/measure.hpp"
+#endif

@@ -8,7 +8,7 @@ import palpate._core.model
 import palpate._core.rendering
 import palpate._core.stability
 import typing
-__all__: list[str] = ['LoopSettings', 'measure', 'render', 'smallest_domain_share', 'tolerated_change', 'usual_telemetry_hz']
+__all__: list[str] = ['LoopSettings', 'measure', 'render', 'usual_telemetry_hz']
 class LoopSettings:
     """
     Default rate, duration and least rate of a run.
@@ -64,6 +64,4 @@ def render(model: palpate._core.model.ForceModel, plan: palpate._core.rendering.
     Returns the values of the summary by name, and the text of the summary under `lines`. Raises InputError
     if the rendering is refused, before the device moves.
     """
-smallest_domain_share: float = 0.1
-tolerated_change: float = 0.01
 usual_telemetry_hz: float = 50.0

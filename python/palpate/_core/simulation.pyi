@@ -10,7 +10,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['AccountUse', 'Hand', 'RestingOscillation', 'TestRig', 'account_use', 'force_driven', 'force_error', 'motion_driven', 'resting_oscillation', 'rig_for', 'simulate']
+__all__: list[str] = ['AccountUse', 'Hand', 'RestingOscillation', 'TestRig', 'account_use', 'force_driven', 'force_error', 'motion_driven', 'resting_oscillation', 'rig_for', 'simulate', 'smallest_domain_share', 'tolerated_change']
 class Hand:
     """
     Simulated hand: a spring to a target that moves between lower and upper, and
@@ -219,3 +219,5 @@ def simulate(model: palpate._core.model.ForceModel, scheme: palpate._core.render
     - force (commanded), applied (at the end of the tick), mean_applied (over the tick).
     - evaluations, status, extrapolated.
     """
+smallest_domain_share: float = 0.1
+tolerated_change: float = 0.01

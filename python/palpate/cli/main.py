@@ -13,6 +13,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from ..errors import command_word, did_you_mean
+from ..system import require_live_control
 from .completion import SHELLS, completes, script_of
 from .exit_status import INTERRUPTED, exit_status_of
 from .printing import TERMS, Verbs, drop_what_cannot_be_written, echo, prepare_streams, print_line
@@ -33,6 +34,9 @@ _VERBS = {
     "demo": "Identify, verify and render a simulated sample.",
 }
 """Verbs with their lines in the help. The file of a verb is imported only when the verb is used."""
+
+_LIVE_VERBS = ("render", "record", "check-device")
+"""Verbs that control a device in real time."""
 
 
 _USUAL_WORDS = {
@@ -68,6 +72,8 @@ class _LazyVerbs(Verbs):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _VERBS:
             return None
+        if cmd_name in _LIVE_VERBS:
+            require_live_control(f"palpate {cmd_name}")
         name = cmd_name.replace("-", "_")
         command = getattr(import_module(f".{name}", __package__), name)
         assert isinstance(command, click.Command)

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .._core.run import measure as measure_live
 from ..errors import InputError
 from ..model import Model
+from ..system import require_live_control
 
 Progress = Callable[[int, float, float, int], None]
 """Function that is called ten times a second with number of ticks, position, force, number of lost samples"""
@@ -37,6 +37,9 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     InputError
         The measurement was refused before any motion; the message states the device, the reason and the cure.
     """
+    require_live_control("a measurement on a device")
+    from .._core.run import measure as measure_live
+
     if object is not None:
         if device != "simulated":
             raise InputError(f"object needs device simulated; {device} has a real object: leave out object")

@@ -12,8 +12,7 @@ import numpy as np
 from .. import _core
 from .._core.device import DeviceProfile
 from .._core.rendering import Scheme
-from .._core.run import smallest_domain_share, tolerated_change
-from .._core.simulation import Hand, TestRig, motion_driven
+from .._core.simulation import Hand, TestRig, motion_driven, smallest_domain_share, tolerated_change
 from .._core.status import Status
 from .._typing import Float1D
 from ..arguments import instance_of, real_of

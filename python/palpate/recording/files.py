@@ -8,7 +8,6 @@ changed it.
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import os
@@ -18,7 +17,7 @@ import struct
 import time
 import zipfile
 from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,6 +26,7 @@ import pandas as pd
 
 from .._core.io import follow_links
 from ..errors import InputError, shortened
+from ..system import create, sync
 from .table import Cells
 
 _BLOCK_BYTES = 1 << 20
@@ -206,17 +206,17 @@ def replacing(path: str | os.PathLike[str], *, replace: bool = True) -> Iterator
         raise InputError(f"{path} cannot be written: it is not an ordinary file")
     temporary = target.with_name(f".{target.name[:40]}.{secrets.token_hex(8)}.tmp")
     try:
-        _create(temporary, replaced)
+        create(temporary, replaced)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}") from None
     try:
         yield temporary
-        _sync(temporary)
+        sync(temporary)
         if replace:
             temporary.replace(target)
         else:
             _rename_to_free_name(temporary, target)
-        _sync(target.parent)
+        sync(target.parent)
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -225,31 +225,6 @@ def require_absent(path: Path) -> None:
     """Raises InputError if a path exists; a broken symbolic link also counts as existing."""
     if os.path.lexists(path):
         raise InputError(f"{path} exists already; choose another name, or replace it with --force")
-
-
-def _create(temporary: Path, replaced: os.stat_result | None) -> None:
-    """Creates a new file with the owner and mode of the file that it will replace."""
-    mode = 0o666 if replaced is None else stat.S_IMODE(replaced.st_mode)
-    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
-    try:
-        if replaced is not None:
-            with suppress(PermissionError):  # only root may change the owner of a file
-                os.fchown(descriptor, replaced.st_uid, replaced.st_gid)
-            os.fchmod(descriptor, mode)  # the umask reduces the mode given to `open`
-    finally:
-        os.close(descriptor)
-
-
-def _sync(path: Path) -> None:
-    """Waits until the content of a file or folder is stored on the disk, if the file system supports this."""
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        os.fsync(descriptor)
-    except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
-            raise
-    finally:
-        os.close(descriptor)
 
 
 def _rename_to_free_name(temporary: Path, target: Path) -> None:

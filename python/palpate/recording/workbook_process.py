@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import datetime
 import marshal
-import resource
 import sys
 from pathlib import Path
 from typing import Any
@@ -29,12 +28,8 @@ def main(library_folder: str, path: str, memory_bytes: str) -> int:
     sys.path.append(library_folder)
     from python_calamine import CalamineWorkbook, SheetTypeEnum, SheetVisibleEnum
 
-    own_pages = int(Path("/proc/self/statm").read_text().split()[0])
-    limit = own_pages * resource.getpagesize() + int(memory_bytes)
-    _, highest = resource.getrlimit(resource.RLIMIT_AS)
-    limit = limit if highest == resource.RLIM_INFINITY else min(limit, highest)
-    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    if sys.platform == "linux":
+        _limit_memory(int(memory_bytes))
     try:
         book = _opened(CalamineWorkbook, path)
         sheets = []
@@ -49,6 +44,18 @@ def main(library_folder: str, path: str, memory_bytes: str) -> int:
         sys.stderr.write(f"{error}" or type(error).__name__)
         return 1
     return 0
+
+
+def _limit_memory(further_bytes: int) -> None:
+    """Limits the address space of this process to its present size and `further_bytes`."""
+    import resource
+
+    own_pages = int(Path("/proc/self/statm").read_text().split()[0])
+    limit = own_pages * resource.getpagesize() + further_bytes
+    _, highest = resource.getrlimit(resource.RLIMIT_AS)
+    limit = limit if highest == resource.RLIM_INFINITY else min(limit, highest)
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _opened(library: Any, path: str) -> Any:

@@ -9,15 +9,11 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "palpate/io/growing_file.hpp"
 #include "palpate/io/tick_record.hpp"
 
 namespace palpate {
-
-/// Metadata at the start of a recording, as pairs of a key and its text.
-using Metadata = std::vector<std::pair<std::string, std::string>>;
 
 /// A recording that is written during a run: a CSV file with `#` lines of metadata, a header of names with units, and
 /// one row for each tick. The start of the file reserves space for the exit reason and the timing of the run, which are

@@ -8,10 +8,15 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "palpate/status.hpp"
 
 namespace palpate {
+
+/// Metadata at the start of a recording, as pairs of a key and its text.
+using Metadata = std::vector<std::pair<std::string, std::string>>;
 
 /// Record of one tick for recordings and telemetry, in SI units.
 struct TickRecord {

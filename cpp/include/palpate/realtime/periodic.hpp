@@ -7,13 +7,9 @@
 #include <cerrno>
 #include <cstdint>
 
+#include "palpate/realtime/timing.hpp"
+
 namespace palpate {
-
-/// Time or duration [ns].
-using Nanoseconds = std::int64_t;
-
-/// Nanoseconds in a second.
-inline constexpr Nanoseconds nanoseconds_a_second = 1'000'000'000;
 
 /// Returns the time of the monotonic system clock, which never jumps [ns]. All deadlines are times of this clock.
 [[nodiscard]] inline Nanoseconds monotonic_now() noexcept {
@@ -21,14 +17,6 @@ inline constexpr Nanoseconds nanoseconds_a_second = 1'000'000'000;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return now.tv_sec * nanoseconds_a_second + now.tv_nsec;
 }
-
-/// One wake-up of a control loop.
-struct Wake {
-    Nanoseconds deadline = 0;  ///< planned time of the wake-up
-    Nanoseconds now = 0;       ///< actual time of the wake-up
-    /// Number of ticks that are skipped, because their planned times had also passed at this wake-up
-    std::uint64_t skipped = 0;
-};
 
 /// Wakes up a loop at the fixed times (deadlines) t_0 + k T, with period T, so that a late tick does not delay later
 /// ticks. Deadlines that have already passed are skipped and counted; their ticks are not run later.

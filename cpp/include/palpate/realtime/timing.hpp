@@ -9,9 +9,21 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "palpate/realtime/periodic.hpp"
-
 namespace palpate {
+
+/// Time or duration [ns].
+using Nanoseconds = std::int64_t;
+
+/// Nanoseconds in a second.
+inline constexpr Nanoseconds nanoseconds_a_second = 1'000'000'000;
+
+/// One wake-up of a control loop.
+struct Wake {
+    Nanoseconds deadline = 0;  ///< planned time of the wake-up
+    Nanoseconds now = 0;       ///< actual time of the wake-up
+    /// Number of ticks that are skipped, because their planned times had also passed at this wake-up
+    std::uint64_t skipped = 0;
+};
 
 /// A histogram of durations from 0 ns to 18 minutes, with fixed size and without allocation. Its durations are exact to
 /// 1/256 of their value. From 256 ns on, the durations between two powers of two are divided into 128 equal cells;

@@ -13,6 +13,12 @@
 
 namespace palpate {
 
+/// A rendering, live or simulated, is not good if the ticks whose force was changed in one way, divided by all ticks,
+/// exceed this limit [-]
+inline constexpr double tolerated_change = 0.01;
+/// A rendering is not good if the handle's travel divided by the length of the domain is below this limit [-]
+inline constexpr double smallest_domain_share = 0.1;
+
 /// Reading, computed force, sent force and status of one tick of the control loop.
 struct Tick {
     Reading reading;             ///< reading from which the force was computed

@@ -39,13 +39,8 @@ namespace detail {
 /// A run is not good if missed ticks divided by planned ticks exceed this limit, or if lost and repeated samples
 /// divided by ticks exceed this limit [-]
 inline constexpr double tolerated_loss = 0.001;
-/// A run is not good if the ticks with one kind of finding in `judge_forces`, divided by all ticks, exceed this limit
-/// [-]
-inline constexpr double tolerated_change = 0.01;
 /// A recording of a real object is not good if the handle's travel is less than this number of encoder steps
 inline constexpr double fewest_encoder_steps = 50;
-/// A rendering is not good if the handle's travel divided by the length of the domain is below this limit [-]
-inline constexpr double smallest_domain_share = 0.1;
 
 /// Returns two counts and their ratio as a text such as "12 of 1000 (1.2 %)".
 [[nodiscard]] inline std::string share_text(std::uint64_t part, std::uint64_t whole) {

@@ -10,7 +10,7 @@
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/fields/readable.hpp"
-#include "palpate/io/recording_file.hpp"
+#include "palpate/io/tick_record.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/make_structure.hpp"
