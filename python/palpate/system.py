@@ -36,7 +36,7 @@ def create(path: Path, replaced: os.stat_result | None) -> None:
     """Creates a new file with the owner and mode of the file that it will replace, where the system has
     both."""
     mode = 0o666 if replaced is None else stat.S_IMODE(replaced.st_mode)
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
     descriptor = os.open(path, flags, mode)
     try:
         if replaced is not None and hasattr(os, "fchown"):
@@ -51,7 +51,7 @@ def sync(path: Path) -> None:
     """Waits until the content of a file or folder is stored on the disk, if the file system supports this."""
     if os.name == "nt":  # Windows opens no folder, and writes back only files that are open for writing
         return
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     except OSError as error:

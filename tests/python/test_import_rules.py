@@ -9,8 +9,8 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "python" / "palpate"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
-# Packages that are optional, or whose import takes longer than a run of most verbs; these are imported inside
-# functions. The module plotting imports matplotlib.
+# Packages that are optional, that a system may lack, or whose import takes longer than a run of most verbs;
+# these are imported inside functions. The module plotting imports matplotlib.
 IMPORTED_LATE = {
     "matplotlib",
     "palpate.plotting",
@@ -25,6 +25,8 @@ IMPORTED_LATE = {
     "tornado",
     "pywt",
     "usb",
+    "resource",
+    "palpate._core.run",
 }
 
 
