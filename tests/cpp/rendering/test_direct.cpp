@@ -13,6 +13,7 @@
 #include "limits/trials.hpp"
 #include "palpate/rendering/direct.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/run/session_text.hpp"
 #include "palpate/simulation/closed_loop.hpp"
 #include "support.hpp"
 
