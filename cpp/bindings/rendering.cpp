@@ -27,7 +27,7 @@ void bind_rendering(py::module_& module) {
                             "Structure that renders a model, with the numbers of the structure in SI units.");
     bind_fields(type);
     type.def_property_readonly(
-            "has_coupling", [](const Scheme& s) { return has_coupling(s.structure); },
+            "has_coupling", [](const Scheme& s) { return has_coupling(s.structure) && !is_uncoupled(s); },
             "True if the structure has a virtual coupling between device and object.")
         .def_property_readonly(
             "has_mass", [](const Scheme& s) { return has_mass(s.structure); },
