@@ -2,10 +2,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <utility>
 
@@ -102,10 +105,13 @@ template <class Random>
     scene.object.amplitude = pick(3) == 0 ? 0.0 : between(-1.0, 1.0) * 5e3 * scene.object.width;
     const double mass = log_between(0.2, 5.0);
     const ForceBounds bounds = scene.object.bounds();
-    scene.inertia = admittance_object(scene.structure, bounds, {mass, 0.0}, device, mass);
+    // The explicit structure is proved for a mass of at least B_o T only
+    scene.inertia = admittance_object(
+        scene.structure, bounds, {mass, 0.0}, device,
+        scene.structure == StructureKind::Explicit ? std::nullopt : std::optional{mass});
     scene.needed = scene.inertia.damping;
     scene.inertia.damping *= share;
-    const auto part = [&](double most) { return most * (pick(2) == 0 ? double(pick(2)) : between(0.0, 1.0)); };
+    const auto part = [&](double most) { return most * (pick(2) == 0 ? static_cast<double>(pick(2)) : between(0.0, 1.0)); };
     scene.hand = {.stiffness = pick(2) == 0 ? display.hand_stiffness : part(display.hand_stiffness),
                   .damping = part(display.hand_damping),
                   .mass = part(display.hand_mass)};

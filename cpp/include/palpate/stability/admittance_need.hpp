@@ -144,7 +144,7 @@ class AdmittanceNeed {
         for (std::size_t k = 0; k < sums.size(); ++k) {
             const double highest = sums[k].value.real() + std::abs(sums[k].slope.real()) * half +
                                    (half > 0.0 ? 0.5 * curvature_[k] * half * half : 0.0);
-            need += limits_[k] > 0.0 ? limits_[k] * std::max(0.0, highest) : 0.0;
+            need += limits_[k] == 0.0 ? 0.0 : limits_[k] * std::max(0.0, highest);
         }
         return need;
     }
