@@ -41,7 +41,8 @@ struct WavySpring {
     }
     [[nodiscard]] ForceBounds bounds() const noexcept {
         ForceBounds found;
-        found.slope = {stiffness - amplitude / width, stiffness + amplitude / width};
+        const double wave = std::abs(amplitude) / width;
+        found.slope = {stiffness - wave, stiffness + wave};
         found.steepest = found.sliding = found.slope.largest();
         return found;
     }

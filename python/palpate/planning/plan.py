@@ -13,7 +13,13 @@ import numpy as np
 from .._core.device import DeviceProfile
 from .._core.io import checked_certificate, scheme_of
 from .._core.model import ForceModel
-from .._core.rendering import Scheme, default_play_radius, solver_name
+from .._core.rendering import (
+    Scheme,
+    default_play_radius,
+    display_lag_s,
+    solver_name,
+    virtual_friction,
+)
 from .._core.simulation import AccountUse, account_use, motion_driven, resting_oscillation
 from .._core.stability import (
     Certificate,
@@ -315,8 +321,9 @@ class Plan:
     def _display_rows(self) -> dict[str, str]:
         """Returns the hands for which a plan on an admittance display is proved, and what the hand feels in
         addition to the object, for display, by name."""
-        assert self.certificate is not None
-        display = self.certificate.device.admittance
+        certificate = self.certificate
+        assert certificate is not None
+        display = certificate.device.admittance
         if display is None:
             return {}
         units, scheme = self._units(), self.scheme
@@ -327,7 +334,11 @@ class Plan:
                 f"up to {display.hand_stiffness:.4g}{units['stiffness']}, "
                 f"{display.hand_damping:.4g}{units['damping']}, {display.hand_mass:.4g}{units['mass']}"
             ),
-            "felt in addition": f"damping {damping:.4g}{units['damping']}, mass {mass:.4g}{units['mass']}",
+            "felt in addition": (
+                f"damping {damping:.4g}{units['damping']} plus {1e3 * display_lag_s(certificate.device):.3g} ms "
+                f"times the slope of the object, mass {mass:.4g}{units['mass']}, friction "
+                f"{virtual_friction(certificate.device):.3g} {self.model.units['force']}".rstrip()
+            ),
         }
 
     def settings(self) -> dict[str, str]:

@@ -32,6 +32,13 @@ concept PositionSource = requires(A& source, double number) {
     return Servo{display.servo_bandwidth_hz, display.servo_damping};
 }
 
+/// Returns the time by which the handle follows the virtual object in slow motion [s]: delay and lag of the servo, less
+/// the feed-forward. A hand feels the slope f' of the object times this time as damping, in addition to B_o.
+[[nodiscard]] inline double display_lag_s(const DeviceProfile& device) noexcept {
+    const AdmittanceDisplay display = device.admittance.value_or(AdmittanceDisplay{});
+    return device.delay_s + servo_of(display).lag_s() - display.feed_forward_s;
+}
+
 /// Returns the Coulomb friction of the virtual object that makes the steps of command and force sensor harmless [N or
 /// N*m]. A command that is wrong by half a step D changes the force of a hand in the stated range by at most
 ///
