@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints known limits of admittance displays next to simulations of them:
-//
-//     admittance_displays line      object damping of the certificate, of the linear limit and with a feed-forward
-//     admittance_displays linear    exact linear limits against simulated ones
-//     admittance_displays clutch    oscillation of a clutch pedal with a force peak, and of the inverse curve
-//     admittance_displays stops     energy of a free mass between two stops
-//     admittance_displays map       largest stable stiffness of explicit and implicit over mass and damping
+// Prints known limits of admittance displays next to simulations of them, one table for each argument.
+// line: object damping of the certificate, of the linear limit, and with a feed-forward.
+// linear: exact linear limits against simulated ones.
+// clutch: oscillation of a clutch pedal with a force peak, and of the inverse curve.
+// stops: energy of a free mass between two stops.
+// map: largest stable stiffness of explicit and implicit over mass and damping.
 
 #include <cmath>
 #include <cstdio>
@@ -53,13 +52,14 @@ Admittance spring(StructureKind structure, double stiffness, Inertia inertia, co
 }
 
 /// Returns the least stable damping of a linear object, over its slopes [N*s/m].
-double linear_limit(StructureKind structure, const ForceBounds& bounds, double mass, const DeviceProfile& device,
-                    double above) {
+double linear_limit(StructureKind structure, const ForceBounds& bounds, double mass,
+                    const DeviceProfile& device, double above) {
     double largest = 0.0;
     for (const double slope : {bounds.slope.lower, 0.0, bounds.slope.upper}) {
         const Grip hand{.stiffness = device.admittance->hand_stiffness};
         const auto unstable = [&](double damping) {
-            return palpate::bench::grows(spring(structure, slope, {mass, damping}, device), device, hand, 100'000);
+            return palpate::bench::grows(spring(structure, slope, {mass, damping}, device), device, hand,
+                                         100'000);
         };
         // A falling object with a hand that is stiffer than its slope can be stable
         if (slope + hand.stiffness > 0.0 && unstable(1e-3 * above) && !unstable(above)) {
@@ -81,11 +81,15 @@ void print_line() {
         {"2 kg, 1 ms, second order 20 Hz", 2.0, display(1e-3, 1, 20.0, 0.8, 5e3, 50.0), {0.0, 5e3}},
         {"same, falling slopes", 2.0, display(1e-3, 1, 20.0, 0.8, 5e3, 50.0), {-3e3, 9e3}},
         {"5 kg, 4 ms, second order 10 Hz", 5.0, display(4e-3, 1, 10.0, 0.8, 5e3, 50.0), {0.0, 5e3}},
-        {"pedal 2 kg, 0.25 ms, second order 60 Hz", 2.0, display(2.5e-4, 1, 60.0, 0.8, 3e4, 50.0), {-3e3, 9e3}},
+        {"pedal 2 kg, 0.25 ms, second order 60 Hz",
+         2.0,
+         display(2.5e-4, 1, 60.0, 0.8, 3e4, 50.0),
+         {-3e3, 9e3}},
         {"pedal 5 kg, same", 5.0, display(2.5e-4, 1, 60.0, 0.8, 3e4, 50.0), {-3e3, 9e3}},
         {"pedal 0.5 kg, 0.25 ms, no lag", 0.5, display(2.5e-4, 1, {}, {}, 3e4, 50.0), {-3e3, 9e3}}};
-    std::printf("| display | implicit | explicit | energy-consistent | linear implicit | linear explicit | with "
-                "feed-forward |\n|---|---|---|---|---|---|---|\n");
+    std::printf(
+        "| display | implicit | explicit | energy-consistent | linear implicit | linear explicit | with "
+        "feed-forward |\n|---|---|---|---|---|---|---|\n");
     for (const Case& each : cases) {
         ForceBounds bounds;
         bounds.slope = each.slopes;
@@ -155,9 +159,11 @@ void print_clutch() {
     const ForceBounds bounds = palpate::bench::Clutch::bounds();
     const Inertia object = palpate::admittance_object(StructureKind::Implicit, bounds, {1.0, 0.0},
                                                       palpate::bench::clutch_pedal(), 1.0);
-    std::printf("clutch: slopes %.4g to %.4g N/mm, 4 kHz, servo 60 Hz, foot 20 N/mm, mass 1 kg, certified B_o "
-                "%.4g N*s/m\n\n| rendering | damping of the foot [N*s/m] | oscillation at the end [um] |\n|---|---|---|\n",
-                1e-3 * bounds.slope.lower, 1e-3 * bounds.slope.upper, object.damping);
+    std::printf(
+        "clutch: slopes %.4g to %.4g N/mm, 4 kHz, servo 60 Hz, foot 20 N/mm, mass 1 kg, certified B_o "
+        "%.4g N*s/m\n\n| rendering | damping of the foot [N*s/m] | oscillation at the end [um] "
+        "|\n|---|---|---|\n",
+        1e-3 * bounds.slope.lower, 1e-3 * bounds.slope.upper, object.damping);
     for (const double damping : {0.0, 50.0}) {
         for (const double share : {1.0, 0.9, 0.8, 0.5, 0.3}) {
             std::printf("| virtual object, %g of the certified B_o | %g | %.4g |\n", share, damping,
@@ -206,8 +212,8 @@ void print_map() {
                         return palpate::bench::grows(spring(structure, 0.0, {mass, damping}, device), device,
                                                      {.stiffness = stiffness}, 20'000);
                     });
-                std::printf("%g,%g,%s,%.6g,%.6g\n", mass, damping, is_explicit ? "explicit" : "implicit", formula,
-                            simulated);
+                std::printf("%g,%g,%s,%.6g,%.6g\n", mass, damping, is_explicit ? "explicit" : "implicit",
+                            formula, simulated);
             }
         }
     }

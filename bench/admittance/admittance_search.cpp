@@ -43,7 +43,8 @@ Counts search(int scenes, std::uint64_t seed, double share) {
 int main(int argc, char** argv) {
     const int scenes = argc > 1 ? std::atoi(argv[1]) : 10'000;
     const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
-    std::printf("| B_o over the certificate | scenes | more energy taken out than allowed |\n|---|---|---|\n");
+    std::printf(
+        "| B_o over the certificate | scenes | more energy taken out than allowed |\n|---|---|---|\n");
     int wrong = 0;
     for (const double share : {1.0, 0.97, 0.9, 0.7, 0.5}) {
         const Counts counts = search(share == 1.0 ? scenes : std::max(1, scenes / 10), seed, share);

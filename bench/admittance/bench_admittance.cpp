@@ -38,8 +38,12 @@ constexpr palpate::VirtualCoupling none{0.0, 0.0};
 constexpr Inertia inertia{2e-3, 0.1};
 constexpr double travel = 0.6;
 
-WaveletNetwork spring_and_wall(std::size_t size) { return palpate::bench::spring_and_wall(size); }
-WaveletNetwork two_clicks(std::size_t size) { return palpate::bench::two_clicks(size); }
+WaveletNetwork spring_and_wall(std::size_t size) {
+    return palpate::bench::spring_and_wall(size);
+}
+WaveletNetwork two_clicks(std::size_t size) {
+    return palpate::bench::two_clicks(size);
+}
 
 /// Returns the force of a slow motion through the travel, with the damping of the object.
 std::vector<double> forces(const WaveletNetwork& object) {
@@ -123,8 +127,8 @@ void energy_consistent(benchmark::State& state) {
     step(state, network, over(CompiledNetwork{network}), over(network));
 }
 
-#define PALPATE_ADMITTANCE(function)                            \
-    BENCHMARK(function<spring_and_wall>)->Arg(16)->Arg(64);     \
+#define PALPATE_ADMITTANCE(function)                        \
+    BENCHMARK(function<spring_and_wall>)->Arg(16)->Arg(64); \
     BENCHMARK(function<two_clicks>)->Arg(16)->Arg(64)
 
 PALPATE_ADMITTANCE(explicit_step);

@@ -40,9 +40,9 @@ struct Clutch {
         double height, centre, width;
     };
     static constexpr std::array<Rise, 4> rises{{{261.376, 0.0, 10.3043e-3},
-                                               {-70.1857, 19.2097e-3, 3.68766e-3},
-                                               {620.0, 68e-3, 23e-3},
-                                               {620.0, -52e-3, 23e-3}}};
+                                                {-70.1857, 19.2097e-3, 3.68766e-3},
+                                                {620.0, 68e-3, 23e-3},
+                                                {620.0, -52e-3, 23e-3}}};
 
     [[nodiscard]] EnvironmentSample at(double y, const State& /*stateless*/) const noexcept {
         EnvironmentSample sample;
@@ -104,8 +104,8 @@ struct TwoStops {
 /// Half the range of the handle's motion [m] in the last tenth of `samples`, with a constant push. `next` returns the
 /// command for a measured force.
 template <class Next>
-[[nodiscard]] double final_oscillation(const DeviceProfile& device, const Grip& hand, double start, int samples,
-                                       const Next& next) {
+[[nodiscard]] double final_oscillation(const DeviceProfile& device, const Grip& hand, double start,
+                                       int samples, const Next& next) {
     SimulatedDisplay display{device, start};
     double low = start;
     double high = start;
@@ -206,7 +206,8 @@ template <class Grows>
 
 /// Returns true if a motion of the object grows without a push of the hand: if its range in the second half of the
 /// samples is larger than in the first half after the start.
-[[nodiscard]] inline bool grows(Admittance source, const DeviceProfile& device, const Grip& hand, int samples) {
+[[nodiscard]] inline bool grows(Admittance source, const DeviceProfile& device, const Grip& hand,
+                                int samples) {
     SimulatedDisplay display{device, 1e-3};
     source.reset(1e-3);
     double first = 0.0;
@@ -218,7 +219,8 @@ template <class Grows>
         if (size > 1e3) {
             return true;
         }
-        (k < samples / 2 ? first : second) = std::max(k < samples / 2 ? (k < samples / 10 ? 0.0 : first) : second, size);
+        (k < samples / 2 ? first : second) =
+            std::max(k < samples / 2 ? (k < samples / 10 ? 0.0 : first) : second, size);
     }
     return second > first;
 }

@@ -31,8 +31,8 @@ struct WavySpring {
 
     [[nodiscard]] EnvironmentSample at(double y, const State& /*stateless*/) const noexcept {
         const double u = y / width;
-        return {stiffness * y + amplitude * std::sin(u), stiffness + amplitude / width * std::cos(u), energy(y),
-                false};
+        return {stiffness * y + amplitude * std::sin(u), stiffness + amplitude / width * std::cos(u),
+                energy(y), false};
     }
     void advance(double /*y*/, State& /*stateless*/) const noexcept {}
     [[nodiscard]] State start(double /*y*/) const noexcept { return {}; }
@@ -90,7 +90,8 @@ template <class Random>
         display.handle_mass = pick(2) == 0 ? 0.0 : between(0.0, 0.2);
     }
     if (pick(5) == 0) {
-        display.feed_forward_s = between(0.2, 1.0) * Servo{display.servo_bandwidth_hz, display.servo_damping}.lag_s();
+        display.feed_forward_s =
+            between(0.2, 1.0) * Servo{display.servo_bandwidth_hz, display.servo_damping}.lag_s();
     }
     if (pick(5) == 0) {
         display.rate_limit = log_between(0.02, 0.5);
@@ -107,12 +108,14 @@ template <class Random>
     const double mass = log_between(0.2, 5.0);
     const ForceBounds bounds = scene.object.bounds();
     // The explicit structure is proved for a mass of at least B_o T only
-    scene.inertia = admittance_object(
-        scene.structure, bounds, {mass, 0.0}, device,
-        scene.structure == StructureKind::Explicit ? std::nullopt : std::optional{mass});
+    scene.inertia =
+        admittance_object(scene.structure, bounds, {mass, 0.0}, device,
+                          scene.structure == StructureKind::Explicit ? std::nullopt : std::optional{mass});
     scene.needed = scene.inertia.damping;
     scene.inertia.damping *= share;
-    const auto part = [&](double most) { return most * (pick(2) == 0 ? static_cast<double>(pick(2)) : between(0.0, 1.0)); };
+    const auto part = [&](double most) {
+        return most * (pick(2) == 0 ? static_cast<double>(pick(2)) : between(0.0, 1.0));
+    };
     scene.hand = {.stiffness = pick(2) == 0 ? display.hand_stiffness : part(display.hand_stiffness),
                   .damping = part(display.hand_damping),
                   .mass = part(display.hand_mass)};

@@ -162,9 +162,10 @@ void bind_stability(py::module_& module) {
         "Returns the scheme with the least damping, and the least mass for it, with which a structure\n"
         "renders a force on an admittance display. Both are at least those of the model, `mass` and\n"
         "`object_damping`. A fixed value replaces the choice.");
-    module.def("stiffest_hand", &stiffest_hand, "bounds"_a, "scheme"_a, "device"_a,
-               "Returns the largest stiffness of a hand for which a scheme is proved on an admittance display,\n"
-               "with the other limits of the hand unchanged [N/m or N*m/rad]; 0 if none is.");
+    module.def(
+        "stiffest_hand", &stiffest_hand, "bounds"_a, "scheme"_a, "device"_a,
+        "Returns the largest stiffness of a hand for which a scheme is proved on an admittance display,\n"
+        "with the other limits of the hand unchanged [N/m or N*m/rad]; 0 if none is.");
     module.def("device_difference", &device_difference, "certified"_a, "device"_a,
                "Returns a sentence about the first field in which a device profile differs from the "
                "certified profile;\n"

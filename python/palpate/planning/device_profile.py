@@ -63,9 +63,10 @@ class DeviceProfile(_core.device.DeviceProfile):
     unknown damping or friction, and an upper bound for unknown delay, steps or jitter.
 
     The keyword arguments are the fields of the core's DeviceProfile, listed there with their units. The
-    defaults are those of a simulated knob. ``on_device`` is an :class:`palpate.planning.OnDevice`, a table in
-    the TOML file, and so is ``admittance``, an :class:`palpate.planning.AdmittanceDisplay`: a device with this
-    table measures the force and moves to a commanded position, like a force-feedback pedal.
+    defaults are those of a simulated knob. Two fields are tables in the TOML file: ``on_device``
+    is an :class:`palpate.planning.OnDevice`, and ``admittance`` an
+    :class:`palpate.planning.AdmittanceDisplay`. A device with the table ``admittance`` measures the force and
+    moves to a commanded position, like a force-feedback pedal.
 
     Raises
     ------

@@ -328,6 +328,7 @@ class Plan:
             return {}
         units, scheme = self._units(), self.scheme
         damping = scheme.object_damping - (self.model.damping or 0.0)
+        late_ms = 1e3 * display_lag_s(certificate.device)
         mass = scheme.mass - (self.model.mass or 0.0)
         return {
             "proved for hands": (
@@ -335,8 +336,8 @@ class Plan:
                 f"{display.hand_damping:.4g}{units['damping']}, {display.hand_mass:.4g}{units['mass']}"
             ),
             "felt in addition": (
-                f"damping {damping:.4g}{units['damping']} plus {1e3 * display_lag_s(certificate.device):.3g} ms "
-                f"times the slope of the object, mass {mass:.4g}{units['mass']}, friction "
+                f"damping {damping:.4g}{units['damping']} plus {late_ms:.3g} ms times the slope of "
+                f"the object, mass {mass:.4g}{units['mass']}, friction "
                 f"{virtual_friction(certificate.device):.3g} {self.model.units['force']}".rstrip()
             ),
         }

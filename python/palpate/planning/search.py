@@ -228,9 +228,7 @@ def _on_admittance_display(
                 f", or a hand of at most {_down(stiffest):g} {_slope_unit(device)} (has "
                 f"{device.admittance.hand_stiffness:.4g})"
             )
-    return Plan(
-        model, chosen.scheme, chosen.certificate, refused, None, accept_force_error, needs
-    )
+    return Plan(model, chosen.scheme, chosen.certificate, refused, None, accept_force_error, needs)
 
 
 def choose(task: Task, accept_force_error: float) -> tuple[Candidate, tuple[str, ...]]:

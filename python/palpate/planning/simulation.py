@@ -329,8 +329,8 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
                 f"the force error is {100 * share:.3g} % of the object's force range, above "
                 f"{100 * _TOLERATED_ERROR_SHARE:.3g} %: "
                 + (
-                    "the damping of the virtual object is felt; a faster servo, a shorter delay or a softer hand "
-                    "needs less"
+                    "the damping of the virtual object is felt; a faster servo, a shorter delay or a softer "
+                    "hand needs less"
                     if plan.certificate is not None and plan.certificate.device.admittance is not None
                     else "choose a structure with palpate plan, or a stiffer coupling"
                     if plan.limited is None

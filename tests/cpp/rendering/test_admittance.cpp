@@ -50,8 +50,8 @@ TEST(Admittance, ForceThatIsNotANumberHoldsTheCommand) {
     for (const AnyStructure& object : objects(1000.0)) {
         Admittance source{object, display()};
         const double before = source.step(5.0).position;
-        for (const double force : {std::numeric_limits<double>::quiet_NaN(),
-                                   std::numeric_limits<double>::infinity()}) {
+        for (const double force :
+             {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
             const PositionCommand command = source.step(force);
             EXPECT_EQ(command.position, before);
             EXPECT_EQ(command.object.status, Status::NonFinite);
@@ -123,8 +123,12 @@ TEST(Admittance, CommandIsAMultipleOfThePositionStepAndAheadByTheFeedForward) {
 }
 
 TEST(Admittance, FrictionCoversTheHandOfTheProfile) {
-    DeviceProfile device = display({.hand_stiffness = 1e4, .hand_damping = 10.0, .hand_mass = 0.1,
-                                    .handle_mass = 0.2, .servo_bandwidth_hz = 10.0, .position_step = 1e-5});
+    DeviceProfile device = display({.hand_stiffness = 1e4,
+                                    .hand_damping = 10.0,
+                                    .hand_mass = 0.1,
+                                    .handle_mass = 0.2,
+                                    .servo_bandwidth_hz = 10.0,
+                                    .position_step = 1e-5});
     const double w = 20.0 * 3.14159265358979323846;
     EXPECT_NEAR(virtual_friction(device), 0.5e-5 * (1e4 + 10.0 * 2.0 * w + 0.3 * 2.0 * w * w), 1e-9);
 }

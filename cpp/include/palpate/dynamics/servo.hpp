@@ -63,7 +63,7 @@ class Servo {
         const double s = damping_ratio_ * frequency_;
         const double squared = frequency_ * frequency_ - s * s;
         const double angle = std::sqrt(std::abs(squared)) * time_s;
-        double even = 1.0;     // e^(-s t) times cos or cosh
+        double even = 1.0;    // e^(-s t) times cos or cosh
         double odd = time_s;  // e^(-s t) times sin or sinh, divided by the frequency
         if (squared >= 0.0) {
             const double decay = std::exp(-s * time_s);
@@ -102,8 +102,7 @@ class Servo {
             zeta < 1.0 ? std::exp(-std::numbers::pi * zeta / std::sqrt(1.0 - zeta * zeta)) : 0.0;
         const double position = (1.0 + overshoot) / (1.0 - overshoot);
         const double velocity = 2.0 * frequency_ / (1.0 - overshoot);
-        return {position, velocity,
-                frequency_ * (frequency_ * (1.0 + position) + 2.0 * zeta * velocity)};
+        return {position, velocity, frequency_ * (frequency_ * (1.0 + position) + 2.0 * zeta * velocity)};
     }
 
   private:

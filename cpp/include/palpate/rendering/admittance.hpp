@@ -98,10 +98,10 @@ class Admittance {
 
     AnyStructure object_;
     DriveLimits limits_;
-    double ahead_;            ///< feed-forward time [periods]
-    double step_;             ///< position step [m or rad]; 0: none
-    double position_ = 0.0;   ///< y, position of the virtual object
-    double command_ = 0.0;    ///< last command
+    double ahead_;           ///< feed-forward time [periods]
+    double step_;            ///< position step [m or rad]; 0: none
+    double position_ = 0.0;  ///< y, position of the virtual object
+    double command_ = 0.0;   ///< last command
 };
 
 static_assert(PositionSource<Admittance>);

@@ -72,7 +72,8 @@ class Explicit {
     [[nodiscard]] Rendered drive(double force, const DriveLimits& limits = {}) noexcept {
         ObjectStep next = moved_by(force);
         // Friction reduces the speed at the end of the step, at most to zero
-        const double speed = std::max(0.0, std::abs(next.velocity) - period_ / inertia_.mass * limits.friction);
+        const double speed =
+            std::max(0.0, std::abs(next.velocity) - period_ / inertia_.mass * limits.friction);
         next.velocity = std::copysign(std::min(speed, limits.largest_step / period_), next.velocity);
         if (std::isfinite(next.position)) {
             next.position = position_ + period_ * next.velocity;

@@ -105,11 +105,13 @@ class Implicit {
     /// object's new position starts at `start`.
     [[nodiscard]] Rendered drive_from(double start, double force, int evaluations,
                                       const DriveLimits& limits = {}) noexcept {
-        const Solution solution = detail::limited_step(position_, force, limits, [&](double driving) noexcept {
-            const LoadLine line{uncoupled_slope_, driving - inertial_ * before_ + uncoupled_factor_ * position_};
-            typename Solver::Memory from{start};
-            return uncoupled_.solve(environment_, state_, line, from);
-        });
+        const Solution solution =
+            detail::limited_step(position_, force, limits, [&](double driving) noexcept {
+                const LoadLine line{uncoupled_slope_,
+                                    driving - inertial_ * before_ + uncoupled_factor_ * position_};
+                typename Solver::Memory from{start};
+                return uncoupled_.solve(environment_, state_, line, from);
+            });
         memory_ = typename Solver::Memory{position_};
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);

@@ -125,9 +125,10 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
 /// coupling to the device or diverges at the period `period_s`.
 inline void validate(const Scheme& scheme, const ForceModel& model, double period_s) {
     validate(scheme, model);
-    detail::require(!is_uncoupled(scheme),
-                    "coupling_stiffness is 0: must be > 0 on a device that applies forces; only an admittance "
-                    "display renders an object without a coupling");
+    detail::require(
+        !is_uncoupled(scheme),
+        "coupling_stiffness is 0: must be > 0 on a device that applies forces; only an admittance "
+        "display renders an object without a coupling");
     with_kind(scheme.structure, [&](auto structure) {
         if constexpr (requires(StructureNumbers numbers) { structure.slope_limit(numbers); }) {
             const double steepest = steepest_slope(scheme, model);

@@ -135,8 +135,9 @@ inline constexpr std::size_t most_simulated_ticks = 3'600'000;
 /// tick; an exception of `each` ends the simulation. In a row of the trace, `force` is the sensor's force at the start
 /// of the tick, which moves the object; `applied` is the hand's force at the end of the tick.
 template <class Each>
-[[nodiscard]] Trace simulate_display(const ForceModel& model, const Scheme& scheme, const DeviceProfile& device,
-                                     const Hand& hand, std::size_t ticks, double start_position, Each&& each) {
+[[nodiscard]] Trace simulate_display(const ForceModel& model, const Scheme& scheme,
+                                     const DeviceProfile& device, const Hand& hand, std::size_t ticks,
+                                     double start_position, Each&& each) {
     validate(scheme, model);
     detail::require(is_uncoupled(scheme), "structure is " + std::string(name_of(scheme.structure)) +
                                               " with a coupling or without mass: an admittance display "

@@ -39,18 +39,17 @@ namespace palpate {
 ///
 ///     B_o >= T max over theta of [need(theta) - (m / T^2)(1 - cos theta)].
 ///
-/// `AdmittanceNeed` defines need(theta). Without hand damping and mass the largest value is almost always at theta = 0:
-/// k_h (t_d + lag) + T sigma, where lag is 1/w for a servo of first order and 2 zeta/w for one of second order, and
-/// sigma is `step_slope`.
+/// `AdmittanceNeed` defines need(theta). The largest value is almost always at theta = 0, where it is
+/// k_h (t_d + lag) + T sigma. The lag is that of the servo, and sigma is `step_slope`.
 [[nodiscard]] inline double needed_object_damping(StructureKind structure, const ForceBounds& bounds,
                                                   Inertia object, const DeviceProfile& device) {
     const AdmittanceNeed need{device, step_slope(structure, bounds)};
     return device.period_s * need.largest(dissipating_inertia(structure, object, device.period_s));
 }
 
-/// Returns the inequalities of a model that a scheme renders on an admittance display. If they hold, the hand receives
-/// no more energy than object and hand stored at the start, for every hand within the stiffness, damping and mass of
-/// the profile, and with a constant force of the muscles every motion comes to rest. docs/certificate.md has the proof.
+/// Returns the inequalities of a model that a scheme renders on an admittance display. If they hold, the muscles
+/// receive no more energy than object and hand stored at the start, for every hand within the limits of the profile.
+/// With a constant force of the muscles every motion comes to rest. docs/certificate.md has the proof.
 [[nodiscard]] inline std::vector<Inequality> admittance_inequalities(const ForceBounds& bounds,
                                                                      const Scheme& scheme,
                                                                      const DeviceProfile& device) {
@@ -78,11 +77,10 @@ namespace palpate {
                          "docs/certificate.md"});
     } else {
         const bool implicit = scheme.structure == StructureKind::Implicit;
-        lines.push_back(implicit
-                            ? detail::uniqueness(object.load_line_slope(T), bounds.falling(),
-                                                 "m / T^2 + B_o / T > s_")
-                            : detail::uniqueness(object.midpoint_slope(T), 0.5 * bounds.falling(),
-                                                 "2 m / T^2 + B_o / T > s_ / 2"));
+        lines.push_back(implicit ? detail::uniqueness(object.load_line_slope(T), bounds.falling(),
+                                                      "m / T^2 + B_o / T > s_")
+                                 : detail::uniqueness(object.midpoint_slope(T), 0.5 * bounds.falling(),
+                                                      "2 m / T^2 + B_o / T > s_ / 2"));
     }
     lines.push_back(detail::unknown("admittance-jitter", "jitter of the samples of an admittance display",
                                     "proved only for jitter_s = 0", 0.0, device.jitter_s,
@@ -91,10 +89,9 @@ namespace palpate {
                                     "proved only for a mean of 0", 0.0, bounds.mean_force,
                                     "subtract the mean from the model"));
     if (bounds.drag > 0.0 || bounds.memory) {
-        lines.push_back(detail::unknown("admittance-velocity",
-                                        "force that depends on velocity or has a memory",
-                                        "proved only for a force of position", 0.0, 1.0,
-                                        "identify the force over position alone"));
+        lines.push_back(detail::unknown(
+            "admittance-velocity", "force that depends on velocity or has a memory",
+            "proved only for a force of position", 0.0, 1.0, "identify the force over position alone"));
     }
     return lines;
 }
@@ -106,21 +103,20 @@ namespace palpate {
                                                Inertia object, const DeviceProfile& device,
                                                std::optional<double> fixed_mass = std::nullopt,
                                                std::optional<double> fixed_damping = std::nullopt) {
-    constexpr double rounding = 1.0 + 1e-9;  // so that a computer that rounds differently finds the same verdict
+    constexpr double rounding =
+        1.0 + 1e-9;  // so that a computer that rounds differently finds the same verdict
     constexpr int iterations = 100;
     const double T = device.period_s;
     const AdmittanceNeed need{device, step_slope(structure, bounds)};
-    const double inertial =
-        structure == StructureKind::EnergyConsistent ? 0.0 : need.least_inertial();
+    const double inertial = structure == StructureKind::EnergyConsistent ? 0.0 : need.least_inertial();
     Inertia chosen = object;
     for (int k = 0; k < iterations; ++k) {
         const double before = chosen.damping;
         // The part B_o T of the mass is not felt: the object follows a force within a period
-        chosen.mass = fixed_mass.value_or(
-            std::max(object.mass, rounding * (inertial * T * T + chosen.damping * T)));
-        chosen.damping = fixed_damping.value_or(std::max(
-            object.damping,
-            rounding * T * need.largest(dissipating_inertia(structure, chosen, T))));
+        chosen.mass =
+            fixed_mass.value_or(std::max(object.mass, rounding * (inertial * T * T + chosen.damping * T)));
+        chosen.damping = fixed_damping.value_or(
+            std::max(object.damping, rounding * T * need.largest(dissipating_inertia(structure, chosen, T))));
         if (std::abs(chosen.damping - before) <= 1e-12 * chosen.damping) {
             break;
         }
@@ -130,7 +126,8 @@ namespace palpate {
 
 /// Returns the largest stiffness of a hand for which a scheme is proved on an admittance display, with the other limits
 /// of the hand unchanged [N/m or N*m/rad]; 0 if none is.
-[[nodiscard]] inline double stiffest_hand(const ForceBounds& bounds, const Scheme& scheme, DeviceProfile device) {
+[[nodiscard]] inline double stiffest_hand(const ForceBounds& bounds, const Scheme& scheme,
+                                          DeviceProfile device) {
     if (!device.admittance) {
         return 0.0;
     }

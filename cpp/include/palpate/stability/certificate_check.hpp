@@ -100,7 +100,7 @@ namespace detail {
             }
         } else if constexpr (std::is_same_v<decltype(before), const std::optional<AdmittanceDisplay>&>) {
             if (before != now) {
-                difference = opening + (!now      ? " as an admittance display, not as one that applies forces"
+                difference = opening + (!now ? " as an admittance display, not as one that applies forces"
                                         : !before ? ", which applies forces, not for an admittance display"
                                                   : " with another hand or position servo");
                 difference += "; plan the model again";
