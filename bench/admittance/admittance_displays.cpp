@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints known limits of admittance displays next to simulations of them, one table for each argument.
-// line: object damping of the certificate, of the linear limit, and with a feed-forward.
-// linear: exact linear limits against simulated ones.
-// clutch: oscillation of a clutch pedal with a force peak, and of the inverse curve.
-// stops: energy of a free mass between two stops.
-// map: largest stable stiffness of explicit and implicit over mass and damping.
+// Prints known limits of admittance displays next to simulations of them. The argument selects the table.
+//
+//     line:    object damping of the certificate, of the linear limit, and with a feed-forward
+//
+//     linear:  exact linear limits against simulated ones
+//
+//     clutch:  oscillation of a clutch pedal with a force peak, and of the inverse curve
+//
+//     stops:   energy of a free mass between two stops
+//
+//     map:     largest stable stiffness of explicit and implicit over mass and damping
 
 #include <cmath>
 #include <cstdio>

@@ -225,6 +225,9 @@ TEST(AdmittanceInequalities, CasesWithoutProofAreRefused) {
     ForceBounds turning = bounds;
     turning.mean_force = 0.1;
     EXPECT_TRUE(refused(turning, scheme, device));
+    ForceBounds inexact = bounds;
+    inexact.force_error = 1e-6;
+    EXPECT_TRUE(refused(inexact, scheme, device));
     // Enough damping, but the load line has several solutions
     const DeviceProfile free = display(1e-3, 1, {}, {}, 0.0, 0.0);
     const ForceBounds falling = slopes(-4e6, 0.0);

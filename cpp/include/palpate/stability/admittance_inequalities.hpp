@@ -88,6 +88,9 @@ namespace palpate {
     lines.push_back(detail::unknown("admittance-mean", "mean of a periodic force",
                                     "proved only for a mean of 0", 0.0, bounds.mean_force,
                                     "subtract the mean from the model"));
+    lines.push_back(detail::unknown("admittance-force-error", "error of the force of another program",
+                                    "proved only for epsilon = 0", 0.0, bounds.force_error,
+                                    "render with palpate"));
     if (bounds.drag > 0.0 || bounds.memory) {
         lines.push_back(detail::unknown(
             "admittance-velocity", "force that depends on velocity or has a memory",

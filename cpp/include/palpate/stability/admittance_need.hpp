@@ -19,12 +19,11 @@ namespace palpate {
 /// Slope that the object damping of an admittance display must outweigh at each frequency theta [N/m or N*m/rad]:
 ///
 ///     need(theta) = sigma + k_h (1/2 + Re L)^+ + b_h (-Re D1)^+ + m_h (-Re D2)^+,
-///     L = sum over j >= 1 of (1 - sigma_j) z^-j,   D1 = sum of sigma'_j z^-j,   D2 = sum of sigma''_j z^-j,
-///     z = e^(i theta).
+///     L = sum over j >= 1 of (1 - sigma_j) z^-j,   D1 = sum of sigma'_j z^-j,   D2 = sum of sigma''_j z^-j.
 ///
-/// sigma_j = sigma(j T - t_d) is the step response of the servo at the samples. (.)^+ is the positive part: the hand may
-/// have any stiffness, damping and mass from zero to the limits k_h, b_h and m_h. `sigma` is the slope that the step of
-/// the object costs. A feed-forward of a periods multiplies the commands by 1 + a (1 - 1/z).
+/// Here z is e^(i theta), and sigma_j = sigma(j T - t_d) the step response of the servo at the samples. The positive
+/// part (.)^+ is taken because the hand may have any stiffness, damping and mass up to k_h, b_h and m_h. `sigma` is the
+/// slope that the step of the object costs. A feed-forward of a periods multiplies the commands by 1 + a (1 - 1/z).
 class AdmittanceNeed {
   public:
     AdmittanceNeed(const DeviceProfile& device, double step_slope) : step_slope_{step_slope} {
