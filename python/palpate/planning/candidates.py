@@ -26,6 +26,7 @@ from .._core.stability import (
     usual_coupling_share,
     with_force_error,
 )
+from ..verdict import FORCE_JND
 from .device_profile import mechanical_units
 from .limited_network import (
     LONGEST_PLAY,
@@ -360,12 +361,16 @@ def _explicit(task: Task) -> Candidate | Refusal:
     return task.certified(scheme)
 
 
-ADMITTANCE_STRUCTURES = ("implicit", "energy-consistent", "explicit")
-"""Structures of an admittance display; of several with the same damping the first is chosen"""
+ADMITTANCE_STRUCTURES = ("implicit", "explicit", "energy-consistent")
+"""Structures of an admittance display, in the order in which they are chosen"""
 
 
 def on_admittance_display(task: Task) -> list[Candidate]:
-    """Returns the object with each structure on an admittance display, the least damping first."""
+    """Returns the object with each structure on an admittance display, the best first.
+
+    A structure is better if it is certified. The first in the order of `ADMITTANCE_STRUCTURES` is chosen
+    unless another one needs less damping by more than the just noticeable difference of a force.
+    """
     bounds = force_bounds(task.model, task.usual_play)
     found = [
         task.certified(
@@ -382,7 +387,10 @@ def on_admittance_display(task: Task) -> list[Candidate]:
         )
         for structure in ADMITTANCE_STRUCTURES
     ]
-    return sorted(found, key=lambda each: (each.certificate.refused, each.scheme.object_damping))
+    proved = [each for each in found if not each.certificate.refused]
+    least = min((each.scheme.object_damping for each in proved), default=0.0)
+    noticed = least * (1.0 + FORCE_JND)
+    return sorted(found, key=lambda each: (each.certificate.refused, each.scheme.object_damping > noticed))
 
 
 Propose = Callable[[Task], Candidate | Refusal]

@@ -57,7 +57,8 @@ def plan(
 
     ``palpate plan --help`` lists the candidate structures in the order in which they are tried. Missing
     numbers are chosen from the device. On an admittance display, such as a force-feedback pedal, the object
-    always has mass and damping, and the structure with the least damping is chosen.
+    always has mass and damping. The implicit structure is chosen unless another one needs noticeably less
+    damping.
 
     Parameters
     ----------
@@ -208,8 +209,8 @@ def _on_admittance_display(
         + (
             each.certificate.reason
             if each.certificate.refused
-            else f"needs an object damping of {each.scheme.object_damping:.4g} {unit}, not less than the "
-            f"{chosen.scheme.object_damping:.4g} {unit} of {chosen.scheme.structure}"
+            else f"needs an object damping of {each.scheme.object_damping:.4g} {unit}; "
+            f"{chosen.scheme.structure} needs {chosen.scheme.object_damping:.4g} {unit}"
         )
         for each in others
     )
