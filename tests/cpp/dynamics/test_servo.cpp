@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-constexpr double frequency = 2.0 * 3.14159265358979323846 * 20.0;
+constexpr double servo_frequency = 2.0 * 3.14159265358979323846 * 20.0;
 
 /// Returns the deviation after steps of 1 us of the servo's equation, integrated by the midpoint rule.
 ServoDeviation integrated(const Servo& servo, ServoDeviation now, double time_s) {
@@ -31,7 +31,7 @@ TEST(Servo, TransitionSolvesTheEquationOfTheServoForEveryDamping) {
         const std::array<double, 4> t = servo.transition(0.01);
         const ServoDeviation expected = integrated(servo, start, 0.01);
         EXPECT_NEAR(t[0] * start.position + t[1] * start.velocity, expected.position, 1e-6);
-        EXPECT_NEAR(t[2] * start.position + t[3] * start.velocity, expected.velocity, 1e-5 * frequency);
+        EXPECT_NEAR(t[2] * start.position + t[3] * start.velocity, expected.velocity, 1e-5 * servo_frequency);
     }
 }
 
