@@ -52,7 +52,7 @@ def display_header(request: Request) -> tuple[Exported, str]:
         Scheme(structure="massless", coupling_stiffness=slope, coupling_damping=0.0),
         precision=request.precision,
         encoder_step=float(plan.rendered.upper[0] - plan.rendered.lower[0]) / _COUNTS,
-        force_limit=np.inf,
+        force_limit=device.force_limit,
         period_s=device.period_s,
     )
     exported = Exported(
@@ -102,7 +102,7 @@ def write(request: Request) -> Written:
         {
             "header": f"{request.output}: {exported.name}_object_start and {exported.name}_object_step",
             "tables": f"{size} bytes",
-            "certificate": "that of the plan; the friction of the object covers the error of the table",
+            "friction": "that of the display, and enough to cover the error of the tables",
         },
         {**exported.record(), "bytes": size},
     )
