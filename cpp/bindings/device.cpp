@@ -54,6 +54,16 @@ void bind_device(py::module_& module) {
         py::init([](const py::dict& fields) { return py::type::of<OnDevice>()(**fields).cast<OnDevice>(); }),
         "fields"_a);
     py::implicitly_convertible<py::dict, OnDevice>();
+    py::class_<AdmittanceDisplay> display(
+        module, "AdmittanceDisplay",
+        "Hand, handle and position servo of a device that measures the force and moves to a commanded\n"
+        "position, in SI units. A certificate holds for every hand within the stated limits.");
+    bind_fields(display);
+    display.def(py::init([](const py::dict& fields) {
+                    return py::type::of<AdmittanceDisplay>()(**fields).cast<AdmittanceDisplay>();
+                }),
+                "fields"_a);
+    py::implicitly_convertible<py::dict, AdmittanceDisplay>();
     py::class_<DeviceProfile> type(
         module, "DeviceProfile",
         "Properties of a haptic device of one degree of freedom, in SI units; a knob (rad) or a straight "

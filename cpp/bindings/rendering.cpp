@@ -9,6 +9,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "fields.hpp"
+#include "palpate/rendering/admittance.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scale.hpp"
 #include "palpate/rendering/scheme.hpp"
@@ -23,11 +24,20 @@ void bind_rendering(py::module_& module) {
         py::tuple(py::cast(std::vector<std::string>(structure_names.begin(), structure_names.end())));
     module.attr("most_prediction_taps") = most_prediction_taps;
     module.attr("compensated_share") = compensated_share;
+    module.def(
+        "display_lag_s", &display_lag_s, "device"_a,
+        "Returns the time by which the handle of an admittance display follows the virtual object in slow\n"
+        "motion [s]: delay and lag of the servo, less the feed-forward. A hand feels the slope of the\n"
+        "object times this time as damping, in addition to the damping of the object.");
+    module.def(
+        "virtual_friction", &virtual_friction, "device"_a,
+        "Returns the Coulomb friction of the virtual object that makes the steps of command and force\n"
+        "sensor of an admittance display harmless [N or N*m].");
     py::class_<Scheme> type(module, "Scheme",
                             "Structure that renders a model, with the numbers of the structure in SI units.");
     bind_fields(type);
     type.def_property_readonly(
-            "has_coupling", [](const Scheme& s) { return has_coupling(s.structure); },
+            "has_coupling", [](const Scheme& s) { return has_coupling(s.structure) && !is_uncoupled(s); },
             "True if the structure has a virtual coupling between device and object.")
         .def_property_readonly(
             "has_mass", [](const Scheme& s) { return has_mass(s.structure); },

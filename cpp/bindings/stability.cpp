@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -143,6 +144,28 @@ void bind_stability(py::module_& module) {
         "which the structure is stable, and returns its scheme. If none is stable, returns the last\n"
         "scheme that was tried. Keywords: mass, object_damping, coupling_stiffness, coupling_damping and\n"
         "play_radius; None: a default, or the result of the search.");
+    module.def(
+        "admittance_scheme",
+        [](const ForceBounds& bounds, const std::string& structure, const DeviceProfile& device, double mass,
+           double object_damping, std::optional<double> fixed_mass, std::optional<double> fixed_damping,
+           double play_radius) {
+            Scheme scheme;
+            scheme.structure = named<StructureKind>(structure, "structure");
+            scheme.coupling = {0.0, 0.0};
+            scheme.inertia = admittance_object(scheme.structure, bounds, {mass, object_damping}, device,
+                                               fixed_mass, fixed_damping);
+            scheme.play_radius = play_radius;
+            return scheme;
+        },
+        "bounds"_a, "structure"_a, "device"_a, py::kw_only(), "mass"_a, "object_damping"_a,
+        "fixed_mass"_a = py::none(), "fixed_damping"_a = py::none(), "play_radius"_a = 0.0,
+        "Returns the scheme with the least damping, and the least mass for it, with which a structure\n"
+        "renders a force on an admittance display. Both are at least those of the model, `mass` and\n"
+        "`object_damping`. A fixed value replaces the choice.");
+    module.def(
+        "stiffest_hand", &stiffest_hand, "bounds"_a, "scheme"_a, "device"_a,
+        "Returns the largest stiffness of a hand for which a scheme is proved on an admittance display,\n"
+        "with the other limits of the hand unchanged [N/m or N*m/rad]; 0 if none is.");
     module.def("device_difference", &device_difference, "certified"_a, "device"_a,
                "Returns a sentence about the first field in which a device profile differs from the "
                "certified profile;\n"

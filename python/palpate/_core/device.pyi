@@ -4,7 +4,7 @@ Profiles of devices, and the packets of USB devices.
 """
 from __future__ import annotations
 import typing
-__all__: list[str] = ['DeviceProfile', 'OnDevice', 'UsbRequest', 'decode_info', 'decode_model', 'longest_watchdog_ms', 'on_device', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_timeout_ms', 'usb_to_device', 'usb_to_host', 'usb_vendor']
+__all__: list[str] = ['AdmittanceDisplay', 'DeviceProfile', 'OnDevice', 'UsbRequest', 'decode_info', 'decode_model', 'longest_watchdog_ms', 'on_device', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_timeout_ms', 'usb_to_device', 'usb_to_host', 'usb_vendor']
 class OnDevice:
     """
     Timing of a model that runs on the motor controller of a device, in SI units.
@@ -47,15 +47,20 @@ class OnDevice:
         """
         Largest time between two samples, minus the period [s].
         """
-class DeviceProfile:
+class AdmittanceDisplay:
     """
-    Properties of a haptic device of one degree of freedom, in SI units; a knob (rad) or a straight handle (m).
+    Hand, handle and position servo of a device that measures the force and moves to a commanded
+    position, in SI units. A certificate holds for every hand within the stated limits.
     """
     def __eq__(self, arg0: typing.Any) -> typing.Any:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, id: str = 'simulated-knob', position_unit: str = 'rad', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, renderer: str | None = None, on_device: OnDevice | None = None) -> None:
+    @typing.overload
+    def __init__(self, *, hand_stiffness: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_damping: typing.SupportsFloat | typing.SupportsIndex = 0.0, hand_mass: typing.SupportsFloat | typing.SupportsIndex = 0.0, handle_mass: typing.SupportsFloat | typing.SupportsIndex = 0.0, servo_bandwidth_hz: typing.SupportsFloat | typing.SupportsIndex | None = None, servo_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, rate_limit: typing.SupportsFloat | typing.SupportsIndex | None = None, position_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, feed_forward_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
+    @typing.overload
+    def __init__(self, fields: dict) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -64,6 +69,74 @@ class DeviceProfile:
     def to_dict(self) -> dict:
         """
         Returns the fields that are written to a file, by name. Optional fields without a value are left out.
+        """
+    @property
+    def feed_forward_s(self) -> float:
+        """
+        Time by which the command is ahead of the object's motion, to compensate the servo's lag [s].
+        """
+    @property
+    def hand_damping(self) -> float:
+        """
+        b_h, largest damping of the hand or foot [N*s/m or N*m*s/rad].
+        """
+    @property
+    def hand_mass(self) -> float:
+        """
+        Largest mass of the hand or foot that moves with the handle [kg or kg*m^2].
+        """
+    @property
+    def hand_stiffness(self) -> float:
+        """
+        k_h, largest stiffness of the hand or foot [N/m or N*m/rad].
+        """
+    @property
+    def handle_mass(self) -> float:
+        """
+        Mass between the force sensor and the hand [kg or kg*m^2].
+        """
+    @property
+    def position_step(self) -> float:
+        """
+        Smallest change of the position command, such as one step of a stepper motor [m or rad]; 0 = not quantised.
+        """
+    @property
+    def rate_limit(self) -> float | None:
+        """
+        Largest speed of the position command [m/s or rad/s]; absent: none.
+        """
+    @property
+    def servo_bandwidth_hz(self) -> float | None:
+        """
+        Natural frequency of the position servo [Hz]; of a servo of first order, its corner frequency. Absent: the servo moves at once.
+        """
+    @property
+    def servo_damping(self) -> float | None:
+        """
+        Damping ratio of a position servo of second order [-]; absent: first order.
+        """
+class DeviceProfile:
+    """
+    Properties of a haptic device of one degree of freedom, in SI units; a knob (rad) or a straight handle (m).
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, *, id: str = 'simulated-knob', position_unit: str = 'rad', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, renderer: str | None = None, on_device: OnDevice | None = None, admittance: AdmittanceDisplay | None = None) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
+        """
+    @property
+    def admittance(self) -> AdmittanceDisplay | None:
+        """
+        Hand, handle and position servo of an admittance display, which measures the force and moves to a position; absent: the device measures its position and applies a force.
         """
     @property
     def coulomb_friction(self) -> float:

@@ -3,9 +3,10 @@
 Structures between a model and a device.
 """
 from __future__ import annotations
+import palpate._core.device
 import palpate._core.model
 import typing
-__all__: list[str] = ['Scheme', 'compensated_share', 'default_play_radius', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'solver_name', 'structure_names']
+__all__: list[str] = ['Scheme', 'compensated_share', 'default_play_radius', 'display_lag_s', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'solver_name', 'structure_names', 'virtual_friction']
 class Scheme:
     """
     Structure that renders a model, with the numbers of the structure in SI units.
@@ -90,6 +91,12 @@ def default_play_radius(model: palpate._core.model.ForceModel, encoder_step: typ
     """
     Returns the default play radius for a hysteresis model that does not define one; otherwise 0.
     """
+def display_lag_s(device: palpate._core.device.DeviceProfile) -> float:
+    """
+    Returns the time by which the handle of an admittance display follows the virtual object in slow
+    motion [s]: delay and lag of the servo, less the feed-forward. A hand feels the slope of the
+    object times this time as damping, in addition to the damping of the object.
+    """
 def explicit_slope_limit(scheme: Scheme, period_s: typing.SupportsFloat | typing.SupportsIndex, *, coupled: bool = True) -> float:
     """
     Returns the slope limit of a model: below it the explicit structure is stable while the device
@@ -100,6 +107,11 @@ def solver_name(model: palpate._core.model.ForceModel, scheme: Scheme, period_s:
     Returns the method that solves the load line of a scheme: 'table' if a table of solutions is
     used for at least a part of the positions, otherwise 'newton'; None for a structure without a
     load line.
+    """
+def virtual_friction(device: palpate._core.device.DeviceProfile) -> float:
+    """
+    Returns the Coulomb friction of the virtual object that makes the steps of command and force
+    sensor of an admittance display harmless [N or N*m].
     """
 compensated_share: float = 0.9
 fewest_encoder_steps_in_play: float = 4.0

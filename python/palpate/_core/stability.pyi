@@ -8,7 +8,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'certify', 'certify_bounds', 'certify_with_account', 'device_difference', 'explicit_scheme', 'force_bounds', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share', 'with_force_error']
+__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'admittance_scheme', 'certify', 'certify_bounds', 'certify_with_account', 'device_difference', 'explicit_scheme', 'force_bounds', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'stiffest_hand', 'usual_coupling_share', 'with_force_error']
 class ForceBounds:
     """
     Proved bounds of a model's force and slope at all positions, inside and outside the domain.
@@ -229,6 +229,12 @@ class Certificate:
         """
         certified, held-by-account, stable-locally or refused.
         """
+def admittance_scheme(bounds: ForceBounds, structure: str, device: palpate._core.device.DeviceProfile, *, mass: typing.SupportsFloat | typing.SupportsIndex, object_damping: typing.SupportsFloat | typing.SupportsIndex, fixed_mass: typing.SupportsFloat | typing.SupportsIndex | None = None, fixed_damping: typing.SupportsFloat | typing.SupportsIndex | None = None, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> palpate._core.rendering.Scheme:
+    """
+    Returns the scheme with the least damping, and the least mass for it, with which a structure
+    renders a force on an admittance display. Both are at least those of the model, `mass` and
+    `object_damping`. A fixed value replaces the choice.
+    """
 def certify(model: palpate._core.model.ForceModel, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> Certificate:
     """
     Returns the certificate of a model that a scheme renders on a device. If stability is not
@@ -297,6 +303,11 @@ def stiffest_coupling(*, coupling_damping: typing.SupportsFloat | typing.Support
     Returns the largest coupling stiffness K_c that is certified with only the given share of the
     device's damping; 0 if no stiffness is certified. `coupling_damping` is B_c; `falling` is the
     steepest falling slope of the object's force.
+    """
+def stiffest_hand(bounds: ForceBounds, scheme: palpate._core.rendering.Scheme, device: palpate._core.device.DeviceProfile) -> float:
+    """
+    Returns the largest stiffness of a hand for which a scheme is proved on an admittance display,
+    with the other limits of the hand unchanged [N/m or N*m/rad]; 0 if none is.
     """
 def with_force_error(certificate: Certificate, force_error: typing.SupportsFloat | typing.SupportsIndex) -> Certificate:
     """

@@ -139,13 +139,13 @@ def export(
     _require_use(kind)
     require_writable(output, inputs=(source,))
     talk(f"writing {output} ...")
-    module = import_module(f"palpate.export.{FORMATS[kind][0]}")
     recording = reading.read(source) if kind == "mcap" and source is not None else None
     request = Request(
         output, source, precision, name, uncertified, encoder_step, force_limit, accept_model, recording
     )
     with finishing():
-        written: Written = module.write(request)
+        writer = "admittance" if kind == "c" and request.is_for_display else FORMATS[kind][0]
+        written: Written = import_module(f"palpate.export.{writer}").write(request)
         verdict = written.verdict
         if "accept_model" in FORMATS[kind][2]:
             verdict = request.model.verdict + verdict

@@ -64,6 +64,12 @@ class Request:
             raise InputError("no model is given: palpate export MODEL.json -o OUT")
         return load_model(self.model_file).require_use(self.model_file, accepted=self.accept_model)
 
+    @property
+    def is_for_display(self) -> bool:
+        """True if the plan of the model is for an admittance display."""
+        certificate = self.model.certificate
+        return certificate is not None and "admittance" in certificate["device"]
+
     def identifier(self) -> str:
         """Returns the name of the model, which is a C identifier.
 

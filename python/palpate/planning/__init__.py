@@ -7,7 +7,7 @@ device property that must be better. `search` runs these steps. `simulation` ren
 """
 
 from .. import _core
-from .._core.device import OnDevice
+from .._core.device import AdmittanceDisplay, OnDevice
 from .._core.rendering import Scheme, explicit_slope_limit
 from .._core.simulation import AccountUse, Hand, TestRig
 from .._core.stability import Certificate, Inequality
@@ -31,6 +31,7 @@ __all__ = [
     "ACCEPTED_FORCE_ERROR",
     "EXAMPLES",
     "AccountUse",
+    "AdmittanceDisplay",
     "Certificate",
     "Comparison",
     "DeviceProfile",
@@ -57,5 +58,5 @@ __all__ = [
     "simulate",
 ]
 
-for _compiled in (Hand, Scheme, OnDevice, _core.device.DeviceProfile):
+for _compiled in (Hand, Scheme, OnDevice, AdmittanceDisplay, _core.device.DeviceProfile):
     named_arguments(_compiled)

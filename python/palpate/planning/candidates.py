@@ -15,6 +15,7 @@ from .._core.rendering import Scheme, compensated_share, default_play_radius
 from .._core.simulation import account_use
 from .._core.stability import (
     Certificate,
+    admittance_scheme,
     certify,
     certify_with_account,
     explicit_scheme,
@@ -25,6 +26,7 @@ from .._core.stability import (
     usual_coupling_share,
     with_force_error,
 )
+from ..verdict import FORCE_JND
 from .device_profile import mechanical_units
 from .limited_network import (
     LONGEST_PLAY,
@@ -95,6 +97,10 @@ class Task:
     mass: float | None = None
     object_damping: float | None = None
     """Object damping B_o of the caller or of the model [force*s/position]"""
+    model_mass: float = 0.0
+    """Mass of the model, the least mass of the object on an admittance display [force*s^2/position]"""
+    model_damping: float = 0.0
+    """Damping of the model, the least damping of the object on an admittance display [force*s/position]"""
     play_radius: float | None = None
     predict: int | None = None
     """Number of previous position samples that the prediction uses. 0: no prediction; None: chosen by the
@@ -353,6 +359,38 @@ def _explicit(task: Task) -> Candidate | Refusal:
         play_radius=task.usual_play,
     )
     return task.certified(scheme)
+
+
+ADMITTANCE_STRUCTURES = ("implicit", "explicit", "energy-consistent")
+"""Structures of an admittance display, in the order in which they are chosen"""
+
+
+def on_admittance_display(task: Task) -> list[Candidate]:
+    """Returns the object with each structure on an admittance display, the best first.
+
+    A structure is better if it is certified. The first in the order of `ADMITTANCE_STRUCTURES` is chosen
+    unless another one needs less damping by more than the just noticeable difference of a force.
+    """
+    bounds = force_bounds(task.model, task.usual_play)
+    found = [
+        task.certified(
+            admittance_scheme(
+                bounds,
+                structure,
+                task.device,
+                mass=task.model_mass,
+                object_damping=task.model_damping,
+                fixed_mass=task.mass,
+                fixed_damping=task.object_damping,
+                play_radius=task.usual_play,
+            )
+        )
+        for structure in ADMITTANCE_STRUCTURES
+    ]
+    proved = [each for each in found if not each.certificate.refused]
+    least = min((each.scheme.object_damping for each in proved), default=0.0)
+    noticed = least * (1.0 + FORCE_JND)
+    return sorted(found, key=lambda each: (each.certificate.refused, each.scheme.object_damping > noticed))
 
 
 Propose = Callable[[Task], Candidate | Refusal]

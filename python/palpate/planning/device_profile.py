@@ -63,8 +63,10 @@ class DeviceProfile(_core.device.DeviceProfile):
     unknown damping or friction, and an upper bound for unknown delay, steps or jitter.
 
     The keyword arguments are the fields of the core's DeviceProfile, listed there with their units. The
-    defaults are those of a simulated knob. ``on_device`` is an :class:`palpate.planning.OnDevice`, a table in
-    the TOML file.
+    defaults are those of a simulated knob. Two fields are tables in the TOML file: ``on_device``
+    is an :class:`palpate.planning.OnDevice`, and ``admittance`` an
+    :class:`palpate.planning.AdmittanceDisplay`. A device with the table ``admittance`` measures the force and
+    moves to a commanded position, like a force-feedback pedal.
 
     Raises
     ------
@@ -97,7 +99,7 @@ class DeviceProfile(_core.device.DeviceProfile):
             raise InputError(f"{file} is not TOML: the file is not text") from None
         except RecursionError:
             raise InputError(
-                f"{file}: the file is nested too deeply; a profile has no table but on_device"
+                f"{file}: the file is nested too deeply; a profile has no table but on_device and admittance"
             ) from None
         except ValueError as error:  # TOML with an integer of too many digits for Python, or an invalid date
             reason = str(error)

@@ -13,7 +13,13 @@ import numpy as np
 from .._core.device import DeviceProfile
 from .._core.io import checked_certificate, scheme_of
 from .._core.model import ForceModel
-from .._core.rendering import Scheme, default_play_radius, solver_name
+from .._core.rendering import (
+    Scheme,
+    default_play_radius,
+    display_lag_s,
+    solver_name,
+    virtual_friction,
+)
 from .._core.simulation import AccountUse, account_use, motion_driven, resting_oscillation
 from .._core.stability import (
     Certificate,
@@ -311,11 +317,35 @@ class Plan:
         rows["certificate"] = PLAN_WORDS[certificate.verdict]
         if not certificate.refused:
             rows["certificate"] += f", samples up to {1e3 * certificate.longest_period_s:.4g} ms apart"
-        rows |= self.account_rows()
+        rows |= self.account_rows() | self._display_rows()
         if certificate.device.renderer == "device":
             rate_hz = 1.0 / certificate.device.period_s
             rows["runs on"] = f"the motor controller of {certificate.device.id} at {rate_hz:.6g} Hz"
         return rows
+
+    def _display_rows(self) -> dict[str, str]:
+        """Returns the hands for which a plan on an admittance display is proved, and what the hand feels in
+        addition to the object, for display, by name."""
+        certificate = self.certificate
+        assert certificate is not None
+        display = certificate.device.admittance
+        if display is None:
+            return {}
+        units, scheme = self._units(), self.scheme
+        damping = scheme.object_damping - (self.model.damping or 0.0)
+        late_ms = 1e3 * display_lag_s(certificate.device)
+        mass = scheme.mass - (self.model.mass or 0.0)
+        return {
+            "proved for hands": (
+                f"up to {display.hand_stiffness:.4g}{units['stiffness']}, "
+                f"{display.hand_damping:.4g}{units['damping']}, {display.hand_mass:.4g}{units['mass']}"
+            ),
+            "felt in addition": (
+                f"damping {damping:.4g}{units['damping']} plus {late_ms:.3g} ms times the slope of "
+                f"the object, mass {mass:.4g}{units['mass']}, friction "
+                f"{virtual_friction(certificate.device):.3g} {self.model.units['force']}".rstrip()
+            ),
+        }
 
     def settings(self) -> dict[str, str]:
         """Returns the settings of the structure for display, by name."""
@@ -411,7 +441,7 @@ class Plan:
             The slope limit of the explicit structure is not above the steepest slope of the model, or the
             certificate is for another device. The message names the difference.
         """
-        self.scheme.validate(self.rendered, device.period_s)
+        self.scheme.validate(self.rendered, None if device.admittance else device.period_s)
         if self.certificate is not None:
             wrong = device_difference(self.certificate.device, device)
             if wrong:
@@ -420,6 +450,10 @@ class Plan:
     def _certificate_findings(self) -> tuple[Finding, ...]:
         if self.certificate is None:
             return (usable(NO_CERTIFICATE),)
+        if self.certificate.refused and self.certificate.device.admittance is not None:
+            cure = f". The object {self.needs}" if self.needs else ""
+            hands = "no structure is proved stable for every hand of this display"
+            return (no(f"not renderable: {hands}{cure}: {self.certificate.reason}"),)
         if self.certificate.refused:
             cure = f". The object {self.needs}" if self.needs else ""
             reason = "" if self.needs else f": {self.certificate.reason}"

@@ -16,11 +16,12 @@ from .._core.device import DeviceProfile
 from .._core.device import on_device as timed_on_device
 from .._core.model import ForceModel
 from .._core.rendering import most_prediction_taps
+from .._core.stability import stiffest_hand
 from ..arguments import instance_of, real_of
 from ..errors import InputError
 from ..model import Model
 from ..model.steepest_slope import SteepestSlope
-from .candidates import CANDIDATES, Candidate, Refusal, Task
+from .candidates import CANDIDATES, Candidate, Refusal, Task, on_admittance_display
 from .device_profile import find_profile, mechanical_units, require_unit
 from .limited_network import renderable_slopes, sliding_bounds
 from .plan import (
@@ -56,7 +57,9 @@ def plan(
     """Chooses the first candidate structure that is not refused for a model on a device.
 
     ``palpate plan --help`` lists the candidate structures in the order in which they are tried. Missing
-    numbers are chosen from the device.
+    numbers are chosen from the device. On an admittance display, such as a force-feedback pedal, the object
+    always has mass and damping. The implicit structure is chosen unless another one needs noticeably less
+    damping.
 
     Parameters
     ----------
@@ -74,7 +77,8 @@ def plan(
         K_c and B_c [force/position, force*s/position]; either implies `coupling`.
     mass, object_damping : float, optional
         Mass and damping of the object [force*s^2/position, force*s/position]. Default: those of the model. 0
-        removes them.
+        removes them. On an admittance display the default is the least damping and mass that are proved for
+        every hand of the profile, at least those of the model.
     play_radius : float, optional
         r of a model with hysteresis [position].
     predict : int, "auto" or "off"
@@ -122,6 +126,14 @@ def plan(
             f"{_FORCE_UNIT[device.position_unit]}, that of the device {device.id}"
         )
     require_force(model)
+    if device.admittance is not None:
+        if coupling or coupling_stiffness is not None or coupling_damping is not None or samples:
+            raise InputError(
+                f"{device.id} is an admittance display: it has no virtual coupling and no prediction"
+            )
+        return _on_admittance_display(
+            model, device, mass, object_damping, play_radius, accept_force_error=accept_force_error
+        )
     task = Task(
         with_network(model),
         device,
@@ -165,6 +177,62 @@ def plan(
     elif planned.limited is not None:
         planned = replace(planned, needs=_wider_play(task))
     return planned
+
+
+def _on_admittance_display(
+    model: Model,
+    device: DeviceProfile,
+    mass: float | None,
+    object_damping: float | None,
+    play_radius: float | None,
+    *,
+    accept_force_error: float,
+) -> Plan:
+    """Returns the plan with the least object damping on an admittance display."""
+    if model.of_velocity or model.memory is not None:
+        raise InputError(
+            f"{device.id} is an admittance display: it renders a force of position alone, without velocity "
+            "input or memory"
+        )
+    if mass == 0.0:
+        raise InputError("mass is 0: must be > 0 on an admittance display")
+    task = Task(
+        with_network(model),
+        device,
+        mass=mass,
+        object_damping=object_damping,
+        model_mass=model.mass or 0.0,
+        model_damping=model.damping or 0.0,
+        play_radius=play_radius,
+    )
+    chosen, *others = on_admittance_display(task)
+    _, unit, _ = mechanical_units(device.position_unit)
+    refused = tuple(
+        f"{each.scheme.structure}: "
+        + (
+            each.certificate.reason
+            if each.certificate.refused
+            else f"needs an object damping of {each.scheme.object_damping:.4g} {unit}; "
+            f"{chosen.scheme.structure} needs {chosen.scheme.object_damping:.4g} {unit}"
+        )
+        for each in others
+    )
+    needs = ""
+    if chosen.certificate.refused:
+        stiffest = stiffest_hand(chosen.certificate.bounds, chosen.scheme, device)
+        freed = replace(task, mass=None, object_damping=None)
+        least = on_admittance_display(freed)[0].scheme
+        needs = (
+            f"needs an object damping of at least {least.object_damping:.4g} {unit} (has "
+            f"{chosen.scheme.object_damping:.4g}) with a mass of {least.mass:.4g}"
+        )
+        if stiffest > 0.0:
+            assert device.admittance is not None
+            needs += (
+                f", or a hand of at most {_down(stiffest):g} {_slope_unit(device)} (has "
+                f"{device.admittance.hand_stiffness:.4g})"
+            )
+    return Plan(model, chosen.scheme, chosen.certificate, refused, None, accept_force_error, needs)
 
 
 def choose(task: Task, accept_force_error: float) -> tuple[Candidate, tuple[str, ...]]:
@@ -518,6 +586,15 @@ def _improved(device: DeviceProfile, properties: Sequence[_Property], fits: Fits
             low, high = (low, middle) if enough else (middle, high)
         found[k] = high
     return after(found)
+
+
+def _down(value: float) -> float:
+    """Rounds down to three digits."""
+    return _rounded(math.floor, value)
+
+
+def _slope_unit(device: DeviceProfile) -> str:
+    return f"{_FORCE_UNIT[device.position_unit]}/{device.position_unit}"
 
 
 def _changed(device: DeviceProfile, **fields: float) -> DeviceProfile:

@@ -64,10 +64,20 @@ def rig_for(model: Model) -> TestRig:
 def hand_for(plan: Plan, device: DeviceProfile) -> Hand:
     """Returns a simulated hand that moves the handle through the domain of a model while a plan is rendered.
 
+    On an admittance display the hand has the largest stiffness and damping of the profile.
+
     Near the ends of the domain 1 % is left out, because the handle overshoots. The hand stops where the felt
     force would exceed 80 % of the force limit of the device.
     """
     usual = rig_for(plan.model).hand
+    if (display := device.admittance) is not None and display.hand_stiffness > 0.0:
+        usual = Hand(
+            stiffness=display.hand_stiffness,
+            damping=display.hand_damping,
+            lower=usual.lower,
+            upper=usual.upper,
+            frequency_hz=usual.frequency_hz,
+        )
     x, _, at_rest = plan.forces_at_rest()
     margin = _DOMAIN_MARGIN * (x[-1] - x[0])
     held = np.abs(at_rest).max(axis=0) <= _HELD_SHARE * device.force_limit
@@ -116,7 +126,8 @@ def simulate(
     """Renders a plan in closed loop and virtual time, with simulated device, hand and controller.
 
     The handle starts at rest at 0, or at the end of the model's domain that is nearest to it. A plan that the
-    energy account holds is limited by it, every other plan by the force limit only.
+    energy account holds is limited by it, every other plan by the force limit only. On an admittance display
+    the force is that of the hand on the handle, which moves the object.
 
     Parameters
     ----------
@@ -317,7 +328,10 @@ def judge(plan: Plan, rendered: Recording, error: ForceError) -> Verdict:
                 f"the RMS force error in motion is {100 * share:.3g} % of the object's force range, above "
                 f"{100 * _TOLERATED_ERROR_SHARE:.3g} %: "
                 + (
-                    "choose a structure with palpate plan, or a stiffer coupling"
+                    "the damping of the virtual object is felt; a faster servo, a shorter delay or a softer "
+                    "hand needs less"
+                    if plan.certificate is not None and plan.certificate.device.admittance is not None
+                    else "choose a structure with palpate plan, or a stiffer coupling"
                     if plan.limited is None
                     else "the device is too weak for the object, so the plan limits the slopes of the force"
                 )

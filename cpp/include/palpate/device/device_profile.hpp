@@ -50,6 +50,53 @@ inline constexpr auto fields_of<OnDevice> = std::tuple{
     Field<&OnDevice::highest_rate_hz>{
         "highest_rate_hz", "Highest rate of the controller [Hz]; absent: not known.", Rule::Positive}};
 
+/// Properties of an admittance display: a device that measures the force of the hand and moves to a commanded position,
+/// such as a force-feedback pedal. A certificate holds for every hand within the stated stiffness, damping and mass.
+struct AdmittanceDisplay {
+    double hand_stiffness = 0.0;
+    double hand_damping = 0.0;
+    double hand_mass = 0.0;
+    double handle_mass = 0.0;
+    std::optional<double> servo_bandwidth_hz = std::nullopt;
+    std::optional<double> servo_damping = std::nullopt;
+    std::optional<double> rate_limit = std::nullopt;
+    double position_step = 0.0;
+    double feed_forward_s = 0.0;
+
+    [[nodiscard]] bool operator==(const AdmittanceDisplay&) const = default;
+};
+
+template <>
+inline constexpr auto fields_of<AdmittanceDisplay> = std::tuple{
+    Field<&AdmittanceDisplay::hand_stiffness>{
+        "hand_stiffness", "k_h, largest stiffness of the hand or foot [N/m or N*m/rad].", Rule::NotNegative},
+    Field<&AdmittanceDisplay::hand_damping>{
+        "hand_damping", "b_h, largest damping of the hand or foot [N*s/m or N*m*s/rad].", Rule::NotNegative},
+    Field<&AdmittanceDisplay::hand_mass>{
+        "hand_mass", "Largest mass of the hand or foot that moves with the handle [kg or kg*m^2].",
+        Rule::NotNegative},
+    Field<&AdmittanceDisplay::handle_mass>{
+        "handle_mass", "Mass between the force sensor and the hand [kg or kg*m^2].", Rule::NotNegative},
+    Field<&AdmittanceDisplay::servo_bandwidth_hz>{
+        "servo_bandwidth_hz",
+        "Natural frequency of the position servo [Hz]; of a servo of first order, its corner frequency. "
+        "Absent: the servo moves at once.",
+        Rule::Positive},
+    Field<&AdmittanceDisplay::servo_damping>{
+        "servo_damping", "Damping ratio of a position servo of second order [-]; absent: first order.",
+        Rule::Positive},
+    Field<&AdmittanceDisplay::rate_limit>{
+        "rate_limit", "Largest speed of the position command [m/s or rad/s]; absent: none.", Rule::Positive},
+    Field<&AdmittanceDisplay::position_step>{
+        "position_step",
+        "Smallest change of the position command, such as one step of a stepper motor [m or rad]; 0 = not "
+        "quantised.",
+        Rule::NotNegative},
+    Field<&AdmittanceDisplay::feed_forward_s>{
+        "feed_forward_s",
+        "Time by which the command is ahead of the object's motion, to compensate the servo's lag [s].",
+        Rule::NotNegative}};
+
 /// Properties of a haptic device; `fields_of` states the meaning of each number. The default is a direct-drive knob
 /// with a 16-bit encoder.
 struct DeviceProfile {
@@ -66,6 +113,7 @@ struct DeviceProfile {
     double jitter_s = 0.0;
     std::optional<std::string> renderer = std::nullopt;
     std::optional<OnDevice> on_device = std::nullopt;
+    std::optional<AdmittanceDisplay> admittance = std::nullopt;
 
     /// Returns the longest time between two samples, T plus jitter [s]. A certificate must hold for this time.
     [[nodiscard]] double longest_period_s() const noexcept { return period_s + jitter_s; }
@@ -137,7 +185,11 @@ inline constexpr auto fields_of<DeviceProfile> = std::tuple{
                                     Rule::Any, true, detail::renderers},
     Field<&DeviceProfile::on_device>{
         "on_device",
-        "Timing of a model that runs on the motor controller; absent: the defaults of OnDevice."}};
+        "Timing of a model that runs on the motor controller; absent: the defaults of OnDevice."},
+    Field<&DeviceProfile::admittance>{
+        "admittance",
+        "Hand, handle and position servo of an admittance display, which measures the force and moves to a "
+        "position; absent: the device measures its position and applies a force."}};
 
 /// Returns the profile with zero damping and friction. A certificate must not rely on values that were not measured.
 [[nodiscard]] inline DeviceProfile unmeasured(DeviceProfile profile) {
@@ -157,6 +209,11 @@ inline void validate(const DeviceProfile& profile) {
     if (!(profile.delay_s <= longest_delay_s(profile.period_s))) {
         throw std::invalid_argument("device profile: delay_s is " + readable(profile.delay_s) +
                                     ", must be 0 to 16 periods");
+    }
+    if (profile.admittance && profile.admittance->servo_damping && !profile.admittance->servo_bandwidth_hz) {
+        throw std::invalid_argument(
+            "device profile: admittance.servo_damping is given without admittance.servo_bandwidth_hz: give "
+            "both, or neither for a servo without lag");
     }
 }
 

@@ -34,7 +34,9 @@ class AnyStructure {
     [[nodiscard]] Rendered step(double position) noexcept { return held_->step(position); }
     /// Moves the virtual object by one step; `force` acts on it in place of the coupling's force. Returns zero force and
     /// the status NonFinite if the object has no mass.
-    [[nodiscard]] Rendered drive(double force) noexcept { return held_->drive(force); }
+    [[nodiscard]] Rendered drive(double force, const DriveLimits& limits = {}) noexcept {
+        return held_->drive(force, limits);
+    }
     /// Returns true if a table of solutions is used for at least a part of the positions; nothing if the structure
     /// solves no load line.
     [[nodiscard]] std::optional<bool> tabulated() const noexcept { return held_->tabulated(); }
@@ -50,7 +52,7 @@ class AnyStructure {
         [[nodiscard]] virtual std::unique_ptr<Held> copy() const = 0;
         virtual void reset(double position) noexcept = 0;
         [[nodiscard]] virtual Rendered step(double position) noexcept = 0;
-        [[nodiscard]] virtual Rendered drive(double force) noexcept = 0;
+        [[nodiscard]] virtual Rendered drive(double force, const DriveLimits& limits) noexcept = 0;
         [[nodiscard]] virtual std::optional<bool> tabulated() const noexcept = 0;
     };
 
@@ -61,9 +63,9 @@ class AnyStructure {
         [[nodiscard]] std::unique_ptr<Held> copy() const override { return std::make_unique<Holder>(*this); }
         void reset(double position) noexcept override { structure_.reset(position); }
         [[nodiscard]] Rendered step(double position) noexcept override { return structure_.step(position); }
-        [[nodiscard]] Rendered drive(double force) noexcept override {
-            if constexpr (requires { structure_.drive(force); }) {
-                return structure_.drive(force);
+        [[nodiscard]] Rendered drive(double force, const DriveLimits& limits) noexcept override {
+            if constexpr (requires { structure_.drive(force, limits); }) {
+                return structure_.drive(force, limits);
             } else {
                 return detail::refused(std::numeric_limits<double>::quiet_NaN());
             }

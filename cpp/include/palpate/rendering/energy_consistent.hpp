@@ -99,8 +99,9 @@ class EnergyConsistent {
     }
 
     /// Moves the virtual object by one step; the given force acts on it in place of the coupling's force.
-    [[nodiscard]] Rendered drive(double force) noexcept {
-        const Solution solution = solve({0.0, 0.0}, force);
+    [[nodiscard]] Rendered drive(double force, const DriveLimits& limits = {}) noexcept {
+        const Solution solution = detail::limited_step(
+            position_, force, limits, [&](double driving) noexcept { return solve({0.0, 0.0}, driving); });
         return solution.status == Status::NonFinite ? detail::refused(position_) : moved_to(solution, force);
     }
 

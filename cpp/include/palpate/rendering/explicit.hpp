@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "palpate/dynamics/coupling.hpp"
@@ -67,7 +69,17 @@ class Explicit {
     }
 
     /// Moves the virtual object by one step; the given force acts on it in place of the coupling's force.
-    [[nodiscard]] Rendered drive(double force) noexcept { return take(moved_by(force), force); }
+    [[nodiscard]] Rendered drive(double force, const DriveLimits& limits = {}) noexcept {
+        ObjectStep next = moved_by(force);
+        // Friction reduces the speed at the end of the step, at most to zero
+        const double speed =
+            std::max(0.0, std::abs(next.velocity) - period_ / inertia_.mass * limits.friction);
+        next.velocity = std::copysign(std::min(speed, limits.largest_step / period_), next.velocity);
+        if (std::isfinite(next.position)) {
+            next.position = position_ + period_ * next.velocity;
+        }
+        return take(next, force);
+    }
 
   private:
     /// Velocity and position of the object at the end of a step.

@@ -96,15 +96,22 @@ class Implicit {
     }
 
     /// Moves the virtual object by one step; `force` acts on it in place of the coupling's force (paper figure 12).
-    [[nodiscard]] Rendered drive(double force) noexcept { return drive_from(position_, force, 0); }
+    [[nodiscard]] Rendered drive(double force, const DriveLimits& limits = {}) noexcept {
+        return drive_from(position_, force, 0, limits);
+    }
 
   private:
     /// Moves the virtual object by one step; `force` acts on it in place of the coupling's force. The search for the
     /// object's new position starts at `start`.
-    [[nodiscard]] Rendered drive_from(double start, double force, int evaluations) noexcept {
-        const LoadLine line{uncoupled_slope_, force - inertial_ * before_ + uncoupled_factor_ * position_};
-        typename Solver::Memory from{start};
-        const Solution solution = uncoupled_.solve(environment_, state_, line, from);
+    [[nodiscard]] Rendered drive_from(double start, double force, int evaluations,
+                                      const DriveLimits& limits = {}) noexcept {
+        const Solution solution =
+            detail::limited_step(position_, force, limits, [&](double driving) noexcept {
+                const LoadLine line{uncoupled_slope_,
+                                    driving - inertial_ * before_ + uncoupled_factor_ * position_};
+                typename Solver::Memory from{start};
+                return uncoupled_.solve(environment_, state_, line, from);
+            });
         memory_ = typename Solver::Memory{position_};
         if (solution.status == Status::NonFinite) {
             return detail::refused(position_);

@@ -53,6 +53,12 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
     return scheme;
 }
 
+/// Returns true if the scheme has no coupling between device and virtual object, but an object with mass: the measured
+/// force drives the object, and its position is the command of an admittance display.
+[[nodiscard]] constexpr bool is_uncoupled(const Scheme& scheme) noexcept {
+    return has_mass(scheme.structure) && scheme.coupling.stiffness == 0.0 && scheme.coupling.damping == 0.0;
+}
+
 /// A model can be compensated only if its largest slope is at most this factor times the coupling's stiffness K_c [-].
 inline constexpr double compensated_share = 0.9;
 
@@ -68,7 +74,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     detail::require(model.memory() == nullptr || scheme.structure == StructureKind::Direct,
                     "structure is " + structure +
                         ", must be direct: only the direct structure can render a force with memory");
-    if (traits.coupling) {
+    if (traits.coupling && !is_uncoupled(scheme)) {
         check_fields(scheme.coupling, "coupling_");
     }
     if (traits.mass) {
@@ -89,7 +95,7 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     detail::require(!model.hysteresis() || model.play_radius() || scheme.play_radius > 0.0,
                     "play_radius is 0, but the model does not define one: must be > 0");
     if (scheme.compensated) {
-        detail::require(traits.coupling,
+        detail::require(traits.coupling && !is_uncoupled(scheme),
                         "compensated is set for the " + structure + " structure, which has no coupling");
         detail::require(
             !model.hysteresis(),
@@ -115,9 +121,14 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
     return scheme.compensated ? stiffness * steepest / (stiffness - steepest) : steepest;
 }
 
-/// Checks a scheme like validate(scheme, model), and also throws if the scheme diverges at the period `period_s`.
+/// Checks a scheme for a device that applies forces like validate(scheme, model), and also throws if the scheme has no
+/// coupling to the device or diverges at the period `period_s`.
 inline void validate(const Scheme& scheme, const ForceModel& model, double period_s) {
     validate(scheme, model);
+    detail::require(
+        !is_uncoupled(scheme),
+        "coupling_stiffness is 0: must be > 0 on a device that applies forces; only an admittance "
+        "display renders an object without a coupling");
     with_kind(scheme.structure, [&](auto structure) {
         if constexpr (requires(StructureNumbers numbers) { structure.slope_limit(numbers); }) {
             const double steepest = steepest_slope(scheme, model);

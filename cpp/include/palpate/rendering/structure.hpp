@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <concepts>
+#include <limits>
 #include <string_view>
 
 #include "palpate/dynamics/coupling.hpp"
@@ -27,6 +29,13 @@ template <class S>
 concept Structure = requires(S& structure, double position) {
     { structure.reset(position) } noexcept;
     { structure.step(position) } noexcept -> std::same_as<Rendered>;
+};
+
+/// Limits of the motion of a virtual object that a force drives. Both act inside the step: the object's state contains
+/// them, so they take energy out of the object and never put energy in.
+struct DriveLimits {
+    double largest_step = std::numeric_limits<double>::infinity();  ///< largest motion in a step [m or rad]
+    double friction = 0.0;  ///< Coulomb friction of the object [N or N*m]
 };
 
 /// Properties of a structure that do not depend on the model.
@@ -54,6 +63,23 @@ namespace detail {
 /// Returns the result of a step whose input or force is not finite: zero force, and the given position of the object.
 [[nodiscard]] inline Rendered refused(double environment_position) noexcept {
     return {0.0, environment_position, 0, Status::NonFinite, false};
+}
+
+/// Returns the end of a step from the position `from` that the limits allow. `solve(force)` returns the solution of the
+/// step without limits; it rises with the force. With friction the object moves only if it moves in the direction of
+/// the force that friction leaves; otherwise it stays.
+template <class Solve>
+[[nodiscard]] auto limited_step(double from, double force, const DriveLimits& limits,
+                                const Solve& solve) noexcept {
+    auto end = solve(force - limits.friction);
+    if (limits.friction > 0.0 && end.position <= from) {
+        const int evaluations = end.evaluations;
+        end = solve(force + limits.friction);
+        end.evaluations += evaluations;
+        end.position = std::min(end.position, from);
+    }
+    end.position = std::clamp(end.position, from - limits.largest_step, from + limits.largest_step);
+    return end;
 }
 
 }  // namespace detail

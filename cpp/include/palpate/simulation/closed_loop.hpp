@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "palpate/fields/readable.hpp"
+#include "palpate/rendering/admittance.hpp"
 #include "palpate/rendering/any_structure.hpp"
 #include "palpate/rendering/make_structure.hpp"
 #include "palpate/rendering/scheme.hpp"
@@ -21,6 +22,7 @@
 #include "palpate/simulation/hand.hpp"
 #include "palpate/simulation/plant.hpp"
 #include "palpate/simulation/simulated_device.hpp"
+#include "palpate/simulation/simulated_display.hpp"
 
 namespace palpate {
 
@@ -129,16 +131,65 @@ inline constexpr std::size_t most_simulated_ticks = 3'600'000;
     return static_cast<std::size_t>(ticks);
 }
 
-/// Renders a model on a simulated device with a hand, in simulated time, limited by `guards`. Calls `each(number)` after
+/// Renders a model on a simulated admittance display with a hand, in simulated time. Calls `each(number)` after every
+/// tick; an exception of `each` ends the simulation. In a row of the trace, `force` is the sensor's force at the start
+/// of the tick, which moves the object; `applied` is the hand's force at the end of the tick.
+template <class Each>
+[[nodiscard]] Trace simulate_display(const ForceModel& model, const Scheme& scheme,
+                                     const DeviceProfile& device, const Hand& hand, std::size_t ticks,
+                                     double start_position, Each&& each) {
+    validate(scheme, model);
+    detail::require(is_uncoupled(scheme), "structure is " + std::string(name_of(scheme.structure)) +
+                                              " with a coupling or without mass: an admittance display "
+                                              "renders an object with mass and coupling_stiffness 0");
+    Admittance source{make_structure(model, scheme, device.period_s, std::numeric_limits<double>::infinity()),
+                      device};
+    source.reset(start_position);
+    SimulatedDisplay display{device, start_position};
+    Trace trace;
+    Motion start = display.handle();
+    double force = display.force(hand.grip(0.0, start));
+    for (std::size_t k = 0; k < ticks; ++k) {
+        each(k);
+        const PositionCommand command = source.step(display.measured(force));
+        display.move(command.position);
+        const double time = static_cast<double>(k + 1) * device.period_s;
+        const Motion end = display.handle();
+        const double next = display.force(hand.grip(time, end));
+        trace.time.push_back(time);
+        trace.position.push_back(end.position);
+        trace.velocity.push_back(end.velocity);
+        trace.handle_start.push_back(start.position);
+        trace.handle_middle.push_back(0.5 * (start.position + end.position) +
+                                      0.125 * device.period_s * (start.velocity - end.velocity));
+        trace.handle_end.push_back(end.position);
+        trace.environment_position.push_back(command.object.environment_position);
+        trace.force.push_back(display.measured(force));
+        trace.applied.push_back(next);
+        trace.mean_applied.push_back(0.5 * (force + next));
+        trace.evaluations.push_back(command.object.evaluations);
+        trace.status.push_back(command.object.status);
+        trace.extrapolated.push_back(static_cast<std::uint8_t>(command.object.extrapolated));
+        start = end;
+        force = next;
+    }
+    return trace;
+}
+
+/// Renders a model on a simulated device with a hand, in simulated time, limited by `guards`; on an admittance display
+/// the guards have no effect. Calls `each(number)` after
 /// every tick; an exception of `each` ends the simulation.
 template <class Each>
 [[nodiscard]] Trace simulate(const ForceModel& model, const Scheme& scheme, const DeviceProfile& profile,
                              const Hand& hand, const Guards& guards, std::size_t ticks, int substeps,
                              double start_position, Each&& each) {
-    validate(scheme, model, profile.period_s);
     detail::require(
         ticks <= most_simulated_ticks,
         "ticks is " + std::to_string(ticks) + ", must be at most " + std::to_string(most_simulated_ticks));
+    if (profile.admittance) {
+        return simulate_display(model, scheme, profile, hand, ticks, start_position, each);
+    }
+    validate(scheme, model, profile.period_s);
     const double late = profile.delay_fraction();
     Trace trace;
     const auto add = [&](const SimulatedTick& now) {

@@ -18,6 +18,7 @@
 #include "palpate/model/fingerprint.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/rendering/scheme.hpp"
+#include "palpate/stability/admittance_inequalities.hpp"
 #include "palpate/stability/coupled_inequalities.hpp"
 #include "palpate/stability/direct_inequalities.hpp"
 #include "palpate/stability/explicit_inequalities.hpp"
@@ -138,8 +139,15 @@ void hash_value(NumberHash& hash, const T& value) {
 /// Inequalities that do not hold are included. Numbers of the scheme that its structure does not use are ignored.
 [[nodiscard]] inline std::vector<Inequality> inequalities_of(const ForceBounds& bounds, const Scheme& scheme,
                                                              const DeviceProfile& device) {
+    if (device.admittance) {
+        return admittance_inequalities(bounds, scheme, device);
+    }
     std::vector<Inequality> lines = with_kind(
         scheme.structure, [&](auto structure) { return inequalities(structure, bounds, scheme, device); });
+    if (is_uncoupled(scheme)) {
+        lines.push_back({"uncoupled", "object without a coupling on a device that applies forces",
+                         "needs an admittance display", 0.0, 1.0, Basis::None, "use a virtual coupling"});
+    }
     if (bounds.drag > 0.0 && !traits_of(scheme.structure).velocity) {
         lines.push_back({"velocity-coupling", "force that depends on velocity, without direct rendering",
                          "proved only for B_v = 0", 0.0, bounds.drag, Basis::None, "use direct rendering"});

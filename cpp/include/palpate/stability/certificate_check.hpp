@@ -98,6 +98,13 @@ namespace detail {
             } else if (before != now) {
                 difference = opening + " in " + before + ", not in " + now;
             }
+        } else if constexpr (std::is_same_v<decltype(before), const std::optional<AdmittanceDisplay>&>) {
+            if (before != now) {
+                difference = opening + (!now ? " as an admittance display, not as one that applies forces"
+                                        : !before ? ", which applies forces, not for an admittance display"
+                                                  : " with another hand or position servo");
+                difference += "; plan the model again";
+            }
         } else if constexpr (!is_optional<std::remove_cvref_t<decltype(before)>>) {
             // The renderer is compared above; a certificate does not contain the timing of another renderer
             if (!agree(before, now)) {

@@ -16,7 +16,7 @@ namespace palpate {
 
 /// Kind of proof of an inequality in a certificate.
 enum class Basis : std::uint8_t {
-    Proved,  ///< proved for every motion and every passive hand
+    Proved,  ///< proved for every motion and every passive hand; on an admittance display for the hands of its profile
     Linear,  ///< valid for the linearised system only: stable near an equilibrium
     /// Nothing is proved if the right side exceeds the left side, so the certificate refuses this case
     None,

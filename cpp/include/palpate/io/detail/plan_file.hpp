@@ -42,7 +42,11 @@ PALPATE_INLINE std::optional<Scheme> read_plan(const JsonField& plan) {
     if (!coupling.is_null()) {
         scheme.coupling = coupling.as<VirtualCoupling>();
     }
-    require_given(coupling, has_coupling(scheme.structure), "coupling");
+    if (coupling.is_null() && has_mass(scheme.structure)) {
+        scheme.coupling = {0.0, 0.0};  // plan for an admittance display
+    } else {
+        require_given(coupling, has_coupling(scheme.structure), "coupling");
+    }
     const JsonField inertia = plan["inertia"];
     if (!inertia.is_null()) {
         scheme.inertia = inertia.as<Inertia>();

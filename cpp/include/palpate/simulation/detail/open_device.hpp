@@ -86,6 +86,10 @@ PALPATE_INLINE std::unique_ptr<LiveDevice> open_device(const RenderOptions& opti
             " Hz: set device to a USB device that contains the exported model, or make a plan for the host "
             "with 'palpate plan' without on_device");
     }
+    if (model.certificate && model.certificate->device.admittance) {
+        refuse(model.name + " is planned for the admittance display " + model.certificate->device.id +
+               ": palpate-control renders on devices that apply forces; simulate it with 'palpate simulate'");
+    }
     if (model.force_unit == "A") {
         refuse("the model's force is a motor current in A: identify it with --torque-constant-Nm-per-A");
     }
