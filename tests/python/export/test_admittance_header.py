@@ -15,7 +15,6 @@ from models_by_hand import model_by_hand
 from palpate import DeviceProfile
 from palpate.cli.main import main
 from palpate.planning import AdmittanceDisplay
-from palpate.verification import force_driven
 
 PROGRAM = """#include <stdio.h>
 #include "pedal.h"
