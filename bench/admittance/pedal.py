@@ -40,7 +40,7 @@ def scaled(recording: palpate.Recording) -> palpate.Recording:
     )
 
 
-def felt(plan: palpate.Plan, rendered: palpate.Recording) -> tuple[float, float]:
+def added_motion(plan: palpate.Plan, rendered: palpate.Recording) -> tuple[float, float]:
     """Returns damping and mass of the difference from the identified force, by least squares after 0.5 s."""
     time = rendered.time
     assert time is not None
@@ -67,7 +67,7 @@ def main() -> None:
             pedal = DeviceProfile.load(example_profiles()[profile][0])
             plan = palpate.plan(model, pedal)
             rendered = palpate.simulate(plan, pedal, hand_for(plan, pedal), 6.0)
-            damping, mass = felt(plan, rendered)
+            damping, mass = added_motion(plan, rendered)
             share = force_error(plan, rendered).band / force_range(plan)
             scheme = plan.scheme
             print(

@@ -15,6 +15,7 @@ from conftest import ROOT
 from palpate import DeviceProfile, Scheme
 from palpate._core.rendering import structure_names
 from palpate.cli.main import palpate
+from palpate.planning import AdmittanceDisplay
 from palpate.planning.candidates import CANDIDATES
 
 PACKAGE = ROOT / "python" / "palpate"
@@ -86,7 +87,10 @@ def test_no_line_of_the_pages_lists_all_structures() -> None:
 
 def test_every_field_of_a_profile_is_in_schema_and_stub_with_its_unit() -> None:
     stub = (PACKAGE / "_core" / "device.pyi").read_text(encoding="utf-8")
-    assert [*SCHEMA["Device"]["properties"], PROFILE_ONLY] == FIELDS
+    assert list(SCHEMA["Device"]["properties"]) == [name for name in FIELDS if name != PROFILE_ONLY]
+    display = AdmittanceDisplay(servo_bandwidth_hz=60.0, servo_damping=0.8, rate_limit=0.5)
+    assert list(SCHEMA["AdmittanceDisplay"]["properties"]) == list(display.to_dict())
+    assert SCHEMA["AdmittanceDisplay"]["required"] == list(AdmittanceDisplay().to_dict())
     for name in FIELDS:
         assert f"    def {name}(self)" in stub
         if SCHEMA["Device"]["properties"].get(name, {}).get("type") == "number":
@@ -96,10 +100,12 @@ def test_every_field_of_a_profile_is_in_schema_and_stub_with_its_unit() -> None:
 
 def test_a_profile_file_must_have_the_fields_that_the_schema_requires(tmp_path: Path) -> None:
     assert set(SCHEMA["Device"]["required"]) == set(DeviceProfile().to_dict())
-    types = {name: specification["type"] for name, specification in SCHEMA["Device"]["properties"].items()}
-    values = {name: 1e-3 for name, kind in types.items() if kind == "number"}
+    properties = SCHEMA["Device"]["properties"].items()
+    values = {name: 1e-3 for name, specification in properties if specification.get("type") == "number"}
     profile = DeviceProfile(**values)
-    assert list(profile.to_dict()) == [name for name in FIELDS if name not in (PROFILE_ONLY, "renderer")]
+    assert list(profile.to_dict()) == [
+        name for name in FIELDS if name not in (PROFILE_ONLY, "renderer", "admittance")
+    ]
     loaded = DeviceProfile.load(profile.save(tmp_path / "device.toml"))
     assert loaded == profile
     for name, value in values.items():

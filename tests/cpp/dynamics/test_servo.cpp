@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
+namespace palpate::admittance_tests {
 namespace {
 
 constexpr double servo_frequency = 2.0 * 3.14159265358979323846 * 20.0;
@@ -74,4 +74,4 @@ TEST(Servo, ImpulseNormsBoundTheResponse) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::admittance_tests

@@ -13,7 +13,7 @@
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
 
-namespace palpate {
+namespace palpate::admittance_tests {
 namespace {
 
 constexpr double period = 1e-3;
@@ -134,4 +134,4 @@ TEST(Admittance, FrictionCoversTheHandOfTheProfile) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::admittance_tests

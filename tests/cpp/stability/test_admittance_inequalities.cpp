@@ -16,7 +16,7 @@
 #include "palpate/stability/certificate_check.hpp"
 #include "support.hpp"
 
-namespace palpate {
+namespace palpate::admittance_tests {
 namespace {
 
 DeviceProfile display(double period_s, double delay, std::optional<double> bandwidth_hz,
@@ -257,4 +257,4 @@ TEST(AdmittanceInequalities, CertificateIsForOneHandAndServo) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::admittance_tests
