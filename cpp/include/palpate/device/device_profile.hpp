@@ -50,6 +50,51 @@ inline constexpr auto fields_of<OnDevice> = std::tuple{
     Field<&OnDevice::highest_rate_hz>{
         "highest_rate_hz", "Highest rate of the controller [Hz]; absent: not known.", Rule::Positive}};
 
+/// Loop of a motor controller that holds a line, force + stiffness (x - position), between two commands (`Command`). The
+/// controller reads its own encoder at a higher rate than the host. The default is a controller of 20 kHz with a period
+/// of delay.
+struct HeldLine {
+    double period_s = 5e-5;
+    double delay_s = 5e-5;
+    double encoder_step = 0.0;
+    double stiffness_step = 0.0;
+    double position_step = 0.0;
+    std::optional<double> largest_stiffness = std::nullopt;
+    bool limits_force = true;
+    std::optional<double> watchdog_s = std::nullopt;
+
+    [[nodiscard]] bool operator==(const HeldLine&) const = default;
+};
+
+template <>
+inline constexpr auto fields_of<HeldLine> = std::tuple{
+    Field<&HeldLine::period_s>{"period_s", "Time between two samples of the controller [s].", Rule::Positive},
+    Field<&HeldLine::delay_s>{
+        "delay_s",
+        "Time from a sample of the controller to its force, lag of the current control included [s].",
+        Rule::NotNegative},
+    Field<&HeldLine::encoder_step>{
+        "encoder_step",
+        "Smallest change of position that the controller reads [m or rad]; 0 = not quantised.",
+        Rule::NotNegative},
+    Field<&HeldLine::stiffness_step>{"stiffness_step",
+                                     "Smallest change of the commanded stiffness [N/m or N*m/rad]; 0 = not "
+                                     "quantised.",
+                                     Rule::NotNegative},
+    Field<&HeldLine::position_step>{
+        "position_step", "Smallest change of the commanded position [m or rad]; 0 = not quantised.",
+        Rule::NotNegative},
+    Field<&HeldLine::largest_stiffness>{
+        "largest_stiffness", "Largest stiffness that a command can have [N/m or N*m/rad]; absent: any.",
+        Rule::Positive},
+    Field<&HeldLine::limits_force>{
+        "limits_force",
+        "True if the controller limits the force of the line to the force limit of the profile."},
+    Field<&HeldLine::watchdog_s>{
+        "watchdog_s",
+        "Time after the last command at which the controller makes zero force [s]; absent: never.",
+        Rule::Positive}};
+
 /// Properties of a haptic device; `fields_of` states the meaning of each number. The default is a direct-drive knob
 /// with a 16-bit encoder.
 struct DeviceProfile {
@@ -66,6 +111,7 @@ struct DeviceProfile {
     double jitter_s = 0.0;
     std::optional<std::string> renderer = std::nullopt;
     std::optional<OnDevice> on_device = std::nullopt;
+    std::optional<HeldLine> held_line = std::nullopt;
 
     /// Returns the longest time between two samples, T plus jitter [s]. A certificate must hold for this time.
     [[nodiscard]] double longest_period_s() const noexcept { return period_s + jitter_s; }
@@ -137,7 +183,9 @@ inline constexpr auto fields_of<DeviceProfile> = std::tuple{
                                     Rule::Any, true, detail::renderers},
     Field<&DeviceProfile::on_device>{
         "on_device",
-        "Timing of a model that runs on the motor controller; absent: the defaults of OnDevice."}};
+        "Timing of a model that runs on the motor controller; absent: the defaults of OnDevice."},
+    Field<&DeviceProfile::held_line>{
+        "held_line", "Loop of a controller that holds a line between two commands; absent: it holds a force."}};
 
 /// Returns the profile with zero damping and friction. A certificate must not rely on values that were not measured.
 [[nodiscard]] inline DeviceProfile unmeasured(DeviceProfile profile) {
@@ -145,9 +193,13 @@ inline constexpr auto fields_of<DeviceProfile> = std::tuple{
     return profile;
 }
 
-/// Returns the part of the profile on which a certificate relies. The timing of another renderer is left out.
-[[nodiscard]] inline DeviceProfile certified_part(DeviceProfile profile) {
+/// Returns the part of the profile on which a certificate relies. The timing of another renderer is left out, and the
+/// loop that holds a line unless the rendering uses it.
+[[nodiscard]] inline DeviceProfile certified_part(DeviceProfile profile, bool holds_line) {
     profile.on_device.reset();
+    if (!holds_line) {
+        profile.held_line.reset();
+    }
     return profile;
 }
 
@@ -157,6 +209,16 @@ inline void validate(const DeviceProfile& profile) {
     if (!(profile.delay_s <= longest_delay_s(profile.period_s))) {
         throw std::invalid_argument("device profile: delay_s is " + readable(profile.delay_s) +
                                     ", must be 0 to 16 periods");
+    }
+    if (profile.held_line && !(profile.held_line->period_s <= profile.period_s)) {
+        throw std::invalid_argument("device profile: held_line.period_s is " +
+                                    readable(profile.held_line->period_s) + ", must be at most period_s, " +
+                                    readable(profile.period_s));
+    }
+    if (profile.held_line && !(profile.held_line->delay_s <= longest_delay_s(profile.held_line->period_s))) {
+        throw std::invalid_argument("device profile: held_line.delay_s is " +
+                                    readable(profile.held_line->delay_s) +
+                                    ", must be 0 to 16 periods of held_line");
     }
 }
 
