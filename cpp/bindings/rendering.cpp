@@ -23,6 +23,15 @@ void bind_rendering(py::module_& module) {
         py::tuple(py::cast(std::vector<std::string>(structure_names.begin(), structure_names.end())));
     module.attr("most_prediction_taps") = most_prediction_taps;
     module.attr("compensated_share") = compensated_share;
+    py::class_<HeldSlope> line(module, "HeldSlope",
+                               "Rule for the slope of a line that a tangent holds, in SI units.");
+    bind_fields(line);
+    line.def(
+        py::init([](const py::dict& fields) { return py::type::of<HeldSlope>()(**fields).cast<HeldSlope>(); }),
+        "fields"_a);
+    py::implicitly_convertible<py::dict, HeldSlope>();
+    module.attr("most_slope_cells") = most_slope_cells;
+    module.attr("cells_in_motion") = cells_in_motion;
     py::class_<Scheme> type(module, "Scheme",
                             "Structure that renders a model, with the numbers of the structure in SI units.");
     bind_fields(type);

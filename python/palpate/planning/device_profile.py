@@ -63,8 +63,8 @@ class DeviceProfile(_core.device.DeviceProfile):
     unknown damping or friction, and an upper bound for unknown delay, steps or jitter.
 
     The keyword arguments are the fields of the core's DeviceProfile, listed there with their units. The
-    defaults are those of a simulated knob. ``on_device`` is an :class:`palpate.planning.OnDevice`, a table in
-    the TOML file.
+    defaults are those of a simulated knob. ``on_device`` is an :class:`palpate.planning.OnDevice`, ``held_line`` a
+    :class:`palpate.planning.HeldLine`; both are tables in the TOML file.
 
     Raises
     ------
@@ -97,7 +97,7 @@ class DeviceProfile(_core.device.DeviceProfile):
             raise InputError(f"{file} is not TOML: the file is not text") from None
         except RecursionError:
             raise InputError(
-                f"{file}: the file is nested too deeply; a profile has no table but on_device"
+                f"{file}: the file is nested too deeply; a profile has no tables but on_device and held_line"
             ) from None
         except ValueError as error:  # TOML with an integer of too many digits for Python, or an invalid date
             reason = str(error)

@@ -13,13 +13,14 @@ import numpy as np
 from .._core.device import DeviceProfile
 from .._core.io import checked_certificate, scheme_of
 from .._core.model import ForceModel
-from .._core.rendering import Scheme, default_play_radius, solver_name
+from .._core.rendering import HeldSlope, Scheme, default_play_radius, solver_name
 from .._core.simulation import AccountUse, account_use, motion_driven, resting_oscillation
 from .._core.stability import (
     Certificate,
     certify,
     certify_with_account,
     device_difference,
+    fast_motion_energy,
     slope_behind_coupling,
 )
 from .._typing import Float1D, Float2D
@@ -270,6 +271,7 @@ class Plan:
             "predict": scheme.predict or None,
             "refused": list(self.refused),
             "accepted_force_error": self.accept_force_error,
+            **({} if scheme.line is None else {"line": scheme.line.to_dict()}),
         }
 
     @property
@@ -330,9 +332,27 @@ class Plan:
         if scheme.predict:
             samples = "sample" if scheme.predict == 1 else f"{scheme.predict} samples"
             rows["prediction"] = f"half a sample ahead, from the previous {samples}"
+        if scheme.line is not None:
+            rows["held line"] = self._line_text(scheme.line)
         if scheme.play_radius:
             rows["play radius"] = f"{scheme.play_radius:.4g}{units['position']}"
         return rows
+
+    def _line_text(self, line: HeldSlope) -> str:
+        """Returns the slope of a held line and its fastest motion in words."""
+        units = self._units()
+        words = {
+            "steepest": f"slope that stores the energy, up to {line.slope:.4g}{units['stiffness']}",
+            "raised": f"slope of the force + {line.lift:.4g}{units['stiffness']}",
+            "constant": f"slope {line.slope:.4g}{units['stiffness']}",
+        }[line.rule]
+        if line.motion is None or self.certificate is None:
+            return f"{words}; any speed"
+        device = self.certificate.device
+        return (
+            f"{words}; up to {line.motion / device.period_s:.4g}{units['position']}/s, a faster motion ends "
+            f"the run and gives at most {fast_motion_energy(device):.3g} J"
+        )
 
     def _units(self) -> dict[str, str]:
         """Returns the unit of each kind of quantity with a space before it; empty text without units."""

@@ -174,6 +174,8 @@ def choose(task: Task, accept_force_error: float) -> tuple[Candidate, tuple[str,
     chosen: Candidate | None = None
     found = ""
     for name, candidate in CANDIDATES.items():
+        if not candidate.applies(task):
+            continue
         if found and not (candidate.reduces_error and _error(task, chosen) > accept_force_error):
             continue
         outcome = candidate.propose(task)

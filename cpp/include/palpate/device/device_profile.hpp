@@ -236,6 +236,7 @@ inline void validate(const DeviceProfile& profile) {
     profile.delay_s = timing.delay_periods * profile.period_s + timing.delay_s;
     profile.jitter_s = timing.jitter_s;
     profile.renderer = "device";
+    profile.held_line.reset();
     if (const double most = longest_delay_samples - timing.delay_periods; timing.delay_s * rate_hz > most) {
         require_field(false, "on_device", rate_hz,
                       "at most " + readable(std::floor(std::max(most, 0.0) / timing.delay_s)) +

@@ -122,19 +122,19 @@ struct Guards {
     guards.ramp = force_ramp(settings, period_s);
     guards.slew = slew_limit(settings, period_s);
     guards.motion = ReadMotion{settings.certified ? settings.encoder_step : 0.0};
-    if (scheme.line) {
+    if (holds_line(scheme.structure)) {
         DeviceProfile timing;
         timing.period_s = period_s;
         timing.delay_s = settings.delay_s;
         guards.line_work = LineWork{timing.whole_delay_samples()};
-        if (scheme.line->motion) {
+        if (scheme.line && scheme.line->motion) {
             // The motion of the handle can be larger than that of the readings by an encoder step
             guards.reading =
                 reading_guard(settings, period_s, *scheme.line->motion - settings.encoder_step);
         }
     }
     // The account limits forces that are held for a period. It has no rule for a line
-    if (settings.energy_account && !scheme.line) {
+    if (settings.energy_account && !holds_line(scheme.structure)) {
         AccountSettings account = account_settings(settings, period_s);
         account.stored = stored_energy(model, scheme, settings.force_limit, period_s);
         if (!settings.certified && settings.device_damping == 0.0 && settings.device_friction == 0.0) {

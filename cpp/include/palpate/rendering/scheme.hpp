@@ -43,7 +43,7 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
                             "m, number of past samples that predict the position half a period ahead, 0 to "
                             "16; 0 = no prediction.",
                             Rule::NotNegative},
-    Field<&Scheme::line>{"line", "Slope of the line that a tangent holds; absent in other structures."}};
+    Field<&Scheme::line>{"line", "Slope of the line that a tangent holds; absent: the slope of the force, at least 0."}};
 
 /// Returns the scheme with coupling and object mass set to 0 if the structure does not use them.
 [[nodiscard]] inline Scheme used_part(Scheme scheme) noexcept {
@@ -94,9 +94,8 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
                     "play_radius is " + readable(scheme.play_radius) + ", must be >= 0");
     detail::require(!model.hysteresis() || model.play_radius() || scheme.play_radius > 0.0,
                     "play_radius is 0, but the model does not define one: must be > 0");
-    detail::require(traits.line == scheme.line.has_value(),
-                    "line is " + std::string(traits.line ? "missing: must be given" : "given: must be absent") +
-                        " for the structure " + structure);
+    detail::require(traits.line || !scheme.line,
+                    "line is given, must be absent for the structure " + structure);
     if (scheme.line) {
         validate(*scheme.line, model);
     }

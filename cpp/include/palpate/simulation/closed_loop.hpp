@@ -43,7 +43,7 @@ std::size_t closed_loop(D& device, AnyStructure structure, const Guards& guards,
     (void)device.open();
     Controller controller{device, std::move(structure), guards};
     (void)controller.start();
-    SimulatedTick now{0, {}, {}, device.handle(), 0.0, device.applied_force(), 0.0};
+    SimulatedTick now{0, {}, {}, device.handle(), device.applied_force(), 0.0};
     for (bool continues = true; now.number < ticks && continues; ++now.number) {
         now.start = now.end;
         now.tick = controller.tick();

@@ -229,7 +229,7 @@ namespace detail {
                                                   const DeviceProfile& device) {
     Certificate certificate;
     certificate.scheme = scheme;
-    certificate.device = certified_part(device, scheme.line.has_value());
+    certificate.device = certified_part(device, holds_line(scheme.structure));
     certificate.bounds = bounds;
     std::vector<Inequality> lines = inequalities_of(bounds, scheme, device);
     const bool is_finite = finite(bounds);
@@ -266,7 +266,7 @@ namespace detail {
         bounds.mean_force =
             detail::active_mean({model.hysteresis()->force(), nullptr, bounds.sliding}, limit);
     }
-    if (scheme.line) {
+    if (holds_line(scheme.structure)) {
         bounds.bend = bend_bounds(model);
     }
     return bounds;

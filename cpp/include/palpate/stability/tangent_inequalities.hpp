@@ -169,7 +169,7 @@ struct LineNeed {
     lines.push_back({"damping-line", "viscous damping against the held line", need.formula,
                      device.viscous_damping,
                      detail::inner_need(loop, stiffness) +
-                         T * (need.outer + either_need(device, rounded)),
+                         T * (need.outer + detail::either_need(device, rounded)),
                      Basis::Proved, "docs/certificate.md"});
     const double errors = detail::product(0.5 * device.encoder_step, need.residual + rounded) +
                           0.5 * loop.encoder_step * stiffness;

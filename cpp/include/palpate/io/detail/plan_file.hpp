@@ -57,10 +57,7 @@ PALPATE_INLINE std::optional<Scheme> read_plan(const JsonField& plan) {
             static_cast<int>(std::min<std::uint64_t>(predict.count(1), most_prediction_taps + 1));
         predict.require(scheme.predict <= most_prediction_taps, "<= " + std::to_string(most_prediction_taps));
     }
-    const bool has_line = plan.value().contains("line");
-    plan.require(has_line == holds_line(scheme.structure),
-                 has_line ? "without line: the structure holds none" : "with line: the structure holds one");
-    if (has_line) {
+    if (plan.value().contains("line")) {
         scheme.line = plan["line"].as<HeldSlope>();
     }
     for (const JsonField& sentence : plan["refused"].items()) {
@@ -98,7 +95,7 @@ PALPATE_INLINE std::optional<Certificate> read_certificate(const JsonField& file
     read.bounds = file["bounds"].as<ForceBounds>();
     read.bounds.hysteresis = model.hysteresis() != nullptr;
     read.bounds.memory = memory_bounds(model);
-    if (read.scheme.line) {
+    if (holds_line(read.scheme.structure)) {
         read.bounds.bend = bend_bounds(model);
     }
     for (const JsonField& line : file["inequalities"].items()) {
