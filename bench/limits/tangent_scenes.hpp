@@ -177,7 +177,9 @@ struct TangentScene {
     TangentScene scene{ForceModel{network, test::unit_domain()}, {}, {}, 0};
     DeviceProfile& device = scene.device;
     const double largest = value_bounds(network, 0.0, 1.0).largest();
-    const auto some = [&](double low, double high) { return std::exp(test::uniform(random, std::log(low), std::log(high))); };
+    const auto some = [&](double low, double high) {
+        return std::exp(test::uniform(random, std::log(low), std::log(high)));
+    };
     device.period_s = 1e-3;
     device.delay_s = delay * device.period_s;
     device.encoder_step = 0.0;
@@ -206,8 +208,8 @@ struct TangentScene {
     // Each rule occurs in scenes in which the plan would choose another one
     switch (delay == 0.0 ? 0 : 1 + random() % 4) {
         case 0:
-            scene.scheme.line = HeldSlope{SlopeRule::Steepest, bounds.rising() * (random() % 3 == 0 ? 0.5 : 1.0),
-                                          0.0, motion};
+            scene.scheme.line = HeldSlope{SlopeRule::Steepest,
+                                          bounds.rising() * (random() % 3 == 0 ? 0.5 : 1.0), 0.0, motion};
             break;
         case 1:
             scene.scheme.line = HeldSlope{SlopeRule::Raised, 0.0, 0.0, std::nullopt};
@@ -270,12 +272,13 @@ struct RepeatedMotion {
     std::vector<int> late;      ///< lateness of each sample [periods of the controller]
     std::vector<bool> lost;     ///< true: the command of this period does not arrive
     double start = 0.0;         ///< start position [m or rad]
-    double shake = 0.0;         ///< motion to and fro between two samples of the controller, divided by the largest
+    double shake = 0.0;  ///< motion to and fro between two samples of the controller, divided by the largest
 };
 
 /// Moves a handle through a repeated motion and returns the energy taken out beyond the stored one [J].
-[[nodiscard]] inline double taken_by(const TangentScene& scene, AnyStructure structure, const RepeatedMotion& motion,
-                                     double largest_motion, double damping, double friction) {
+[[nodiscard]] inline double taken_by(const TangentScene& scene, AnyStructure structure,
+                                     const RepeatedMotion& motion, double largest_motion, double damping,
+                                     double friction) {
     constexpr int cycles = 25;
     const DeviceProfile& device = scene.device;
     const HeldLine& loop = *device.held_line;
@@ -284,14 +287,17 @@ struct RepeatedMotion {
     const int delay = static_cast<int>(std::lround(device.delay_s / loop.period_s));
     const auto steps_of = [](double x, double step) { return step > 0.0 ? step * std::round(x / step) : x; };
     const int periods = cycles * static_cast<int>(motion.moved.size());
-    const auto at = [&](const auto& values, int k) { return values[static_cast<std::size_t>(k) % values.size()]; };
+    const auto at = [&](const auto& values, int k) {
+        return values[static_cast<std::size_t>(k) % values.size()];
+    };
     // True positions at the samples of the controller; the handle rests for the longest delay before it moves
     const int rest = delay + inner_late + inner + 1;
     std::vector<double> x(static_cast<std::size_t>(rest), motion.start);
     double base = motion.start;
     for (int k = 0; k < periods; ++k) {
         const double per_step = at(motion.moved, k) * largest_motion / inner;
-        const double shake = std::min(motion.shake, 1.0 - std::abs(at(motion.moved, k))) * largest_motion / inner;
+        const double shake =
+            std::min(motion.shake, 1.0 - std::abs(at(motion.moved, k))) * largest_motion / inner;
         for (int j = 1; j <= inner; ++j) {
             base += per_step;
             x.push_back(base + (j % 2 == 0 || j == inner ? 0.0 : shake));
@@ -309,7 +315,8 @@ struct RepeatedMotion {
         if (sample >= static_cast<int>(x.size())) {
             break;
         }
-        const Rendered rendered = structure.step(steps_of(x[static_cast<std::size_t>(sample)], device.encoder_step));
+        const Rendered rendered =
+            structure.step(steps_of(x[static_cast<std::size_t>(sample)], device.encoder_step));
         Command line{rendered.force, rendered.environment_position, rendered.stiffness};
         (void)limit.apply(line);
         const double stiffness = steps_of(line.stiffness, loop.stiffness_step);
@@ -329,8 +336,8 @@ struct RepeatedMotion {
         }
         const Command& line = sent[active].line;
         const double read = steps_of(x[static_cast<std::size_t>(i - inner_late)], loop.encoder_step);
-        const double force =
-            std::clamp(line.force + line.stiffness * (read - line.position), -device.force_limit, device.force_limit);
+        const double force = std::clamp(line.force + line.stiffness * (read - line.position),
+                                        -device.force_limit, device.force_limit);
         const double d = x[static_cast<std::size_t>(i + 1)] - x[static_cast<std::size_t>(i)];
         energy += force * d + damping * device.viscous_damping / loop.period_s * d * d +
                   friction * device.coulomb_friction * std::abs(d);
@@ -363,7 +370,8 @@ struct RepeatedMotion {
     const int late = static_cast<int>(std::lround(scene.device.jitter_s / loop.period_s));
     const AnyStructure structure = scene.structure();
     const auto any = [&](RepeatedMotion& motion, std::size_t k) {
-        motion.moved[k] = random() % 3 == 0 ? test::uniform(random, -1.0, 1.0) : (random() % 2 == 0 ? 1.0 : -1.0);
+        motion.moved[k] =
+            random() % 3 == 0 ? test::uniform(random, -1.0, 1.0) : (random() % 2 == 0 ? 1.0 : -1.0);
         motion.late[k] = static_cast<int>(random() % static_cast<unsigned>(late + 1));
         // After a lost command the next one arrives
         const bool lost = scene.lost > 0 && k % 2 == 1 && random() % 2 == 0;
@@ -410,8 +418,8 @@ struct RepeatedMotion {
 
 inline std::ostream& operator<<(std::ostream& out, const TangentScene& scene) {
     return out << name_of(scene.scheme.line->rule) << ", slope " << scene.scheme.line->slope << ", lift "
-               << scene.scheme.line->lift << ", motion " << scene.scheme.line->motion.value_or(0.0) << ", delay "
-               << scene.device.delay_s << " s, b " << scene.device.viscous_damping << ", f_c "
+               << scene.scheme.line->lift << ", motion " << scene.scheme.line->motion.value_or(0.0)
+               << ", delay " << scene.device.delay_s << " s, b " << scene.device.viscous_damping << ", f_c "
                << scene.device.coulomb_friction << ", lost " << scene.lost;
 }
 

@@ -20,8 +20,8 @@ int main(int count, char** arguments) {
             std::array<int, shares.size()> found{};
             const int number = scenes / 6 + 1;
             for (int k = 0; k < number; ++k) {
-                test::Random random{static_cast<std::uint64_t>(k) * 7919 + static_cast<std::uint64_t>(delay) * 31 +
-                                    (simple ? 1U : 0U)};
+                test::Random random{static_cast<std::uint64_t>(k) * 7919 +
+                                    static_cast<std::uint64_t>(delay) * 31 + (simple ? 1U : 0U)};
                 std::optional<bench::TangentScene> scene;
                 while (!scene) {
                     // Half of the chains with a delay have a fraction of a sample
@@ -30,8 +30,9 @@ int main(int count, char** arguments) {
                 }
                 for (std::size_t j = 0; j < shares.size(); ++j) {
                     test::Random same = random;
-                    const double taken = simple ? bench::search_by_value(*scene, same, shares[j], shares[j])
-                                                : bench::search_by_motions(*scene, same, shares[j], shares[j]);
+                    const double taken = simple
+                                             ? bench::search_by_value(*scene, same, shares[j], shares[j])
+                                             : bench::search_by_motions(*scene, same, shares[j], shares[j]);
                     if (taken > rounding) {
                         ++found[j];
                         if (j == 0) {

@@ -55,7 +55,8 @@ void bind_device(py::module_& module) {
         "fields"_a);
     py::implicitly_convertible<py::dict, OnDevice>();
     py::class_<HeldLine> loop(
-        module, "HeldLine", "Loop of a motor controller that holds a line between two commands, in SI units.");
+        module, "HeldLine",
+        "Loop of a motor controller that holds a line between two commands, in SI units.");
     bind_fields(loop);
     loop.def(
         py::init([](const py::dict& fields) { return py::type::of<HeldLine>()(**fields).cast<HeldLine>(); }),

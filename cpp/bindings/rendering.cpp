@@ -26,9 +26,10 @@ void bind_rendering(py::module_& module) {
     py::class_<HeldSlope> line(module, "HeldSlope",
                                "Rule for the slope of a line that a tangent holds, in SI units.");
     bind_fields(line);
-    line.def(
-        py::init([](const py::dict& fields) { return py::type::of<HeldSlope>()(**fields).cast<HeldSlope>(); }),
-        "fields"_a);
+    line.def(py::init([](const py::dict& fields) {
+                 return py::type::of<HeldSlope>()(**fields).cast<HeldSlope>();
+             }),
+             "fields"_a);
     py::implicitly_convertible<py::dict, HeldSlope>();
     module.attr("most_slope_cells") = most_slope_cells;
     module.attr("cells_in_motion") = cells_in_motion;

@@ -156,13 +156,16 @@ void bind_stability(py::module_& module) {
     module.def(
         "stiffest_line_wall", &stiffest_line_wall, "device"_a, "width"_a, "motion"_a = py::none(),
         "Returns the largest stiffness of a wall whose slope rises over `width`, f'(x) = K / (1 + exp(-x /\n"
-        "width)), that a held line renders, certified for motions up to `motion` in a period. None: certified\n"
+        "width)), that a held line renders, certified for motions up to `motion` in a period. None: "
+        "certified\n"
         "for every motion.");
-    module.def("inner_need", &detail::inner_need, "held_line"_a, "stiffness"_a,
-               "Returns the device damping that the loop of a controller needs for a line of this stiffness.");
-    module.def("fast_motion_energy", &fast_motion_energy, "device"_a,
-               "Returns the largest energy that a hand can take out after a motion faster than the certified one,\n"
-               "until the zero force of the guard acts [J]: (T + t_d) (F_max - f_c)^2 / 4 b.");
+    module.def(
+        "inner_need", &detail::inner_need, "held_line"_a, "stiffness"_a,
+        "Returns the device damping that the loop of a controller needs for a line of this stiffness.");
+    module.def(
+        "fast_motion_energy", &fast_motion_energy, "device"_a,
+        "Returns the largest energy that a hand can take out after a motion faster than the certified one,\n"
+        "until the zero force of the guard acts [J]: (T + t_d) (F_max - f_c)^2 / 4 b.");
     module.def("device_difference", &device_difference, "certified"_a, "device"_a,
                "Returns a sentence about the first field in which a device profile differs from the "
                "certified profile;\n"

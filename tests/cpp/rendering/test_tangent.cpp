@@ -67,7 +67,7 @@ TEST(Tangent, SteepestLineStoresTheEnergyOfTheForceInEveryMotion) {
         const double steepest = curve.slopes_everywhere().upper;
         for (int j = 0; j < 200; ++j) {
             const double x = test::uniform(random, -0.3, 1.3);
-            // The encoder reads up to half of a step of w / 8 beside the true position
+            // The reading is wrong by up to half of an encoder step of w / 8
             const double read = x + test::uniform(random, -1.0, 1.0) * motion / cells_in_motion;
             const double d = test::uniform(random, -1.0, 1.0) * motion;
             const double slope = structure.step(read).stiffness;
@@ -125,14 +125,16 @@ TEST(Tangent, LimitsTheForceOfASteepestLineOnly) {
     line.linear = {10.0};
     const ForceModel spring{line, test::unit_domain()};
     EXPECT_EQ(structure_of(spring, {SlopeRule::Steepest, 1e9, 0.0, 0.1}, 2.0).step(0.9).force, 2.0);
-    EXPECT_NEAR(structure_of(spring, {SlopeRule::Raised, 0.0, 0.0, std::nullopt}, 2.0).step(0.9).force, 9.0, 1e-9);
+    EXPECT_NEAR(structure_of(spring, {SlopeRule::Raised, 0.0, 0.0, std::nullopt}, 2.0).step(0.9).force, 9.0,
+                1e-9);
 }
 
 TEST(Tangent, SendsNothingForAPositionThatIsNotFinite) {
     test::Random random{4};
     AnyStructure structure = structure_of(wavy(random), {SlopeRule::Steepest, 1e9, 0.0, 0.1});
     const Rendered before = structure.step(0.4);
-    for (const double x : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    for (const double x :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
         const Rendered rendered = structure.step(x);
         EXPECT_EQ(rendered.force, 0.0);
         EXPECT_EQ(rendered.stiffness, 0.0);
@@ -157,8 +159,9 @@ TEST(Tangent, RefusesASchemeWithAWrongLine) {
     scheme.structure = StructureKind::Tangent;
     EXPECT_EQ(refusal_of(model, scheme), "") << "absent: the slope of the force";
     scheme.line = HeldSlope{SlopeRule::Steepest, 1.0, 0.0, 1e-5};
-    EXPECT_EQ(refusal_of(model, scheme),
-              "line.motion is 1e-05, must be at least 0.0002441 for the rule steepest and a domain of this length");
+    EXPECT_EQ(
+        refusal_of(model, scheme),
+        "line.motion is 1e-05, must be at least 0.0002441 for the rule steepest and a domain of this length");
     scheme.line = HeldSlope{SlopeRule::Raised, 0.0, -1.0, std::nullopt};
     EXPECT_EQ(refusal_of(model, scheme), "line.lift is -1, must be >= 0");
     scheme.line = HeldSlope{};

@@ -50,7 +50,8 @@ class ScriptedDevice {
 struct LineStructure {
     void reset(double /*position*/) noexcept {}
     [[nodiscard]] Rendered step(double position) noexcept {
-        return {fails ? 0.0 : 10.0 * position, position, 1, fails ? Status::NonFinite : Status::Ok, false, 20.0};
+        return {fails ? 0.0 : 10.0 * position,          position, 1,
+                fails ? Status::NonFinite : Status::Ok, false,    20.0};
     }
     bool fails = false;
 };
@@ -92,7 +93,8 @@ TEST(Controller, RampMultipliesForceAndStiffness) {
 TEST(Controller, AForceThatAGuardOfHeldForcesChangesIsHeld) {
     ScriptedDevice device;
     device.next.position = 0.2;
-    Controller<ScriptedDevice> controller{device, LineStructure{}, Guards{.limit = {5.0}, .slew = {0.5, 0.0}}};
+    Controller<ScriptedDevice> controller{device, LineStructure{},
+                                          Guards{.limit = {5.0}, .slew = {0.5, 0.0}}};
     (void)controller.start();
     (void)controller.tick();
     EXPECT_EQ(device.line.force, 0.5);

@@ -156,7 +156,8 @@ TEST(HeldLineDevice, WithoutALoopHoldsTheForce) {
 TEST(HeldLineDevice, LimitsTheForceOfTheLineAndRoundsIt) {
     DeviceProfile profile;
     profile.force_limit = 0.4;
-    profile.held_line = HeldLine{.period_s = 5e-5, .delay_s = 0.0, .encoder_step = 0.0, .stiffness_step = 8.0};
+    profile.held_line =
+        HeldLine{.period_s = 5e-5, .delay_s = 0.0, .encoder_step = 0.0, .stiffness_step = 8.0};
     SimulatedHandle<Hand, SemiImplicitEuler> device{profile, {}, 20, 0.5};
     (void)device.open();
     (void)device.exchange({5.0, 0.5, 20.0});

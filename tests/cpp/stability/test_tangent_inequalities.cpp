@@ -202,8 +202,8 @@ DeviceProfile moteus() {
     device.encoder_step = 3.83495196971410303e-4;
     device.delay_s = 1.16e-3;
     device.force_limit = 1.5;
-    device.held_line = HeldLine{
-        .period_s = 1.0 / 30e3, .delay_s = 1.0 / 30e3 + 1.6e-4, .encoder_step = device.encoder_step};
+    device.held_line =
+        HeldLine{.period_s = 1.0 / 30e3, .delay_s = 1.0 / 30e3 + 1.6e-4, .encoder_step = device.encoder_step};
     return device;
 }
 

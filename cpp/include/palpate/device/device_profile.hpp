@@ -185,7 +185,8 @@ inline constexpr auto fields_of<DeviceProfile> = std::tuple{
         "on_device",
         "Timing of a model that runs on the motor controller; absent: the defaults of OnDevice."},
     Field<&DeviceProfile::held_line>{
-        "held_line", "Loop of a controller that holds a line between two commands; absent: it holds a force."}};
+        "held_line",
+        "Loop of a controller that holds a line between two commands; absent: it holds a force."}};
 
 /// Returns the profile with zero damping and friction. A certificate must not rely on values that were not measured.
 [[nodiscard]] inline DeviceProfile unmeasured(DeviceProfile profile) {

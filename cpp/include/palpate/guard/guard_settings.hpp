@@ -130,9 +130,9 @@ inline constexpr std::uint64_t fewest_frozen_samples = 5;
     const GuardSettings& settings, double period_s,
     double largest_step = std::numeric_limits<double>::infinity()) noexcept {
     const auto samples = static_cast<std::uint64_t>(std::llround(settings.frozen_s / period_s));
-    return ReadingGuard{{std::min(settings.largest_speed * period_s, largest_step), settings.frozen_speed * period_s,
-                         settings.frozen_s > 0.0 ? std::max(samples, fewest_frozen_samples) : 0,
-                         settings.longest_delay_s}};
+    return ReadingGuard{
+        {std::min(settings.largest_speed * period_s, largest_step), settings.frozen_speed * period_s,
+         settings.frozen_s > 0.0 ? std::max(samples, fewest_frozen_samples) : 0, settings.longest_delay_s}};
 }
 
 }  // namespace palpate

@@ -129,8 +129,7 @@ struct Guards {
         guards.line_work = LineWork{timing.whole_delay_samples()};
         if (scheme.line && scheme.line->motion) {
             // The motion of the handle can be larger than that of the readings by an encoder step
-            guards.reading =
-                reading_guard(settings, period_s, *scheme.line->motion - settings.encoder_step);
+            guards.reading = reading_guard(settings, period_s, *scheme.line->motion - settings.encoder_step);
         }
     }
     // The account limits forces that are held for a period. It has no rule for a line

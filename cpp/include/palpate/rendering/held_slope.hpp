@@ -20,8 +20,7 @@ enum class SlopeRule : std::uint8_t {
 };
 
 template <>
-inline constexpr auto words_of<SlopeRule> =
-    std::array<std::string_view, 3>{"steepest", "raised", "constant"};
+inline constexpr auto words_of<SlopeRule> = std::array<std::string_view, 3>{"steepest", "raised", "constant"};
 
 /// Rule for the slope of a held line, with its numbers.
 struct HeldSlope {
@@ -36,9 +35,9 @@ struct HeldSlope {
 template <>
 inline constexpr auto fields_of<HeldSlope> = std::tuple{
     Field<&HeldSlope::rule>{"rule", "Rule for the slope: steepest, raised or constant."},
-    Field<&HeldSlope::slope>{"slope",
-                             "Largest slope of the line (steepest), or its slope (constant) [N/m or N*m/rad].",
-                             Rule::NotNegative},
+    Field<&HeldSlope::slope>{
+        "slope", "Largest slope of the line (steepest), or its slope (constant) [N/m or N*m/rad].",
+        Rule::NotNegative},
     Field<&HeldSlope::lift>{
         "lift", "Difference of the line's slope from that of the force (raised) [N/m or N*m/rad].",
         Rule::NotNegative},

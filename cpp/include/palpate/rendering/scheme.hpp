@@ -43,7 +43,8 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
                             "m, number of past samples that predict the position half a period ahead, 0 to "
                             "16; 0 = no prediction.",
                             Rule::NotNegative},
-    Field<&Scheme::line>{"line", "Slope of the line that a tangent holds; absent: the slope of the force, at least 0."}};
+    Field<&Scheme::line>{
+        "line", "Slope of the line that a tangent holds; absent: the slope of the force, at least 0."}};
 
 /// Returns the scheme with coupling and object mass set to 0 if the structure does not use them.
 [[nodiscard]] inline Scheme used_part(Scheme scheme) noexcept {

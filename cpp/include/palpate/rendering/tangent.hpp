@@ -26,8 +26,7 @@ namespace detail {
                                          double high) noexcept {
     const double ends = std::max(sign * derivatives(network, low)[1], sign * derivatives(network, high)[1]);
     const double h = high - low;
-    const double rounding =
-        derivatives_rounding(network, std::max(std::abs(low), std::abs(high)))[1];
+    const double rounding = derivatives_rounding(network, std::max(std::abs(low), std::abs(high)))[1];
     return ends + derivative_bounds(network, low, high)[3] * h * h / 8.0 + rounding;
 }
 
@@ -82,7 +81,8 @@ class SteepestSlopes {
         periodic_ = domain.period.has_value();
         const int reach = static_cast<int>(std::ceil(motion / width_));
         const std::vector<double> rising = rising_slopes(model, cells);
-        const int beyond = periodic_ ? 0 : reach + 4;  // cells outside the domain from which it can be reached
+        const int beyond =
+            periodic_ ? 0 : reach + 4;  // cells outside the domain from which it can be reached
         from_ = domain.lower[0] - beyond * width_;
         const auto slope = [&](int cell) {
             const int within = periodic_ ? (cell % cells + cells) % cells : std::clamp(cell, -1, cells);
@@ -97,11 +97,11 @@ class SteepestSlopes {
             return most;
         };
         for (int cell = -beyond; cell < cells + beyond; ++cell) {
-            slopes_.push_back(std::max(
-                detail::largest_weighted_mean(
-                    reach, [&](int k) { return steepest(cell - 1 + k, cell + 2 + k); }),
-                detail::largest_weighted_mean(
-                    reach, [&](int k) { return steepest(cell - 2 - k, cell + 1 - k); })));
+            slopes_.push_back(
+                std::max(detail::largest_weighted_mean(
+                             reach, [&](int k) { return steepest(cell - 1 + k, cell + 2 + k); }),
+                         detail::largest_weighted_mean(
+                             reach, [&](int k) { return steepest(cell - 2 - k, cell + 1 - k); })));
         }
     }
 

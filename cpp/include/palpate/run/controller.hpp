@@ -102,7 +102,8 @@ class Controller {
                                      Status reading_status) noexcept {
         line = {rendered.force, rendered.environment_position, rendered.stiffness};
         double& force = line.force;
-        const Status limited = rendered.stiffness == 0.0 ? guards_.limit.apply(force) : guards_.limit.apply(line);
+        const Status limited =
+            rendered.stiffness == 0.0 ? guards_.limit.apply(force) : guards_.limit.apply(line);
         for (const Status failed : {rendered.status, limited}) {
             if (!sends_force(failed)) {
                 line = {};

@@ -29,10 +29,10 @@ namespace palpate {
 struct SimulatedTick {
     std::size_t number = 0;
     Tick tick;
-    Motion start;               ///< position and velocity of the handle at the start of the tick
-    Motion end;                 ///< position and velocity of the handle at the end of the tick
-    double force = 0.0;         ///< force of the motor at the end of the tick [N or N*m]
-    double mean_force = 0.0;    ///< mean force of the motor over the tick [N or N*m]
+    Motion start;             ///< position and velocity of the handle at the start of the tick
+    Motion end;               ///< position and velocity of the handle at the end of the tick
+    double force = 0.0;       ///< force of the motor at the end of the tick [N or N*m]
+    double mean_force = 0.0;  ///< mean force of the motor over the tick [N or N*m]
 };
 
 /// Runs a structure on a simulated device in simulated time. Calls `watch(SimulatedTick)` after every tick; the loop

@@ -25,7 +25,8 @@ inline constexpr int most_substeps = 1000;  ///< largest allowed number of integ
 /// and Coulomb friction, encoder step, force step, force limit, a force that is held for one tick, and delay. The
 /// integrator `Plant` moves the handle: SemiImplicitEuler, Midpoint for an energy account, or MountedObject with an
 /// object on the handle. With `held_line` in its profile the device holds lines: it rounds their stiffness and position,
-/// and its controller applies them with its own period, delay, encoder step and force limit.
+/// and its controller applies
+/// them with the period, delay and encoder step of `HeldLine`, within the force limit.
 ///
 /// The simulation does not include electrical dynamics of the motor, torque ripple, backlash, flexible parts, jitter of
 /// the sample time, or noise of a force transducer.
@@ -125,8 +126,8 @@ class SimulatedHandle {
         const double stiffness = rounded(command.stiffness, loop.stiffness_step);
         const double position = rounded(command.position, loop.position_step);
         // The force is that of the line at the rounded position, so rounding the position does not move the line
-        return {rounded(command.force + stiffness * (position - command.position), profile_.force_step), position,
-                stiffness};
+        return {rounded(command.force + stiffness * (position - command.position), profile_.force_step),
+                position, stiffness};
     }
 
     /// Stores the command of this tick until the device's delay has passed and the motor applies it.

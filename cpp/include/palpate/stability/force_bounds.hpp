@@ -32,7 +32,8 @@ struct MemoryBounds {
 /// Bounds of the change of a slope over all positions, continuations included: |f'(x) - f'(y)| <= curvature |x - y| +
 /// jump.
 struct BendBounds {
-    double curvature = std::numeric_limits<double>::infinity();  ///< C, max |f''| where f' is continuous [N/m^2]
+    double curvature =
+        std::numeric_limits<double>::infinity();  ///< C, max |f''| where f' is continuous [N/m^2]
     double jump = 0.0;  ///< J, sum of the jumps of f' at the ends of domain and continuation [N/m]
 };
 

@@ -358,9 +358,9 @@ namespace detail {
     return (off + jitter) * std::ceil(span / (period - jitter)) / (period + jitter);
 }
 
-/// Returns Lambda^2: the sum of D^2 over all samples is at most Lambda^2 T times the integral of the squared velocity,
-/// where D is the motion during the time `delay` after a sample at k period + u_k, 0 <= u_k <= jitter, and T is period +
-/// jitter. It is the sum over all samples of the largest time during which the delay after a sample overlaps the delay
+/// Returns Lambda^2 for samples at k period + u_k, 0 <= u_k <= jitter, and T = period + jitter. D is the motion during the
+/// time `delay` after a sample. The sum of D^2 over all samples is at most Lambda^2 T times the integral of the squared
+/// velocity. Lambda^2 is the sum over all samples of the largest time during which the delay after a sample overlaps the delay
 /// after one given sample, divided by T. For n + tau samples and no jitter it is n^2 + (2 n + 1) tau.
 [[nodiscard]] inline double lag_squared_of(double delay, double period, double jitter) noexcept {
     double common = delay;

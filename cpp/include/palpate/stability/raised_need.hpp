@@ -12,9 +12,9 @@ namespace palpate {
 
 namespace detail {
 
-/// Cubic bounds of the energy between a force and a raised line through its value at 0, in units of C w^3: curvature C,
-/// largest motion w, positions divided by w. |f - f(0) - f'(0) y| <= y^2 / 2, so the force is above the line of slope
-/// f'(0) + lift by at most E(y), with lift in units of C w:
+/// Cubic bounds of the energy between a force and a raised line through its value at 0, in units of C w^3. C is the
+/// curvature, w the largest motion; positions are divided by w. |f - f(0) - f'(0) y| <= y^2 / 2. So the force is above
+/// the line of slope f'(0) + lift by at most E(y), with lift in units of C w:
 ///
 ///     E(y) = max(0, y^2 / 2 - lift y) for y > 0,   E(y) = y^2 / 2 + lift |y| for y < 0.
 ///

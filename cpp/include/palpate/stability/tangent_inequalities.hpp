@@ -28,8 +28,8 @@ namespace palpate {
 
 namespace detail {
 
-/// Returns T_in B(kappa, 0, t_in): device damping that the loop of the controller needs for a line of slope kappa,
-/// because the controller holds its force for a period T_in and applies it t_in after its sample [N*s/m].
+/// Returns T_in B(kappa, 0, t_in), the device damping that the loop of the controller needs for a line of slope kappa
+/// [N*s/m]. The controller holds its force for a period T_in and applies it t_in after its sample.
 [[nodiscard]] inline double inner_need(const HeldLine& loop, double stiffness) {
     DeviceProfile controller;
     controller.period_s = loop.period_s;
@@ -51,12 +51,15 @@ namespace detail {
 struct LineNeed {
     double stiffness = 0.0;  ///< largest slope of the line [N/m]
     double outer = 0.0;      ///< B_o, device damping divided by the longest period [N/m]
-    double residual = 0.0;   ///< largest difference of slopes, line and force, while both follow a reading [N/m]
+    double residual =
+        0.0;  ///< largest difference of slopes, line and force, while both follow a reading [N/m]
     const char* formula = "";
 };
 
 /// Returns a * b, or 0 if one factor is 0 and the other is infinite.
-[[nodiscard]] inline double product(double a, double b) noexcept { return a == 0.0 || b == 0.0 ? 0.0 : a * b; }
+[[nodiscard]] inline double product(double a, double b) noexcept {
+    return a == 0.0 || b == 0.0 ? 0.0 : a * b;
+}
 
 /// Returns the needs of the rule `Steepest` on a device without delay. `rising` is the bound of the rising slope, with
 /// the stiffness of a sticking play operator and of a memory.
@@ -100,8 +103,9 @@ struct LineNeed {
     // w is the motion in the nominal period, so the largest speed is w / period
     const double bent = bend.curvature * *line.motion * T / device.period_s;
     const double straight = device_need(device, {0.0, s}) + either_need(device, bend.jump + by_reading);
-    const double curved = bent > 0.0 ? bent * raised_need(device.delay_s / T, lag_squared(device), line.lift / bent)
-                                     : device_need(device, {0.0, line.lift});
+    const double curved = bent > 0.0
+                              ? bent * raised_need(device.delay_s / T, lag_squared(device), line.lift / bent)
+                              : device_need(device, {0.0, line.lift});
     if (straight + curved < need.outer) {
         need.outer = straight + curved;
         need.formula = "b >= T_in B(kappa, 0, t_in) + T (C w c + B(0, s_, t_d) + ...)";
@@ -166,11 +170,10 @@ struct LineNeed {
     const double rounded = 0.5 * loop.stiffness_step;
     const double stiffness = need.stiffness + rounded;
     const double T = device.longest_period_s();
-    lines.push_back({"damping-line", "viscous damping against the held line", need.formula,
-                     device.viscous_damping,
-                     detail::inner_need(loop, stiffness) +
-                         T * (need.outer + detail::either_need(device, rounded)),
-                     Basis::Proved, "docs/certificate.md"});
+    lines.push_back(
+        {"damping-line", "viscous damping against the held line", need.formula, device.viscous_damping,
+         detail::inner_need(loop, stiffness) + T * (need.outer + detail::either_need(device, rounded)),
+         Basis::Proved, "docs/certificate.md"});
     const double errors = detail::product(0.5 * device.encoder_step, need.residual + rounded) +
                           0.5 * loop.encoder_step * stiffness;
     lines.push_back({"friction-line", "Coulomb friction against encoder and force steps",
@@ -219,10 +222,12 @@ namespace detail {
 
 /// Returns the line of the rule `Raised` that needs least, for motions up to w in a period. A lift of C w / 2 needs the
 /// least damping against the delay; a smaller one needs less damping in the loop of the controller.
-[[nodiscard]] inline HeldSlope best_raised(const ForceBounds& bounds, const DeviceProfile& device, double motion) {
+[[nodiscard]] inline HeldSlope best_raised(const ForceBounds& bounds, const DeviceProfile& device,
+                                           double motion) {
     constexpr int steps = 4;
     const double curvature = bounds.bend ? bounds.bend->curvature : 0.0;
-    const double bent = std::isfinite(curvature) ? curvature * motion * device.longest_period_s() / device.period_s : 0.0;
+    const double bent =
+        std::isfinite(curvature) ? curvature * motion * device.longest_period_s() / device.period_s : 0.0;
     HeldSlope best{SlopeRule::Raised, 0.0, 0.0, motion};
     for (int k = 1; k <= steps && bent > 0.0; ++k) {
         const HeldSlope higher{SlopeRule::Raised, 0.0, 0.5 * bent * k / steps, motion};
@@ -249,17 +254,16 @@ namespace detail {
 /// w = `motion` in a period; if none is certified, the line that needs least. Without delay this is `Steepest`. With a
 /// delay the rules are tried in this order: the slope of the force, without a largest motion; `Raised` with the best
 /// lift; `Constant` with the best slope, for every motion.
-[[nodiscard]] inline HeldSlope line_for(const ForceBounds& bounds, const DeviceProfile& device, double motion) {
+[[nodiscard]] inline HeldSlope line_for(const ForceBounds& bounds, const DeviceProfile& device,
+                                        double motion) {
     const double M = bounds.rising();
     if (device.delay_s == 0.0) {
-        const double highest =
-            device.held_line ? device.held_line->largest_stiffness.value_or(M) - device.held_line->stiffness_step
-                             : M;
+        const double highest = device.held_line ? device.held_line->largest_stiffness.value_or(M) -
+                                                      device.held_line->stiffness_step
+                                                : M;
         return {SlopeRule::Steepest, std::clamp(M, 0.0, std::max(0.0, highest)), 0.0, motion};
     }
-    const auto missing = [&](const HeldSlope& line) {
-        return detail::line_shortfall(bounds, line, device);
-    };
+    const auto missing = [&](const HeldSlope& line) { return detail::line_shortfall(bounds, line, device); };
     const HeldSlope plain{SlopeRule::Raised, 0.0, 0.0, std::nullopt};
     if (missing(plain) <= 0.0) {
         return plain;

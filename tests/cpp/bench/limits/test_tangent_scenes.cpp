@@ -32,7 +32,8 @@ TEST(TangentSearch, TakesNoEnergyOutOfCertifiedScenes) {
                 if (simple && delay == 0.4) {
                     continue;
                 }
-                test::Random random{static_cast<std::uint64_t>(1000 * k) + static_cast<std::uint64_t>(10 * delay)};
+                test::Random random{static_cast<std::uint64_t>(1000 * k) +
+                                    static_cast<std::uint64_t>(10 * delay)};
                 const TangentScene scene = scene_of(random, delay, simple);
                 const auto search = [&](double share) {
                     test::Random same = random;
@@ -63,7 +64,9 @@ LineGrid grid_of(double from, double step, int nodes, const Force& force, const 
 }
 
 /// A wall that rises smoothly from x = 0 to the slope 1 at x = 1.
-double wall(double x) { return x < 0.0 ? 0.0 : x < 1.0 ? 0.5 * x * x : x - 0.5; }
+double wall(double x) {
+    return x < 0.0 ? 0.0 : x < 1.0 ? 0.5 * x * x : x - 0.5;
+}
 /// The slope of the rule steepest, for motions of w.
 double steepest(double x, double w) {
     double most = 0.0;
@@ -99,15 +102,16 @@ TEST(TangentCounterexample, ALineOfTheRuleSteepestGivesEnergyWithADelay) {
 TEST(TangentCounterexample, AClampOfTheMotionNeedsTheDampingOfHoldForFastMotions) {
     // Each line is held beyond w, so a wall of slope 1 is crossed in 16 clamps
     static constexpr double w = 0.2;
-    LineGrid grid = grid_of(-2.0, 0.2, 60, [](double x) { return std::max(0.0, x); },
-                            [](double x) { return x > -0.2 ? 1.0 : 0.0; });
+    LineGrid grid = grid_of(
+        -2.0, 0.2, 60, [](double x) { return std::max(0.0, x); },
+        [](double x) { return x > -0.2 ? 1.0 : 0.0; });
     grid.work = [](const Command& line, double from, double to) {
         double work = 0.0;
         constexpr int parts = 200;
         for (int k = 0; k < parts; ++k) {
             const double x = from + (to - from) * (k + 0.5) / parts;
-            work += (to - from) / parts *
-                    (line.force + line.stiffness * std::clamp(x - line.position, -w, w));
+            work +=
+                (to - from) / parts * (line.force + line.stiffness * std::clamp(x - line.position, -w, w));
         }
         return work;
     };
@@ -160,11 +164,13 @@ TEST(TangentCounterexample, AFallingForceNeedsDampingWithADelay) {
     grid.delay = 1;
     grid.damping = 0.3;
     EXPECT_GT(most_taken(grid), 1e-3);
-    grid.damping = device_need([] {
-        DeviceProfile late;
-        late.delay_s = late.period_s;
-        return late;
-    }(), {0.0, 1.0});
+    grid.damping = device_need(
+        [] {
+            DeviceProfile late;
+            late.delay_s = late.period_s;
+            return late;
+        }(),
+        {0.0, 1.0});
     EXPECT_LE(most_taken(grid), 1e-6);
     grid.damping = 0.0;
     grid.delay = 0;
