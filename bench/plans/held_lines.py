@@ -30,8 +30,8 @@ from palpate._core.stability import inner_need, line_for, renderable_slopes, sti
 from palpate.cli.figures import figure_file
 from palpate.cli.printing import number
 from palpate.planning import HeldLine, Plan, example_profiles, force_error, simulate
-from palpate.plotting.look import grid
 from palpate.planning.plan import with_network
+from palpate.plotting.look import grid
 
 WALLS = ((0.01, 3.0), (0.01, 10.0), (0.05, 3.0), (0.05, 10.0))
 """Width of a wall [rad] and largest speed [rad/s]"""

@@ -63,8 +63,8 @@ class DeviceProfile(_core.device.DeviceProfile):
     unknown damping or friction, and an upper bound for unknown delay, steps or jitter.
 
     The keyword arguments are the fields of the core's DeviceProfile, listed there with their units. The
-    defaults are those of a simulated knob. ``on_device`` is an :class:`palpate.planning.OnDevice`, ``held_line`` a
-    :class:`palpate.planning.HeldLine`; both are tables in the TOML file.
+    defaults are those of a simulated knob. ``on_device`` is an :class:`palpate.planning.OnDevice`,
+    ``held_line`` a :class:`palpate.planning.HeldLine`; both are tables in the TOML file.
 
     Raises
     ------
