@@ -364,8 +364,13 @@ struct RepeatedMotion {
 /// taken out beyond the stored one, divided by the largest force times the largest motion.
 [[nodiscard]] inline double search_by_motions(const TangentScene& scene, test::Random& random, double damping,
                                               double friction, int improvements = 40) {
-    const double largest_motion =
+    double largest_motion =
         scene.scheme.line->motion.value_or(std::exp(test::uniform(random, std::log(0.02), std::log(0.5))));
+    // The slopes of the rule steepest hold for motions of w between two commands that arrive
+    if (scene.scheme.line->rule == SlopeRule::Steepest) {
+        const DeviceProfile& device = scene.device;
+        largest_motion *= device.period_s / (device.longest_period_s() + scene.lost * device.period_s);
+    }
     const HeldLine& loop = *scene.device.held_line;
     const int late = static_cast<int>(std::lround(scene.device.jitter_s / loop.period_s));
     const AnyStructure structure = scene.structure();
