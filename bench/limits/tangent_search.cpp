@@ -14,7 +14,8 @@ int main(int count, char** arguments) {
     constexpr double rounding = 1e-7;
     constexpr std::array shares{1.0, 0.7, 0.5, 0.3};
     int violations = 0;
-    std::cout << "delay  search  scenes  energy found at 1.0, 0.7, 0.5 and 0.3 of b and f_c\n";
+    std::cout << "delay  search  scenes  energy found at 1.0 of b and f_c, in a quarter of the scenes at "
+                 "0.7, 0.5, 0.3\n";
     for (const double delay : {0.0, 1.0, 2.0}) {
         for (const bool simple : {true, false}) {
             std::array<int, shares.size()> found{};
@@ -28,7 +29,8 @@ int main(int count, char** arguments) {
                     const double fraction = !simple && delay > 0.0 && k % 2 == 1 ? 0.6 : 0.0;
                     scene = bench::random_tangent_scene(random, delay - fraction, simple);
                 }
-                for (std::size_t j = 0; j < shares.size(); ++j) {
+                // Smaller damping and friction than certified are searched in every fourth scene
+                for (std::size_t j = 0; j < (k % 4 == 0 ? shares.size() : 1); ++j) {
                     test::Random same = random;
                     const double taken = simple
                                              ? bench::search_by_value(*scene, same, shares[j], shares[j])
@@ -42,7 +44,8 @@ int main(int count, char** arguments) {
                 }
             }
             violations += found[0];
-            std::cout << delay << "  " << (simple ? "grid" : "chain") << "  " << number;
+            std::cout << delay << "  " << (simple ? "grid" : "chain") << "  " << number << " ("
+                      << (number + 3) / 4 << ")";
             for (const int each : found) {
                 std::cout << "  " << each;
             }

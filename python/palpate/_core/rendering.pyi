@@ -5,7 +5,49 @@ Structures between a model and a device.
 from __future__ import annotations
 import palpate._core.model
 import typing
-__all__: list[str] = ['Scheme', 'compensated_share', 'default_play_radius', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'solver_name', 'structure_names']
+__all__: list[str] = ['HeldSlope', 'Scheme', 'cells_in_motion', 'compensated_share', 'default_play_radius', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'most_slope_cells', 'solver_name', 'structure_names']
+class HeldSlope:
+    """
+    Rule for the slope of a line that a tangent holds, in SI units.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    @typing.overload
+    def __init__(self, *, rule: str = 'raised', slope: typing.SupportsFloat | typing.SupportsIndex = 0.0, lift: typing.SupportsFloat | typing.SupportsIndex = 0.0, motion: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    @typing.overload
+    def __init__(self, fields: dict) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
+        """
+    @property
+    def lift(self) -> float:
+        """
+        Difference of the line's slope from that of the force (raised) [N/m or N*m/rad].
+        """
+    @property
+    def motion(self) -> float | None:
+        """
+        w, largest motion of the handle in one period [m or rad]; absent: any motion. A larger motion ends a certified run.
+        """
+    @property
+    def rule(self) -> str:
+        """
+        Rule for the slope: steepest, raised or constant.
+        """
+    @property
+    def slope(self) -> float:
+        """
+        Largest slope of the line (steepest), or its slope (constant) [N/m or N*m/rad].
+        """
 class Scheme:
     """
     Structure that renders a model, with the numbers of the structure in SI units.
@@ -14,7 +56,7 @@ class Scheme:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, structure: str = 'massless', coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex = 100.0, coupling_damping: typing.SupportsFloat | typing.SupportsIndex = 0.02, mass: typing.SupportsFloat | typing.SupportsIndex = 0.001, object_damping: typing.SupportsFloat | typing.SupportsIndex = 0.5, compensated: bool = False, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, predict: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, structure: str = 'massless', coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex = 100.0, coupling_damping: typing.SupportsFloat | typing.SupportsIndex = 0.02, mass: typing.SupportsFloat | typing.SupportsIndex = 0.001, object_damping: typing.SupportsFloat | typing.SupportsIndex = 0.5, compensated: bool = False, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, predict: typing.SupportsInt | typing.SupportsIndex = 0, line: HeldSlope | None = None) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -62,6 +104,11 @@ class Scheme:
         True if the virtual object of the structure has mass and damping.
         """
     @property
+    def line(self) -> HeldSlope | None:
+        """
+        Slope of the line that a tangent holds; absent: the slope of the force, at least 0.
+        """
+    @property
     def mass(self) -> float:
         """
         m, mass of the object [kg or kg*m^2].
@@ -101,7 +148,9 @@ def solver_name(model: palpate._core.model.ForceModel, scheme: Scheme, period_s:
     used for at least a part of the positions, otherwise 'newton'; None for a structure without a
     load line.
     """
+cells_in_motion: int = 16
 compensated_share: float = 0.9
 fewest_encoder_steps_in_play: float = 4.0
 most_prediction_taps: int = 16
-structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent')
+most_slope_cells: int = 65536
+structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent', 'tangent')

@@ -8,7 +8,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'certify', 'certify_bounds', 'certify_with_account', 'device_difference', 'explicit_scheme', 'force_bounds', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'usual_coupling_share', 'with_force_error']
+__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'certify', 'certify_bounds', 'certify_with_account', 'device_difference', 'explicit_scheme', 'fast_motion_energy', 'force_bounds', 'inner_need', 'line_for', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'stiffest_line_wall', 'usual_coupling_share', 'with_force_error']
 class ForceBounds:
     """
     Proved bounds of a model's force and slope at all positions, inside and outside the domain.
@@ -256,10 +256,24 @@ def explicit_scheme(bounds: ForceBounds, device: palpate._core.device.DeviceProf
     scheme that was tried. Keywords: mass, object_damping, coupling_stiffness, coupling_damping and
     play_radius; None: a default, or the result of the search.
     """
+def fast_motion_energy(device: palpate._core.device.DeviceProfile) -> float:
+    """
+    Returns the largest energy that a hand can take out after a motion faster than the certified one,
+    until the zero force of the guard acts [J]: (T + t_d) (F_max - f_c)^2 / 4 b.
+    """
 def force_bounds(model: palpate._core.model.ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> ForceBounds:
     """
     Returns proved bounds of the force of a model of position, or of position and velocity, limited to
     force_limit. A play_radius above 0 replaces the play radius of the model.
+    """
+def inner_need(held_line: palpate._core.device.HeldLine, stiffness: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Returns the device damping that the loop of a controller needs for a line of this stiffness.
+    """
+def line_for(model: palpate._core.model.ForceModel, device: palpate._core.device.DeviceProfile, motion: typing.SupportsFloat | typing.SupportsIndex, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> palpate._core.rendering.HeldSlope:
+    """
+    Returns the line of the simplest rule that is certified for a model on a device, for motions up to
+    `motion` in a period; if none is certified, the line that needs least.
     """
 def narrowest_play(sliding: ForceBounds, device: palpate._core.device.DeviceProfile, least: typing.SupportsFloat | typing.SupportsIndex, most: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """
@@ -297,6 +311,12 @@ def stiffest_coupling(*, coupling_damping: typing.SupportsFloat | typing.Support
     Returns the largest coupling stiffness K_c that is certified with only the given share of the
     device's damping; 0 if no stiffness is certified. `coupling_damping` is B_c; `falling` is the
     steepest falling slope of the object's force.
+    """
+def stiffest_line_wall(device: palpate._core.device.DeviceProfile, width: typing.SupportsFloat | typing.SupportsIndex, motion: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
+    """
+    Returns the largest stiffness of a wall whose slope rises over `width`, f'(x) = K / (1 + exp(-x /
+    width)), that a held line renders, certified for motions up to `motion` in a period. None: certified
+    for every motion.
     """
 def with_force_error(certificate: Certificate, force_error: typing.SupportsFloat | typing.SupportsIndex) -> Certificate:
     """
