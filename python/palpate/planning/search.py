@@ -8,7 +8,7 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -424,7 +424,16 @@ def _properties(
         rate = _rounded(math.ceil, factor / device.period_s)
         jitter_s = device.jitter_s / (rate * device.period_s)
         delay_s = device.delay_s / (rate * device.period_s)
-        return _changed(on, period_s=1.0 / rate, jitter_s=jitter_s, delay_s=delay_s)
+        # A host that is faster than the loop of the controller sends forces instead of lines
+        loop = on.held_line
+        slower = loop is not None and loop.period_s > 1.0 / rate
+        return _changed(
+            on,
+            period_s=1.0 / rate,
+            jitter_s=jitter_s,
+            delay_s=delay_s,
+            held_line=None if slower else loop,
+        )
 
     fastest = _fastest_on_device(device)
 
@@ -500,7 +509,7 @@ def _improved(device: DeviceProfile, properties: Sequence[_Property], fits: Fits
     return after(found)
 
 
-def _changed(device: DeviceProfile, **fields: float) -> DeviceProfile:
+def _changed(device: DeviceProfile, **fields: Any) -> DeviceProfile:
     return DeviceProfile(**device.to_dict() | fields)
 
 
