@@ -40,8 +40,7 @@ FAST_CURRENT_S = 2e-5
 """Lag of the current control in the second row of the moteus r4 [s]"""
 
 LINE_DAMPING = 0.03
-"""Device damping for which the lines of the force errors are chosen [N*m*s/rad]; hold needs 0.03 without delay, 0.09
-and 0.15 with a delay"""
+"""Device damping for which the lines of the force errors are chosen [N*m*s/rad]; hold needs 0.03 to 0.15"""
 
 ASSUMED_LOOPS = {
     "odri-solo": HeldLine(period_s=1e-4, delay_s=1e-4, encoder_step=3.49e-5),

@@ -5,7 +5,6 @@ import json
 from pathlib import Path
 
 import pytest
-
 from bench.plans import held_lines
 
 ROOT = Path(__file__).parents[3]
