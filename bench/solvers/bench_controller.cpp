@@ -69,6 +69,9 @@ void tick(benchmark::State& state, const palpate::ForceModel& model, palpate::St
     scheme.structure = kind;
     scheme.compensated = compensated;
     scheme.play_radius = model.hysteresis() != nullptr ? 0.005 : 0.0;
+    if (palpate::holds_line(kind)) {
+        scheme.line = palpate::HeldSlope{palpate::SlopeRule::Steepest, 1e6, 0.0, 0.01};
+    }
     Playback device{palpate::bench::hand_motion(4000)};
     palpate::GuardSettings settings;
     settings.force_limit = 50.0;
@@ -117,6 +120,7 @@ palpate::ForceModel with_memory() {
 
 BENCHMARK_CAPTURE(tick, direct, spring_wall(), palpate::StructureKind::Direct);
 BENCHMARK_CAPTURE(tick, direct_memory, with_memory(), palpate::StructureKind::Direct);
+BENCHMARK_CAPTURE(tick, tangent, spring_wall(), palpate::StructureKind::Tangent);
 BENCHMARK_CAPTURE(tick, massless, spring_wall(), palpate::StructureKind::Massless);
 BENCHMARK_CAPTURE(tick, massless_compensated, spring_wall(), palpate::StructureKind::Massless, true);
 BENCHMARK_CAPTURE(tick, implicit, spring_wall(), palpate::StructureKind::Implicit);

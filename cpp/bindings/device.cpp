@@ -64,6 +64,14 @@ void bind_device(py::module_& module) {
                 }),
                 "fields"_a);
     py::implicitly_convertible<py::dict, AdmittanceDisplay>();
+    py::class_<HeldLine> loop(
+        module, "HeldLine",
+        "Loop of a motor controller that holds a line between two commands, in SI units.");
+    bind_fields(loop);
+    loop.def(
+        py::init([](const py::dict& fields) { return py::type::of<HeldLine>()(**fields).cast<HeldLine>(); }),
+        "fields"_a);
+    py::implicitly_convertible<py::dict, HeldLine>();
     py::class_<DeviceProfile> type(
         module, "DeviceProfile",
         "Properties of a haptic device of one degree of freedom, in SI units; a knob (rad) or a straight "

@@ -33,6 +33,16 @@ void bind_rendering(py::module_& module) {
         "virtual_friction", &virtual_friction, "device"_a,
         "Returns the Coulomb friction of the virtual object that makes the steps of command and force\n"
         "sensor of an admittance display harmless [N or N*m].");
+    py::class_<HeldSlope> line(module, "HeldSlope",
+                               "Rule for the slope of a line that a tangent holds, in SI units.");
+    bind_fields(line);
+    line.def(py::init([](const py::dict& fields) {
+                 return py::type::of<HeldSlope>()(**fields).cast<HeldSlope>();
+             }),
+             "fields"_a);
+    py::implicitly_convertible<py::dict, HeldSlope>();
+    module.attr("most_slope_cells") = most_slope_cells;
+    module.attr("cells_in_motion") = cells_in_motion;
     py::class_<Scheme> type(module, "Scheme",
                             "Structure that renders a model, with the numbers of the structure in SI units.");
     bind_fields(type);

@@ -166,6 +166,28 @@ void bind_stability(py::module_& module) {
         "stiffest_hand", &stiffest_hand, "bounds"_a, "scheme"_a, "device"_a,
         "Returns the largest stiffness of a hand for which a scheme is proved on an admittance display,\n"
         "with the other limits of the hand unchanged [N/m or N*m/rad]; 0 if none is.");
+        "line_for",
+        [](const ForceModel& model, const DeviceProfile& device, double motion, double play_radius) {
+            ForceBounds bounds = force_bounds(model, play_radius, device.force_limit);
+            bounds.bend = bend_bounds(model);
+            return line_for(bounds, device, motion);
+        },
+        "model"_a, "device"_a, "motion"_a, "play_radius"_a = 0.0,
+        "Returns the line of the simplest rule that is certified for a model on a device, for motions up to\n"
+        "`motion` in a period; if none is certified, the line that needs least.");
+    module.def(
+        "stiffest_line_wall", &stiffest_line_wall, "device"_a, "width"_a, "motion"_a = py::none(),
+        "Returns the largest stiffness of a wall whose slope rises over `width`, f'(x) = K / (1 + exp(-x /\n"
+        "width)), that a held line renders, certified for motions up to `motion` in a period. None: "
+        "certified\n"
+        "for every motion.");
+    module.def(
+        "inner_need", &detail::inner_need, "held_line"_a, "stiffness"_a,
+        "Returns the device damping that the loop of a controller needs for a line of this stiffness.");
+    module.def(
+        "fast_motion_energy", &fast_motion_energy, "device"_a,
+        "Returns the largest energy that a hand can take out after a motion faster than the certified one,\n"
+        "until the zero force of the guard acts [J]: (T + t_d) (F_max - f_c)^2 / 4 b.");
     module.def("device_difference", &device_difference, "certified"_a, "device"_a,
                "Returns a sentence about the first field in which a device profile differs from the "
                "certified profile;\n"

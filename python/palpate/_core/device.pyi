@@ -164,6 +164,11 @@ class DeviceProfile:
         Delta_F, smallest change of the commanded force [N or N*m]; 0 = not quantised.
         """
     @property
+    def held_line(self) -> HeldLine | None:
+        """
+        Loop of a controller that holds a line between two commands; absent: it holds a force.
+        """
+    @property
     def id(self) -> str:
         """
         Name; a certificate holds for the device with this name and these numbers.

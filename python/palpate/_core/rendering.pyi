@@ -15,7 +15,7 @@ class Scheme:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, structure: str = 'massless', coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex = 100.0, coupling_damping: typing.SupportsFloat | typing.SupportsIndex = 0.02, mass: typing.SupportsFloat | typing.SupportsIndex = 0.001, object_damping: typing.SupportsFloat | typing.SupportsIndex = 0.5, compensated: bool = False, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, predict: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, *, structure: str = 'massless', coupling_stiffness: typing.SupportsFloat | typing.SupportsIndex = 100.0, coupling_damping: typing.SupportsFloat | typing.SupportsIndex = 0.02, mass: typing.SupportsFloat | typing.SupportsIndex = 0.001, object_damping: typing.SupportsFloat | typing.SupportsIndex = 0.5, compensated: bool = False, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, predict: typing.SupportsInt | typing.SupportsIndex = 0, line: HeldSlope | None = None) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...
@@ -61,6 +61,11 @@ class Scheme:
     def has_mass(self) -> bool:
         """
         True if the virtual object of the structure has mass and damping.
+        """
+    @property
+    def line(self) -> HeldSlope | None:
+        """
+        Slope of the line that a tangent holds; absent: the slope of the force, at least 0.
         """
     @property
     def mass(self) -> float:
@@ -116,4 +121,5 @@ def virtual_friction(device: palpate._core.device.DeviceProfile) -> float:
 compensated_share: float = 0.9
 fewest_encoder_steps_in_play: float = 4.0
 most_prediction_taps: int = 16
-structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent')
+most_slope_cells: int = 65536
+structure_names: tuple = ('direct', 'massless', 'implicit', 'explicit', 'energy-consistent', 'tangent')

@@ -262,10 +262,24 @@ def explicit_scheme(bounds: ForceBounds, device: palpate._core.device.DeviceProf
     scheme that was tried. Keywords: mass, object_damping, coupling_stiffness, coupling_damping and
     play_radius; None: a default, or the result of the search.
     """
+def fast_motion_energy(device: palpate._core.device.DeviceProfile) -> float:
+    """
+    Returns the largest energy that a hand can take out after a motion faster than the certified one,
+    until the zero force of the guard acts [J]: (T + t_d) (F_max - f_c)^2 / 4 b.
+    """
 def force_bounds(model: palpate._core.model.ForceModel, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = ...) -> ForceBounds:
     """
     Returns proved bounds of the force of a model of position, or of position and velocity, limited to
     force_limit. A play_radius above 0 replaces the play radius of the model.
+    """
+def inner_need(held_line: palpate._core.device.HeldLine, stiffness: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Returns the device damping that the loop of a controller needs for a line of this stiffness.
+    """
+def line_for(model: palpate._core.model.ForceModel, device: palpate._core.device.DeviceProfile, motion: typing.SupportsFloat | typing.SupportsIndex, play_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> palpate._core.rendering.HeldSlope:
+    """
+    Returns the line of the simplest rule that is certified for a model on a device, for motions up to
+    `motion` in a period; if none is certified, the line that needs least.
     """
 def narrowest_play(sliding: ForceBounds, device: palpate._core.device.DeviceProfile, least: typing.SupportsFloat | typing.SupportsIndex, most: typing.SupportsFloat | typing.SupportsIndex) -> float:
     """

@@ -7,8 +7,8 @@ device property that must be better. `search` runs these steps. `simulation` ren
 """
 
 from .. import _core
-from .._core.device import AdmittanceDisplay, OnDevice
-from .._core.rendering import Scheme, explicit_slope_limit
+from .._core.device import AdmittanceDisplay, HeldLine, OnDevice
+from .._core.rendering import HeldSlope, Scheme, explicit_slope_limit
 from .._core.simulation import AccountUse, Hand, TestRig
 from .._core.stability import Certificate, Inequality
 from ..arguments import named_arguments
@@ -37,6 +37,8 @@ __all__ = [
     "DeviceProfile",
     "ForceError",
     "Hand",
+    "HeldLine",
+    "HeldSlope",
     "Inequality",
     "OnDevice",
     "Plan",
@@ -58,5 +60,5 @@ __all__ = [
     "simulate",
 ]
 
-for _compiled in (Hand, Scheme, OnDevice, AdmittanceDisplay, _core.device.DeviceProfile):
+for _compiled in (Hand, Scheme, HeldLine, HeldSlope, OnDevice, AdmittanceDisplay, _core.device.DeviceProfile):
     named_arguments(_compiled)

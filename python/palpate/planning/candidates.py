@@ -11,7 +11,13 @@ from dataclasses import dataclass, replace
 from .._core.device import DeviceProfile
 from .._core.model import ForceModel
 from .._core.portable import ExportedModel
-from .._core.rendering import Scheme, compensated_share, default_play_radius
+from .._core.rendering import (
+    Scheme,
+    cells_in_motion,
+    compensated_share,
+    default_play_radius,
+    most_slope_cells,
+)
 from .._core.simulation import account_use
 from .._core.stability import (
     Certificate,
@@ -20,6 +26,7 @@ from .._core.stability import (
     certify_with_account,
     explicit_scheme,
     force_bounds,
+    line_for,
     passive_shift,
     steepest_stick,
     stiffest_coupling,
@@ -53,6 +60,10 @@ _LATE_TICK_PERIODS = 1.25
 """Time between two samples for which the prediction of a plan must be certified; if no rendering is, less is
 accepted [longest time between samples of the device]
 """
+
+_FASTEST_STROKES_S = (0.02, 0.06, 0.2)
+"""Times in which the fastest certified motion of a tangent crosses the domain [s]. A faster motion ends the
+run; the first time that is certified is taken"""
 
 _LEAST_HYSTERESIS = 1.0 / 64.0
 """Least factor by which a plan may multiply the hysteresis h to make it renderable [-]"""
@@ -273,6 +284,25 @@ def _held(task: Task) -> Candidate | Refusal:
     return refusal
 
 
+def _tangent(task: Task) -> Candidate | Refusal:
+    """Renders the identified model by lines that the controller of the device holds between two commands,
+    certified for the fastest motions of `_FASTEST_STROKES_S` that hold."""
+    if refusal := task.not_direct() or task.only_direct():
+        return refusal
+    model, device = task.model, task.device
+    if device.held_line is None:
+        return Refusal("the controller of the device does not hold a line")
+    travel = float(model.upper[0] - model.lower[0])
+    least = max(travel * cells_in_motion / most_slope_cells, 8.0 * device.encoder_step)
+    for stroke_s in _FASTEST_STROKES_S:
+        motion = max(travel * device.period_s / stroke_s, least)
+        line = line_for(model, device, motion, task.usual_play)
+        found = task.certified(Scheme(structure="tangent", play_radius=task.usual_play, line=line))
+        if found.certificate.certified:
+            break
+    return found
+
+
 def _massless(task: Task) -> Candidate | Refusal:
     """Renders the model as a massless virtual object behind a coupling. A model without hysteresis has
     limited slopes and is compensated for the spring of the coupling."""
@@ -421,6 +451,8 @@ class CandidateStructure:
     use: str
     """Rendering or purpose of the structure, in a few words"""
     propose: Propose
+    applies: Callable[[Task], bool] = lambda task: True
+    """Returns False for a device that cannot have the structure, which is then not mentioned"""
     reduces_error: bool = False
     """True if the structure is also tried when the force error of a proved rendering is not accepted, and is
     chosen if its own is smaller"""
@@ -428,6 +460,11 @@ class CandidateStructure:
 
 CANDIDATES: Mapping[str, CandidateStructure] = {
     "direct": CandidateStructure("the identified model", _direct),
+    "tangent": CandidateStructure(
+        "the identified model, if the controller of the device holds lines",
+        _of_position(_tangent),
+        applies=lambda task: task.device.held_line is not None,
+    ),
     LIMITED: CandidateStructure(
         "the nearest force that the device can render", _of_position(_direct_limited)
     ),

@@ -63,10 +63,10 @@ class DeviceProfile(_core.device.DeviceProfile):
     unknown damping or friction, and an upper bound for unknown delay, steps or jitter.
 
     The keyword arguments are the fields of the core's DeviceProfile, listed there with their units. The
-    defaults are those of a simulated knob. Two fields are tables in the TOML file: ``on_device``
-    is an :class:`palpate.planning.OnDevice`, and ``admittance`` an
-    :class:`palpate.planning.AdmittanceDisplay`. A device with the table ``admittance`` measures the force and
-    moves to a commanded position, like a force-feedback pedal.
+    defaults are those of a simulated knob. Three fields are tables in the TOML file: ``on_device``
+    is an :class:`palpate.planning.OnDevice`, ``held_line`` a :class:`palpate.planning.HeldLine`, and
+    ``admittance`` an :class:`palpate.planning.AdmittanceDisplay`. A device with the table ``admittance``
+    measures the force and moves to a commanded position, like a force-feedback pedal.
 
     Raises
     ------
@@ -99,7 +99,8 @@ class DeviceProfile(_core.device.DeviceProfile):
             raise InputError(f"{file} is not TOML: the file is not text") from None
         except RecursionError:
             raise InputError(
-                f"{file}: the file is nested too deeply; a profile has no table but on_device and admittance"
+                f"{file}: the file is nested too deeply; a profile has no tables but on_device, admittance "
+                "and held_line"
             ) from None
         except ValueError as error:  # TOML with an integer of too many digits for Python, or an invalid date
             reason = str(error)

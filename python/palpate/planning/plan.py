@@ -14,6 +14,7 @@ from .._core.device import DeviceProfile
 from .._core.io import checked_certificate, scheme_of
 from .._core.model import ForceModel
 from .._core.rendering import (
+    HeldSlope,
     Scheme,
     default_play_radius,
     display_lag_s,
@@ -26,6 +27,7 @@ from .._core.stability import (
     certify,
     certify_with_account,
     device_difference,
+    fast_motion_energy,
     slope_behind_coupling,
 )
 from .._typing import Float1D, Float2D
@@ -277,6 +279,7 @@ class Plan:
             "predict": scheme.predict or None,
             "refused": list(self.refused),
             "accepted_force_error": self.accept_force_error,
+            **({} if scheme.line is None else {"line": scheme.line.to_dict()}),
         }
 
     @property
@@ -365,6 +368,8 @@ class Plan:
         if scheme.predict:
             samples = "sample" if scheme.predict == 1 else f"{scheme.predict} samples"
             rows["prediction"] = f"half a sample ahead, from the previous {samples}"
+        if scheme.line is not None:
+            rows["held line"] = self._line_text(scheme.line)
         if scheme.play_radius:
             rows["play radius"] = self._play_text(units["position"])
         return rows
@@ -376,6 +381,22 @@ class Plan:
         usual = default_play_radius(with_network(self.model, play_radius=None), step)
         text = f"{radius:.4g}{unit}: after a reversal the force changes over {2.0 * radius:.4g}{unit}"
         return f"{text}, usually over {2.0 * usual:.4g}{unit}" if radius > usual > 0.0 else text
+
+    def _line_text(self, line: HeldSlope) -> str:
+        """Returns the slope of a held line and its fastest motion in words."""
+        units = self._units()
+        words = {
+            "steepest": f"slope that stores the energy, up to {line.slope:.4g}{units['stiffness']}",
+            "raised": f"slope of the force + {line.lift:.4g}{units['stiffness']}",
+            "constant": f"slope {line.slope:.4g}{units['stiffness']}",
+        }[line.rule]
+        if line.motion is None or self.certificate is None:
+            return f"{words}; any speed"
+        device = self.certificate.device
+        return (
+            f"{words}; up to {line.motion / device.period_s:.4g}{units['position']}/s, a faster motion ends "
+            f"the run and gives at most {fast_motion_energy(device):.3g} J"
+        )
 
     def _units(self) -> dict[str, str]:
         """Returns the unit of each kind of quantity with a space before it; empty text without units."""

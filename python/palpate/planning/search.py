@@ -8,7 +8,7 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -245,6 +245,8 @@ def choose(task: Task, accept_force_error: float) -> tuple[Candidate, tuple[str,
     chosen: Candidate | None = None
     found = ""
     for name, candidate in CANDIDATES.items():
+        if not candidate.applies(task):
+            continue
         if found and not (candidate.reduces_error and _error(task, chosen) > accept_force_error):
             continue
         outcome = candidate.propose(task)
@@ -512,7 +514,16 @@ def _properties(
         rate = _rounded(math.ceil, factor / device.period_s)
         jitter_s = device.jitter_s / (rate * device.period_s)
         delay_s = device.delay_s / (rate * device.period_s)
-        return _changed(on, period_s=1.0 / rate, jitter_s=jitter_s, delay_s=delay_s)
+        # A host that is faster than the loop of the controller sends forces instead of lines
+        loop = on.held_line
+        slower = loop is not None and loop.period_s > 1.0 / rate
+        return _changed(
+            on,
+            period_s=1.0 / rate,
+            jitter_s=jitter_s,
+            delay_s=delay_s,
+            held_line=None if slower else loop,
+        )
 
     fastest = _fastest_on_device(device)
 
@@ -597,7 +608,7 @@ def _slope_unit(device: DeviceProfile) -> str:
     return f"{_FORCE_UNIT[device.position_unit]}/{device.position_unit}"
 
 
-def _changed(device: DeviceProfile, **fields: float) -> DeviceProfile:
+def _changed(device: DeviceProfile, **fields: Any) -> DeviceProfile:
     return DeviceProfile(**device.to_dict() | fields)
 
 

@@ -8,11 +8,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "palpate/guard/limit_cycle_detector.hpp"
+#include "palpate/guard/line_work.hpp"
 #include "palpate/guard/passivity_observer.hpp"
 #include "palpate/guard/read_motion.hpp"
 #include "palpate/guard/reading_guard.hpp"
@@ -474,6 +476,25 @@ TEST(StoredEnergy, CouplingStoresTheIntegralOfItsLimitedForce) {
     StoredEnergy uncoupled{{.within = 1.0, .force_limit = 3.0, .included_stretch = 0.0}};
     uncoupled.visit(0.0, 10.0);
     EXPECT_EQ(uncoupled.most(), 1.0);
+}
+
+TEST(ForceLimit, ALineThatIsNotFiniteBecomesZeroForce) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (Command line : {Command{nan, 0.0, 1.0}, Command{1.0, nan, 1.0}, Command{1.0, 0.0, nan}}) {
+        EXPECT_EQ(ForceLimit{5.0}.apply(line), Status::NonFinite);
+        EXPECT_EQ(line.force, 0.0);
+        EXPECT_EQ(line.stiffness, 0.0);
+    }
+}
+
+TEST(LineWork, IsTheMeanOfTheForcesAtBothEndsOfAMotion) {
+    LineWork work{1};
+    work.sent(4.0);
+    work.sent(0.0);
+    // The line of stiffness 4 acts one period late: from 2.0 to 2.4 over a motion of 0.1
+    EXPECT_NEAR(work.mean(2.4, 0.1), 2.2, 1e-12);
+    work.sent(0.0);
+    EXPECT_EQ(work.mean(2.4, 0.1), 2.4);
 }
 
 }  // namespace

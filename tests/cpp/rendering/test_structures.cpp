@@ -547,7 +547,7 @@ TEST(Structure, ExtremePositionsGiveAFiniteForceOrAreRefused) {
         if (has_coupling(scheme.structure)) {
             scheme.compensated = true;
             check(bounded, scheme, name + ", compensated");
-        } else {
+        } else if (traits_of(scheme.structure).predicts) {
             scheme.predict = 4;
             check(bounded, scheme, name + ", predicted");
             check(both, scheme, name + ", predicted, hysteresis");

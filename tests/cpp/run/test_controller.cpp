@@ -33,6 +33,7 @@ class ScriptedDevice {
     Opened open() { return {}; }
     Reading exchange(const Command& command) noexcept {
         sent = command.force;
+        line = command;
         Reading reading = next;
         reading.sequence = ++sequence;
         return reading;
@@ -41,8 +42,85 @@ class ScriptedDevice {
 
     Reading next;
     double sent = 0.0;
+    Command line;
     std::uint64_t sequence = 0;
 };
+
+/// A structure that sends a line of slope 20 through the force 10 x.
+struct LineStructure {
+    void reset(double /*position*/) noexcept {}
+    [[nodiscard]] Rendered step(double position) noexcept {
+        return {fails ? 0.0 : 10.0 * position,          position, 1,
+                fails ? Status::NonFinite : Status::Ok, false,    20.0};
+    }
+    bool fails = false;
+};
+
+TEST(Controller, SendsALineThroughTheMeasuredPosition) {
+    ScriptedDevice device;
+    device.next.position = 0.2;
+    Controller<ScriptedDevice> controller{device, LineStructure{}, ForceLimit{5.0}};
+    (void)controller.start();
+    (void)controller.tick();
+    EXPECT_EQ(device.line.force, 2.0);
+    EXPECT_EQ(device.line.position, 0.2);
+    EXPECT_EQ(device.line.stiffness, 20.0);
+}
+
+TEST(Controller, MovesALineAlongItselfToTheForceLimit) {
+    ScriptedDevice device;
+    device.next.position = 0.8;
+    Controller<ScriptedDevice> controller{device, LineStructure{}, ForceLimit{5.0}};
+    (void)controller.start();
+    EXPECT_EQ(controller.tick().status, Status::Limited);
+    EXPECT_EQ(device.line.force, 5.0);
+    EXPECT_EQ(device.line.stiffness, 20.0);
+    EXPECT_NEAR(device.line.position, 0.8 - 3.0 / 20.0, 1e-12) << "the same line: 8 + 20 (x - 0.8)";
+}
+
+TEST(Controller, RampMultipliesForceAndStiffness) {
+    ScriptedDevice device;
+    device.next.position = 0.2;
+    Controller<ScriptedDevice> controller{device, LineStructure{}, Guards{.limit = {5.0}, .ramp = {4, 0}}};
+    (void)controller.start();
+    for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+        (void)controller.tick();
+        EXPECT_EQ(device.line.force, share * 2.0);
+        EXPECT_EQ(device.line.stiffness, share * 20.0);
+    }
+}
+
+TEST(Controller, AForceThatAGuardOfHeldForcesChangesIsHeld) {
+    ScriptedDevice device;
+    device.next.position = 0.2;
+    Controller<ScriptedDevice> controller{device, LineStructure{},
+                                          Guards{.limit = {5.0}, .slew = {0.5, 0.0}}};
+    (void)controller.start();
+    (void)controller.tick();
+    EXPECT_EQ(device.line.force, 0.5);
+    EXPECT_EQ(device.line.stiffness, 0.0);
+}
+
+TEST(Controller, ZeroForceHasNoStiffness) {
+    ScriptedDevice device;
+    device.next.position = 0.2;
+    Controller<ScriptedDevice> failing{device, LineStructure{true}, ForceLimit{5.0}};
+    (void)failing.start();
+    (void)failing.tick();
+    EXPECT_EQ(device.line.force, 0.0);
+    EXPECT_EQ(device.line.stiffness, 0.0);
+    Controller<ScriptedDevice> controller{device, LineStructure{}, ForceLimit{5.0}};
+    (void)controller.start();
+    (void)controller.tick();
+    EXPECT_EQ(device.line.stiffness, 20.0);
+    device.next.status = Status::Timeout;
+    (void)controller.tick();
+    (void)controller.tick();
+    EXPECT_EQ(device.line.force, 0.0);
+    EXPECT_EQ(device.line.stiffness, 0.0);
+    (void)controller.stop();
+    EXPECT_EQ(device.line.stiffness, 0.0);
+}
 
 TEST(Controller, PutsTheObjectAtRestUnderTheHandleBeforeTheFirstForce) {
     const VirtualCoupling coupling;

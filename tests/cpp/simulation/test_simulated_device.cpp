@@ -134,5 +134,40 @@ TEST(SimulatedDevice, StartsAtRestAtTheGivenPosition) {
     EXPECT_EQ(device.exchange({}).velocity, 0.0);
 }
 
+TEST(HeldLineDevice, AppliesTheLineBetweenTwoCommands) {
+    DeviceProfile profile;
+    profile.held_line = HeldLine{.period_s = 5e-5, .delay_s = 0.0, .encoder_step = 0.0};
+    SimulatedHandle<Hand, SemiImplicitEuler> device{profile, {}, 20, 0.5};
+    (void)device.open();
+    (void)device.exchange({0.0, 0.5, 20.0});
+    EXPECT_NE(device.handle_position(), 0.5) << "the hand moves the handle";
+    EXPECT_NEAR(device.applied_force(), 20.0 * (device.handle_position() - 0.5),
+                20.0 * std::abs(device.handle_velocity()) * 6e-5);
+    EXPECT_NE(device.applied_force(), 0.0);
+}
+
+TEST(HeldLineDevice, WithoutALoopHoldsTheForce) {
+    SimulatedHandle<Hand, SemiImplicitEuler> device{DeviceProfile{}, {}, 20, 0.5};
+    (void)device.open();
+    (void)device.exchange({1.0, 0.5, 20.0});
+    EXPECT_EQ(device.applied_force(), 1.0);
+}
+
+TEST(HeldLineDevice, LimitsTheForceOfTheLineAndRoundsIt) {
+    DeviceProfile profile;
+    profile.force_limit = 0.4;
+    profile.held_line =
+        HeldLine{.period_s = 5e-5, .delay_s = 0.0, .encoder_step = 0.0, .stiffness_step = 8.0};
+    SimulatedHandle<Hand, SemiImplicitEuler> device{profile, {}, 20, 0.5};
+    (void)device.open();
+    (void)device.exchange({5.0, 0.5, 20.0});
+    EXPECT_EQ(device.applied_force(), 0.4);
+    const double from = device.handle_position();
+    (void)device.exchange({0.1, from, 3.9});
+    EXPECT_EQ(device.applied_force(), 0.1) << "a stiffness below half a step is 0";
+    (void)device.exchange({std::numeric_limits<double>::quiet_NaN(), 0.0, 1.0});
+    EXPECT_EQ(device.applied_force(), 0.0);
+}
+
 }  // namespace
 }  // namespace palpate

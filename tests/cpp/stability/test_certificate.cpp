@@ -903,7 +903,7 @@ TEST(Certificate, HoldsTheNumbersForWhichItWasComputed) {
     const Scheme scheme = scheme_of(StructureKind::Massless, {100.0, 0.02});
     const Certificate certificate = certify_rendered(slopes(-1.0, 20.0), scheme, device);
     EXPECT_EQ(certificate.scheme.coupling.stiffness, 100.0);
-    EXPECT_EQ(certificate.device, certified_part(device));
+    EXPECT_EQ(certificate.device, certified_part(device, false));
     EXPECT_FALSE(certificate.device.on_device.has_value());
     EXPECT_EQ(certificate.bounds.slope.upper, 20.0);
     EXPECT_EQ(certificate.inequalities.size(), inequalities_of(slopes(-1.0, 20.0), scheme, device).size());

@@ -96,6 +96,50 @@ inline constexpr auto fields_of<AdmittanceDisplay> = std::tuple{
         "feed_forward_s",
         "Time by which the command is ahead of the object's motion, to compensate the servo's lag [s].",
         Rule::NotNegative}};
+/// Loop of a motor controller that holds a line, force + stiffness (x - position), between two commands (`Command`). The
+/// controller reads its own encoder at a higher rate than the host. The default is a controller of 20 kHz with a period
+/// of delay.
+struct HeldLine {
+    double period_s = 5e-5;
+    double delay_s = 5e-5;
+    double encoder_step = 0.0;
+    double stiffness_step = 0.0;
+    double position_step = 0.0;
+    std::optional<double> largest_stiffness = std::nullopt;
+    bool limits_force = true;
+    std::optional<double> watchdog_s = std::nullopt;
+
+    [[nodiscard]] bool operator==(const HeldLine&) const = default;
+};
+
+template <>
+inline constexpr auto fields_of<HeldLine> = std::tuple{
+    Field<&HeldLine::period_s>{"period_s", "Time between two samples of the controller [s].", Rule::Positive},
+    Field<&HeldLine::delay_s>{
+        "delay_s",
+        "Time from a sample of the controller to its force, lag of the current control included [s].",
+        Rule::NotNegative},
+    Field<&HeldLine::encoder_step>{
+        "encoder_step",
+        "Smallest change of position that the controller reads [m or rad]; 0 = not quantised.",
+        Rule::NotNegative},
+    Field<&HeldLine::stiffness_step>{"stiffness_step",
+                                     "Smallest change of the commanded stiffness [N/m or N*m/rad]; 0 = not "
+                                     "quantised.",
+                                     Rule::NotNegative},
+    Field<&HeldLine::position_step>{
+        "position_step", "Smallest change of the commanded position [m or rad]; 0 = not quantised.",
+        Rule::NotNegative},
+    Field<&HeldLine::largest_stiffness>{
+        "largest_stiffness", "Largest stiffness that a command can have [N/m or N*m/rad]; absent: any.",
+        Rule::Positive},
+    Field<&HeldLine::limits_force>{
+        "limits_force",
+        "True if the controller limits the force of the line to the force limit of the profile."},
+    Field<&HeldLine::watchdog_s>{
+        "watchdog_s",
+        "Time after the last command at which the controller makes zero force [s]; absent: never.",
+        Rule::Positive}};
 
 /// Properties of a haptic device; `fields_of` states the meaning of each number. The default is a direct-drive knob
 /// with a 16-bit encoder.
@@ -114,6 +158,7 @@ struct DeviceProfile {
     std::optional<std::string> renderer = std::nullopt;
     std::optional<OnDevice> on_device = std::nullopt;
     std::optional<AdmittanceDisplay> admittance = std::nullopt;
+    std::optional<HeldLine> held_line = std::nullopt;
 
     /// Returns the longest time between two samples, T plus jitter [s]. A certificate must hold for this time.
     [[nodiscard]] double longest_period_s() const noexcept { return period_s + jitter_s; }
@@ -189,7 +234,10 @@ inline constexpr auto fields_of<DeviceProfile> = std::tuple{
     Field<&DeviceProfile::admittance>{
         "admittance",
         "Hand, handle and position servo of an admittance display, which measures the force and moves to a "
-        "position; absent: the device measures its position and applies a force."}};
+        "position; absent: the device measures its position and applies a force."},
+    Field<&DeviceProfile::held_line>{
+        "held_line",
+        "Loop of a controller that holds a line between two commands; absent: it holds a force."}};
 
 /// Returns the profile with zero damping and friction. A certificate must not rely on values that were not measured.
 [[nodiscard]] inline DeviceProfile unmeasured(DeviceProfile profile) {
@@ -197,9 +245,13 @@ inline constexpr auto fields_of<DeviceProfile> = std::tuple{
     return profile;
 }
 
-/// Returns the part of the profile on which a certificate relies. The timing of another renderer is left out.
-[[nodiscard]] inline DeviceProfile certified_part(DeviceProfile profile) {
+/// Returns the part of the profile on which a certificate relies. The timing of another renderer is left out, and the
+/// loop that holds a line unless the rendering uses it.
+[[nodiscard]] inline DeviceProfile certified_part(DeviceProfile profile, bool holds_line) {
     profile.on_device.reset();
+    if (!holds_line) {
+        profile.held_line.reset();
+    }
     return profile;
 }
 
@@ -214,6 +266,16 @@ inline void validate(const DeviceProfile& profile) {
         throw std::invalid_argument(
             "device profile: admittance.servo_damping is given without admittance.servo_bandwidth_hz: give "
             "both, or neither for a servo without lag");
+    }
+    if (profile.held_line && !(profile.held_line->period_s <= profile.period_s)) {
+        throw std::invalid_argument("device profile: held_line.period_s is " +
+                                    readable(profile.held_line->period_s) + ", must be at most period_s, " +
+                                    readable(profile.period_s));
+    }
+    if (profile.held_line && !(profile.held_line->delay_s <= longest_delay_s(profile.held_line->period_s))) {
+        throw std::invalid_argument("device profile: held_line.delay_s is " +
+                                    readable(profile.held_line->delay_s) +
+                                    ", must be 0 to 16 periods of held_line");
     }
 }
 
@@ -231,6 +293,7 @@ inline void validate(const DeviceProfile& profile) {
     profile.delay_s = timing.delay_periods * profile.period_s + timing.delay_s;
     profile.jitter_s = timing.jitter_s;
     profile.renderer = "device";
+    profile.held_line.reset();
     if (const double most = longest_delay_samples - timing.delay_periods; timing.delay_s * rate_hz > most) {
         require_field(false, "on_device", rate_hz,
                       "at most " + readable(std::floor(std::max(most, 0.0) / timing.delay_s)) +

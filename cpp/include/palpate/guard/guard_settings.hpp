@@ -124,12 +124,15 @@ inline constexpr std::uint64_t fewest_frozen_samples = 5;
     return {static_cast<std::uint64_t>(std::llround(settings.ramp_s / period_s)), 0};
 }
 
-/// Returns the guard of the readings, with the limits of these settings in one period.
-[[nodiscard]] inline ReadingGuard reading_guard(const GuardSettings& settings, double period_s) noexcept {
+/// Returns the guard of the readings, with the limits of these settings in one period. A change of position above
+/// `largest_step` is also a fault.
+[[nodiscard]] inline ReadingGuard reading_guard(
+    const GuardSettings& settings, double period_s,
+    double largest_step = std::numeric_limits<double>::infinity()) noexcept {
     const auto samples = static_cast<std::uint64_t>(std::llround(settings.frozen_s / period_s));
-    return ReadingGuard{{settings.largest_speed * period_s, settings.frozen_speed * period_s,
-                         settings.frozen_s > 0.0 ? std::max(samples, fewest_frozen_samples) : 0,
-                         settings.longest_delay_s}};
+    return ReadingGuard{
+        {std::min(settings.largest_speed * period_s, largest_step), settings.frozen_speed * period_s,
+         settings.frozen_s > 0.0 ? std::max(samples, fewest_frozen_samples) : 0, settings.longest_delay_s}};
 }
 
 }  // namespace palpate

@@ -9,6 +9,7 @@
 #include "palpate/guard/guard_settings.hpp"
 #include "palpate/guard/limit_cycle_detector.hpp"
 #include "palpate/guard/limits.hpp"
+#include "palpate/guard/line_work.hpp"
 #include "palpate/guard/passivity_observer.hpp"
 #include "palpate/guard/read_motion.hpp"
 #include "palpate/guard/reading_guard.hpp"
@@ -29,6 +30,7 @@ struct Guards {
     LimitCycleDetector limit_cycle{};
     ForceRamp ramp{};                   ///< start ramp: increases the force from zero
     SlewLimit slew{};                   ///< limits the change of the force from tick to tick
+    LineWork line_work{};               ///< computes the work of a held line
     EnergyAccount account{};            ///< limits the energy that a hand can take out
     ReadMotion motion{};                ///< computes the motion of the handle for the sums of energy
     PassivityObserver ramp_observer{};  ///< sums the energy that the rendering absorbs during the start ramp
@@ -120,7 +122,18 @@ struct Guards {
     guards.ramp = force_ramp(settings, period_s);
     guards.slew = slew_limit(settings, period_s);
     guards.motion = ReadMotion{settings.certified ? settings.encoder_step : 0.0};
-    if (settings.energy_account) {
+    if (holds_line(scheme.structure)) {
+        DeviceProfile timing;
+        timing.period_s = period_s;
+        timing.delay_s = settings.delay_s;
+        guards.line_work = LineWork{timing.whole_delay_samples()};
+        if (scheme.line && scheme.line->motion) {
+            // The motion of the handle can be larger than that of the readings by an encoder step
+            guards.reading = reading_guard(settings, period_s, *scheme.line->motion - settings.encoder_step);
+        }
+    }
+    // The account limits forces that are held for a period. It has no rule for a line
+    if (settings.energy_account && !holds_line(scheme.structure)) {
         AccountSettings account = account_settings(settings, period_s);
         account.stored = stored_energy(model, scheme, settings.force_limit, period_s);
         if (!settings.certified && settings.device_damping == 0.0 && settings.device_friction == 0.0) {

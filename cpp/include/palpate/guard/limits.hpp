@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "palpate/device/device.hpp"
 #include "palpate/status.hpp"
 
 namespace palpate {
@@ -15,6 +16,22 @@ namespace palpate {
 /// force.
 struct ForceLimit {
     double largest = 5.0;  ///< force limit [N or N*m], > 0
+
+    /// Limits the force of a held line: moves the line's position to the limit, so that the line does not change. A device
+    /// that limits the force of the line itself then applies the same force as with the unlimited one. A line that is
+    /// not finite becomes zero force.
+    [[nodiscard]] Status apply(Command& line) const noexcept {
+        if (!std::isfinite(line.force) || !std::isfinite(line.position) || !std::isfinite(line.stiffness)) {
+            line = {};
+            return Status::NonFinite;
+        }
+        const double unlimited = line.force;
+        const Status status = apply(line.force);
+        if (status == Status::Limited && line.stiffness > 0.0) {
+            line.position += (line.force - unlimited) / line.stiffness;
+        }
+        return status;
+    }
 
     /// Limits the force to the range from -`largest` to `largest`; returns `Limited` if the force was clipped,
     /// `NonFinite` if it was not finite.
@@ -56,12 +73,18 @@ struct ForceRamp {
     /// Returns true if the start ramp has ended, so that forces are not scaled.
     [[nodiscard]] bool is_over() const noexcept { return done >= ticks; }
 
+    /// Returns the factor of the start ramp for this tick, from 0 to 1.
+    [[nodiscard]] double factor() const noexcept {
+        return is_over() ? 1.0 : static_cast<double>(done) / static_cast<double>(ticks);
+    }
+
     /// Multiplies the force by the factor of the start ramp for this tick.
     [[nodiscard]] Status apply(double& force) noexcept {
         if (is_over()) {
             return Status::Ok;
         }
-        force *= static_cast<double>(done++) / static_cast<double>(ticks);
+        force *= factor();
+        ++done;
         return Status::Ramp;
     }
 };

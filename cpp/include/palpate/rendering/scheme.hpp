@@ -9,6 +9,7 @@
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/fields/field_table.hpp"
 #include "palpate/model/force_model.hpp"
+#include "palpate/rendering/held_slope.hpp"
 #include "palpate/rendering/structures.hpp"
 
 namespace palpate {
@@ -22,6 +23,7 @@ struct Scheme {
     bool compensated = false;
     double play_radius = 0.0;
     int predict = 0;
+    std::optional<HeldSlope> line = std::nullopt;
 };
 
 template <>
@@ -40,7 +42,9 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
     Field<&Scheme::predict>{"predict",
                             "m, number of past samples that predict the position half a period ahead, 0 to "
                             "16; 0 = no prediction.",
-                            Rule::NotNegative}};
+                            Rule::NotNegative},
+    Field<&Scheme::line>{
+        "line", "Slope of the line that a tangent holds; absent: the slope of the force, at least 0."}};
 
 /// Returns the scheme with coupling and object mass set to 0 if the structure does not use them.
 [[nodiscard]] inline Scheme used_part(Scheme scheme) noexcept {
@@ -49,6 +53,9 @@ inline constexpr auto fields_of<Scheme> = std::tuple{
     }
     if (!has_mass(scheme.structure)) {
         scheme.inertia = {0.0, 0.0};
+    }
+    if (!holds_line(scheme.structure)) {
+        scheme.line.reset();
     }
     return scheme;
 }
@@ -94,6 +101,11 @@ inline void validate(const Scheme& scheme, const ForceModel& model) {
                     "play_radius is " + readable(scheme.play_radius) + ", must be >= 0");
     detail::require(!model.hysteresis() || model.play_radius() || scheme.play_radius > 0.0,
                     "play_radius is 0, but the model does not define one: must be > 0");
+    detail::require(traits.line || !scheme.line,
+                    "line is given, must be absent for the structure " + structure);
+    if (scheme.line) {
+        validate(*scheme.line, model);
+    }
     if (scheme.compensated) {
         detail::require(traits.coupling && !is_uncoupled(scheme),
                         "compensated is set for the " + structure + " structure, which has no coupling");

@@ -5,10 +5,13 @@
 #include <cmath>
 #include <concepts>
 #include <limits>
+#include <optional>
 #include <string_view>
 
 #include "palpate/dynamics/coupling.hpp"
 #include "palpate/model/environment.hpp"
+#include "palpate/model/force_model.hpp"
+#include "palpate/rendering/held_slope.hpp"
 #include "palpate/status.hpp"
 
 namespace palpate {
@@ -20,6 +23,8 @@ struct Rendered {
     int evaluations = 0;                ///< number of evaluations of the model's force
     Status status = Status::Ok;
     bool extrapolated = false;  ///< true if y lies outside the model's domain
+    /// Slope of the line through (y, force) that the device holds; 0: the device holds the force [N/m or N*m/rad]
+    double stiffness = 0.0;
 };
 
 /// A class that computes a force from the measured position of the device, once a tick. `reset` sets the virtual object
@@ -45,6 +50,7 @@ struct StructureTraits {
     bool mass = false;                   ///< true: the virtual object has mass and damping
     bool velocity = false;               ///< true: the structure can render a force that depends on velocity
     bool predicts = false;               ///< true: the structure can use a predicted position
+    bool line = false;                   ///< true: the structure sends lines instead of forces
     bool may_reduce_hysteresis = false;  ///< true: may dissipate less energy than the model's hysteresis
 };
 
@@ -56,6 +62,8 @@ struct StructureNumbers {
     double period_s = 1e-3;     ///< period T [s]
     double force_limit = 0.0;   ///< force limit [N or N*m]; infinity without a limit
     double finest_width = 0.0;  ///< width of the model's finest wavelet [m or rad]
+    std::optional<HeldSlope> line = std::nullopt;  ///< slope of a held line
+    const ForceModel* model = nullptr;             ///< model whose force the structure renders
 };
 
 namespace detail {

@@ -13,15 +13,16 @@
 #include "palpate/rendering/explicit.hpp"
 #include "palpate/rendering/implicit.hpp"
 #include "palpate/rendering/massless.hpp"
+#include "palpate/rendering/tangent.hpp"
 
 namespace palpate {
 
 /// One enumerator for each structure, in the order of the type list `Structures`.
-enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit, EnergyConsistent };
+enum class StructureKind : std::uint8_t { Direct, Massless, Implicit, Explicit, EnergyConsistent, Tangent };
 
 /// Types of all structures, in the order of `StructureKind`.
 using Structures = std::tuple<DirectStructure, MasslessStructure, ImplicitStructure, ExplicitStructure,
-                              EnergyConsistentStructure>;
+                              EnergyConsistentStructure, TangentStructure>;
 
 /// Properties of all structures, in the order of the list `Structures`.
 inline constexpr auto structure_traits =
@@ -41,6 +42,10 @@ inline constexpr auto words_of<StructureKind> = structure_names;
 /// Returns true if the structure has a virtual coupling between device and object.
 [[nodiscard]] constexpr bool has_coupling(StructureKind kind) noexcept {
     return traits_of(kind).coupling;
+}
+/// Returns true if the structure sends lines, which the motor controller of the device holds.
+[[nodiscard]] constexpr bool holds_line(StructureKind kind) noexcept {
+    return traits_of(kind).line;
 }
 /// Returns true if the virtual object of the structure has mass and damping.
 [[nodiscard]] constexpr bool has_mass(StructureKind kind) noexcept {

@@ -57,13 +57,14 @@ class Controller {
         Tick tick{reading_, sends ? structure_.step(reading_.position) : Rendered{}, {}, reading_status};
         if (sends) {
             observe(tick.rendered.environment_position);
-            tick.status = limit_force(tick.rendered, tick.command.force, reading_status);
+            tick.status = limit_force(tick.rendered, tick.command, reading_status);
         } else {
             guards_.motion.interrupt();
             guards_.account.interrupt();
         }
         guards_.slew.sent(tick.command.force);
         guards_.account.sent(tick.command.force);
+        guards_.line_work.sent(tick.command.stiffness);
         reading_ = device_.exchange(tick.command);
         return tick;
     }
@@ -91,30 +92,42 @@ class Controller {
     void observe(double object) noexcept {
         const double moved = guards_.motion.to(reading_.position);
         guards_.account.visit(reading_.position, object);
-        guards_.account.book(reading_.applied, moved);
-        if (std::isfinite(moved * reading_.applied)) {
-            (guards_.ramp.is_over() ? guards_.observer : guards_.ramp_observer).book(reading_.applied, moved);
+        const double applied = guards_.line_work.mean(reading_.applied, moved);
+        guards_.account.book(applied, moved);
+        if (std::isfinite(moved * applied)) {
+            (guards_.ramp.is_over() ? guards_.observer : guards_.ramp_observer).book(applied, moved);
         }
     }
 
     /// Applies the guards to the force in this order: force limit, scaling after a limit cycle, start ramp, slew limit,
     /// energy account. The force limit comes first: a force that is clipped and then scaled is passive, but a force of a
     /// periodic model that is scaled and then clipped can be active. The force limit also replaces numbers that are not
-    /// finite. A failed step sends zero force at once: the limits of its change do not apply.
-    [[nodiscard]] Status limit_force(const Rendered& rendered, double& force,
+    /// finite. A failed step sends zero force at once: the limits of its change do not apply. Factors of the force also
+    /// multiply the stiffness of a line. The last two guards limit a constant force, so a force that they change is held.
+    [[nodiscard]] Status limit_force(const Rendered& rendered, Command& line,
                                      Status reading_status) noexcept {
-        force = rendered.force;
-        const Status limited = guards_.limit.apply(force);
+        line = {rendered.force, rendered.environment_position, rendered.stiffness};
+        double& force = line.force;
+        const Status limited =
+            rendered.stiffness == 0.0 ? guards_.limit.apply(force) : guards_.limit.apply(line);
         for (const Status failed : {rendered.status, limited}) {
             if (!sends_force(failed)) {
-                force = 0.0;
+                line = {};
                 return failed;
             }
         }
         const Status cycle_scaled = guards_.limit_cycle.apply(force);
+        line.stiffness *= guards_.limit_cycle.scale();
+        line.stiffness *= guards_.ramp.factor();
         const Status ramped = guards_.ramp.apply(force);
         const Status slewed = guards_.slew.apply(force);
         const Status energy_limited = guards_.account.apply(force);
+        if (slewed != Status::Ok || energy_limited != Status::Ok) {
+            line.stiffness = 0.0;
+        }
+        if (line.stiffness == 0.0) {
+            line.position = 0.0;
+        }
         guards_.limit_cycle.watch(reading_.position, force);
         // The first status in this list that is not Ok is reported; the energy account comes before the force limit.
         for (const Status status : {rendered.status, ramped, energy_limited, cycle_scaled, limited, slewed}) {

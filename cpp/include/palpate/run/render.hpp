@@ -215,6 +215,10 @@ namespace detail {
         return "is certified for a force limit of " + readable(certified.force_limit) +
                " N*m, the device makes at most " + readable(device.force_limit) + " N*m";
     }
+    if (holds_line(model.certificate->scheme.structure) && !device.held_line) {
+        return "is certified for a controller that holds a line between two commands, the device does not "
+               "hold one";
+    }
     if (changes_plan(options)) {
         return "is certified for its plan only: do not set structure, its numbers, force_limit, slew_s or "
                "tolerated_samples";

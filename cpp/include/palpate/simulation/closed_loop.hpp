@@ -31,10 +31,10 @@ namespace palpate {
 struct SimulatedTick {
     std::size_t number = 0;
     Tick tick;
-    Motion start;               ///< position and velocity of the handle at the start of the tick
-    Motion end;                 ///< position and velocity of the handle at the end of the tick
-    double force_before = 0.0;  ///< force of the motor before the tick [N or N*m]
-    double force = 0.0;         ///< force of the motor at the end of the tick [N or N*m]
+    Motion start;             ///< position and velocity of the handle at the start of the tick
+    Motion end;               ///< position and velocity of the handle at the end of the tick
+    double force = 0.0;       ///< force of the motor at the end of the tick [N or N*m]
+    double mean_force = 0.0;  ///< mean force of the motor over the tick [N or N*m]
 };
 
 /// Runs a structure on a simulated device in simulated time. Calls `watch(SimulatedTick)` after every tick; the loop
@@ -45,13 +45,13 @@ std::size_t closed_loop(D& device, AnyStructure structure, const Guards& guards,
     (void)device.open();
     Controller controller{device, std::move(structure), guards};
     (void)controller.start();
-    SimulatedTick now{0, {}, {}, device.handle(), 0.0, device.applied_force()};
+    SimulatedTick now{0, {}, {}, device.handle(), device.applied_force(), 0.0};
     for (bool continues = true; now.number < ticks && continues; ++now.number) {
         now.start = now.end;
-        now.force_before = now.force;
         now.tick = controller.tick();
         now.end = device.handle();
         now.force = device.applied_force();
+        now.mean_force = device.mean_applied_force();
         continues = watch(std::as_const(now));
     }
     return now.number;
@@ -190,7 +190,6 @@ template <class Each>
         return simulate_display(model, scheme, profile, hand, ticks, start_position, each);
     }
     validate(scheme, model, profile.period_s);
-    const double late = profile.delay_fraction();
     Trace trace;
     const auto add = [&](const SimulatedTick& now) {
         each(now.number);
@@ -204,7 +203,7 @@ template <class Each>
         trace.environment_position.push_back(now.tick.rendered.environment_position);
         trace.force.push_back(now.tick.command.force);
         trace.applied.push_back(now.force);
-        trace.mean_applied.push_back(late * now.force_before + (1.0 - late) * now.force);
+        trace.mean_applied.push_back(now.mean_force);
         trace.evaluations.push_back(now.tick.rendered.evaluations);
         trace.status.push_back(now.tick.status);
         trace.extrapolated.push_back(static_cast<std::uint8_t>(now.tick.rendered.extrapolated));

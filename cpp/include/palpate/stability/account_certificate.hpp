@@ -36,7 +36,7 @@ namespace palpate {
     validate(scheme, model);
     Certificate certificate;
     certificate.scheme = scheme;
-    certificate.device = certified_part(device);
+    certificate.device = certified_part(device, holds_line(scheme.structure));
     certificate.bounds = rendered_bounds(model, scheme, device);
     const EnergyAccount account = account_of(model, scheme, device);
     const double stored = account.stored().within();

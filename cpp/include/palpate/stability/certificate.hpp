@@ -24,6 +24,7 @@
 #include "palpate/stability/explicit_inequalities.hpp"
 #include "palpate/stability/force_bounds.hpp"
 #include "palpate/stability/inequality.hpp"
+#include "palpate/stability/tangent_inequalities.hpp"
 
 namespace palpate {
 
@@ -236,7 +237,7 @@ namespace detail {
                                                   const DeviceProfile& device) {
     Certificate certificate;
     certificate.scheme = scheme;
-    certificate.device = certified_part(device);
+    certificate.device = certified_part(device, holds_line(scheme.structure));
     certificate.bounds = bounds;
     std::vector<Inequality> lines = inequalities_of(bounds, scheme, device);
     const bool is_finite = finite(bounds);
@@ -272,6 +273,9 @@ namespace detail {
     if (traits_of(scheme.structure).may_reduce_hysteresis && model.hysteresis() != nullptr) {
         bounds.mean_force =
             detail::active_mean({model.hysteresis()->force(), nullptr, bounds.sliding}, limit);
+    }
+    if (holds_line(scheme.structure)) {
+        bounds.bend = bend_bounds(model);
     }
     return bounds;
 }

@@ -86,6 +86,10 @@ namespace detail {
         difference = opening + " with the model on " + place(certified) + ", not on " + place(device) +
                      "; plan the model again";
     }
+    if (difference.empty() && certified.id == device.id && certified.held_line &&
+        certified.held_line != device.held_line) {
+        difference = opening + " with other numbers of held_line; plan the model again";
+    }
     for_each_field<DeviceProfile>([&](const auto& field) {
         const auto& before = field.of(certified);
         const auto& now = field.of(device);

@@ -12,8 +12,10 @@
 
 #include "palpate/fields/field_table.hpp"
 #include "palpate/model/bounds.hpp"
+#include "palpate/model/derivatives.hpp"
 #include "palpate/model/force_model.hpp"
 #include "palpate/stability/limited_mean.hpp"
+#include "palpate/stability/proved_maximum.hpp"
 
 namespace palpate {
 
@@ -25,6 +27,14 @@ struct MemoryBounds {
     double bending_per_m = 0.0;  ///< P P' sum_j k_j, increase of `bending` for each metre of U [N/m^2]
     double relaxation_per_s =
         0.0;  ///< P^2 sum_j k_j / tau_j, largest decrease of the stiffness by time [N/(m*s)]
+};
+
+/// Bounds of the change of a slope over all positions, continuations included: |f'(x) - f'(y)| <= curvature |x - y| +
+/// jump.
+struct BendBounds {
+    double curvature =
+        std::numeric_limits<double>::infinity();  ///< C, max |f''| where f' is continuous [N/m^2]
+    double jump = 0.0;  ///< J, sum of the jumps of f' at the ends of domain and continuation [N/m]
 };
 
 /// Proved bounds of a model's force over all positions, continuations included. The bounds of a force with memory are
@@ -42,6 +52,7 @@ struct ForceBounds {
     double force_error = 0.0;
     bool hysteresis = false;
     std::optional<MemoryBounds> memory = std::nullopt;
+    std::optional<BendBounds> bend = std::nullopt;
 
     /// Returns M = max(0, max f'), the steepest rising slope [N/m]; NaN stays NaN.
     [[nodiscard]] double rising() const noexcept { return slope.upper <= 0.0 ? 0.0 : slope.upper; }
@@ -242,6 +253,51 @@ struct SlopeReading {
         bounds.relaxation_per_s += ratio * ratio * k / memory->parameters().time_constant_s[j];
     }
     return bounds;
+}
+
+namespace detail {
+
+/// Returns the sum of the jumps of the slope of a curve at the ends of its domain and of its continuation [N/m].
+[[nodiscard]] inline double slope_jumps(const NetworkCurve& curve) noexcept {
+    const double first = curve.inside(curve.lower()).slope;
+    const double last = curve.inside(curve.upper()).slope;
+    if (curve.periodic()) {
+        return std::abs(last - first);
+    }
+    double jumps = 0.0;
+    for (const auto& [line, slope] : {std::pair{curve.below(), first}, std::pair{curve.above(), last}}) {
+        // A line of no length is a jump from the domain to zero slope
+        const double begin = line.reach > 0.0 ? line.at_edge.slope : 0.0;
+        jumps += std::abs(begin - slope) + (std::isfinite(line.reach) ? std::abs(begin) : 0.0);
+    }
+    return jumps;
+}
+
+/// Returns a proved upper bound of |f''| of a network over [from, to] [N/m^2]. Over a cell of width h, |f''| is at most
+/// its larger value at an end of the cell plus h^2 / 8 times the largest fourth derivative.
+[[nodiscard]] inline double curvature_bound(const NetworkParameters& network, double from, double to) {
+    const double rounding = derivatives_rounding(network, std::max(std::abs(from), std::abs(to)))[2];
+    const double size = derivative_bounds(network, from, to)[2];
+    return rounding + proved_maximum(from, to, 1e-3 * size, [&](double low, double high) {
+               const double ends =
+                   std::max(std::abs(derivatives(network, low)[2]), std::abs(derivatives(network, high)[2]));
+               const double h = high - low;
+               return ends + (h > 0.0 ? derivative_bounds(network, low, high)[4] * h * h / 8.0 : 0.0);
+           });
+}
+
+}  // namespace detail
+
+/// Returns proved bounds of the change of the slope of a model of position without hysteresis and memory; nothing for
+/// other models.
+[[nodiscard]] inline std::optional<BendBounds> bend_bounds(const ForceModel& model) {
+    const WaveletNetwork* network = model.network();
+    if (network == nullptr || model.memory() != nullptr) {
+        return std::nullopt;
+    }
+    const NetworkCurve& curve = network->curve();
+    return BendBounds{detail::curvature_bound(curve.parameters(), curve.lower(), curve.upper()),
+                      detail::slope_jumps(curve)};
 }
 
 /// Returns proved bounds of the force of a model of position, or of position and velocity, on a device with this force

@@ -358,6 +358,19 @@ namespace detail {
     return (off + jitter) * std::ceil(span / (period - jitter)) / (period + jitter);
 }
 
+/// Returns Lambda^2 for samples at k period + u_k, 0 <= u_k <= jitter, and T = period + jitter. D is the motion during the
+/// time `delay` after a sample. The sum of D^2 over all samples is at most Lambda^2 T times the integral of the squared
+/// velocity. Lambda^2 is the sum over all samples of the largest time during which the delay after a sample overlaps the delay
+/// after one given sample, divided by T. For n + tau samples and no jitter it is n^2 + (2 n + 1) tau.
+[[nodiscard]] inline double lag_squared_of(double delay, double period, double jitter) noexcept {
+    double common = delay;
+    for (int j = 1; j * period < delay + jitter; ++j) {
+        const double rest = delay - j * period;
+        common += std::min(delay, rest + jitter) + std::max(0.0, rest);
+    }
+    return common / (period + jitter);
+}
+
 /// Returns the device damping divided by the longest period, b / T [N/m], for samples at the times k period + u_k with
 /// 0 <= u_k <= jitter, if each force acts the time `delay` after its sample. If each force acts before the next sample,
 /// `delayed_need` gives the result. Otherwise it is the smaller of two bounds. One is R(Lambda) of `held_need`; the
@@ -367,14 +380,7 @@ namespace detail {
     if (delay <= period - jitter) {  // the force always acts before the next position is read
         return delayed_need(0, delay / T, slopes);
     }
-    // `common` is Lambda^2 T: the sum, over all samples, of the largest time during which the delay after a sample
-    // overlaps the delay after one given sample. The given sample itself adds `delay`.
-    double common = delay;
-    for (int j = 1; j * period < delay + jitter; ++j) {
-        const double rest = delay - j * period;
-        common += std::min(delay, rest + jitter) + std::max(0.0, rest);
-    }
-    const double simple = held_need(std::sqrt(common / T), slopes);
+    const double simple = held_need(std::sqrt(lag_squared_of(delay, period, jitter)), slopes);
     const int whole = static_cast<int>(std::lround(delay / period));
     if (jitter >= period || whole == 0 || !(slopes.steepest() > 0.0) || !std::isfinite(simple)) {
         return simple;

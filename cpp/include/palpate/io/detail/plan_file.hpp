@@ -32,7 +32,7 @@ PALPATE_INLINE std::optional<Scheme> read_plan(const JsonField& plan) {
         return std::nullopt;
     }
     plan.require_keys({"structure", "solver", "network", "coupling", "inertia", "compensated", "play_radius",
-                       "predict", "refused", "accepted_force_error"});
+                       "predict", "refused", "accepted_force_error", "line"});
     Scheme scheme;
     scheme.structure = plan["structure"].as<StructureKind>();
     if (const JsonField solver = plan["solver"]; !solver.is_null()) {
@@ -60,6 +60,9 @@ PALPATE_INLINE std::optional<Scheme> read_plan(const JsonField& plan) {
         scheme.predict =
             static_cast<int>(std::min<std::uint64_t>(predict.count(1), most_prediction_taps + 1));
         predict.require(scheme.predict <= most_prediction_taps, "<= " + std::to_string(most_prediction_taps));
+    }
+    if (plan.value().contains("line")) {
+        scheme.line = plan["line"].as<HeldSlope>();
     }
     for (const JsonField& sentence : plan["refused"].items()) {
         (void)sentence.string();
@@ -96,6 +99,9 @@ PALPATE_INLINE std::optional<Certificate> read_certificate(const JsonField& file
     read.bounds = file["bounds"].as<ForceBounds>();
     read.bounds.hysteresis = model.hysteresis() != nullptr;
     read.bounds.memory = memory_bounds(model);
+    if (holds_line(read.scheme.structure)) {
+        read.bounds.bend = bend_bounds(model);
+    }
     for (const JsonField& line : file["inequalities"].items()) {
         read.inequalities.push_back(line.as<Inequality>());
     }

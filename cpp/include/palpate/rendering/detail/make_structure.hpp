@@ -27,8 +27,8 @@ PALPATE_INLINE AnyStructure make_structure(const ForceModel& given, const Scheme
                                   CompiledCurve{memory->ratio(), always}, *memory, period_s, force_limit}};
     }
     const ForceModel model = scheme.play_radius > 0.0 ? given.with_play_radius(scheme.play_radius) : given;
-    const StructureNumbers numbers{scheme.coupling, scheme.inertia, scheme.predict,
-                                   period_s,        force_limit,    model.finest_width()};
+    const StructureNumbers numbers{scheme.coupling, scheme.inertia,       scheme.predict, period_s,
+                                   force_limit,     model.finest_width(), scheme.line,    &model};
     const auto build = [&](auto environment, const auto& solver_of) {
         return with_kind(scheme.structure, [&](auto structure) {
             return structure.build(std::move(environment), numbers, solver_of);

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests the page about held lines against its numbers, and the study."""
+
+import json
+from pathlib import Path
+
+import pytest
+from bench.plans import held_lines
+
+ROOT = Path(__file__).parents[3]
+PAGE = ROOT / "docs" / "held-lines.md"
+NUMBERS = PAGE.parent / "figures" / "held-lines.json"
+
+
+def test_page_shows_the_stored_numbers() -> None:
+    content = json.loads(NUMBERS.read_text(encoding="utf-8"))
+    errors = {name: {int(k): v for k, v in by.items()} for name, by in content["errors"].items()}
+    tables = held_lines.tables([held_lines.Walls(**row) for row in content["walls"]], errors)
+    text = PAGE.read_text(encoding="utf-8")
+    assert all(table in text for table in tables.values())
+
+
+def test_the_stored_walls_follow_from_the_profiles() -> None:
+    content = json.loads(NUMBERS.read_text(encoding="utf-8"))
+    stored = {row["device"]: row for row in content["walls"]}
+    name, device = next(each for each in held_lines.devices() if each[0] == "mit-drive")
+    walls = held_lines.walls(name, device)
+    assert walls.hold == pytest.approx(stored[name]["hold"], rel=1e-6)
+    assert walls.by_width == pytest.approx(stored[name]["by_width"], rel=1e-3)
+
+
+def test_a_line_has_less_force_error_than_hold_at_every_delay() -> None:
+    errors = json.loads(NUMBERS.read_text(encoding="utf-8"))["errors"]
+    for delay in ("0", "1", "2"):
+        assert errors["held line, 3 rad/s"][delay] < 0.25 * errors["hold"][delay]
