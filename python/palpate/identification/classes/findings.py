@@ -17,7 +17,7 @@ from ...recording.motion import noise_band, strokes_from_order
 from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
-from ..data.rows import period_notes
+from ..data.rows import Rows, period_notes
 from ..decision import latest
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
@@ -225,13 +225,28 @@ def _floor(best: Candidate) -> float:
     return FORCE_FLOOR * float(np.abs(best.data.force[best.error.weight > 0.0]).max(initial=0.0))
 
 
+def _pulls(data: Rows, near_zero: float) -> bool:
+    """Returns True if the object pulls the tool in more than one row of each press or of each release. A zero
+    that moves, or one stroke with the wrong sign, shows a pull that other strokes do not show."""
+    rows = np.flatnonzero(data.reported)
+    direction = strokes_from_order(data.path[rows, 0]) if data.side is None else data.side[rows]
+    pulled = data.force[rows] < -near_zero
+    if direction is None or not direction.any():
+        return bool(np.count_nonzero(pulled) > 1)
+    moving = direction != 0
+    pulled, direction = pulled[moving], direction[moving]
+    starts = np.flatnonzero(np.diff(direction, prepend=0))
+    in_stroke = np.add.reduceat(pulled.astype(np.intp), starts) > 1
+    return any(in_stroke[direction[starts] == way].all() for way in np.unique(direction))
+
+
 def _first_contact(best: Candidate, near_zero: float) -> float:
     """Returns the position [box] at which the domain of a force that the tool can leave starts: 0, or the end
     of a pull that no row shows. Between few rows before the contact a network can pull; its continuation
     does not."""
     data = best.data
     pressed = data.box[data.fitted & (data.force > near_zero), 0]
-    position = np.linspace(0.0, float(pressed.min(initial=1.0)), COMPARED_POSITIONS)
+    position = np.linspace(0.0, float(pressed.min()) if len(pressed) else 0.0, COMPARED_POSITIONS)
     middle, half = best.parts_at(position[:, None])
     least = middle - np.abs(half)
     if least.min() >= -_floor(best):
@@ -278,10 +293,8 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     band, checked = band_with_check(best)
     below, lower = options.below, network.lower
     if below == "auto":
-        force = data.force[data.reported]
-        near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(force)))
-        pulls = float(np.partition(force, 1)[1]) < -near_zero  # in more than one row
-        leaves = single and data.period is None and not pulls
+        near_zero = options.search.contact_share * float(np.ptp(data.force[data.reported]))
+        leaves = single and data.period is None and not _pulls(data, max(best.rmse, near_zero))
         below = "free" if leaves else "linear"
         if leaves:
             lower = lower + data.reach[0] * _first_contact(best, near_zero)
