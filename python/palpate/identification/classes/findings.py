@@ -226,18 +226,22 @@ def _floor(best: Candidate) -> float:
 
 
 def _pulls(data: Rows, near_zero: float) -> bool:
-    """Returns True if the object pulls the tool in more than one row of each press or of each release. A zero
-    that moves, or one stroke with the wrong sign, shows a pull that other strokes do not show."""
+    """Returns True if the object pulls the tool in more than one row of each press, or of each release, that
+    passes the place of the pull. A zero that moves, or one stroke with the wrong sign, shows a pull that
+    other strokes do not show."""
     rows = np.flatnonzero(data.reported)
     direction = strokes_from_order(data.path[rows, 0]) if data.side is None else data.side[rows]
-    pulled = data.force[rows] < -near_zero
     if direction is None or not direction.any():
-        return bool(np.count_nonzero(pulled) > 1)
-    moving = direction != 0
-    pulled, direction = pulled[moving], direction[moving]
-    starts = np.flatnonzero(np.diff(direction, prepend=0))
+        return bool(np.count_nonzero(data.force[rows] < -near_zero) > 1)
+    box, pulled = data.box[rows, 0], data.force[rows] < -near_zero
+    starts = np.flatnonzero(np.diff(direction, prepend=np.nan))
     in_stroke = np.add.reduceat(pulled.astype(np.intp), starts) > 1
-    return any(in_stroke[direction[starts] == way].all() for way in np.unique(direction))
+    first, last = np.minimum.reduceat(box, starts), np.maximum.reduceat(box, starts)
+    for way in np.unique(direction[pulled & (direction != 0)]):
+        place = np.median(box[pulled & (direction == way)])
+        if in_stroke[(direction[starts] == way) & (first <= place) & (place <= last)].all():
+            return True
+    return False
 
 
 def _first_contact(best: Candidate, near_zero: float) -> float:
