@@ -23,7 +23,7 @@ from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate
-from .class_selection import ClassSelection
+from .class_selection import VELOCITY_INPUTS, ClassSelection
 from .repeatability import band_with_check, left_out_nrmse
 
 USABLE_NRMSE = 0.1
@@ -184,6 +184,33 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     ]
 
 
+def energy_findings(best: Candidate) -> list[Finding]:
+    """Returns a finding if a force of position and velocity gains energy: on average over a place, the force
+    of a press is below that of a release at the same speed, and a hand feels the difference."""
+    data, rows = best.data, np.flatnonzero(best.error.weight > 0.0)
+    if data.names != VELOCITY_INPUTS or not len(rows):
+        return []
+    there, back = data.positions[rows], data.positions[rows] * (1.0, -1.0)
+    known = np.abs(there[:, 1]) <= min(data.positions[rows, 1].max(), -data.positions[rows, 1].min())
+    there, back = there[known], back[known]
+    loop = np.sign(there[:, 1]) * (best.network.force(there, None) - best.network.force(back, None))
+    place = _places(data.box[rows][known], None)
+    count = np.maximum(np.bincount(place, minlength=PLACES), 1)
+    mean, force = (np.bincount(place, values, PLACES) / count for values in (loop, data.force[rows][known]))
+    gained = -mean / force_jnd(force, _floor(best) or 1.0)
+    worst = int(np.argmax(gained))
+    if gained[worst] <= MOST_JND:
+        return []
+    position = data.position_unit.text(float(data.lower[0] + data.reach[0] * (worst + 0.5) / PLACES))
+    return [
+        usable(
+            f"at {position} the force of a release is {data.force_unit.text(-float(mean[worst]))} above that "
+            "of a press at the same speed; a passive object cannot do that. A stroke has another zero or the "
+            "wrong sign, or the force is late: record again, or try --force-late-s"
+        )
+    ]
+
+
 def drift_findings(best: Candidate) -> list[Finding]:
     """Returns a finding if the residual changes over the recording by more than a just noticeable difference,
     between strokes in the same direction over the same place. One press and release cannot show this."""
@@ -290,6 +317,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     # One cause of an error hides the others.
     findings += (
         report.findings
+        or energy_findings(best)
         or limit_findings(best, options)
         or drift_findings(best)
         or place_findings(best, options.hysteresis_nonnegative)
