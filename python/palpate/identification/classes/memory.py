@@ -399,9 +399,10 @@ def _errors(network: FittedNetwork, recordings: Sequence[Recording]) -> tuple[fl
     model = ForceModel(
         **network.parameters(), below=network.below, above="linear", memory=network.memory.memory()
     )
-    timed = [part for part in recordings if part.time is not None]
-    squares = np.concatenate(
-        [(model.force_over_time(part.time, part.position)[0] - part.force) ** 2 for part in timed]
-    )
-    moving = np.concatenate([roles_of(part) == Role.MOVING for part in timed])
-    return float(np.sqrt(np.mean(squares))), float(np.sqrt(np.mean(squares[moving])))
+    squares, moving = [], []
+    for part in recordings:
+        if part.time is not None:
+            squares.append((model.force_over_time(part.time, part.position)[0] - part.force) ** 2)
+            moving.append(roles_of(part) == Role.MOVING)
+    square = np.concatenate(squares)
+    return float(np.sqrt(square.mean())), float(np.sqrt(square[np.concatenate(moving)].mean()))

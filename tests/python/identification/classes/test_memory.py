@@ -264,7 +264,7 @@ def test_measured_relaxation_of_four_stretches_is_one_model(data: Path) -> None:
     assert model.verdict.level == "good"
 
 
-def test_friction_that_creeps_in_pauses_is_no_memory() -> None:
+def test_friction_that_creeps_in_pauses_gives_no_memory() -> None:
     """The rows of the pauses alone would accept a memory: they are half of the recording."""
     step, pause = 0.01, 1500
     way = np.tile(np.repeat([1.0, 0.0, -1.0, 0.0], [300, pause, 300, pause]), 2)
