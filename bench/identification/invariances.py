@@ -258,10 +258,7 @@ def compared(model: Model, truth: Truth, other: Model, other_truth: Truth) -> di
     the steepest slope by 10 %.
     """
     error, other_error = truth.error(model), other_truth.error(other)
-    slope, other_slope = (
-        exact.steepest(exact.modelled(each)) / exact.steepest(exact.force)
-        for each, exact in ((model, truth), (other, other_truth))
-    )
+    slope, other_slope = truth.slope_ratio(model), other_truth.slope_ratio(other)
     return {
         "size": abs(other.n_wavelets - model.n_wavelets) <= 1,
         "error": abs(other_error - error) <= 0.05 * max(error, model.fit.nrmse),

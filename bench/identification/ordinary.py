@@ -101,10 +101,19 @@ class Truth:
         windows = np.lib.stride_tricks.sliding_window_view(strokes, place, axis=1)
         return float(windows.min(axis=-1).max())
 
-    def steepest(self, force: Array) -> float:
-        """Returns the largest |slope| of a force (n,) over the position of a stroke [N/m or N*m/rad]."""
+    def steepest(self, force: Array, judged: NDArray[np.bool_]) -> float:
+        """Returns the largest |slope| of a force (n,) over the judged positions of a stroke [N/m or
+        N*m/rad]."""
         steps = np.diff(force.reshape(2, POINTS), axis=1)
+        inside = judged.reshape(2, POINTS)
+        steps = steps[inside[:, 1:] & inside[:, :-1]]
         return float(np.abs(steps).max() / (self.position[1] - self.position[0]))
+
+    def slope_ratio(self, model: Model, *, settled: bool = False) -> float:
+        """Returns the steepest slope of a model divided by that of the exact force; if `settled`, only where
+        the error is judged, which leaves out the ends of the strokes behind a turn."""
+        judged = self.judged if settled else np.ones_like(self.judged)
+        return self.steepest(self.modelled(model), judged) / self.steepest(self.force, judged)
 
     def pull(self, model: Model) -> float | None:
         """Returns the largest force with which a model pulls below and above the strokes [just noticeable
@@ -177,7 +186,9 @@ def judged(model: Model, best: Model, rows: Rows) -> dict[str, Any]:
         "reference_error": best_error,
         "error_ratio": error / best_error if best_error > 0.0 else float(error > 0.0),
         "worst_place_jnd": place,
-        "slope_ratio": truth.steepest(truth.modelled(model)) / truth.steepest(truth.force),
+        "slope_ratio": truth.slope_ratio(model),
+        "settled_slope_ratio": truth.slope_ratio(model, settled=True),
+        "reference_slope_ratio": truth.slope_ratio(best, settled=True),
         "pull_jnd": truth.pull(model),
         "verdict": model.verdict.level,
         "reasons": list(model.verdict.reasons),
@@ -268,8 +279,17 @@ def _ratios(median: float, most: float = np.inf) -> Callable[[Array], bool]:
     return lambda values: bool(np.median(values) <= median and np.percentile(values, 95) <= most)
 
 
-def _slope_right(row: Row) -> bool:
-    return 0.8 <= row["slope_ratio"] <= 1.25
+def _slope_right(row: Row, key: str = "slope_ratio") -> bool:
+    return 0.8 <= row[key] <= 1.25
+
+
+def _resolvable_slope_right(row: Row) -> bool | None:
+    """None if the noise of the draw hides the slope even from the fit that knows roles and class."""
+    return _settled_slope_right(row) if _slope_right(row, "reference_slope_ratio") else None
+
+
+def _settled_slope_right(row: Row) -> bool:
+    return _slope_right(row, "settled_slope_ratio")
 
 
 def _pulls(row: Row) -> bool | None:
@@ -287,6 +307,8 @@ MARKS = (
     Mark("- of models called good", lambda row: row["error_ratio"] if row["verdict"] == "good" else None, ""),
     Mark("steepest slope over true", _at("slope_ratio"), ""),
     Mark("slope 0.8 to 1.25 of true", _slope_right, ">= 95 %", _at_least(0.95)),
+    Mark("- not behind a turn", _settled_slope_right, ">= 95 %", _at_least(0.95)),
+    Mark("- - that the reference resolves", _resolvable_slope_right, ">= 95 %", _at_least(0.95)),
     Mark("pulls outside", _pulls, "0 %", _at_most(0.0)),
     *(Mark(f"class right: {name}", _at(name), ">= 95 %", _at_least(0.95)) for name in CLASSES),
     Mark("good, but wrong", silent, "<= 1 %", _at_most(0.01)),

@@ -121,6 +121,22 @@ def test_a_model_that_is_twice_as_stiff_is_a_silent_error() -> None:
     assert silent(found)
 
 
+def test_the_slope_behind_a_turn_is_judged_apart() -> None:
+    truth = Truth.of(spring())
+    press = np.arange(len(truth.side)) < len(truth.side) // 2
+    behind = replace(truth, judged=press & (np.cumsum(press) > 100))
+    bent = truth.force.copy()
+    bent[:50] *= 3.0  # in the part that is left out
+
+    class Bent(Truth):
+        def modelled(self, model: Model) -> Array:
+            return bent
+
+    model = Bent(**vars(behind))
+    assert model.slope_ratio(line(1.0)) > 2.0
+    assert model.slope_ratio(line(1.0), settled=True) == pytest.approx(1.0)
+
+
 def test_only_an_error_over_a_hundredth_of_the_stroke_is_a_wrong_place() -> None:
     truth = Truth.of(spring())
     for share, wrong in ((0.005, False), (0.02, True)):

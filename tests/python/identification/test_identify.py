@@ -2,6 +2,7 @@
 """identify: the simulated sample, several recordings, and measured switches, domes and springs."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -219,6 +220,21 @@ def test_an_object_that_pulls_in_the_recording_continues_below_it() -> None:
     model = identify(Recording.from_arrays(x, f))
     assert model.below == "linear"
     assert model.force(-3.0) == pytest.approx(-9.0, rel=0.02)
+
+
+def test_a_pull_in_some_strokes_only_does_not_continue_below_the_recording() -> None:
+    button = push_button()
+    moved = np.where(np.arange(len(button)) < 720, 0.0, -0.06)  # zero set again behind the first release
+    model = identify(replace(button, force=button.force + moved))
+    assert model.below == "free"
+    assert model.force(BELOW, direction=np.ones(2)) == pytest.approx(0.0, abs=0.02)
+
+
+def test_an_object_that_pulls_in_each_release_continues_below_the_recording() -> None:
+    button = push_button()
+    release = np.tile(np.repeat([False, True], 360), 3)
+    model = identify(replace(button, force=np.where(release, button.force - 0.1, button.force)))
+    assert model.below == "linear"
 
 
 @pytest.mark.parametrize("end", ["below", "above"])

@@ -17,13 +17,13 @@ from ...recording.motion import noise_band, strokes_from_order
 from ...recording.roles import counts_text, role_counts
 from ...verdict import FORCE_FLOOR, Finding, Verdict, force_jnd, no, usable
 from ..data.limits import neighbour_correlation
-from ..data.rows import period_notes
+from ..data.rows import Rows, period_notes
 from ..decision import latest
 from ..network.constraints import COMPARED_POSITIONS
 from ..network.fitted import FittedNetwork
 from ..options import IdentifyOptions
 from ..search.evidence import Candidate
-from .class_selection import ClassSelection
+from .class_selection import VELOCITY_INPUTS, ClassSelection
 from .repeatability import band_with_check, left_out_nrmse
 
 USABLE_NRMSE = 0.1
@@ -184,6 +184,33 @@ def place_findings(best: Candidate, nonnegative: bool) -> list[Finding]:
     ]
 
 
+def energy_findings(best: Candidate) -> list[Finding]:
+    """Returns a finding if a force of position and velocity gains energy: on average over a place, the force
+    of a press is below that of a release at the same speed, and a hand feels the difference."""
+    data, rows = best.data, np.flatnonzero(best.error.weight > 0.0)
+    if data.names != VELOCITY_INPUTS or not len(rows):
+        return []
+    there, back = data.positions[rows], data.positions[rows] * (1.0, -1.0)
+    known = np.abs(there[:, 1]) <= min(data.positions[rows, 1].max(), -data.positions[rows, 1].min())
+    there, back = there[known], back[known]
+    loop = np.sign(there[:, 1]) * (best.network.force(there, None) - best.network.force(back, None))
+    place = _places(data.box[rows][known], None)
+    count = np.maximum(np.bincount(place, minlength=PLACES), 1)
+    mean, force = (np.bincount(place, values, PLACES) / count for values in (loop, data.force[rows][known]))
+    gained = -mean / force_jnd(force, _floor(best) or 1.0)
+    worst = int(np.argmax(gained))
+    if gained[worst] <= MOST_JND:
+        return []
+    position = data.position_unit.text(float(data.lower[0] + data.reach[0] * (worst + 0.5) / PLACES))
+    return [
+        usable(
+            f"at {position} the force of a release is {data.force_unit.text(-float(mean[worst]))} above that "
+            "of a press at the same speed; a passive object cannot do that. A stroke has another zero or the "
+            "wrong sign, or the force is late: record again, or try --force-late-s"
+        )
+    ]
+
+
 def drift_findings(best: Candidate) -> list[Finding]:
     """Returns a finding if the residual changes over the recording by more than a just noticeable difference,
     between strokes in the same direction over the same place. One press and release cannot show this."""
@@ -225,13 +252,32 @@ def _floor(best: Candidate) -> float:
     return FORCE_FLOOR * float(np.abs(best.data.force[best.error.weight > 0.0]).max(initial=0.0))
 
 
+def _pulls(data: Rows, near_zero: float) -> bool:
+    """Returns True if the object pulls the tool in more than one row of each press, or of each release, that
+    passes the place of the pull. A zero that moves, or one stroke with the wrong sign, shows a pull that
+    other strokes do not show."""
+    rows = np.flatnonzero(data.reported)
+    direction = strokes_from_order(data.path[rows, 0]) if data.side is None else data.side[rows]
+    if direction is None or not direction.any():
+        return bool(np.count_nonzero(data.force[rows] < -near_zero) > 1)
+    box, pulled = data.box[rows, 0], data.force[rows] < -near_zero
+    starts = np.flatnonzero(np.diff(direction, prepend=np.nan))
+    in_stroke = np.add.reduceat(pulled.astype(np.intp), starts) > 1
+    first, last = np.minimum.reduceat(box, starts), np.maximum.reduceat(box, starts)
+    for way in np.unique(direction[pulled & (direction != 0)]):
+        place = np.median(box[pulled & (direction == way)])
+        if in_stroke[(direction[starts] == way) & (first <= place) & (place <= last)].all():
+            return True
+    return False
+
+
 def _first_contact(best: Candidate, near_zero: float) -> float:
     """Returns the position [box] at which the domain of a force that the tool can leave starts: 0, or the end
     of a pull that no row shows. Between few rows before the contact a network can pull; its continuation
     does not."""
     data = best.data
     pressed = data.box[data.fitted & (data.force > near_zero), 0]
-    position = np.linspace(0.0, float(pressed.min(initial=1.0)), COMPARED_POSITIONS)
+    position = np.linspace(0.0, float(pressed.min()) if len(pressed) else 0.0, COMPARED_POSITIONS)
     middle, half = best.parts_at(position[:, None])
     least = middle - np.abs(half)
     if least.min() >= -_floor(best):
@@ -271,6 +317,7 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     # One cause of an error hides the others.
     findings += (
         report.findings
+        or energy_findings(best)
         or limit_findings(best, options)
         or drift_findings(best)
         or place_findings(best, options.hysteresis_nonnegative)
@@ -278,10 +325,8 @@ def identified(selection: ClassSelection) -> FittedNetwork:
     band, checked = band_with_check(best)
     below, lower = options.below, network.lower
     if below == "auto":
-        force = data.force[data.reported]
-        near_zero = max(best.rmse, options.search.contact_share * float(np.ptp(force)))
-        pulls = float(np.partition(force, 1)[1]) < -near_zero  # in more than one row
-        leaves = single and data.period is None and not pulls
+        near_zero = options.search.contact_share * float(np.ptp(data.force[data.reported]))
+        leaves = single and data.period is None and not _pulls(data, max(best.rmse, near_zero))
         below = "free" if leaves else "linear"
         if leaves:
             lower = lower + data.reach[0] * _first_contact(best, near_zero)

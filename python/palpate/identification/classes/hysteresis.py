@@ -255,7 +255,9 @@ class PlaySearch:
 
     def __init__(self, samples: Samples, options: IdentifyOptions) -> None:
         data = samples.data
-        self._samples, self._path, self._starts = samples, data.path[:, 0], list(data.starts or ())
+        moving = np.maximum.accumulate(np.where(data.fitted, np.arange(len(data.force)), 0))
+        # A tool that waits does not move the play: noise of its position would.
+        self._samples, self._path, self._starts = samples, data.path[moving, 0], list(data.starts or ())
         self._radii, self._evidence = sorted(options.search.play_radius), options.search.evidence
 
     def best_of_options(self, basis: Basis) -> list[HysteresisInput]:
@@ -268,7 +270,7 @@ class PlaySearch:
         """
         if not self._usable:
             return []
-        known = _thinned(self._usable[-1].known)
+        known = self._thinned(self._usable[-1])
         errors = [math.inf, *(self._residual_squares(each, basis, known) for each in self._usable), math.inf]
         return [
             strokes
@@ -290,7 +292,7 @@ class PlaySearch:
         lower, upper = max(radius / RADIUS_SEARCH_RATIO, least), min(radius * RADIUS_SEARCH_RATIO, most)
         if lower >= upper:
             return strokes
-        known = _thinned(self._of(upper).known)
+        known = self._thinned(self._of(upper))
         found = scipy.optimize.minimize_scalar(
             lambda log_radius: self._residual_squares(self._of(math.exp(log_radius)), basis, known),
             bounds=(math.log(lower), math.log(upper)),
@@ -308,7 +310,8 @@ class PlaySearch:
         """Direction states of the rows for each tried play radius, the smallest radius first; without radii
         at which too few rows, or rows of one stroke only, have a known direction state."""
         tried = [self._of(radius) for radius in self._radii]
-        return [one for one in tried if one.known.mean() >= LEAST_KNOWN_SHARE and one.both_ways]
+        fitted = self._samples.data.fitted
+        return [one for one in tried if one.known[fitted].mean() >= LEAST_KNOWN_SHARE and one.both_ways]
 
     def _residual_squares(self, strokes: HysteresisInput, basis: Basis, known: NDArray[np.bool_]) -> float:
         """Returns the residual sum of squares of the best weights on given wavelets, over the rows `known`.
@@ -320,9 +323,9 @@ class PlaySearch:
         problem = self._samples.problem(self._samples.rows(strokes), strokes)
         return problem.total(problem.solve(basis).rss)
 
-
-def _thinned(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Selects at most MOST_ROWS of the rows (n,), evenly spread."""
-    thin = np.zeros_like(rows)
-    thin[:: max(1, -(-len(rows) // MOST_ROWS))] = True
-    return np.asarray(rows & thin)
+    def _thinned(self, strokes: HysteresisInput) -> NDArray[np.bool_]:
+        """Selects at most MOST_ROWS of the fitted rows (n,) with known direction state, evenly spread."""
+        rows = np.flatnonzero(self._samples.data.fitted)
+        thin = np.zeros(len(strokes.known), dtype=bool)
+        thin[rows[:: max(1, -(-len(rows) // MOST_ROWS))]] = True
+        return np.asarray(thin & strokes.known)

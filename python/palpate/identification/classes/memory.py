@@ -308,11 +308,16 @@ def better_with_memory(
         memory=recorded.memory(refined, stiffness),
         below="free" if recorded.contact else "linear",
     )
-    error, findings = _error(network, recordings), list(_undetermined(found, recordings))
+    (error, of_motion), findings = _errors(network, recordings), list(_undetermined(found, recordings))
     linear = replace(network, below="linear")
-    if recorded.contact and options.below == "auto" and (other := _error(linear, recordings)) < error:
-        findings.append(_pulls(recordings[0], recorded, other, error))
-        network, error = linear, other
+    others = _errors(linear, recordings)
+    if recorded.contact and options.below == "auto" and others[0] < error:
+        findings.append(_pulls(recordings[0], recorded, others[0], error))
+        network, (error, of_motion) = linear, others
+    if of_motion**2 > (1.0 + LEAST_GAIN) * found.rmse**2:
+        # Friction creeps in a pause. Its rows alone would accept a model that is wrong while the tool moves.
+        change = recordings[0].file_unit("force").interval(found.rmse, of_motion)
+        return _refused(found, f"it raises the RMS error while the tool moves from {change}")
     nrmse = error / recorded.spread
     held_out = fit.held_out_errors(refined)
     gain = 1.0 - max(nrmse**2, float(held_out.mean())) / before
@@ -387,15 +392,17 @@ IdentifyRest = Callable[[Float1D, Float1D, float, float, int], FittedNetwork]
 the sum of their squared errors, and the largest number of wavelets"""
 
 
-def _error(network: FittedNetwork, recordings: Sequence[Recording]) -> float:
-    """Returns the RMS error of a model with memory on all rows of recordings [force]."""
+def _errors(network: FittedNetwork, recordings: Sequence[Recording]) -> tuple[float, float]:
+    """Returns the RMS errors of a model with memory on all rows of recordings, and on the rows at which the
+    tool moves [force]."""
     assert network.memory is not None
     model = ForceModel(
         **network.parameters(), below=network.below, above="linear", memory=network.memory.memory()
     )
-    errors = [
-        model.force_over_time(part.time, part.position)[0] - part.force
-        for part in recordings
-        if part.time is not None
-    ]
-    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+    squares, moving = [], []
+    for part in recordings:
+        if part.time is not None:
+            squares.append((model.force_over_time(part.time, part.position)[0] - part.force) ** 2)
+            moving.append(roles_of(part) == Role.MOVING)
+    square = np.concatenate(squares)
+    return float(np.sqrt(square.mean())), float(np.sqrt(square[np.concatenate(moving)].mean()))

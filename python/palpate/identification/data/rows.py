@@ -191,7 +191,7 @@ class Rows:
         gap = 0.0 if self.period is None else self._usual_gap()
         if self.weight is not None:
             return replace(self, counted=self.weight, limits=RowLimits(position_gap=gap))
-        limits = RowLimits(force_error=STEP_ERROR * force_step(self.force), position_gap=gap)
+        limits = RowLimits(force_error=STEP_ERROR * force_step(self.force[self.fitted]), position_gap=gap)
         again, repeats = repeated(self.positions, self.force, self.side)
         notes = (*self.notes, repeats) if repeats else self.notes
         unused = again | ~self.fitted

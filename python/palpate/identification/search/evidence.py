@@ -263,9 +263,9 @@ class Candidate:
         criterion."""
         return PathPoint(self.model_class, self.n_wavelets, self.rmse, self.criterion(name))
 
-    def force_at(self, rows: slice = ALL_ROWS) -> Float1D:
+    def force_at(self, rows: slice | NDArray[np.intp] = ALL_ROWS) -> Float1D:
         """Returns the force (n,) of the candidate without the forces of mass and damping, at all rows or at
-        the rows of a slice."""
+        some rows."""
         return self._force(self.data.box[rows], None if self.side is None else self.side[rows])
 
     def force_near(self, positions: Float2D) -> Float1D:
@@ -413,7 +413,8 @@ def local_noise_ratio(below: Candidate, above: Candidate) -> float:
     all rows overestimates the evidence for structure by this ratio.
     """
     data = above.data
-    rows = slice(None, None, max(1, len(data.force) // MOST_NOISE_ROWS))
+    rows = np.flatnonzero(data.fitted)
+    rows = rows[:: max(1, len(rows) // MOST_NOISE_ROWS)]
     force = above.force_at(rows)
     weight = (force - below.force_at(rows)) ** 2
     if data.weight is not None:

@@ -9,9 +9,18 @@ import pytest
 from imperfect import Array, wandering
 from palpate import InputError, SearchOptions, identify, verify
 from palpate._core.model import play
+from palpate._typing import Int8Vector
+from palpate.identification.classes.hysteresis import PlaySearch
+from palpate.identification.data.rows import Rows
 from palpate.identification.data.strokes import HysteresisInput
+from palpate.identification.network.basis import Basis
+from palpate.identification.options import IdentifyOptions
+from palpate.identification.search.evidence import Samples
 from palpate.recording import Recording
+from palpate.recording.roles import Role
 from palpate.verification import compare
+
+BOX = np.zeros(1), np.ones(1)
 
 MOTIONS = 20 * max(1, int(os.environ.get("PALPATE_TEST_SCALE", "1")))
 
@@ -109,3 +118,21 @@ def test_models_of_several_inputs_are_not_compared() -> None:
     model = identify(recording, inputs=("position", "temperature"))
     with pytest.raises(InputError, match="must be position only for a comparison"):
         compare(model, model)
+
+
+def test_rows_that_wait_do_not_change_the_play_of_the_other_rows() -> None:
+    rng, options = np.random.default_rng(4), IdentifyOptions()
+    exact = np.tile(np.r_[np.linspace(0.0, 1.0, 400), np.linspace(1.0, 0.0, 400)], 2)
+    x, at = exact + rng.normal(0.0, 1e-4, len(exact)), np.full(3000, 400)
+    force, role = x + 0.1 * state(exact, 0.004, 0.0), np.full(len(x), Role.MOVING, dtype=np.int8)
+    waited = np.insert(x, at, x[399] + rng.normal(0.0, 1e-3, len(at)))
+
+    def states(position: Array, force: Array, role: Int8Vector) -> list[Array]:
+        rows = Rows(("position",), position[:, None], force, starts=(0,), role=role, corners=BOX).limited()
+        found = PlaySearch(Samples(rows, options, 1024), options).best_of_options(Basis.empty(1))
+        return [each.side[rows.fitted] for each in found]
+
+    alone = states(x, force, role)
+    with_waits = states(waited, np.insert(force, at, force[399]), np.insert(role, at, Role.HOLD))
+    assert len(alone) >= 1
+    np.testing.assert_array_equal(with_waits, alone)

@@ -262,3 +262,20 @@ def test_measured_relaxation_of_four_stretches_is_one_model(data: Path) -> None:
     assert model.fit.nrmse <= 0.05
     # a force that changes at the same position does not mean two objects in one file
     assert model.verdict.level == "good"
+
+
+def test_friction_that_creeps_in_pauses_gives_no_memory() -> None:
+    """The rows of the pauses alone would accept a memory: they are half of the recording."""
+    step, pause = 0.01, 1500
+    way = np.tile(np.repeat([1.0, 0.0, -1.0, 0.0], [300, pause, 300, pause]), 2)
+    position = np.cumsum(way) / 300.0
+    moving = np.maximum.accumulate(np.where(way != 0.0, np.arange(len(way)), 0))
+    kept = 0.5 + 0.5 * np.exp(-step * (np.arange(len(way)) - moving))
+    turned = np.clip((position - play(position, 0.05, start=0.0)) / 0.05, -1.0, 1.0)
+    force = position + 0.3 * turned * kept
+    model = palpate.identify(position, with_noise(force, 0.01), time=step * np.arange(len(way)))
+    assert model.memory is None
+    assert model.hysteretic
+    at = np.linspace(0.2, 0.8, 50)
+    loop = model.force(at, direction=np.ones(50)) - model.force(at, direction=-np.ones(50))
+    assert loop == pytest.approx(0.6, rel=0.05)
