@@ -3,12 +3,14 @@
 
 /// Includes all headers of palpate that need no third-party library.
 
+#include "palpate/device/mit_wire.hpp"
 #include "palpate/device/packet_stream.hpp"
 #include "palpate/dynamics/filters.hpp"
 #include "palpate/fields/escaped.hpp"
 #include "palpate/portable/export_check.hpp"
 #include "palpate/realtime/wake_up.hpp"
 #include "palpate/run/measure.hpp"
+#include "palpate/run/transports.hpp"
 #include "palpate/simulation/faulty_device.hpp"
 #include "palpate/simulation/force_error.hpp"
 #include "palpate/simulation/press.hpp"

@@ -161,7 +161,7 @@ def torque_of_turn(model: Model, encoder_zero: float = 0.0) -> Callable[[Float1D
     Raises
     ------
     InputError
-        The model has no period, a revolution is no whole number of periods, the position is no angle, or the
+        The model has no period, a revolution is not a multiple of it, the position is not an angle, or the
         force depends on other quantities.
     """
     force_of_position(model)
@@ -204,7 +204,7 @@ def table_of(kind: str, model: Model, unit_force: float = 1.0, encoder_zero: flo
     Raises
     ------
     InputError
-        The model is no cogging (see `torque_of_turn`), or its torque is zero at every angle.
+        The model is not that of a motor (see `torque_of_turn`), or its torque is zero at every angle.
     """
     torque = torque_of_turn(model, encoder_zero)
     if not np.any(torque(np.linspace(0.0, TURN, POSITIONS, endpoint=False))):

@@ -3,6 +3,7 @@
 
 #include <linux/can.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -29,6 +30,7 @@ struct MitSettings {
     Nanoseconds wait = 2'000'000;  ///< longest wait of a tick for the answer of the drive [ns]
     /// Time without a frame after which a Damiao drive ends its torque [s]; other makers: set it with their tool
     double watchdog_s = 0.02;
+    bool makes_force = true;  ///< false: the drive is never enabled and only reports its position
 };
 
 /// Counters of the frames of a drive since it was opened.
@@ -62,8 +64,8 @@ class MitDevice {
     explicit MitDevice(MitSettings settings = {}, Bus bus = {})
         : settings_{std::move(settings)}, bus_{std::move(bus)} {}
 
-    /// Finds the drive, compares its ranges with the preset if it reports them, sets its watchdog and enables it with
-    /// zero torque.
+    /// Finds the drive, compares its ranges with the preset if it reports them, sets its watchdog and, with
+    /// `makes_force`, enables it with zero torque.
     Opened open() {
         const Opened bus = bus_.open(settings_.interface);
         if (!bus) {
@@ -99,12 +101,9 @@ class MitDevice {
         const bool sent = send(mit::disable_frame) == Sent::Yes;
         ZeroForce zero = sent ? ZeroForce::Sent : ZeroForce::NotSent;
         const Nanoseconds deadline = monotonic_now() + step_wait;
-        while (sent && settings_.preset.maker == mit::Maker::Damiao && zero == ZeroForce::Sent) {
-            const std::optional<mit::Answer> answer = next_answer(deadline);
-            if (!answer) {
-                break;
-            }
-            zero = answer->state == 0 ? ZeroForce::Confirmed : zero;
+        const bool confirms = settings_.preset.maker == mit::Maker::Damiao;
+        for (mit::Answer answer; sent && confirms && zero == ZeroForce::Sent && next_answer(answer, deadline);) {
+            zero = answer.state == 0 ? ZeroForce::Confirmed : zero;
         }
         bus_.close();
         return zero;
@@ -167,12 +166,14 @@ class MitDevice {
         return false;
     }
 
-    [[nodiscard]] std::optional<mit::Answer> next_answer(Nanoseconds deadline) noexcept {
+    /// Reads the next answer of this drive. Returns false without one.
+    [[nodiscard]] bool next_answer(mit::Answer& answer, Nanoseconds deadline) noexcept {
         mit::Frame bytes{};
         if (!next_frame(bytes, deadline)) {
-            return {};
+            return false;
         }
-        return mit::answer_of(bytes, settings_.preset.maker, settings_.preset.ranges);
+        answer = mit::answer_of(bytes, settings_.preset.maker, settings_.preset.ranges);
+        return true;
     }
 
     /// Returns the answer to a register frame; nothing without an answer.
@@ -201,11 +202,12 @@ class MitDevice {
         last_ = {};
         for (can_frame old{}; bus_.receive(old, 0);) {
         }
-        if (send(mit::disable_frame) != Sent::Yes || !next_answer(monotonic_now() + step_wait)) {
+        mit::Answer answer;
+        if (send(mit::disable_frame) != Sent::Yes || !next_answer(answer, monotonic_now() + step_wait)) {
             return bus_.is_off() ? "cannot be reached, because the bus is off: check the wires and the bit rate"
                                  : "does not answer: check its number, its power, the wires and the bit rate";
         }
-        if (next_answer(monotonic_now() + quiet_wait)) {
+        if (next_answer(answer, monotonic_now() + quiet_wait)) {
             return "is two drives that answer to the same number: give one of them another number";
         }
         if (settings_.preset.maker == mit::Maker::Damiao) {
@@ -213,29 +215,26 @@ class MitDevice {
                 return reason;
             }
         }
-        std::optional<mit::Answer> answer;
-        if (send(mit::enable_frame) == Sent::Yes) {
-            answer = next_answer(monotonic_now() + step_wait);
-        }
-        if (!answer) {
+        if (send(settings_.makes_force ? mit::enable_frame : mit::disable_frame) != Sent::Yes ||
+            !next_answer(answer, monotonic_now() + step_wait)) {
             return "does not answer when it is enabled: check its power";
         }
-        if (has_fault(*answer)) {
-            return "reports the fault " + std::to_string(answer->state) +
+        if (has_fault(answer)) {
+            return "reports the fault " + std::to_string(answer.state) +
                    ": look it up in the manual of the drive, remove its cause and clear it";
         }
-        if (answer->at_end) {
+        if (answer.at_end) {
             return "reports a position at the end of its range: set the zero position of the drive";
         }
         start_ = monotonic_now();
         late_from_ = start_;
-        take(*answer);
+        take(answer);
         return "";
     }
 
     /// Compares mode and ranges of a Damiao drive with the preset, and sets its watchdog.
     [[nodiscard]] std::string set_up_damiao() {
-        struct Range {
+        struct Entry {
             std::uint8_t address;
             const char* name;
             double value;
@@ -244,8 +243,8 @@ class MitDevice {
         if (register_answer(read_register, 10, 0) != 1U) {
             return "is not in the MIT mode: set its register 10 (CTRL_MODE) to 1";
         }
-        for (const Range& range :
-             {Range{21, "PMAX", ranges.position}, {22, "VMAX", ranges.velocity}, {23, "TMAX", ranges.torque}}) {
+        for (const Entry& range :
+             {Entry{21, "PMAX", ranges.position}, {22, "VMAX", ranges.velocity}, {23, "TMAX", ranges.torque}}) {
             const std::optional<std::uint32_t> bits = register_answer(read_register, range.address, 0);
             const double found = bits ? std::bit_cast<float>(*bits) : std::numeric_limits<double>::quiet_NaN();
             if (!(std::abs(found - range.value) <= 1e-3 * range.value)) {
@@ -262,7 +261,8 @@ class MitDevice {
     }
 
     [[nodiscard]] bool has_fault(const mit::Answer& answer) const noexcept {
-        return answer.state != (settings_.preset.maker == mit::Maker::Damiao ? enabled_state : 0);
+        const bool enabled = settings_.preset.maker == mit::Maker::Damiao && settings_.makes_force;
+        return answer.state != (enabled ? enabled_state : 0);
     }
 
     void take(const mit::Answer& answer) noexcept {
@@ -291,7 +291,9 @@ class MitDevice {
 
     [[nodiscard]] Status exchanged(const Command& command) noexcept {
         const bool is_alone = discard_waiting();
-        const mit::Line line = mit::line_of(is_alone ? command : Command{}, settings_.preset.ranges);
+        const mit::Line line = settings_.makes_force
+                                   ? mit::line_of(is_alone ? command : Command{}, settings_.preset.ranges)
+                                   : mit::Line{mit::disable_frame, false};
         const Nanoseconds sent = monotonic_now();
         const Sent result = send(line.frame);
         if (result != Sent::Yes) {
@@ -299,15 +301,15 @@ class MitDevice {
         } else if (awaited_++ == 0) {
             oldest_unanswered_ = sent;
         }
-        const std::optional<mit::Answer> answer =
-            result == Sent::Yes ? next_answer(sent + settings_.wait) : std::nullopt;
+        mit::Answer answer;
+        const bool answered = result == Sent::Yes && next_answer(answer, sent + settings_.wait);
         const Nanoseconds now = monotonic_now();
         last_.delay = static_cast<double>(now - late_from_) * 1e-9;
         if (bus_.is_off() || result == Sent::Down) {
             last_.applied = 0.0;
             return Status::Fault;
         }
-        if (!answer) {
+        if (!answered) {
             health_.timeouts += result == Sent::Yes ? 1 : 0;
             return result == Sent::Yes ? Status::Timeout : Status::Lost;
         }
@@ -316,8 +318,8 @@ class MitDevice {
         late_from_ = oldest_unanswered_;
         allowed_late_ += awaited_ - 1;
         awaited_ = 0;
-        take(*answer);
-        if (!is_alone || has_fault(*answer) || answer->at_end) {
+        take(answer);
+        if (!is_alone || has_fault(answer) || answer.at_end) {
             return Status::Fault;
         }
         return line.is_limited ? Status::Limited : Status::Ok;
