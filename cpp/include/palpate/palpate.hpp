@@ -4,6 +4,7 @@
 /// Includes all headers of palpate that need no third-party library.
 
 #include "palpate/device/mit_wire.hpp"
+#include "palpate/device/moteus_wire.hpp"
 #include "palpate/device/packet_stream.hpp"
 #include "palpate/dynamics/filters.hpp"
 #include "palpate/fields/escaped.hpp"

@@ -154,7 +154,7 @@ def check_device(
     Parameters
     ----------
     device : str
-        Name of the device: ``simulated``, ``usb[:SERIAL]`` or ``mit:BUS:NUMBER:KIND``.
+        Name of the device, in one of the forms that ``palpate devices`` lists.
     object : Model, optional
         The object mounted on the simulated device.
     transducer : bool

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -23,6 +24,9 @@
 
 namespace palpate {
 
+/// Flag in canfd_frame::flags of a frame of CAN FD; CANFD_FDF of newer headers.
+inline constexpr std::uint8_t fd_frame_flag = 0x04;
+
 /// Result of sending a frame.
 enum class Sent : std::uint8_t {
     Yes,
@@ -30,7 +34,7 @@ enum class Sent : std::uint8_t {
     Down,  ///< the interface is down or gone
 };
 
-/// A CAN bus over SocketCAN of Linux (docs.kernel.org/networking/can.html), for frames of up to 8 bytes.
+/// A CAN bus over SocketCAN of Linux (docs.kernel.org/networking/can.html), for frames of CAN and CAN FD.
 ///
 /// A name with a slash is the path of a Unix socket (SOCK_SEQPACKET) that carries the same frames, so that an emulated
 /// drive needs no CAN hardware.
@@ -57,21 +61,24 @@ class CanBus {
     }
 
     /// Sends a frame without waiting.
-    [[nodiscard]] Sent send(const can_frame& frame) noexcept {
+    [[nodiscard]] Sent send(const canfd_frame& frame) noexcept {
         if (socket_ < 0 || is_off_) {
             return Sent::Down;
         }
-        if (::send(socket_, &frame, sizeof frame, MSG_DONTWAIT | MSG_NOSIGNAL) == sizeof frame) {
+        canfd_frame sent = frame;
+        sent.flags &= static_cast<std::uint8_t>(~fd_frame_flag);
+        const std::size_t size = (frame.flags & fd_frame_flag) != 0 ? CANFD_MTU : CAN_MTU;
+        if (::send(socket_, &sent, size, MSG_DONTWAIT | MSG_NOSIGNAL) == static_cast<ssize_t>(size)) {
             return Sent::Yes;
         }
         return errno == ENOBUFS || errno == EAGAIN ? Sent::Full : Sent::Down;
     }
 
     /// Receives the next data frame that arrives before the deadline. Returns false without one.
-    [[nodiscard]] bool receive(can_frame& frame, Nanoseconds deadline) noexcept {
+    [[nodiscard]] bool receive(canfd_frame& frame, Nanoseconds deadline) noexcept {
         while (socket_ >= 0 && !is_off_) {
             const ssize_t size = ::recv(socket_, &frame, sizeof frame, MSG_DONTWAIT);
-            if (size == sizeof frame) {
+            if (size == CAN_MTU || size == CANFD_MTU) {
                 if ((frame.can_id & CAN_ERR_FLAG) == 0) {
                     return true;
                 }
@@ -112,6 +119,8 @@ class CanBus {
         if (socket_ < 0) {
             return failure(name, "load the kernel module can_raw");
         }
+        const int on = 1;
+        (void)::setsockopt(socket_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
         const can_err_mask_t errors = CAN_ERR_BUSOFF;
         (void)::setsockopt(socket_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors);
         sockaddr_can address{};

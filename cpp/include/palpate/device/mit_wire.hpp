@@ -107,7 +107,8 @@ struct Fields {
 /// Frame of a line that was rounded to the fields of a drive.
 struct Line {
     Frame frame{};
-    bool is_limited = false;  ///< true if position, stiffness or torque exceed their fields, or stiffness is negative
+    bool is_limited =
+        false;  ///< true if position, stiffness or torque exceed their fields, or stiffness is negative
 };
 
 /// Rounds the line force + stiffness (x - position) to the fields. A force > 0 pushes to smaller positions, so the
@@ -125,9 +126,9 @@ struct Line {
     const double half_position = 0.5 * step_of(-ranges.position, ranges.position, position_bits);
     const double half_stiffness = 0.5 * step_of(0.0, ranges.stiffness, field_bits);
     const double half_torque = 0.5 * step_of(-ranges.torque, ranges.torque, field_bits);
-    const double stiffness = value_of(
-        code_of(command.stiffness + half_stiffness, 0.0, ranges.stiffness, field_bits), 0.0, ranges.stiffness,
-        field_bits);
+    const double stiffness =
+        value_of(code_of(command.stiffness + half_stiffness, 0.0, ranges.stiffness, field_bits), 0.0,
+                 ranges.stiffness, field_bits);
     const double position =
         value_of(code_of(command.position + half_position, -ranges.position, ranges.position, position_bits),
                  -ranges.position, ranges.position, position_bits);
@@ -142,11 +143,12 @@ struct Line {
 /// Answer of a drive to a frame.
 struct Answer {
     std::uint8_t number = 0;
-    std::uint8_t state = 0;   ///< Damiao: 0 disabled, 1 enabled, else a fault; others: 0, or the number of a fault
-    bool at_end = false;      ///< true if the position is at an end of its field and therefore not known
-    double position = 0.0;    ///< [rad]
-    double velocity = 0.0;    ///< [rad/s]
-    double torque = 0.0;      ///< [N*m]
+    std::uint8_t state =
+        0;  ///< Damiao: 0 disabled, 1 enabled, else a fault; others: 0, or the number of a fault
+    bool at_end = false;    ///< true if the position is at an end of its field and therefore not known
+    double position = 0.0;  ///< [rad]
+    double velocity = 0.0;  ///< [rad/s]
+    double torque = 0.0;    ///< [N*m]
 };
 
 /// Reads the answer of a drive.

@@ -15,7 +15,7 @@ struct Transport {
     std::string_view form;  ///< name of a device, with the optional parts in brackets
     std::string_view help;  ///< meaning of the parts of the form; empty: none needed
     bool measures;          ///< true if `record` and `check-device` can use it
-    double wait_s;          ///< longest wait of a tick for a sample if the options do not set it [s]; 0: no wait
+    double wait_s;  ///< longest wait of a tick for a sample if the options do not set it [s]; 0: no wait
 };
 
 /// Every kind of device. `open_device` and `device_to_measure` have one function for each, in the same order.
@@ -29,10 +29,12 @@ inline constexpr std::array transports{
 #endif
               true, 5e-3},
     Transport{"mit", "mit:BUS:NUMBER:KIND",
-              "an MIT-mode drive of this KIND, such as damiao-4310, with a CAN NUMBER on a BUS such as can0", true,
+              "an MIT-mode drive of this KIND, such as damiao-4310, with a CAN NUMBER on a BUS such as can0",
+              true, 2e-3},
+    Transport{"moteus", "moteus:BUS:NUMBER:KP", "a moteus whose servo.pid_position.kp is KP in N*m/rev", true,
               2e-3},
-    Transport{"inverse3", "inverse3[:AXIS[@PORT]]",
-              "AXIS is x, y, z, -x, -y or -z, PORT that of its service", false, 20e-3},
+    Transport{"inverse3", "inverse3[:AXIS[@PORT]]", "AXIS is x, y, z, -x, -y or -z, PORT that of its service",
+              false, 20e-3},
 };
 
 /// Returns the forms of all devices as text: "simulated, usb[:SERIAL] or ...". `measuring`: only those that measure.

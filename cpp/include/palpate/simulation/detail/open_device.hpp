@@ -15,8 +15,8 @@
 #include "palpate/model/force_model.hpp"
 #include "palpate/run/live_device.hpp"
 #include "palpate/run/measure.hpp"
+#include "palpate/run/open_can.hpp"
 #include "palpate/run/open_inverse3.hpp"
-#include "palpate/run/open_mit.hpp"
 #include "palpate/run/open_usb.hpp"
 #include "palpate/run/render.hpp"
 #include "palpate/run/transports.hpp"
@@ -80,7 +80,8 @@ struct TransportFunctions {
 inline constexpr std::array<TransportFunctions, transports.size()> transport_functions{{
     {open_simulated, nullptr},  // the simulated device is measured with an object
     {open_usb, usb_to_measure},
-    {open_mit, mit_to_measure},
+    {open_can<MitProtocol>, can_to_measure<MitProtocol>},
+    {open_can<MoteusProtocol>, can_to_measure<MoteusProtocol>},
     {open_inverse3, nullptr},
 }};
 

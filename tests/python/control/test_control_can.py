@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""palpate-control on an emulated MIT-mode drive, and its frames against those of PyPI damiao-motor."""
+"""palpate-control on an emulated MIT-mode drive; frames against those of PyPI damiao-motor and moteus."""
 
 import json
+import math
 import random
 import re
 import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -48,13 +49,25 @@ def control(*words: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
 
 
-def test_frames_have_the_bytes_of_damiao_motor(tmp_path: Path) -> None:
-    damiao = pytest.importorskip("damiao_motor.core.motor", reason="needs damiao-motor")
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, list[str]], list[str]]:
+    """Returns a function that gives the frames of commands, one a line, as hexadecimal digits."""
     compiler = shutil.which("g++") or pytest.skip("needs g++")
-    program = tmp_path / "frames"
-    source = ROOT / "tests" / "python" / "control" / "mit_frames.cpp"
+    program = tmp_path_factory.mktemp("frames") / "can_frames"
+    source = ROOT / "tests" / "python" / "control" / "can_frames.cpp"
     include = ROOT / "cpp" / "include"
     subprocess.run([compiler, "-std=c++20", f"-I{include}", str(source), "-o", str(program)], check=True)
+
+    def of(kind: str, lines: list[str]) -> list[str]:
+        command = [str(program), kind]
+        text = "\n".join(lines)
+        return subprocess.run(command, input=text, capture_output=True, text=True, check=True).stdout.split()
+
+    return of
+
+
+def test_frames_have_the_bytes_of_damiao_motor(frames: Callable[[str, list[str]], list[str]]) -> None:
+    damiao = pytest.importorskip("damiao_motor.core.motor", reason="needs damiao-motor")
     chance = random.Random(41)
     lines, expected = [], []
     for _ in range(10_000):
@@ -66,8 +79,32 @@ def test_frames_have_the_bytes_of_damiao_motor(tmp_path: Path) -> None:
         kp, kd = chance.uniform(-50.0, 600.0), chance.uniform(-0.5, 6.0)
         lines.append(f"{p!r} {v!r} {t!r} {position!r} {speed!r} {kp!r} {kd!r} {torque!r}")
         expected.append(motor.encode_cmd_msg(position, speed, torque, kp, kd).hex())
-    printed = subprocess.run([program], input="\n".join(lines), capture_output=True, text=True, check=True)
-    assert printed.stdout.split() == expected
+    assert frames("mit", lines) == expected
+
+
+def test_frames_have_the_bytes_of_moteus(frames: Callable[[str, list[str]], list[str]]) -> None:
+    moteus = pytest.importorskip("moteus", reason="needs moteus")
+    ignored = moteus.multiplex.IGNORE
+    query = moteus.QueryResolution()
+    query.voltage = query.temperature = ignored
+    controller = moteus.Controller(id=1, transport=object())
+    chance = random.Random(42)
+    lines, expected = [], []
+    for number in range(10_000):
+        given = {
+            "position": math.nan if number % 10 == 0 else chance.uniform(-100.0, 100.0),
+            "velocity": chance.uniform(-50.0, 50.0),
+            "feedforward_torque": chance.uniform(-5.0, 5.0),
+            "kp_scale": chance.uniform(0.0, 20.0),
+            "kd_scale": chance.uniform(0.0, 1.0),
+            "maximum_torque": chance.uniform(0.0, 5.0),
+            "watchdog_timeout": chance.uniform(0.001, 1.0),
+        }
+        lines.append(" ".join(map(repr, given.values())))
+        command = controller.make_position(**given, ilimit_scale=0.0, query_override=query)
+        expected.append(command.data.hex())
+        assert (command.source, command.destination, command.reply_required) == (0, 1, True)
+    assert frames("moteus", lines) == expected
 
 
 @needs_program
@@ -81,13 +118,13 @@ def test_a_spring_is_rendered_and_zero_force_confirmed(
     )
     assert ran.returncode == 0, ran.stderr
     summary = json.loads(ran.stdout)
-    assert summary["mit"]["answers"] > 100
-    assert summary["mit"]["timeouts"] == summary["mit"]["repeated"] == 0
+    assert summary["can"]["answers"] > 100
+    assert summary["can"]["timeouts"] == summary["can"]["repeated"] == 0
     assert "confirmed" in json.dumps(summary)
     assert (drive.enabled, drive.torque) == (False, 0.0)
     rows = every_row(record)
     settled = rows[rows["time_s"] > 0.3]
-    applied, position = settled["applied_force_Nm"].to_numpy(), settled["position_rad"].to_numpy()
+    applied, position = settled["applied_Nm"].to_numpy(), settled["position_rad"].to_numpy()
     assert position.max() - position.min() > 0.1
     # applied belongs to the command before: the force of the model at about the same position
     assert np.corrcoef(applied, position)[0, 1] > 0.9
@@ -150,7 +187,15 @@ def test_the_watchdog_ends_the_torque_of_a_killed_program(drive: Drive, bus: Pat
             "mit:/nowhere/bus:1:damiao-4310",
             "/nowhere/bus: No such file or directory; start the emulated",
         ),
-        ("mitten", "must be simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND or inverse3[:AXIS[@PORT]]"),
+        ("mitten", "must be simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND, moteus:BUS:NUMBER:KP or inverse3"),
+        (
+            "moteus:can0:1",
+            "must be moteus:BUS:NUMBER:KP, such as moteus:can0:1:4; KP is servo.",
+        ),
+        ("moteus:can0:127:4", "the number must be from 1 to 126"),
+        ("moteus:can0:1:0", "KP must be a number > 0 in N*m/rev"),
+        ("moteus:can0:1:nan", "KP must be a number > 0 in N*m/rev"),
+        ("moteus:can99:1:4", "there is no CAN interface can99"),
     ],
 )
 def test_a_wrong_name_is_refused_in_one_sentence(name: str, sentence: str, spring: Path) -> None:
@@ -190,4 +235,4 @@ def test_the_help_names_every_transport() -> None:
         assert text in shown
         assert form in device_help
         assert (form in measured_device_help) == (name != "inverse3")
-    assert re.search(r"usb 5, mit 2, inverse3 20", shown)
+    assert re.search(r"usb 5, mit 2, moteus 2, inverse3 20", shown)
