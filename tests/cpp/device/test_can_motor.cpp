@@ -156,6 +156,25 @@ TYPED_TEST(CanMotorOf, ReadsPositionVelocityTorqueDelayAndStatus) {
     EXPECT_EQ(motor.exchange({1.0}).status, Status::Fault);
 }
 
+TYPED_TEST(CanMotorOf, LateAnswersAreCountedAndAreNotASecondMotor) {
+    auto motor = TypeParam{}.motor();
+    ASSERT_TRUE(motor.open());
+    for (int k = 0; k < 8; ++k) {
+        motor.bus().late = true;
+        EXPECT_EQ(motor.exchange({}).status, Status::Timeout);
+    }
+    motor.bus().late = false;
+    EXPECT_EQ(motor.exchange({}).status, Status::Ok);
+    EXPECT_EQ(motor.exchange({}).status, Status::Ok);
+    EXPECT_EQ(motor.health().late, 8U);
+    EXPECT_EQ(motor.health().repeated, 0U);
+    motor.bus().twice = true;
+    for (int k = 0; k < 3; ++k) {
+        EXPECT_EQ(motor.exchange({}).status, Status::Ok);
+    }
+    EXPECT_EQ(motor.exchange({}).status, Status::Fault);
+}
+
 TYPED_TEST(CanMotorOf, ADeviceThatMakesNoForceIsNeverEnabled) {
     auto settings = TypeParam{}.motor().settings();
     settings.makes_force = false;

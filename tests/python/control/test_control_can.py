@@ -210,7 +210,7 @@ def test_a_drive_is_measured_without_being_enabled(
 ) -> None:
     device = f"mit:{bus}:1:damiao-4310"
     code = main(
-        ["check-device", "--device", device, "--wait-ms", "2000", "--duration-s", "1", "--rate-hz", "200"]
+        ["check-device", "--device", device, "--wait-ms", "2000", "--duration-s", "2", "--rate-hz", "200"]
     )
     printed = capsys.readouterr()
     assert code in (0, 1), printed.err

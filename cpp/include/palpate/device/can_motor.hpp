@@ -200,8 +200,9 @@ class CanMotor {
     [[nodiscard]] bool discard_waiting() noexcept {
         bool repeated = false;
         for (CanAnswer answer; next_answer(answer, 0);) {
-            if (allowed_late_ > 0) {
-                --allowed_late_;
+            int& expected = allowed_late_ > 0 ? allowed_late_ : awaited_;
+            if (expected > 0) {
+                --expected;
                 ++health_.late;
             } else {
                 ++health_.repeated;
