@@ -20,10 +20,8 @@ from .printing import OverwrittenLine, number, print_line
 from .verb import PATH, options
 
 
-class DeviceName(click.ParamType):
+class DeviceName(click.types.StringParamType):
     """Name of a device; a shell completes its first word."""
-
-    name = "device"
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str

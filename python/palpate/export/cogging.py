@@ -58,6 +58,11 @@ class Controller:
     """Makes the table of a torque over the angle of the encoder [units of the controller over rad]"""
 
 
+def _angles(count: int) -> Float1D:
+    """Returns this number of angles at equal distances over a revolution [rad]."""
+    return np.arange(count, dtype=np.float64) * (TURN / count)
+
+
 def _moteus(torque: Callable[[Float1D], Float1D]) -> Table:
     """Returns the settings of a moteus: current = scale comp[i], linear between the entries.
 
@@ -71,7 +76,8 @@ def _moteus(torque: Callable[[Float1D], Float1D]) -> Table:
 
     def replayed(angle: Float1D) -> Float1D:
         place = np.mod(angle / TURN, 1.0) * MOTEUS_ENTRIES
-        return scale * np.interp(place, np.arange(MOTEUS_ENTRIES + 1), np.append(entries, entries[0]))
+        line = np.interp(place, np.arange(MOTEUS_ENTRIES + 1), np.append(entries, entries[0]))
+        return np.asarray(scale * line)
 
     return Table(
         "\n".join([*lines, "conf write", ""]), f"{MOTEUS_ENTRIES} entries, scale {scale:.4g} A", replayed
@@ -85,7 +91,7 @@ def _straight_lines(torque: Callable[[Float1D], Float1D]) -> Float1D:
     equations of the hat functions are circulant, so that a Fourier transform solves them.
     """
     parts = 16
-    samples = torque(np.arange(MOTEUS_ENTRIES * parts) * (TURN / (MOTEUS_ENTRIES * parts)))
+    samples = torque(_angles(MOTEUS_ENTRIES * parts))
     offset = np.arange(1 - parts, parts)
     hat = 1.0 - np.abs(offset) / parts
     first = parts * np.arange(MOTEUS_ENTRIES)
@@ -101,7 +107,7 @@ def _odrive(torque: Callable[[Float1D], Float1D]) -> Table:
 
     Source: `Controller::update` of odriverobotics/ODrive, Firmware/MotorControl/controller.cpp, version 0.5.
     """
-    entries = torque(np.arange(ODRIVE_ENTRIES) * (TURN / ODRIVE_ENTRIES)).astype(np.float32)
+    entries = torque(_angles(ODRIVE_ENTRIES)).astype(np.float32)
 
     def replayed(angle: Float1D) -> Float1D:
         place = np.fix(angle / TURN * ODRIVE_ENTRIES).astype(np.int64)
@@ -116,26 +122,28 @@ def _openffboard(torque: Callable[[Float1D], Float1D]) -> Table:
     Source: `TMC4671::turn` of the OpenFFBoard firmware with anticogging; it rounds the sum towards zero.
     """
     samples = 1 << 13  # resolves orders up to 4096
-    terms = 2.0 / samples * np.fft.rfft(torque(np.arange(samples) * (TURN / samples)))[1 : samples // 2]
+    terms = 2.0 / samples * np.fft.rfft(torque(_angles(samples)))[1 : samples // 2]
     order = np.sort(np.argsort(-np.abs(terms), kind="stable")[:OPENFFBOARD_HARMONICS]) + 1
     amplitude = np.abs(terms[order - 1]).astype(np.float32)
     phase = np.angle(1j * terms[order - 1]).astype(np.float32)
     rows = [f"{k},{a:.9g},{p:.9g}" for k, a, p in zip(order, amplitude, phase, strict=True)]
 
     def replayed(angle: Float1D) -> Float1D:
-        return np.trunc(
-            sum(a * np.sin(k * angle + p) for k, a, p in zip(order, amplitude, phase, strict=True))
-        )
+        waves = [a * np.sin(k * angle + p) for k, a, p in zip(order, amplitude, phase, strict=True)]
+        return np.asarray(np.trunc(np.sum(waves, axis=0)))
 
     return Table("\n".join(["order,amplitude,phase_rad", *rows, ""]), f"{len(order)} harmonics", replayed)
 
 
 def _plain(torque: Callable[[Float1D], Float1D]) -> Table:
     """Returns a CSV table of angle and torque every 0.1 degrees, linear between the rows."""
-    angle = np.arange(ODRIVE_ENTRIES) * (TURN / ODRIVE_ENTRIES)
+    angle = _angles(ODRIVE_ENTRIES)
     entries = torque(angle)
     rows = [f"{x:.17g},{y:.17g}" for x, y in zip(angle, entries, strict=True)]
-    replayed = lambda at: np.interp(at, angle, entries, period=TURN)  # noqa: E731
+
+    def replayed(at: Float1D) -> Float1D:
+        return np.asarray(np.interp(at, angle, entries, period=TURN))
+
     return Table("\n".join(["angle_rad,torque", *rows, ""]), f"{ODRIVE_ENTRIES} rows", replayed)
 
 
@@ -207,7 +215,7 @@ def table_of(kind: str, model: Model, unit_force: float = 1.0, encoder_zero: flo
         The model is not that of a motor (see `torque_of_turn`), or its torque is zero at every angle.
     """
     torque = torque_of_turn(model, encoder_zero)
-    if not np.any(torque(np.linspace(0.0, TURN, POSITIONS, endpoint=False))):
+    if not np.any(torque(_angles(POSITIONS))):
         raise InputError("the torque of the model is zero at every angle: there is no cogging to compensate")
     return CONTROLLERS[kind].table(lambda angle: torque(angle) / unit_force)
 
@@ -217,7 +225,7 @@ def friction_of(model: Model) -> float:
     model]; 0 without hysteresis."""
     if not model.hysteretic:
         return 0.0
-    x = np.linspace(0.0, TURN, POSITIONS, endpoint=False)
+    x = _angles(POSITIONS)
     return float(np.mean(np.asarray(model.force(x, direction=1.0)) - model.force(x, direction=-1.0)) / 2.0)
 
 
@@ -230,7 +238,7 @@ def write(request: Request) -> Written:
         raise InputError(f"--encoder-zero is {request.encoder_zero:g}: must be a finite number")
     unit_force = _unit_force(model, unit, request)
     table = table_of(kind, model, unit_force, request.encoder_zero)
-    angle = np.linspace(0.0, TURN, POSITIONS, endpoint=False)
+    angle = _angles(POSITIONS)
     torque = torque_of(angle)
     error = unit_force * table.replayed(angle) - (torque - (torque.mean() if kind == "openffboard" else 0.0))
     largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))
