@@ -68,10 +68,11 @@ class CanBus {
         canfd_frame sent = frame;
         sent.flags &= static_cast<std::uint8_t>(~fd_frame_flag);
         const std::size_t size = (frame.flags & fd_frame_flag) != 0 ? CANFD_MTU : CAN_MTU;
-        if (::send(socket_, &sent, size, MSG_DONTWAIT | MSG_NOSIGNAL) == static_cast<ssize_t>(size)) {
-            return Sent::Yes;
+        const ssize_t done = ::send(socket_, &sent, size, MSG_DONTWAIT | MSG_NOSIGNAL);
+        if (done < 0) {
+            return errno == ENOBUFS || errno == EAGAIN ? Sent::Full : Sent::Down;
         }
-        return errno == ENOBUFS || errno == EAGAIN ? Sent::Full : Sent::Down;
+        return done == static_cast<ssize_t>(size) ? Sent::Yes : Sent::Down;
     }
 
     /// Receives the next data frame that arrives before the deadline. Returns false without one.

@@ -64,8 +64,7 @@ class CanMotor {
 
     /// Finds the controller, sets it up and, if `Settings::makes_force` is set, enables it with zero torque.
     Opened open() {
-        const Opened bus = bus_.open(settings_.interface);
-        if (!bus) {
+        if (Opened bus = bus_.open(settings_.interface); !bus) {
             return bus;
         }
         std::string reason = start();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
@@ -61,20 +62,25 @@ inline constexpr int field_bits = 12;  ///< bits of velocity, torque and both ga
 inline constexpr Frame enable_frame{0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC};
 inline constexpr Frame disable_frame{0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFD};
 
+/// Returns the largest whole number of a field of `bits` bits.
+[[nodiscard]] constexpr double largest_code(int bits) noexcept {
+    return static_cast<double>((1U << static_cast<unsigned>(bits)) - 1U);
+}
+
 /// Returns the width of one step of a field of `bits` bits from `low` to `high`.
 [[nodiscard]] constexpr double step_of(double low, double high, int bits) noexcept {
-    return (high - low) / ((1 << bits) - 1);
+    return (high - low) / largest_code(bits);
 }
 
 /// Returns the whole number of a field, rounded down as the makers do: (x - low) (2^bits - 1) / (high - low).
 [[nodiscard]] inline std::uint32_t code_of(double value, double low, double high, int bits) noexcept {
     const double within = std::isnan(value) ? low : std::clamp(value, low, high);
-    return static_cast<std::uint32_t>((within - low) * ((1 << bits) - 1) / (high - low));
+    return static_cast<std::uint32_t>((within - low) * largest_code(bits) / (high - low));
 }
 
 /// Returns the value of a field.
 [[nodiscard]] constexpr double value_of(std::uint32_t code, double low, double high, int bits) noexcept {
-    return code * (high - low) / ((1 << bits) - 1) + low;
+    return code * (high - low) / largest_code(bits) + low;
 }
 
 /// Torque of a drive at position p and velocity v: kp (position - p) + kd (velocity - v) + torque.
@@ -142,9 +148,8 @@ struct Line {
 
 /// Answer of a drive to a frame.
 struct Answer {
-    std::uint8_t number = 0;
-    std::uint8_t state =
-        0;  ///< Damiao: 0 disabled, 1 enabled, else a fault; others: 0, or the number of a fault
+    /// Damiao: 0 disabled, 1 enabled, else a fault; CubeMars: 0, or the number of a fault; RobStride: 0
+    std::uint8_t state = 0;
     bool at_end = false;    ///< true if the position is at an end of its field and therefore not known
     double position = 0.0;  ///< [rad]
     double velocity = 0.0;  ///< [rad/s]
@@ -153,14 +158,14 @@ struct Answer {
 
 /// Reads the answer of a drive.
 [[nodiscard]] inline Answer answer_of(const Frame& bytes, Maker maker, const Ranges& ranges) noexcept {
-    const std::uint32_t p = static_cast<std::uint32_t>(bytes[1] << 8 | bytes[2]);
-    const std::uint32_t v = static_cast<std::uint32_t>(bytes[3] << 4 | bytes[4] >> 4);
-    const std::uint32_t t = static_cast<std::uint32_t>((bytes[4] & 0xF) << 8 | bytes[5]);
+    const auto byte = [&bytes](std::size_t index) -> std::uint32_t { return bytes[index]; };
+    const std::uint32_t p = byte(1) << 8U | byte(2);
+    const std::uint32_t v = byte(3) << 4U | byte(4) >> 4U;
+    const std::uint32_t t = (byte(4) & 0xFU) << 8U | byte(5);
     Answer answer;
-    answer.number = maker == Maker::Damiao ? bytes[0] & 0xF : bytes[0];
-    answer.state = maker == Maker::Damiao     ? static_cast<std::uint8_t>(bytes[0] >> 4)
-                   : maker == Maker::CubeMars ? bytes[7]
-                                              : std::uint8_t{0};
+    answer.state = static_cast<std::uint8_t>(maker == Maker::Damiao     ? byte(0) >> 4U
+                                             : maker == Maker::CubeMars ? byte(7)
+                                                                        : 0U);
     answer.at_end = p == 0 || p == 0xFFFF;
     answer.position = value_of(p, -ranges.position, ranges.position, position_bits);
     answer.velocity = value_of(v, -ranges.velocity, ranges.velocity, field_bits);

@@ -154,6 +154,9 @@ struct Values {
 /// Reads an answer. Values that it does not contain stay unset; bytes behind an unknown subframe are not read.
 [[nodiscard]] inline Values values_of(std::span<const std::uint8_t> data) noexcept {
     constexpr std::uint8_t reply_int8 = 0x20, reply_float = 0x2C;
+    const auto signed_byte = [](std::uint32_t bits) {
+        return static_cast<int>(bits) - (bits < 128 ? 0 : 256);
+    };
     Values values;
     for (std::size_t at = 0; at + 2 <= data.size();) {
         const std::uint8_t type = data[at] & 0xFCU;
@@ -170,9 +173,9 @@ struct Values {
                 bits |= static_cast<std::uint32_t>(data[at + byte]) << 8U * byte;
             }
             if (size == 1 && address == mode_register) {
-                values.mode = static_cast<std::int8_t>(bits);
+                values.mode = signed_byte(bits);
             } else if (size == 1 && address == fault_register) {
-                values.fault = static_cast<std::int8_t>(bits);
+                values.fault = signed_byte(bits);
             } else if (size == 4 && address >= position_register && address < position_register + 3) {
                 const std::array to{&values.position, &values.velocity, &values.torque};
                 *to[static_cast<std::size_t>(address - position_register)] = std::bit_cast<float>(bits);
