@@ -56,10 +56,12 @@ inline constexpr std::array presets{
     Preset{"robstride-03", Maker::RobStride, {12.566370614359172, 50.0, 60.0, 5000.0, 100.0}},
 };
 
-inline constexpr int position_bits = 16;
-inline constexpr int field_bits = 12;  ///< bits of velocity, torque and both gains
+inline constexpr int position_bits = 16;  ///< bits of the position
+inline constexpr int field_bits = 12;     ///< bits of velocity, torque and both gains
 
+/// Enables the torque of a drive.
 inline constexpr Frame enable_frame{0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC};
+/// Ends the torque of a drive; the drive answers with its state.
 inline constexpr Frame disable_frame{0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFD};
 
 /// Returns the largest whole number of a field of `bits` bits.

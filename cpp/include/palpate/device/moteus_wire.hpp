@@ -17,19 +17,19 @@
 /// mjbots/moteus.
 namespace palpate::moteus {
 
-inline constexpr std::uint8_t mode_register = 0x00;
+inline constexpr std::uint8_t mode_register = 0x00;      ///< mode of the controller
 inline constexpr std::uint8_t position_register = 0x01;  ///< position, velocity and torque: rev, rev/s, N*m
-inline constexpr std::uint8_t fault_register = 0x0F;
+inline constexpr std::uint8_t fault_register = 0x0F;     ///< number of a fault, or 0
 /// First of six: position, velocity, feed-forward torque, kp scale, kd scale, largest torque
 inline constexpr std::uint8_t command_register = 0x20;
-inline constexpr std::uint8_t timeout_register = 0x27;
-inline constexpr std::uint8_t integral_register = 0x2B;
+inline constexpr std::uint8_t timeout_register = 0x27;   ///< time of the watchdog [s]
+inline constexpr std::uint8_t integral_register = 0x2B;  ///< scale of the limit of the integral term
 
-inline constexpr int stopped_mode = 0;
-inline constexpr int position_mode = 10;
+inline constexpr int stopped_mode = 0;           ///< mode without torque
+inline constexpr int position_mode = 10;         ///< mode that holds a line
 inline constexpr int first_harmless_fault = 96;  ///< from here on a fault number only names an active limit
 
-inline constexpr double rad_a_revolution = 2.0 * std::numbers::pi;
+inline constexpr double rad_a_revolution = 2.0 * std::numbers::pi;  ///< [rad/rev]
 
 /// Data of a frame of CAN FD.
 struct Frame {

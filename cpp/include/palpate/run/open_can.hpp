@@ -189,7 +189,9 @@ template <class Protocol>
 
 #else
 
+/// Placeholder of the MIT mode on a system without CAN.
 struct MitProtocol {};
+/// Placeholder of the registers of a moteus on a system without CAN.
 struct MoteusProtocol {};
 
 /// Throws std::invalid_argument, because CAN needs Linux.
@@ -199,6 +201,7 @@ template <class Protocol>
     refuse("device " + options.device + ": CAN needs Linux");
 }
 
+/// Throws std::invalid_argument, because CAN needs Linux.
 template <class Protocol>
 [[nodiscard]] std::unique_ptr<LiveDevice> can_to_measure(MeasureOptions& options) {
     refuse("device " + options.device + ": CAN needs Linux");
