@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <exception>
 #include <memory>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "palpate/run/measure.hpp"
 #include "palpate/run/render.hpp"
 #include "palpate/run/summary.hpp"
+#include "palpate/run/transports.hpp"
 #include "palpate/simulation/open_device.hpp"
 #include "palpate/version.hpp"
 #include "settings.hpp"
@@ -205,6 +207,14 @@ py::dict measure_in_python(const std::optional<ForceModel>& object, const std::s
 }  // namespace
 
 void bind_run(py::module_& module) {
+    module.attr("device_help") = transport_help(false);
+    module.attr("measured_device_help") = transport_help(true);
+    module.attr("device_waits") = transport_waits();
+    py::tuple forms{transports.size()};
+    for (std::size_t k = 0; k < transports.size(); ++k) {
+        forms[k] = py::make_tuple(transports[k].name, transports[k].form, transports[k].help);
+    }
+    module.attr("transports") = forms;
     module.attr("usual_telemetry_hz") = Telemetry::usual_hz;
     py::class_<LoopSettings>(module, "LoopSettings", "Default rate, duration and least rate of a run.")
         .def(py::init<>())
@@ -222,7 +232,7 @@ void bind_run(py::module_& module) {
         "renders instead. `findings` are the defects of the model, which the verdict repeats. Without a "
         "plan\n"
         "the default scheme is used. Options are keywords, None for the default:\n\n"
-        "- device (simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]), wait_s, uncertified, faults.\n"
+        "- device (see `transports`), wait_s, uncertified, faults.\n"
         "- rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.\n"
         "- force_limit and the fields of a scheme.\n"
         "- record, force, telemetry_port, telemetry_hz.\n\n"
@@ -240,7 +250,7 @@ void bind_run(py::module_& module) {
         "A hand moves the handle. With `probe` the device moves it slowly between `lower` and `upper`. With\n"
         "`push` the device gives short pushes of up to this force to either side. Options are keywords,\n"
         "None for the default:\n\n"
-        "- device (simulated or usb[:SERIAL]), wait_s.\n"
+        "- device (see `transports`), wait_s.\n"
         "- rate_hz, duration_s (inf: until Ctrl-C), lowest_rate_share, priority, cpu.\n"
         "- probe, lower, upper, speed, stiffness, force_limit, push.\n"
         "- record, force, keep.\n"

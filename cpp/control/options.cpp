@@ -15,6 +15,7 @@
 
 #include "palpate/device/device_profile.hpp"
 #include "palpate/fields/readable.hpp"
+#include "palpate/run/transports.hpp"
 #include "palpate/version.hpp"
 
 namespace palpate::control {
@@ -178,15 +179,7 @@ void add_guards(CLI::App& app, RenderOptions& options) {
 }
 
 void add_running(CLI::App& app, RenderOptions& options) {
-    app.add_option(
-           "--device", options.device,
-#ifdef PALPATE_HAS_USB
-           "simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z and PORT "
-           "of its service")
-#else
-           "simulated, or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z and PORT "
-           "of its service. This program was built without libusb and has no usb[:SERIAL]")
-#endif
+    app.add_option("--device", options.device, transport_help(false))
         ->type_name("NAME")
         ->capture_default_str();
     app.add_option("--rate-hz", options.loop.rate_hz, "Ticks of the control loop a second")
@@ -209,7 +202,7 @@ void add_running(CLI::App& app, RenderOptions& options) {
     app.add_flag("--accept-model", options.accept_model, "Render the model although its verdict is no");
     app.add_option_function<double>(
            "--wait-ms", [&options](double wait_ms) { options.wait_s = 1e-3 * wait_ms; },
-           "Longest wait in ms for the device [5 for a USB packet, 20 for an answer of an Inverse3]")
+           "Longest wait in ms for the device [" + transport_waits() + "]")
         ->check(number_between(0.1, 10'000.0));
     app.add_option("--priority", options.real_time.priority,
                    "Real-time priority (SCHED_FIFO) of the loop, 0 = ordinary scheduling")

@@ -54,11 +54,15 @@ INCLUDES = {
 
 # Headers that need a library besides the standard one. Only these include each other; palpate.hpp does not.
 OPTIONAL_HEADERS = {
+    "device/can_bus.hpp",
+    "device/can_motor.hpp",
     "device/detail/usb_connection.hpp",
     "device/detail/usb_text.hpp",
     "device/detail/usb_transfers.hpp",
     "device/inverse3.hpp",
     "device/inverse3_messages.hpp",
+    "device/mit_device.hpp",
+    "device/moteus_device.hpp",
     "device/usb.hpp",
     "io/detail/model_file.hpp",
     "io/detail/plan_file.hpp",
@@ -68,6 +72,7 @@ OPTIONAL_HEADERS = {
     "io/parse_model.hpp",
     "io/plan_file.hpp",
     "run/detail/open_inverse3.hpp",
+    "run/open_can.hpp",
     "run/open_inverse3.hpp",
     "run/open_usb.hpp",
     "simulation/detail/open_device.hpp",
@@ -75,8 +80,10 @@ OPTIONAL_HEADERS = {
 }
 
 # System headers that a folder may use besides the standard library: the clock, the scheduler, memory and
-# latency in realtime; files and sockets in io.
+# latency in realtime; files and sockets in io; the CAN bus in device.
 SYSTEM_HEADERS = {
+    "device": {"linux/can.h", "linux/can/error.h", "linux/can/raw.h", "net/if.h", "poll.h", "sys/socket.h"}
+    | {"sys/un.h", "unistd.h"},
     "realtime": {"fcntl.h", "pthread.h", "sched.h", "signal.h", "sys/mman.h", "time.h", "unistd.h"}
     | {"linux/futex.h", "sys/syscall.h"},
     "io": {"fcntl.h", "netinet/in.h", "sys/file.h", "sys/socket.h", "sys/stat.h", "unistd.h"},

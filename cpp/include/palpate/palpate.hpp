@@ -3,6 +3,8 @@
 
 /// Includes all headers of palpate that need no third-party library; those of live control only on Linux.
 
+#include "palpate/device/mit_wire.hpp"
+#include "palpate/device/moteus_wire.hpp"
 #include "palpate/device/packet_stream.hpp"
 #include "palpate/dynamics/filters.hpp"
 #include "palpate/fields/escaped.hpp"
@@ -19,4 +21,5 @@
 #ifdef __linux__
 #include "palpate/realtime/wake_up.hpp"
 #include "palpate/run/measure.hpp"
+#include "palpate/run/transports.hpp"
 #endif

@@ -9,6 +9,7 @@ from dataclasses import asdict
 import click
 
 from .._core.device import longest_watchdog_ms, shortest_watchdog_ms
+from .._core.run import device_help
 from ..devices import DeviceError, Found, find_devices, install_rule, open_usb
 from ..errors import InputError
 from ..verdict import GOOD, Verdict, no, usable
@@ -65,6 +66,7 @@ def devices(
         end_with(verdict)
         return
     print_verdict(verdict)
+    talk(f"devices of other kinds are not searched; --device is {device_help}")
     for one in found:
         name = " ".join(part for part in (one.product, one.serial) if part) or "without a name"
         print_line(f"{name} ({one.place})")

@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from ..errors import InputError
-from ..export.request import Request, Written
+from ..export.request import COGGING_TABLES, Request, Written
 from .exit_status import end_with, finishing
 from .printing import print_json, print_numbers, print_verdict, talk
 from .verb import (
@@ -45,15 +45,29 @@ FORMATS = {
         "An MCAP file of a recording or flight record, for tools that show logs.",
         {"source", *READING_NAMES},
     ),
+    "cogging": (
+        "cogging",
+        "The table of a motor controller against the cogging of its motor.",
+        {"source", "cogging", "unit_force", "encoder_zero", "accept_model"},
+    ),
+    "knots": ("knots", "A curve of NUMBER knots, as pedals use it.", {"source", "knots", "accept_model"}),
 }
 """Formats: option -> module of `palpate.export` with a function `write`, the help, the parameters it uses."""
+
+_WITH_VALUE: dict[str, dict[str, Any]] = {
+    "cogging": {"type": click.Choice(COGGING_TABLES)},
+    "knots": {"type": int, "metavar": "NUMBER"},
+}
+"""Formats whose option has a value -> settings of the option."""
 
 _EVERY_FORMAT = {"kind", "output", "as_json", "quiet"}
 """Parameters that every format uses."""
 
 format_options: Callable[[Any], Any] = options(
     *(
-        click.option(
+        click.option(f"--{name}", default=None, show_default=False, help=text, **_WITH_VALUE[name])
+        if name in _WITH_VALUE
+        else click.option(
             f"--{name}", "kind", flag_value=name, type=str, default=None, show_default=False, help=text
         )
         for name, (_, text, _) in FORMATS.items()
@@ -112,6 +126,21 @@ def _require_use(kind: str) -> None:
     show_default="of the certified device",
     help="Largest force of the device, without certificate.",
 )
+@click.option(
+    "--unit-force",
+    type=float,
+    default=None,
+    metavar="NUMBER",
+    show_default="1 if the table has the unit of the model",
+    help="Force for one unit of a table against cogging, such as N*m for 1 A of a moteus.",
+)
+@click.option(
+    "--encoder-zero",
+    type=float,
+    default=0.0,
+    metavar="RAD",
+    help="Position of the model at zero of the controller's encoder, for a table against cogging.",
+)
 @accept_model_option
 @json_option
 @reading_options
@@ -124,6 +153,10 @@ def export(
     uncertified: bool,
     encoder_step: float | None,
     force_limit: float | None,
+    cogging: str | None,
+    knots: int | None,
+    unit_force: float | None,
+    encoder_zero: float,
     accept_model: bool,
     as_json: bool,
     reading: ReadingOptions,
@@ -134,6 +167,8 @@ def export(
     (palpate plan), because the file renders it without the guards of palpate. The exit code is 1 if the
     comparison fails.
     """
+    valued = {"cogging": cogging, "knots": knots}
+    kind = kind or next((name for name, value in valued.items() if value is not None), None)
     if kind is None:
         raise InputError(f"no format is given: one of {', '.join(f'--{each}' for each in FORMATS)}")
     _require_use(kind)
@@ -141,7 +176,19 @@ def export(
     talk(f"writing {output} ...")
     recording = reading.read(source) if kind == "mcap" and source is not None else None
     request = Request(
-        output, source, precision, name, uncertified, encoder_step, force_limit, accept_model, recording
+        output,
+        source,
+        precision,
+        name,
+        uncertified,
+        encoder_step,
+        force_limit,
+        accept_model,
+        recording,
+        cogging,
+        unit_force,
+        encoder_zero,
+        knots,
     )
     with finishing():
         writer = "admittance" if kind == "c" and request.is_for_display else FORMATS[kind][0]

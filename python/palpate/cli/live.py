@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
+from .._core.run import device_waits, measured_device_help, transports
 from ..devices import DeviceError
 from ..errors import InputError
 from ..verdict import Verdict
@@ -17,8 +19,24 @@ from .exit_status import terminated_as_interrupted
 from .printing import OverwrittenLine, number, print_line
 from .verb import PATH, options
 
+
+class DeviceName(click.types.StringParamType):
+    """Name of a device; a shell completes its first word."""
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem[str]]:
+        """Returns the kinds of devices that the user may mean."""
+        return [CompletionItem(name) for name, _, _ in transports if name.startswith(incomplete)]
+
+
+def device_option(text: str) -> Callable[[Any], Any]:
+    """Returns the option that chooses a device."""
+    return click.option("--device", type=DeviceName(), default="simulated", metavar="NAME", help=f"{text}.")
+
+
 device_options = options(
-    click.option("--device", default="simulated", help="simulated, or usb[:SERIAL]."),
+    device_option(measured_device_help),
     click.option(
         "--object",
         "object_file",
@@ -29,8 +47,8 @@ device_options = options(
     click.option(
         "--wait-ms",
         type=click.FloatRange(0.1, 10000),
-        show_default="5",
-        help="Longest wait for a packet of a USB device [ms].",
+        show_default=device_waits,
+        help="Longest wait for an answer of the device [ms].",
     ),
     click.option(
         "--transducer/--no-transducer",

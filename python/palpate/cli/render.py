@@ -8,13 +8,13 @@ from typing import Any
 
 import click
 
-from .._core.run import LoopSettings, usual_telemetry_hz
+from .._core.run import LoopSettings, device_help, device_waits, usual_telemetry_hz
 from .._core.run import render as render_live
 from ..errors import InputError
 from ..model import load_model
 from ..planning import Plan, example_profiles
 from .exit_status import end_with
-from .live import live_line, session_verdict
+from .live import device_option, live_line, session_verdict
 from .printing import print_json, print_numbers, print_verdict, talk
 from .verb import PATH, accept_model_option, json_option, require_writable, scheme_options, sized, verb
 
@@ -23,13 +23,7 @@ _LOOP = LoopSettings()
 
 @verb("palpate render press.json --duration-s 10 --record felt.csv", ends_at_once=False)
 @click.argument("model_file", metavar="MODEL.json", type=PATH)
-@click.option(
-    "--device",
-    default="simulated",
-    metavar="NAME",
-    help="simulated, usb[:SERIAL], or inverse3[:AXIS[@PORT]] with AXIS of x, y, z, -x, -y, -z and PORT "
-    "of its service.",
-)
+@device_option(device_help)
 @click.option(
     "--uncertified",
     is_flag=True,
@@ -38,7 +32,7 @@ _LOOP = LoopSettings()
 @click.option(
     "--wait-ms",
     type=click.FloatRange(0.1, 10000),
-    show_default="5 for USB, 20 for an Inverse3",
+    show_default=device_waits,
     help="Longest wait for an answer of the device [ms].",
 )
 @click.option("--rate-hz", type=float, show_default=f"{_LOOP.rate_hz:g}", help="Rate of the loop [Hz].")

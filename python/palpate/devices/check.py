@@ -154,7 +154,7 @@ def check_device(
     Parameters
     ----------
     device : str
-        ``simulated``, or ``usb[:SERIAL]``.
+        Name of the device, in one of the forms that ``palpate devices`` lists.
     object : Model, optional
         The object mounted on the simulated device.
     transducer : bool
@@ -170,7 +170,7 @@ def check_device(
     coulomb_friction : float, optional
         Friction of the device if it is known and cannot be measured [N or N*m]; a lower bound.
     wait_s : float, optional
-        Longest wait for a packet of a USB device [s].
+        Longest wait for an answer of the device [s].
     progress : callable, optional
         Called ten times a second with ticks, position, force and samples lost.
 

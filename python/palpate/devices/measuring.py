@@ -21,7 +21,7 @@ def measure(device: str = "simulated", *, object: Model | None = None, **setting
     Parameters
     ----------
     device : str
-        ``simulated``, or ``usb[:SERIAL]``.
+        Name of the device, in one of the forms that ``palpate devices`` lists.
     object : Model, optional
         The object mounted on the simulated device.
     **settings
@@ -87,7 +87,7 @@ def record(
     force : bool
         True: an existing recording is replaced. False: it is refused.
     device : str
-        ``simulated``, or ``usb[:SERIAL]``.
+        Name of the device, in one of the forms that ``palpate devices`` lists.
     object : Model, optional
         The object mounted on the simulated device.
     probe : bool

@@ -30,6 +30,10 @@ _RESERVED = frozenset(
 """Words that cannot be the name of a model: those of C and C++, and the prefix of the macros of a program."""
 
 
+COGGING_TABLES = ("moteus", "openffboard", "odrive", "table")
+"""Controllers whose table against cogging can be exported, and a plain table."""
+
+
 @dataclass(frozen=True)
 class Request:
     """Options of one export."""
@@ -50,6 +54,14 @@ class Request:
     """True if a model with the verdict "no" is exported too"""
     recording: Recording | None = None
     """Recording to export in place of a model"""
+    cogging: str | None = None
+    """Controller whose table against cogging is written, one of `COGGING_TABLES`"""
+    unit_force: float | None = None
+    """Force for one unit of that table; None: the table has the unit of the model"""
+    encoder_zero: float = 0.0
+    """Position of the model at zero of the controller's encoder [rad]"""
+    knots: int | None = None
+    """Number of knots of the curve of a pedal"""
 
     @cached_property
     def model(self) -> Model:

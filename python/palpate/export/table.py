@@ -36,15 +36,7 @@ def table_of(model: Model) -> pd.DataFrame:
     InputError
         The force depends on other quantities than position and direction.
     """
-    if model.dimension != 1:
-        raise InputError(
-            f"the model has {model.dimension} inputs: a table needs a force of position alone, so identify "
-            "the model with --inputs position"
-        )
-    if model.memory is not None:
-        raise InputError(
-            "the force has a memory, which a table cannot contain: identify the model with --inputs position"
-        )
+    force_of_position(model)
     position, force = units_of(model)
     x = np.linspace(model.lower[0], model.upper[0], ROWS)
     columns = {f"position_{position}": x}
@@ -55,3 +47,22 @@ def table_of(model: Model) -> pd.DataFrame:
         columns[f"{prefix}slope_{force}/{position}"] = model.slope(x, direction=direction)
     columns["energy_J"] = model.energy(x, direction=0.0 if model.hysteretic else None)
     return pd.DataFrame(columns)
+
+
+def force_of_position(model: Model) -> None:
+    """Refuses a model whose force depends on other quantities than position and direction.
+
+    Raises
+    ------
+    InputError
+        The model has several inputs or a memory.
+    """
+    if model.dimension != 1:
+        raise InputError(
+            f"the model has {model.dimension} inputs: a table needs a force of position alone, so identify "
+            "the model with --inputs position"
+        )
+    if model.memory is not None:
+        raise InputError(
+            "the force has a memory, which a table cannot contain: identify the model with --inputs position"
+        )

@@ -65,6 +65,7 @@ CASES = [
     (["plan", "m.json", "--device", "bench"], ["bench-knob"]),
     (["plan", "m.json", "--device", "d"], ["d.toml"]),
     (["plan", "--examples", "--dev"], ["--device"]),
+    (["render", "m.json", "--device", "m"], ["mit", "moteus"]),
     (["app", ""], ["a.csv", "a.parquet"]),
     (["identify", "in"], ["compopt", "-o", "default"]),
     (["demo", "-o", ""], ["compopt", "-o", "dirnames"]),
@@ -72,7 +73,7 @@ CASES = [
 """Words, and what the shell receives for the last of them"""
 
 
-@pytest.mark.parametrize(("words", "expected"), sampled(CASES, *CASES[1::5]), ids=" ".join)
+@pytest.mark.parametrize(("words", "expected"), sampled(CASES, *CASES[1::5], CASES[12]), ids=" ".join)
 def test_bash_completes_verbs_options_values_and_files_by_type(
     words: list[str], expected: list[str], folder: Path
 ) -> None:

@@ -241,7 +241,7 @@ def test_a_recording_without_object_or_force_measurement_is_refused(tmp_path: Pa
         record(tmp_path / "a.csv")
     with pytest.raises(InputError, match=r"simulated-knob.* has no force transducer, so it cannot"):
         record(tmp_path / "a.csv", object=load_model(OBJECT), transducer=False)
-    with pytest.raises(InputError, match=r"device is 'knob', must be simulated or usb\[:SERIAL\]"):
+    with pytest.raises(InputError, match=r"device is 'knob', must be simulated, usb\[:SERIAL\], mit:"):
         record(tmp_path / "a.csv", device="knob")
     assert not list(tmp_path.iterdir())
 

@@ -218,8 +218,8 @@ def test_a_usb_device_receives_the_force_and_zero_at_the_end(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("device", "sentence"),
     [
-        ("toaster", "device is 'toaster', must be simulated, usb[:SERIAL] or inverse3"),
-        ("usb:", "device is 'usb:', must be simulated, usb[:SERIAL] or inverse3"),
+        ("toaster", "device is 'toaster', must be simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND"),
+        ("usb:", "device is 'usb:', must be simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND"),
         ("inverse3:w", "Inverse3"),
     ],
 )

@@ -86,7 +86,7 @@ def test_the_version_equals_the_version_of_the_package() -> None:
             [MODEL, "--structure", "explicit", "--mass", "1e-4"],
             "explicit, which diverges: the model's steepest",
         ),
-        ([MODEL, "--device", "knob"], "must be simulated, usb[:SERIAL] or inverse3"),
+        ([MODEL, "--device", "knob"], "must be simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND"),
         ([MODEL, "--record", "/no/such/folder/out.csv"], "cannot be written: No such file or directory"),
         ([MODEL, "--record", "/tmp"], "cannot be written: it is not an ordinary file"),
         ([MODEL, "--record", MODEL], ", the model file: choose another name"),

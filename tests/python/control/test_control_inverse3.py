@@ -259,7 +259,7 @@ def test_a_missing_or_uncalibrated_device_is_refused_with_the_cure(
     [
         ("inverse3:w", "must be inverse3[:AXIS[@PORT]]: AXIS is x, y, z, -x, -y or -z, PORT is the TCP port"),
         ("inverse3:z@0", "must be inverse3[:AXIS[@PORT]]"),
-        ("inverse3:", "device is 'inverse3:', must be simulated, usb[:SERIAL] or inverse3"),
+        ("inverse3:", "device is 'inverse3:', must be simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND"),
         ("inverse3:z@1", "no Haply Inverse Service answers at 127.0.0.1:1 (Connection refused)"),
     ],
 )

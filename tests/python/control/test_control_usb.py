@@ -145,7 +145,7 @@ def test_a_delay_longer_than_certified_ends_the_run_with_zero_torque(tmp_path: P
         ([], ["--no-device"], "no USB device 1209:0001 with this protocol is connected"),
         ([], ["--serial", "A", "--serial", "B"], "2 suitable USB devices are connected (A, B)"),
         (["--device", "usb:OTHER"], [], "no USB device has the serial number OTHER; connected: EMU-1"),
-        (["--device", "usb:"], [], "device is 'usb:', must be simulated, usb[:SERIAL] or inverse3"),
+        (["--device", "usb:"], [], "device is 'usb:', must be simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND"),
         ([], ["--wrong-magic"], "is 1209:0001 with another protocol"),
         ([], ["--info-bytes", "31"], "the answer to GET_INFO has 31 bytes, must have 32"),
         ([], ["--info-bytes", "33"], "the answer to GET_INFO has 33 bytes, must have 32"),

@@ -12,13 +12,13 @@
 
 namespace palpate {
 
-/// Opens a device for rendering by its name: `simulated`, `usb[:SERIAL]` or `inverse3[:AXIS[@PORT]]`. Throws
-/// std::invalid_argument with the reason if the device cannot be opened or does not fit the model.
+/// Opens a device for rendering by its name, which has one of the forms in `transports`. Throws std::invalid_argument
+/// with the reason if the device cannot be opened or does not fit the model.
 [[nodiscard]] PALPATE_INLINE std::unique_ptr<LiveDevice> open_device(const RenderOptions& options,
                                                                      const PlannedModel& model);
 
-/// Returns a device for a measurement by its name, not open yet: usb[:SERIAL], or the simulated device with the model
-/// `object` mounted on its handle. Sets options of the measurement that depend on the device.
+/// Returns a device for a measurement by its name, not open yet. The model `object` is mounted on the handle of the
+/// simulated device. Sets options of the measurement that depend on the device.
 [[nodiscard]] PALPATE_INLINE std::unique_ptr<LiveDevice> device_to_measure(
     MeasureOptions& options, const std::optional<ForceModel>& object);
 

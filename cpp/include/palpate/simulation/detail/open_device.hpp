@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -12,9 +15,11 @@
 #include "palpate/model/force_model.hpp"
 #include "palpate/run/live_device.hpp"
 #include "palpate/run/measure.hpp"
+#include "palpate/run/open_can.hpp"
 #include "palpate/run/open_inverse3.hpp"
 #include "palpate/run/open_usb.hpp"
 #include "palpate/run/render.hpp"
+#include "palpate/run/transports.hpp"
 #include "palpate/simulation/faulty_device.hpp"
 #include "palpate/simulation/open_device.hpp"
 #include "palpate/simulation/simulated_device.hpp"
@@ -64,15 +69,42 @@ namespace palpate {
     return live;
 }
 
+namespace detail {
+
+/// Functions of a transport, in the order of `transports`.
+struct TransportFunctions {
+    std::unique_ptr<LiveDevice> (*open)(const RenderOptions& options, const PlannedModel& model);
+    std::unique_ptr<LiveDevice> (*measure)(MeasureOptions& options);  ///< null: cannot measure
+};
+
+inline constexpr std::array<TransportFunctions, transports.size()> transport_functions{{
+    {open_simulated, nullptr},  // the simulated device is measured with an object
+    {open_usb, usb_to_measure},
+    {open_can<MitProtocol>, can_to_measure<MitProtocol>},
+    {open_can<MoteusProtocol>, can_to_measure<MoteusProtocol>},
+    {open_inverse3, nullptr},
+}};
+
+/// Returns the index of the transport of a device's name; refuses a name of another form.
+[[nodiscard]] inline std::size_t transport_of(const std::string& device, bool measuring) {
+    const std::string kind = device.substr(0, device.find(':'));
+    for (std::size_t k = 0; k < transports.size(); ++k) {
+        const Transport& transport = transports[k];
+        const bool has_parts = device.size() > kind.size();
+        const bool fits = !has_parts || (transport.form != transport.name && device.size() > kind.size() + 1);
+        if (kind == transport.name && fits && (transport.measures || !measuring)) {
+            return k;
+        }
+    }
+    refuse("device is '" + device + "', must be " + transport_forms(measuring));
+}
+
+}  // namespace detail
+
 PALPATE_INLINE std::unique_ptr<LiveDevice> open_device(const RenderOptions& options,
                                                        const PlannedModel& model) {
-    const std::string kind = options.device.substr(0, options.device.find(':'));
-    const bool whole = options.device == kind;
-    if (!(kind == "simulated" && whole) &&
-        !((kind == "usb" || kind == "inverse3") && (whole || options.device.size() > kind.size() + 1))) {
-        refuse("device is '" + options.device +
-               "', must be simulated, usb[:SERIAL] or inverse3[:AXIS[@PORT]]");
-    }
+    const std::size_t transport = detail::transport_of(options.device, false);
+    const std::string_view kind = transports[transport].name;
     if (kind != "simulated" && !options.faults.empty()) {
         refuse(
             "faults is set: must be empty for a real device, because only the simulated device simulates "
@@ -93,18 +125,15 @@ PALPATE_INLINE std::unique_ptr<LiveDevice> open_device(const RenderOptions& opti
     if (model.force_unit == "A") {
         refuse("the model's force is a motor current in A: identify it with --torque-constant-Nm-per-A");
     }
-    return kind == "usb"        ? open_usb(options, model)
-           : kind == "inverse3" ? open_inverse3(options, model)
-                                : open_simulated(options, model);
+    return detail::transport_functions[transport].open(options, model);
 }
 
 PALPATE_INLINE std::unique_ptr<LiveDevice> device_to_measure(MeasureOptions& options,
                                                              const std::optional<ForceModel>& object) {
-    if (options.device == "usb" || options.device.starts_with("usb:")) {
-        return usb_to_measure(options);
+    const std::size_t transport = detail::transport_of(options.device, true);
+    if (const auto measured = detail::transport_functions[transport].measure; measured != nullptr) {
+        return measured(options);
     }
-    detail::require(options.device == "simulated",
-                    "device is '" + options.device + "', must be simulated or usb[:SERIAL]");
     detail::require(!options.device_renders, "device_renders needs a USB device that contains a model");
     detail::require(object || options.record.empty(),
                     "the simulated device has no object: set object to a model file");

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes the cogging torque of a motor as the table that its controller adds to every command.
+
+The force f(x) of a model is the torque that turns the motor slowly, so the table adds +f(x). With hysteresis
+f is the mean of both directions; half the difference is friction, which a table over the angle cannot hold.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import Float1D
+from ..errors import InputError
+from ..model import Model
+from ..verdict import GOOD
+from .exported import units_of
+from .request import Request, Written
+from .table import force_of_position
+
+TURN = 2.0 * math.pi
+"""One revolution [rad]"""
+
+POSITIONS = 36_000
+"""Number of angles of a revolution at which a table is compared with the model, every 0.01 degrees."""
+
+MOTEUS_ENTRIES = 1024
+"""Entries of motor.cogging_dq_comp, whole numbers from -127 to 127."""
+
+ODRIVE_ENTRIES = 3600
+"""Entries of cogging_map of the ODrive firmware 0.5, one for each 0.1 degrees."""
+
+OPENFFBOARD_HARMONICS = 20
+"""Harmonics that the anticogging of the OpenFFBoard sums."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Table of one controller: its text, and the torque that the controller makes of it."""
+
+    text: str
+    size: str
+    """What the table contains, for display"""
+    replayed: Callable[[Float1D], Float1D]
+    """Returns the added torque at angles of the encoder [units of the controller]"""
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Controller with a table against cogging."""
+
+    unit: str
+    """Unit of the table; "" for that of the model"""
+    table: Callable[[Callable[[Float1D], Float1D]], Table]
+    """Makes the table of a torque over the angle of the encoder [units of the controller over rad]"""
+
+
+def _angles(count: int) -> Float1D:
+    """Returns this number of angles at equal distances over a revolution [rad]."""
+    return np.arange(count, dtype=np.float64) * (TURN / count)
+
+
+def _moteus(torque: Callable[[Float1D], Float1D]) -> Table:
+    """Returns the settings of a moteus: current = scale comp[i], linear between the entries.
+
+    Source: `ISR_DoPositionCommon` of mjbots/moteus, fw/bldc_servo_control.h.
+    """
+    best = _straight_lines(torque)
+    scale = float(np.float32(np.abs(best).max() / 127.0))
+    entries = np.rint(best / scale)
+    lines = [f"conf set motor.cogging_dq_scale {scale:.9g}"]
+    lines += [f"conf set motor.cogging_dq_comp.{index} {entry:.0f}" for index, entry in enumerate(entries)]
+
+    def replayed(angle: Float1D) -> Float1D:
+        place = np.mod(angle / TURN, 1.0) * MOTEUS_ENTRIES
+        line = np.interp(place, np.arange(MOTEUS_ENTRIES + 1), np.append(entries, entries[0]))
+        return np.asarray(scale * line)
+
+    return Table(
+        "\n".join([*lines, "conf write", ""]), f"{MOTEUS_ENTRIES} entries, scale {scale:.4g} A", replayed
+    )
+
+
+def _straight_lines(torque: Callable[[Float1D], Float1D]) -> Float1D:
+    """Returns the entries whose straight lines have the least squared error over a revolution.
+
+    At order k the lines between samples of the torque are too low by sinc^2(k / entries). The normal
+    equations of the hat functions are circulant, so that a Fourier transform solves them.
+    """
+    parts = 16
+    samples = torque(_angles(MOTEUS_ENTRIES * parts))
+    offset = np.arange(1 - parts, parts)
+    hat = 1.0 - np.abs(offset) / parts
+    first = parts * np.arange(MOTEUS_ENTRIES)
+    right = hat @ samples[np.mod(first + offset[:, None], len(samples))]
+    own, neighbour = float(hat @ hat), float(hat[: parts - 1] @ hat[parts:])
+    order = np.arange(MOTEUS_ENTRIES // 2 + 1)
+    left = own + 2.0 * neighbour * np.cos(TURN * order / MOTEUS_ENTRIES)
+    return np.fft.irfft(np.fft.rfft(right) / left, MOTEUS_ENTRIES)
+
+
+def _odrive(torque: Callable[[Float1D], Float1D]) -> Table:
+    """Returns the 3600 torques of an ODrive, one a line. The controller holds an entry up to the next one.
+
+    Source: `Controller::update` of odriverobotics/ODrive, Firmware/MotorControl/controller.cpp, version 0.5.
+    """
+    entries = torque(_angles(ODRIVE_ENTRIES)).astype(np.float32)
+
+    def replayed(angle: Float1D) -> Float1D:
+        place = np.fix(angle / TURN * ODRIVE_ENTRIES).astype(np.int64)
+        return entries[np.mod(place, ODRIVE_ENTRIES)].astype(np.float64)
+
+    return Table("".join(f"{entry:.9g}\n" for entry in entries), f"{ODRIVE_ENTRIES} entries", replayed)
+
+
+def _openffboard(torque: Callable[[Float1D], Float1D]) -> Table:
+    """Returns the 20 largest harmonics of an OpenFFBoard: sum of amplitude sin(order angle + phase).
+
+    Source: `TMC4671::turn` of the OpenFFBoard firmware with anticogging; it rounds the sum towards zero.
+    """
+    samples = 1 << 13  # resolves orders up to 4096
+    terms = 2.0 / samples * np.fft.rfft(torque(_angles(samples)))[1 : samples // 2]
+    order = np.sort(np.argsort(-np.abs(terms), kind="stable")[:OPENFFBOARD_HARMONICS]) + 1
+    amplitude = np.abs(terms[order - 1]).astype(np.float32)
+    phase = np.angle(1j * terms[order - 1]).astype(np.float32)
+    rows = [f"{k},{a:.9g},{p:.9g}" for k, a, p in zip(order, amplitude, phase, strict=True)]
+
+    def replayed(angle: Float1D) -> Float1D:
+        waves = [a * np.sin(k * angle + p) for k, a, p in zip(order, amplitude, phase, strict=True)]
+        return np.asarray(np.trunc(np.sum(waves, axis=0)))
+
+    return Table("\n".join(["order,amplitude,phase_rad", *rows, ""]), f"{len(order)} harmonics", replayed)
+
+
+def _plain(torque: Callable[[Float1D], Float1D]) -> Table:
+    """Returns a CSV table of angle and torque every 0.1 degrees, linear between the rows."""
+    angle = _angles(ODRIVE_ENTRIES)
+    entries = torque(angle)
+    rows = [f"{x:.17g},{y:.17g}" for x, y in zip(angle, entries, strict=True)]
+
+    def replayed(at: Float1D) -> Float1D:
+        return np.asarray(np.interp(at, angle, entries, period=TURN))
+
+    return Table("\n".join(["angle_rad,torque", *rows, ""]), f"{ODRIVE_ENTRIES} rows", replayed)
+
+
+CONTROLLERS = {
+    "moteus": Controller("A", _moteus),
+    "openffboard": Controller("count", _openffboard),
+    "odrive": Controller("N*m", _odrive),
+    "table": Controller("", _plain),
+}
+"""Kinds of tables, the choices of `--cogging` in `export/request.py`."""
+
+
+def torque_of_turn(model: Model, encoder_zero: float = 0.0) -> Callable[[Float1D], Float1D]:
+    """Returns the torque of a motor over the angle of its encoder [rad], the mean of both directions.
+
+    Parameters
+    ----------
+    model : Model
+        Cogging of a motor, identified with a period.
+    encoder_zero : float
+        Position of the model at which the encoder of the controller is at zero [rad].
+
+    Raises
+    ------
+    InputError
+        The model has no period, a revolution is not a multiple of it, the position is not an angle, or the
+        force depends on other quantities.
+    """
+    force_of_position(model)
+    if units_of(model)[0] != "rad":
+        raise InputError(
+            f"the position is in {model.units['position']}: cogging needs an angle, so record it in rad or "
+            "deg"
+        )
+    if model.period is None:
+        raise InputError(
+            "the model has no period, so its force does not repeat after a revolution: identify it with "
+            "--period 360deg"
+        )
+    turns = TURN / model.period
+    if round(turns) < 1 or abs(turns - round(turns)) > 1e-6 * turns:
+        raise InputError(
+            f"the period is {math.degrees(model.period):.6g} deg: a revolution of 360 deg must be a whole "
+            "number of periods, so identify the model with --period 360deg"
+        )
+    side = 0.0 if model.hysteretic else None
+    # Whole periods in place of the stated one, so that the last period ends with the revolution.
+    stretch = model.period * round(turns) / TURN
+    return lambda angle: np.asarray(model.force(stretch * angle + encoder_zero, direction=side))
+
+
+def table_of(kind: str, model: Model, unit_force: float = 1.0, encoder_zero: float = 0.0) -> Table:
+    """Returns the table of a controller against the cogging of a model.
+
+    Parameters
+    ----------
+    kind : str
+        Key of `CONTROLLERS`.
+    model : Model
+        Cogging of a motor, identified with a period.
+    unit_force : float
+        Force of the model for one unit of the table.
+    encoder_zero : float
+        Position of the model at which the encoder of the controller is at zero [rad].
+
+    Raises
+    ------
+    InputError
+        The model is not that of a motor (see `torque_of_turn`), or its torque is zero at every angle.
+    """
+    torque = torque_of_turn(model, encoder_zero)
+    if not np.any(torque(_angles(POSITIONS))):
+        raise InputError("the torque of the model is zero at every angle: there is no cogging to compensate")
+    return CONTROLLERS[kind].table(lambda angle: torque(angle) / unit_force)
+
+
+def friction_of(model: Model) -> float:
+    """Returns the mean friction over a revolution: half the difference of both directions [unit of the
+    model]; 0 without hysteresis."""
+    if not model.hysteretic:
+        return 0.0
+    x = _angles(POSITIONS)
+    return float(np.mean(np.asarray(model.force(x, direction=1.0)) - model.force(x, direction=-1.0)) / 2.0)
+
+
+def write(request: Request) -> Written:
+    """Writes the table of a controller, and returns its largest difference from the model."""
+    model, kind = request.model, str(request.cogging)
+    unit = CONTROLLERS[kind].unit
+    torque_of = torque_of_turn(model, request.encoder_zero)
+    if not math.isfinite(request.encoder_zero):
+        raise InputError(f"--encoder-zero is {request.encoder_zero:g}: must be a finite number")
+    unit_force = _unit_force(model, unit, request)
+    table = table_of(kind, model, unit_force, request.encoder_zero)
+    angle = _angles(POSITIONS)
+    torque = torque_of(angle)
+    error = unit_force * table.replayed(angle) - (torque - (torque.mean() if kind == "openffboard" else 0.0))
+    largest, rms = float(np.abs(error).max()), float(np.sqrt(np.mean(error**2)))
+    peak, friction = float(np.abs(torque).max()), friction_of(model)
+    request.write_text(table.text)
+    force = model.units["force"]
+    numbers = {
+        "table": f"{request.output}: {kind}, {table.size}",
+        "largest torque": f"{peak:.4g} {force}",
+        "error of table": f"up to {largest:.3g} {force}, {100.0 * largest / peak:.2g} % of that torque",
+        **({"friction": f"{friction:.4g} {force}, not in the table"} if model.hysteretic else {}),
+    }
+    record = {"kind": kind, "unit_force": unit_force, "largest_torque": peak, "largest_error": largest}
+    return Written(GOOD, numbers, record | {"rms_error": rms, "friction": friction})
+
+
+def _unit_force(model: Model, unit: str, request: Request) -> float:
+    """Returns the force of the model for one unit of the table."""
+    given, force = request.unit_force, model.units["force"]
+    if given is None:
+        if unit in ("", force):
+            return 1.0
+        raise InputError(
+            f"the table is in {unit} and the force of the model in {force}: state the force of one {unit} in "
+            f"{force} with --unit-force"
+        )
+    if not (math.isfinite(given) and given > 0.0):
+        raise InputError(f"--unit-force is {given:g}: must be a finite number > 0")
+    return given
