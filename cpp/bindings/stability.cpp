@@ -166,6 +166,7 @@ void bind_stability(py::module_& module) {
         "stiffest_hand", &stiffest_hand, "bounds"_a, "scheme"_a, "device"_a,
         "Returns the largest stiffness of a hand for which a scheme is proved on an admittance display,\n"
         "with the other limits of the hand unchanged [N/m or N*m/rad]; 0 if none is.");
+    module.def(
         "line_for",
         [](const ForceModel& model, const DeviceProfile& device, double motion, double play_radius) {
             ForceBounds bounds = force_bounds(model, play_radius, device.force_limit);
