@@ -50,7 +50,7 @@ class AdmittanceNeed {
             double middle, half;
         };
         constexpr double relative = 1e-6;
-        constexpr int most_evaluations = 1 << 18;
+        constexpr int most_evaluations = 262'144;
         constexpr int first_parts = 64;
         std::vector<Part> open;
         double found = at(0.0);
@@ -158,7 +158,7 @@ class AdmittanceNeed {
     /// Returns bounds of the second derivatives of the three sums by theta: sums of j^2 times the size of each
     /// coefficient, and of the lower powers of j with a feed-forward.
     [[nodiscard]] std::array<double, 3> curvatures() const noexcept {
-        constexpr int most_terms = 1 << 20;
+        constexpr int most_terms = 1'048'576;
         constexpr double negligible = 1e-15;
         std::array<std::array<double, 3>, 3> sums{};  // of j^0, j^1 and j^2 for each of the three
         const auto add = [&](std::size_t k, double j, double coefficient) {
