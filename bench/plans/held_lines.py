@@ -43,7 +43,7 @@ LINE_DAMPING = 0.03
 """Device damping for which the lines of the force errors are chosen [N*m*s/rad]; hold needs 0.03 to 0.15"""
 
 ASSUMED_LOOPS = {
-    "odri-solo": HeldLine(period_s=1e-4, delay_s=1e-4, encoder_step=3.49e-5),
+    "odri-solo": HeldLine(period_s=1e-4, delay_s=3e-4, encoder_step=3.49e-5),
     "odrive-v3": HeldLine(period_s=1.25e-4, delay_s=1.125e-3, encoder_step=7.67e-4),
     "smartknob": HeldLine(period_s=1e-4, delay_s=3.5e-4, encoder_step=3.83e-4),
     "vesc": HeldLine(period_s=1e-4, delay_s=1.1e-3, encoder_step=3.83e-4),

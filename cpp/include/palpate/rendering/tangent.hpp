@@ -85,8 +85,9 @@ class SteepestSlopes {
             periodic_ ? 0 : reach + 4;  // cells outside the domain from which it can be reached
         from_ = domain.lower[0] - beyond * width_;
         const auto slope = [&](int cell) {
-            const int within = periodic_ ? (cell % cells + cells) % cells : std::clamp(cell, -1, cells);
-            return rising[static_cast<std::size_t>(within + 1)];
+            // The slopes of the cells follow that below the domain
+            const int index = 1 + (periodic_ ? (cell % cells + cells) % cells : std::clamp(cell, -1, cells));
+            return rising[static_cast<std::size_t>(index)];
         };
         // The true position lies in the measured cell or in one of its neighbours
         const auto steepest = [&](int first, int last) {
