@@ -4,7 +4,7 @@ Profiles of devices, and the packets of USB devices.
 """
 from __future__ import annotations
 import typing
-__all__: list[str] = ['AdmittanceDisplay', 'DeviceProfile', 'OnDevice', 'UsbRequest', 'decode_info', 'decode_model', 'longest_watchdog_ms', 'on_device', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_timeout_ms', 'usb_to_device', 'usb_to_host', 'usb_vendor']
+__all__: list[str] = ['AdmittanceDisplay', 'DeviceProfile', 'HeldLine', 'OnDevice', 'UsbRequest', 'decode_info', 'decode_model', 'longest_watchdog_ms', 'on_device', 'shortest_watchdog_ms', 'usb_cause', 'usb_interface', 'usb_interface_kind', 'usb_largest_packet', 'usb_product', 'usb_timeout_ms', 'usb_to_device', 'usb_to_host', 'usb_vendor']
 class OnDevice:
     """
     Timing of a model that runs on the motor controller of a device, in SI units.
@@ -115,6 +115,68 @@ class AdmittanceDisplay:
         """
         Damping ratio of a position servo of second order [-]; absent: first order.
         """
+class HeldLine:
+    """
+    Loop of a motor controller that holds a line between two commands, in SI units.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    @typing.overload
+    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 5e-05, delay_s: typing.SupportsFloat | typing.SupportsIndex = 5e-05, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, stiffness_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, largest_stiffness: typing.SupportsFloat | typing.SupportsIndex | None = None, limits_force: bool = True, watchdog_s: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    @typing.overload
+    def __init__(self, fields: dict) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
+        """
+    @property
+    def delay_s(self) -> float:
+        """
+        Time from a sample of the controller to its force, lag of the current control included [s].
+        """
+    @property
+    def encoder_step(self) -> float:
+        """
+        Smallest change of position that the controller reads [m or rad]; 0 = not quantised.
+        """
+    @property
+    def largest_stiffness(self) -> float | None:
+        """
+        Largest stiffness that a command can have [N/m or N*m/rad]; absent: any.
+        """
+    @property
+    def limits_force(self) -> bool:
+        """
+        True if the controller limits the force of the line to the force limit of the profile.
+        """
+    @property
+    def period_s(self) -> float:
+        """
+        Time between two samples of the controller [s].
+        """
+    @property
+    def position_step(self) -> float:
+        """
+        Smallest change of the commanded position [m or rad]; 0 = not quantised.
+        """
+    @property
+    def stiffness_step(self) -> float:
+        """
+        Smallest change of the commanded stiffness [N/m or N*m/rad]; 0 = not quantised.
+        """
+    @property
+    def watchdog_s(self) -> float | None:
+        """
+        Time after the last command at which the controller makes zero force [s]; absent: never.
+        """
 class DeviceProfile:
     """
     Properties of a haptic device of one degree of freedom, in SI units; a knob (rad) or a straight handle (m).
@@ -123,7 +185,7 @@ class DeviceProfile:
         ...
     def __hash__(self) -> int:
         ...
-    def __init__(self, *, id: str = 'simulated-knob', position_unit: str = 'rad', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, renderer: str | None = None, on_device: OnDevice | None = None, admittance: AdmittanceDisplay | None = None) -> None:
+    def __init__(self, *, id: str = 'simulated-knob', position_unit: str = 'rad', period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, inertia: typing.SupportsFloat | typing.SupportsIndex = 0.0002, viscous_damping: typing.SupportsFloat | typing.SupportsIndex = 0.06, coulomb_friction: typing.SupportsFloat | typing.SupportsIndex = 0.0, encoder_step: typing.SupportsFloat | typing.SupportsIndex = 9.587379924285257e-05, force_step: typing.SupportsFloat | typing.SupportsIndex = 0.0, delay_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit: typing.SupportsFloat | typing.SupportsIndex = 5.0, jitter_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, renderer: str | None = None, on_device: OnDevice | None = None, admittance: AdmittanceDisplay | None = None, held_line: HeldLine | None = None) -> None:
         ...
     def __reduce__(self) -> tuple[typing.Any, tuple]:
         ...

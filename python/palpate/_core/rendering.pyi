@@ -6,7 +6,49 @@ from __future__ import annotations
 import palpate._core.device
 import palpate._core.model
 import typing
-__all__: list[str] = ['Scheme', 'compensated_share', 'default_play_radius', 'display_lag_s', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'solver_name', 'structure_names', 'virtual_friction']
+__all__: list[str] = ['HeldSlope', 'Scheme', 'cells_in_motion', 'compensated_share', 'default_play_radius', 'display_lag_s', 'explicit_slope_limit', 'fewest_encoder_steps_in_play', 'most_prediction_taps', 'most_slope_cells', 'solver_name', 'structure_names', 'virtual_friction']
+class HeldSlope:
+    """
+    Rule for the slope of a line that a tangent holds, in SI units.
+    """
+    def __eq__(self, arg0: typing.Any) -> typing.Any:
+        ...
+    def __hash__(self) -> int:
+        ...
+    @typing.overload
+    def __init__(self, *, rule: str = 'raised', slope: typing.SupportsFloat | typing.SupportsIndex = 0.0, lift: typing.SupportsFloat | typing.SupportsIndex = 0.0, motion: typing.SupportsFloat | typing.SupportsIndex | None = None) -> None:
+        ...
+    @typing.overload
+    def __init__(self, fields: dict) -> None:
+        ...
+    def __reduce__(self) -> tuple[typing.Any, tuple]:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def to_dict(self) -> dict:
+        """
+        Returns the fields that are written to a file, by name. Optional fields without a value are left out.
+        """
+    @property
+    def lift(self) -> float:
+        """
+        Difference of the line's slope from that of the force (raised) [N/m or N*m/rad].
+        """
+    @property
+    def motion(self) -> float | None:
+        """
+        w, largest motion of the handle in one period [m or rad]; absent: any motion. A larger motion ends a certified run.
+        """
+    @property
+    def rule(self) -> str:
+        """
+        Rule for the slope: steepest, raised or constant.
+        """
+    @property
+    def slope(self) -> float:
+        """
+        Largest slope of the line (steepest), or its slope (constant) [N/m or N*m/rad].
+        """
 class Scheme:
     """
     Structure that renders a model, with the numbers of the structure in SI units.
@@ -118,6 +160,7 @@ def virtual_friction(device: palpate._core.device.DeviceProfile) -> float:
     Returns the Coulomb friction of the virtual object that makes the steps of command and force
     sensor of an admittance display harmless [N or N*m].
     """
+cells_in_motion: int = 16
 compensated_share: float = 0.9
 fewest_encoder_steps_in_play: float = 4.0
 most_prediction_taps: int = 16

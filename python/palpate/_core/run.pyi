@@ -8,7 +8,7 @@ import palpate._core.model
 import palpate._core.rendering
 import palpate._core.stability
 import typing
-__all__: list[str] = ['LoopSettings', 'device_help', 'device_waits', 'measure', 'measured_device_help', 'render', 'smallest_domain_share', 'tolerated_change', 'transports', 'usual_telemetry_hz']
+__all__: list[str] = ['LoopSettings', 'device_help', 'device_waits', 'measure', 'measured_device_help', 'render', 'transports', 'usual_telemetry_hz']
 class LoopSettings:
     """
     Default rate, duration and least rate of a run.
@@ -67,7 +67,5 @@ def render(model: palpate._core.model.ForceModel, plan: palpate._core.rendering.
 device_help: str = 'simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND, moteus:BUS:NUMBER:KP or inverse3[:AXIS[@PORT]]; an MIT-mode drive of this KIND, such as damiao-4310, with a CAN NUMBER on a BUS such as can0; a moteus whose servo.pid_position.kp is KP in N*m/rev; AXIS is x, y, z, -x, -y or -z, PORT that of its service'
 device_waits: str = 'usb 5, mit 2, moteus 2, inverse3 20'
 measured_device_help: str = 'simulated, usb[:SERIAL], mit:BUS:NUMBER:KIND or moteus:BUS:NUMBER:KP; an MIT-mode drive of this KIND, such as damiao-4310, with a CAN NUMBER on a BUS such as can0; a moteus whose servo.pid_position.kp is KP in N*m/rev'
-smallest_domain_share: float = 0.1
-tolerated_change: float = 0.01
 transports: tuple = (('simulated', 'simulated', ''), ('usb', 'usb[:SERIAL]', ''), ('mit', 'mit:BUS:NUMBER:KIND', 'an MIT-mode drive of this KIND, such as damiao-4310, with a CAN NUMBER on a BUS such as can0'), ('moteus', 'moteus:BUS:NUMBER:KP', 'a moteus whose servo.pid_position.kp is KP in N*m/rev'), ('inverse3', 'inverse3[:AXIS[@PORT]]', 'AXIS is x, y, z, -x, -y or -z, PORT that of its service'))
 usual_telemetry_hz: float = 50.0

@@ -8,7 +8,7 @@ import palpate._core.device
 import palpate._core.model
 import palpate._core.rendering
 import typing
-__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'admittance_scheme', 'certify', 'certify_bounds', 'certify_with_account', 'device_difference', 'explicit_scheme', 'force_bounds', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'stiffest_hand', 'usual_coupling_share', 'with_force_error']
+__all__: list[str] = ['Certificate', 'ForceBounds', 'Inequality', 'admittance_scheme', 'certify', 'certify_bounds', 'certify_with_account', 'device_difference', 'explicit_scheme', 'fast_motion_energy', 'force_bounds', 'inner_need', 'line_for', 'narrowest_play', 'passive_shift', 'renderable_slopes', 'slope_behind_coupling', 'steepest_stick', 'stiffest_coupling', 'stiffest_hand', 'stiffest_line_wall', 'usual_coupling_share', 'with_force_error']
 class ForceBounds:
     """
     Proved bounds of a model's force and slope at all positions, inside and outside the domain.
@@ -322,6 +322,12 @@ def stiffest_hand(bounds: ForceBounds, scheme: palpate._core.rendering.Scheme, d
     """
     Returns the largest stiffness of a hand for which a scheme is proved on an admittance display,
     with the other limits of the hand unchanged [N/m or N*m/rad]; 0 if none is.
+    """
+def stiffest_line_wall(device: palpate._core.device.DeviceProfile, width: typing.SupportsFloat | typing.SupportsIndex, motion: typing.SupportsFloat | typing.SupportsIndex | None = None) -> float:
+    """
+    Returns the largest stiffness of a wall whose slope rises over `width`, f'(x) = K / (1 + exp(-x /
+    width)), that a held line renders, certified for motions up to `motion` in a period. None: certified
+    for every motion.
     """
 def with_force_error(certificate: Certificate, force_error: typing.SupportsFloat | typing.SupportsIndex) -> Certificate:
     """
