@@ -38,8 +38,8 @@ struct Preset {
     Ranges ranges;
 };
 
-/// Drives by name. Sources: Damiao, the table of PyPI damiao-motor 1.0.6; CubeMars, the table of the maker's AK series
-/// manual V1.0.15; RobStride, the table of PyPI robstride-dynamics 0.0.1. No number was tried on hardware.
+/// Drives by name. Sources: Damiao, the table of PyPI damiao-motor 1.0.6; CubeMars, from memory, not
+/// checked against the manual of the AK series; RobStride, the table of PyPI robstride-dynamics 0.0.1. No number was tried on hardware.
 inline constexpr std::array presets{
     Preset{"damiao-4310", Maker::Damiao, {12.5, 30.0, 10.0, 500.0, 5.0}},
     Preset{"damiao-4340", Maker::Damiao, {12.5, 10.0, 28.0, 500.0, 5.0}},
