@@ -139,7 +139,7 @@ std::vector<Input> inputs() {
 
 /// Most instructions of a tick, in the order of `all_variants`: 1.2 times the numbers counted with g++ 12.2, -O1, glibc
 /// 2.36 and the AVX-512 kernels, for all ticks of `inputs`. With -O3 a tick needs fewer.
-constexpr std::array<std::uint64_t, 18> most_instructions{
+constexpr std::array<std::uint64_t, 20> most_instructions{
     1080,   // direct, position
     1240,   // direct, hysteresis
     1190,   // direct, predicted
@@ -156,6 +156,8 @@ constexpr std::array<std::uint64_t, 18> most_instructions{
     3510,   // energy-consistent, position
     11730,  // energy-consistent, hysteresis
     15160,  // energy-consistent, compensated
+    940,    // tangent, position
+    1350,   // tangent, hysteresis
     1390,   // direct, velocity
     1330,   // direct, memory
 };
