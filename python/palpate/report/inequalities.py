@@ -71,6 +71,46 @@ MEANINGS = {
         "energy",
         "The energy account must be able to hold the largest force of the object at rest.",
     ),
+    "damping-line": (
+        "damping",
+        "The controller samples and delays the line that it holds, and the line differs from the force; both "
+        "feed energy into the handle, which the viscous damping of the device must absorb.",
+    ),
+    "friction-line": (
+        "force",
+        "Steps of the encoders and of the force feed energy into the handle; the Coulomb friction of the "
+        "device must absorb it.",
+    ),
+    "line-controller": ("", "The controller of the device must hold a line between two commands."),
+    "line-limit": (
+        "",
+        "The controller must limit the force of the line, because a limit in the host is late.",
+    ),
+    "line-delay": ("time", "No proof covers a delay with a line of this rule."),
+    "line-hysteresis": ("stiffness", "No proof covers hysteresis with a line of this rule."),
+    "line-stiffness": ("stiffness", "The controller must be able to hold the slope of the line."),
+    "line-watchdog": ("time", "The controller must not stop the force before the next command."),
+    "line-motion": (
+        "position",
+        "The motion in a period up to which the certificate holds must be one that the encoder can measure.",
+    ),
+    "admittance-structure": ("", "The object must have mass, and no coupling, because it moves the display."),
+    "admittance-damping": (
+        "damping",
+        "Delay, servo and integration feed energy into the hand; the damping of the object must absorb it, "
+        "for every hand of the profile.",
+    ),
+    "admittance-explicit-mass": (
+        "mass",
+        "The object must not have more damping than the mass can follow from one sample to the next.",
+    ),
+    "admittance-jitter": ("time", "No proof covers samples at unequal times on this kind of device."),
+    "admittance-mean": ("force", "No proof covers a periodic force that pushes to one side in the mean."),
+    "admittance-force-error": ("force", "No proof covers an error of the force on this kind of device."),
+    "admittance-velocity": (
+        "",
+        "No proof covers a force of velocity or with a memory on this kind of device.",
+    ),
     "account-renderer": ("rate", "A motor controller has no energy account."),
     "velocity-coupling": (
         "damping",
@@ -142,6 +182,14 @@ SYMBOLS = {
     "H": "response of the rendering to motion at one frequency",
     "z": "shift by one sample",
     "theta": "frequency in radians for each sample",
+    "kappa": "slope of the line that the controller holds",
+    "kappa_max": "largest slope of a line that the controller can hold",
+    "w": "largest motion in one period up to which the certificate holds",
+    "C": "steepest change of the slope of the force",
+    "T_in": "time between two samples of the controller",
+    "t_in": "delay of the controller from a sample to its force",
+    "t_w": "time after the last command at which the controller makes zero force",
+    "Delta_in": "step of the controller's encoder",
 }
 """Meaning of the symbols in the formulas of inequalities"""
 

@@ -155,5 +155,6 @@ def _unit(kind: str, position: str) -> str:
         "stiffness": f"{force}/{position}",
         "energy": "J",
         "rate": "Hz",
+        "time": "s",
     }
     return units.get(kind, "").replace("*", "·")

@@ -156,7 +156,7 @@ constexpr std::array<std::uint64_t, 20> most_instructions{
     3510,   // energy-consistent, position
     11730,  // energy-consistent, hysteresis
     15160,  // energy-consistent, compensated
-    940,    // tangent, position
+    940,    // tangent
     1350,   // tangent, hysteresis
     1390,   // direct, velocity
     1330,   // direct, memory

@@ -269,6 +269,7 @@ def test_defaults_and_names_equal_those_of_the_core() -> None:
         "implicit",
         "explicit",
         "energy-consistent",
+        "tangent",
     )
     scheme = Scheme()
     assert (scheme.structure, scheme.mass, scheme.object_damping) == ("massless", 0.001, 0.5)

@@ -143,7 +143,7 @@ struct LineNeed {
                device.delay_s, "use the rule raised or constant");
     }
     if (bounds.hysteresis && line.rule != SlopeRule::Steepest) {
-        refuse("line-hysteresis", "hysteresis h / r behind a line of another rule than steepest",
+        refuse("line-hysteresis", "hysteresis behind a line of another rule than steepest",
                "proved only for h / r = 0", bounds.hysteresis_per_play,
                "use direct rendering, or a device without delay");
     }
