@@ -4,7 +4,7 @@
     PALPATE_DATA=FOLDER python bench/plans/renderable_pairs.py --to docs [--every 1] [--models FOLDER]
 
 The objects are all key switches, domes and springs of the measured data, one recording each, whose model has
-not the verdict no. The devices are all example profiles in metres. Each pair is planned; nothing else is
+not the verdict no. The devices are all example profiles in metres that apply a force. Each pair is planned; nothing else is
 measured. --every 10 takes every tenth object. --models keeps the identified models for a further run.
 
 Prints the tables of FOLDER/renderable-pairs.md, writes them there if that page exists, and writes all numbers
@@ -143,7 +143,7 @@ def main() -> int:
     if options.models is not None:
         options.models.mkdir(parents=True, exist_ok=True)
     profiles = [DeviceProfile.load(file) for file, _ in example_profiles().values()]
-    devices = [device for device in profiles if device.position_unit == "m"]
+    devices = [each for each in profiles if each.position_unit == "m" and each.admittance is None]
     pairs, omitted = [], []
     for kind, file in recordings(folder)[:: options.every]:
         model = model_of(file, options.models)
