@@ -5,7 +5,8 @@
 
 The objects are all key switches, domes and springs of the measured data, one recording each, whose model has
 not the verdict no. The devices are all example profiles in metres that apply a force. Each pair is planned;
-nothing else is measured. --every 10 takes every tenth object. --models keeps the identified models for a further run.
+nothing else is measured. --every 10 takes every tenth object. --models keeps the identified models for a
+further run.
 
 Prints the tables of FOLDER/renderable-pairs.md, writes them there if that page exists, and writes all numbers
 to FOLDER/figures/renderable-pairs.json.
