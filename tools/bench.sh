@@ -62,7 +62,7 @@ limits/failure_maps.py --to $to --points $(awk -v scale="$scale" 'BEGIN { print 
 limits/prediction.py --to $to
 rivals/rivals.py --to $to
 plans/on_device_stiffness.py --to $to
-plans/held_lines.py --to $to
+plans/held_lines.py --to $to $([ "$at_once" -gt 1 ] && echo --devices 1)
 portable/cost.py --to $to --json build/bench/portable_cost.json
 plans/plan_against_trial.py --to $to --grid $(awk -v scale="$scale" 'BEGIN { print scale < 0.1 ? 0 : 4 }')
 END

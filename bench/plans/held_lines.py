@@ -189,8 +189,9 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--to", type=Path, required=True)
+    parser.add_argument("--devices", type=int, metavar="N", help="Only the first N devices; default: all.")
     options = parser.parse_args()
-    rows = [walls(name, device) for name, device in devices()]
+    rows = [walls(name, device) for name, device in [*devices()][: options.devices]]
     found = errors()
     filled = tables(rows, found)
     print("\n\n".join(filled.values()))
