@@ -39,7 +39,7 @@ def test_all_verbs_without_a_device_work_on_another_system(tmp_path: Path) -> No
         assert done.returncode == 0, (arguments, done.stderr, done.stdout)
 
 
-@pytest.mark.parametrize("verb", ["render", "record", "check-device"])
+@pytest.mark.parametrize("verb", ["render", "record", "devices", "check-device"])
 def test_live_control_is_refused_in_one_sentence(
     verb: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -35,7 +35,7 @@ _VERBS = {
 }
 """Verbs with their lines in the help. The file of a verb is imported only when the verb is used."""
 
-_LIVE_VERBS = ("render", "record", "check-device")
+_LIVE_VERBS = ("render", "record", "devices", "check-device")
 """Verbs that control a device in real time."""
 
 

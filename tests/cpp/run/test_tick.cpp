@@ -140,26 +140,26 @@ std::vector<Input> inputs() {
 /// Most instructions of a tick, in the order of `all_variants`: 1.2 times the numbers counted with g++ 12.2, -O1, glibc
 /// 2.36 and the AVX-512 kernels, for all ticks of `inputs`. With -O3 a tick needs fewer.
 constexpr std::array<std::uint64_t, 20> most_instructions{
-    1710,   // direct, position
-    1540,   // direct, hysteresis
-    1250,   // direct, predicted
-    1720,   // direct, predicted hysteresis
-    1520,   // massless, position
+    1670,   // direct, position
+    1520,   // direct, hysteresis
+    1190,   // direct, predicted
+    1690,   // direct, predicted hysteresis
+    1480,   // massless, position
     4770,   // massless, hysteresis
-    2750,   // massless, compensated
-    1870,   // implicit, position
-    6910,   // implicit, hysteresis
-    2210,   // implicit, compensated
-    1150,   // explicit, position
-    1990,   // explicit, hysteresis
-    3000,   // explicit, compensated
-    4450,   // energy-consistent, position
-    12250,  // energy-consistent, hysteresis
-    15550,  // energy-consistent, compensated
+    2450,   // massless, compensated
+    1850,   // implicit, position
+    6380,   // implicit, hysteresis
+    1830,   // implicit, compensated
+    1080,   // explicit, position
+    1690,   // explicit, hysteresis
+    2750,   // explicit, compensated
+    4430,   // energy-consistent, position
+    11730,  // energy-consistent, hysteresis
+    15160,  // energy-consistent, compensated
     940,    // tangent
     1350,   // tangent, hysteresis
-    1640,   // direct, velocity
-    1640,   // direct, memory
+    1390,   // direct, velocity
+    1620,   // direct, memory
 };
 
 // A tick must end in time for every reading, so its number of instructions is bounded.

@@ -23,6 +23,11 @@ inline constexpr int longest_delay_samples = 16;
     return longest_delay_samples * period_s * (1.0 + 1e-9);
 }
 
+/// Returns the number of whole periods in a delay. A remainder below 1e-9 of a period counts as rounding.
+[[nodiscard]] inline int whole_periods(double delay_s, double period_s) noexcept {
+    return static_cast<int>(std::floor(delay_s / period_s + 1e-9));
+}
+
 /// Timing of a model that runs on the motor controller of a device instead of on the host. A profile without these
 /// numbers gets the defaults: a controller applies a force one period after the sample, with an interrupt of a hardware
 /// timer.
@@ -163,10 +168,8 @@ struct DeviceProfile {
     /// Returns the longest time between two samples, T plus jitter [s]. A certificate must hold for this time.
     [[nodiscard]] double longest_period_s() const noexcept { return period_s + jitter_s; }
 
-    /// Returns n, the number of whole periods in the delay. A remainder below 1e-9 of a period counts as rounding.
-    [[nodiscard]] int whole_delay_samples() const noexcept {
-        return static_cast<int>(std::floor(delay_s / period_s + 1e-9));
-    }
+    /// Returns n, the number of whole periods in the delay.
+    [[nodiscard]] int whole_delay_samples() const noexcept { return whole_periods(delay_s, period_s); }
     /// Returns the part of the delay that remains after n whole periods T, divided by T: 0 <= result < 1.
     [[nodiscard]] double delay_fraction() const noexcept {
         const double rest = delay_s / period_s - whole_delay_samples();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include "palpate/guard/energy_account.hpp"
 #include "palpate/guard/guard_settings.hpp"
@@ -28,11 +29,11 @@ struct Guards {
     ForceLimit limit{};
     /// Detects limit cycles; after each limit cycle, all forces are multiplied by a smaller factor
     LimitCycleDetector limit_cycle{};
-    ForceRamp ramp{};                   ///< start ramp: increases the force from zero
-    SlewLimit slew{};                   ///< limits the change of the force from tick to tick
-    LineWork line_work{};               ///< computes the work of a held line
-    EnergyAccount account{};            ///< limits the energy that a hand can take out
-    ReadMotion motion{};                ///< computes the motion of the handle for the sums of energy
+    ForceRamp ramp{};                     ///< start ramp: increases the force from zero
+    SlewLimit slew{};                     ///< limits the change of the force from tick to tick
+    std::optional<LineWork> line_work{};  ///< computes the work of a held line; absent for held forces
+    EnergyAccount account{};              ///< limits the energy that a hand can take out
+    ReadMotion motion{};                  ///< computes the motion of the handle for the sums of energy
     PassivityObserver ramp_observer{};  ///< sums the energy that the rendering absorbs during the start ramp
     PassivityObserver observer{};       ///< sums the energy that the rendering absorbs after the start ramp
 };
@@ -123,10 +124,7 @@ struct Guards {
     guards.slew = slew_limit(settings, period_s);
     guards.motion = ReadMotion{settings.certified ? settings.encoder_step : 0.0};
     if (holds_line(scheme.structure)) {
-        DeviceProfile timing;
-        timing.period_s = period_s;
-        timing.delay_s = settings.delay_s;
-        guards.line_work = LineWork{timing.whole_delay_samples()};
+        guards.line_work = LineWork{whole_periods(settings.delay_s, period_s)};
         if (scheme.line && scheme.line->motion) {
             // The motion of the handle can be larger than that of the readings by an encoder step
             guards.reading = reading_guard(settings, period_s, *scheme.line->motion - settings.encoder_step);

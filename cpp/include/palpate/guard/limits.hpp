@@ -73,17 +73,19 @@ struct ForceRamp {
     /// Returns true if the start ramp has ended, so that forces are not scaled.
     [[nodiscard]] bool is_over() const noexcept { return done >= ticks; }
 
-    /// Returns the factor of the start ramp for this tick, from 0 to 1.
-    [[nodiscard]] double factor() const noexcept {
-        return is_over() ? 1.0 : static_cast<double>(done) / static_cast<double>(ticks);
+    /// Returns the share of the start ramp that has passed.
+    [[nodiscard]] double passed() const noexcept {
+        return static_cast<double>(done) / static_cast<double>(ticks);
     }
+    /// Returns the factor of the start ramp for this tick, from 0 to 1.
+    [[nodiscard]] double factor() const noexcept { return is_over() ? 1.0 : passed(); }
 
     /// Multiplies the force by the factor of the start ramp for this tick.
     [[nodiscard]] Status apply(double& force) noexcept {
         if (is_over()) {
             return Status::Ok;
         }
-        force *= factor();
+        force *= passed();
         ++done;
         return Status::Ramp;
     }

@@ -64,7 +64,9 @@ class Controller {
         }
         guards_.slew.sent(tick.command.force);
         guards_.account.sent(tick.command.force);
-        guards_.line_work.sent(tick.command.stiffness);
+        if (guards_.line_work) {
+            guards_.line_work->sent(tick.command.stiffness);
+        }
         reading_ = device_.exchange(tick.command);
         return tick;
     }
@@ -92,7 +94,10 @@ class Controller {
     void observe(double object) noexcept {
         const double moved = guards_.motion.to(reading_.position);
         guards_.account.visit(reading_.position, object);
-        const double applied = guards_.line_work.mean(reading_.applied, moved);
+        double applied = reading_.applied;
+        if (guards_.line_work) {
+            applied = guards_.line_work->mean(applied, moved);
+        }
         guards_.account.book(applied, moved);
         if (std::isfinite(moved * applied)) {
             (guards_.ramp.is_over() ? guards_.observer : guards_.ramp_observer).book(applied, moved);
@@ -102,33 +107,26 @@ class Controller {
     /// Applies the guards to the force in this order: force limit, scaling after a limit cycle, start ramp, slew limit,
     /// energy account. The force limit comes first: a force that is clipped and then scaled is passive, but a force of a
     /// periodic model that is scaled and then clipped can be active. The force limit also replaces numbers that are not
-    /// finite. A failed step sends zero force at once: the limits of its change do not apply. Factors of the force also
-    /// multiply the stiffness of a line. The last two guards limit a constant force, so a force that they change is held.
+    /// finite. A failed step sends zero force at once: the limits of its change do not apply. The last two guards limit a constant force, so a force that they change is held.
     [[nodiscard]] Status limit_force(const Rendered& rendered, Command& line,
                                      Status reading_status) noexcept {
-        line = {rendered.force, rendered.environment_position, rendered.stiffness};
-        double& force = line.force;
-        const Status limited =
-            rendered.stiffness == 0.0 ? guards_.limit.apply(force) : guards_.limit.apply(line);
+        line.force = rendered.force;
+        const bool is_line = rendered.stiffness != 0.0;
+        const Status limited = is_line ? limit_line(rendered, line) : guards_.limit.apply(line.force);
         for (const Status failed : {rendered.status, limited}) {
             if (!sends_force(failed)) {
                 line = {};
                 return failed;
             }
         }
-        const Status cycle_scaled = guards_.limit_cycle.apply(force);
-        line.stiffness *= guards_.limit_cycle.scale();
-        line.stiffness *= guards_.ramp.factor();
-        const Status ramped = guards_.ramp.apply(force);
-        const Status slewed = guards_.slew.apply(force);
-        const Status energy_limited = guards_.account.apply(force);
-        if (slewed != Status::Ok || energy_limited != Status::Ok) {
-            line.stiffness = 0.0;
+        const Status cycle_scaled = guards_.limit_cycle.apply(line.force);
+        const Status ramped = guards_.ramp.apply(line.force);
+        const Status slewed = guards_.slew.apply(line.force);
+        const Status energy_limited = guards_.account.apply(line.force);
+        if (is_line && (slewed != Status::Ok || energy_limited != Status::Ok || line.stiffness == 0.0)) {
+            line.position = line.stiffness = 0.0;
         }
-        if (line.stiffness == 0.0) {
-            line.position = 0.0;
-        }
-        guards_.limit_cycle.watch(reading_.position, force);
+        guards_.limit_cycle.watch(reading_.position, line.force);
         // The first status in this list that is not Ok is reported; the energy account comes before the force limit.
         for (const Status status : {rendered.status, ramped, energy_limited, cycle_scaled, limited, slewed}) {
             if (status != Status::Ok) {
@@ -136,6 +134,15 @@ class Controller {
             }
         }
         return reading_status;
+    }
+
+    /// Makes the line of a structure the command, within the force limit; factors of the force also multiply its slope.
+    [[nodiscard]] Status limit_line(const Rendered& rendered, Command& line) const noexcept {
+        line = {rendered.force, rendered.environment_position, rendered.stiffness};
+        const Status limited = guards_.limit.apply(line);
+        line.stiffness *= guards_.limit_cycle.scale();
+        line.stiffness *= guards_.ramp.factor();
+        return limited;
     }
 
     D& device_;

@@ -12,19 +12,14 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/device/mit_device.hpp"
+#include "palpate/device/moteus_device.hpp"
 #include "palpate/fields/readable.hpp"
 #include "palpate/run/live_device.hpp"
 #include "palpate/run/measure.hpp"
 #include "palpate/run/render.hpp"
 
-#ifdef __linux__
-#include "palpate/device/mit_device.hpp"
-#include "palpate/device/moteus_device.hpp"
-#endif
-
 namespace palpate {
-
-#ifdef __linux__
 
 namespace detail {
 
@@ -186,27 +181,5 @@ template <class Protocol>
         options.force_limit.value_or(std::min(ProbeSettings{}.force_limit, live->profile.force_limit));
     return live;
 }
-
-#else
-
-/// Placeholder of the MIT mode on a system without CAN.
-struct MitProtocol {};
-/// Placeholder of the registers of a moteus on a system without CAN.
-struct MoteusProtocol {};
-
-/// Throws std::invalid_argument, because CAN needs Linux.
-template <class Protocol>
-[[nodiscard]] std::unique_ptr<LiveDevice> open_can(const RenderOptions& options,
-                                                   const PlannedModel& /*model*/) {
-    refuse("device " + options.device + ": CAN needs Linux");
-}
-
-/// Throws std::invalid_argument, because CAN needs Linux.
-template <class Protocol>
-[[nodiscard]] std::unique_ptr<LiveDevice> can_to_measure(MeasureOptions& options) {
-    refuse("device " + options.device + ": CAN needs Linux");
-}
-
-#endif
 
 }  // namespace palpate
