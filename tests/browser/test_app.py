@@ -273,6 +273,18 @@ def test_stop_ends_a_started_device_with_zero_force(app: App, recording: Path) -
     assert app.download("felt", "knob-felt.csv").startswith(b"#")
 
 
+@needs_control
+def test_a_run_that_ends_before_the_page_asks_is_shown(app: App, recording: Path) -> None:
+    app.after(app.page.drop, recording)
+    app.click("#identify")
+    app.after(app.page.choose, "device", "bench-knob")
+    app.page.run("document.getElementById('connection').add(new Option('usb:missing'))")
+    app.page.choose("connection", "usb:missing")  # there is none with this number, so the run ends at once
+    app.page.click("#start")
+    app.page.wait("document.getElementById('part-feel').textContent.includes('Last run')")
+    assert app.page.run("!document.getElementById('start').disabled")
+
+
 def test_a_dragged_peak_makes_an_edited_object_that_is_compared_with_the_first(
     app: App, tmp_path: Path
 ) -> None:

@@ -109,7 +109,7 @@
   });
 
   // The cursor is where the handle is: of the simulated rendering that is played, or of the running device.
-  let playing = false, running = false;
+  let playing = false, running = false, endings = null;
   function moveTo(x, y) {
     for (const { model } of drawn.feel?.views.roots ?? []) {
       for (const each of model.references()) {
@@ -137,11 +137,11 @@
   }
   async function pulse() {
     try {
-      const { progress, running: now, ended: how, at } = await (await fetch("pulse")).json();
+      const { progress, running: now, ended: how, endings: count, at } = await (await fetch("pulse")).json();
       if (progress) say(progress);
       if (now && at) { moveTo(...at); say("The device is running"); }
-      if (running && !now) { say(`The device has stopped: ${how}`); act("refresh"); }
-      running = now;
+      if (count !== (endings ?? count)) { say(`The device has stopped: ${how}`); act("refresh"); }
+      [running, endings] = [now, count];
     } catch (error) {
       say(ENDED);
     }

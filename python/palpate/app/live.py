@@ -66,6 +66,8 @@ class Live:
     def __init__(self) -> None:
         self.ended = ""
         """Last line of a program that has ended, as a sentence for the page"""
+        self.endings = 0
+        """Number of runs that have ended; a short one begins and ends between two requests of the page"""
         self._process: subprocess.Popen[str] | None = None
         self._socket: socket.socket | None = None
         self._seen_s = 0.0
@@ -147,3 +149,4 @@ class Live:
         self._socket = None
         listening.close()
         self.ended = (ending or lines or ["the program has ended"])[0]
+        self.endings += 1

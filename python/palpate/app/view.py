@@ -332,6 +332,7 @@ class View:
             "progress": self.session.command_line.progress,
             "running": live.is_running,
             "ended": live.ended,
+            "endings": live.endings,
         }
         if tick and isinstance(recording, Recording):
             axes = Axes.of(recording)
