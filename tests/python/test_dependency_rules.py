@@ -18,8 +18,7 @@ COMMON = {"errors", "arguments", "system", "verdict", "html_table", "_typing", "
 # Modules of the package, lowest first: a module may import the modules that are listed before it.
 MODULE_ORDER = ["recording", "model", "identification", "verification", "planning", "devices", "cli"]
 
-# Modules of the package that may import any module except cli; only the module cli imports them. A method
-# `plot` may also import `plotting`, which draws its object.
+# Modules of the package that may import any module except cli; only the module cli imports them.
 SIDE_MODULES = {"plotting", "baselines", "report", "export", "app"}
 
 # A report uses the units, labels and strokes of plotting; the page uses these, reports and exports.
@@ -111,22 +110,12 @@ def module_of(path: Path) -> str:
 def imported_modules(path: Path) -> set[str]:
     """Returns the modules of the package that a file imports, imports within functions included.
 
-    The package itself, which exports names of all modules, is ".". The import of `plotting` in a method
-    `plot` is left out.
+    The package itself, which exports names of all modules, is ".".
     """
     package_parts = ("palpate", *path.relative_to(PACKAGE).parts[:-1])
     found = set()
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    drawing = {
-        id(node)
-        for method in ast.walk(tree)
-        if isinstance(method, ast.FunctionDef) and method.name == "plot"
-        for node in ast.walk(method)
-        if isinstance(node, ast.ImportFrom) and node.level and node.module == "plotting"
-    }
     for node in ast.walk(tree):
-        if id(node) in drawing:
-            continue
         targets: list[tuple[str, ...]] = []
         if isinstance(node, ast.Import):
             targets = [tuple(alias.name.split(".")) for alias in node.names]

@@ -74,14 +74,12 @@ def test_a_module_of_scipy_is_loaded_by_its_first_use(path: Path) -> None:
 
 
 def imported_modules(path: Path, all_modules: set[str]) -> set[str]:
-    """Returns the modules of palpate that a file imports when it is loaded, except for type checking."""
+    """Returns the modules of palpate that a file imports, in functions too, except for type checking."""
     pending: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
     modules = set()
     while pending:
         node = pending.pop()
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
-            continue
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             continue
         if isinstance(node, (ast.Import, ast.ImportFrom)):
             for target in targets_of(path, node):

@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +26,6 @@ from ..verdict import Verdict
 from .band import Band
 from .model_display import frame_of, html_of
 from .model_file import Fit, PathStep, describe, memory_record, terms_of, write_json
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _HELD_OUT_KEY = "held_out_every"
 """Key in the notes of a model file whose value is k if every k-th row of the recordings was held out."""
@@ -432,25 +429,6 @@ class Model(ForceModel):
         harmonics, the columns order and phase_rad follow; the order of a wavelet is 0.
         """
         return frame_of(self)
-
-    def plot(self, ax: Axes | None = None, *, label: str = "model", color: str = "black") -> Axes:
-        """Draws the force over the domain and returns the axes.
-
-        A model with hysteresis has one curve for press and one for release. A model with further inputs has
-        one curve for their least, middle and largest values.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw on; by default those of a new figure.
-        label, color : str
-            Name and colour of the curves, to draw several models on the same axes.
-        """
-        from ..plotting import axes_or_new, draw_model
-
-        axes = axes_or_new(ax)
-        draw_model(axes, self, label=label, color=color)
-        return axes
 
     def _repr_html_(self) -> str:
         return html_of(self)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -39,9 +39,6 @@ from ..model.model_file import CONTINUATIONS, certificate_record
 from ..model.steepest_slope import SteepestSlope
 from ..verdict import FORCE_FLOOR, Finding, Verdict, no, usable
 from .device_profile import mechanical_units
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 PLAN_WORDS = {
     "certified": "proved",
@@ -424,20 +421,6 @@ class Plan:
             force = strokes(self.model, x)
             return x, force, force
         return x, strokes(self.model, x), _at_rest(self.rendered, self.scheme, x)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the identified force and the force that a hand at rest feels, and returns the axes.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw on; by default those of a new figure.
-        """
-        from ..plotting import axes_or_new, draw_plan
-
-        axes = axes_or_new(ax)
-        draw_plan(axes, self)
-        return axes
 
     def _repr_html_(self) -> str:
         rows = {"structure": self.description} if self.certificate is None else self.summary()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures: each function draws on axes of the caller. The command line and the methods `plot` use them."""
+"""Figures: each function draws on axes of the caller. `plot` chooses one by the type of its argument."""
 
 from .analysis import draw_force_history, draw_spectrum, draw_transform, draw_views
 from .frame import draw_frame_bounds, draw_frame_grid
@@ -12,6 +12,7 @@ from .models import (
     draw_residual,
     draw_two_models,
 )
+from .plot import plot
 from .recordings import draw_recording
 from .rendering import draw_plan, draw_real_against_rendered, draw_root_locus, draw_structures
 from .transforms import History, Plane, history_of, power_spectrum, short_time_transform, wavelet_transform
@@ -38,6 +39,7 @@ __all__ = [
     "draw_two_models",
     "draw_views",
     "history_of",
+    "plot",
     "power_spectrum",
     "short_time_transform",
     "wavelet_transform",

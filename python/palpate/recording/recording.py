@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,9 +27,6 @@ from .motion import cycles_of
 from .roles import informative
 from .table import FRAME, Cells, FrameTable, python_arguments
 from .units import FORCE_UNITS, POSITION_UNITS, Unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 T = TypeVar("T")
 
@@ -417,20 +414,6 @@ class Recording:
         frame.attrs.update(self.metadata)
         frame.attrs.update(layout.record())
         return frame
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws force over position, press and release with different dots, and returns the axes.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw on; by default those of a new figure.
-        """
-        from ..plotting import axes_or_new, draw_recording
-
-        axes = axes_or_new(ax)
-        draw_recording(axes, self)
-        return axes
 
     def _repr_html_(self) -> str:
         return html_of(self)

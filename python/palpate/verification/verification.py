@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -40,9 +39,6 @@ from .metrics import (
     share_within_stiffness_jnd,
 )
 from .prediction import Prediction, flight_of, predict
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 FEW_OUTSIDE = 0.01
 """Share of rows outside the model's domain above which the result is usable with a reservation [-]."""
@@ -172,27 +168,6 @@ class Verification:
         for stem, values in (("modelled_force", self.force), ("residual", self.residual)):
             frame[free_name(stem, f"_{suffix}" if suffix else "", frame.columns)] = values
         return frame
-
-    def plot(self, ax: Axes | None = None, *, residual: bool = False) -> Axes:
-        """Draws recorded and modelled force over position, or their difference, and returns the axes.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw on; by default those of a new figure.
-        residual : bool
-            True draws the residual, recorded minus modelled force.
-        """
-        from ..plotting import axes_or_new, draw_forces, draw_residual
-
-        axes, recording = axes_or_new(ax), self.compared
-        if residual:
-            draw_residual(axes, recording, self.force, band=self.band)
-        else:
-            one_curve = not self.prediction.over_time
-            one_curve &= self.prediction.side is None or recording.direction is not None
-            draw_forces(axes, recording, self.force, one_curve=one_curve)
-        return axes
 
     def _repr_html_(self) -> str:
         recording = self.compared

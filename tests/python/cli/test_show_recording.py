@@ -13,6 +13,7 @@ import pytest
 from models_by_hand import model_by_hand
 from palpate import Recording, read_recording
 from palpate.cli.main import main
+from palpate.plotting import plot
 from palpate.recording.sample import sample_recording
 
 
@@ -215,7 +216,7 @@ def test_the_roles_of_the_rows_are_printed(tmp_path: Path, capsys: pytest.Captur
 
 
 def test_rows_of_each_role_have_a_colour(tmp_path: Path) -> None:
-    axes = read_recording(waiting(tmp_path / "held.csv")).plot()
+    axes = plot(read_recording(waiting(tmp_path / "held.csv")))
     dots = {str(line.get_label()): line for line in axes.get_lines()}
     assert list(dots) == ["recorded", "approach", "wait in contact"]
     assert len({line.get_color() for line in dots.values()}) == 3

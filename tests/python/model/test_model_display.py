@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from models_by_hand import keyswitch_by_hand, model_by_hand
 from palpate import InputError, Model
+from palpate.plotting import plot
 
 
 def two_inputs() -> Model:
@@ -67,7 +68,7 @@ def labels(axes: Axes) -> list[str]:
 def test_plot_draws_press_and_release_on_the_given_axes() -> None:
     given = Figure().subplots()
     model = keyswitch_by_hand()
-    assert model.plot(given) is given
+    assert plot(model, given) is given
     assert labels(given) == ["model, press", "model, release"]
     press = given.lines[0]
     assert np.asarray(press.get_xdata())[-1] == pytest.approx(4.0)
@@ -78,16 +79,16 @@ def test_plot_draws_press_and_release_on_the_given_axes() -> None:
 def test_plot_of_several_inputs_has_a_curve_for_least_middle_and_largest_values() -> None:
     given = Figure().subplots()
     model = two_inputs()
-    model.plot(given)
+    plot(model, given)
     assert labels(given) == ["model, lateral_m 0", "model, lateral_m 0.25", "model, lateral_m 0.5"]
     assert np.asarray(given.lines[1].get_ydata())[0] == model.predict([[0.0, 0.25]])[0]
 
 
 def test_two_models_on_the_same_axes_have_their_names_and_colours() -> None:
     given = Figure().subplots()
-    model_by_hand().plot(given, label="first")
+    plot(model_by_hand(), given, label="first")
     assert given.get_legend() is None
-    model_by_hand(bias=1.0).plot(given, label="second", color="red")
+    plot(model_by_hand(bias=1.0), given, label="second", color="red")
     assert labels(given) == ["first", "second"]
     assert [line.get_color() for line in given.lines] == ["black", "red"]
     assert given.get_legend() is not None
@@ -97,14 +98,14 @@ def test_plot_without_axes_makes_a_figure(monkeypatch: pytest.MonkeyPatch) -> No
     import matplotlib.pyplot as plt
 
     plt.switch_backend("Agg")
-    axes = model_by_hand().plot()
+    axes = plot(model_by_hand())
     assert axes.figure in [plt.figure(number) for number in plt.get_fignums()]
     plt.close(axes.figure)  # type: ignore[arg-type]
 
 
 def test_plot_refuses_another_object_than_axes() -> None:
     with pytest.raises(InputError, match=r"ax is 'red'; it must be a Axes: leave it out"):
-        model_by_hand().plot("red")  # type: ignore[arg-type]
+        plot(model_by_hand(), "red")  # type: ignore[arg-type]
 
 
 def test_html_begins_with_the_verdict_and_its_reasons() -> None:

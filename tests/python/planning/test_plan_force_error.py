@@ -32,6 +32,7 @@ from palpate._core.model import fingerprint
 from palpate.cli.main import main
 from palpate.planning import OnDevice, example_profiles
 from palpate.planning.device_profile import find_profile
+from palpate.plotting import plot
 from test_plan import SMOOTH, WEAK, slide
 
 
@@ -380,12 +381,12 @@ def test_plot_of_a_plan_draws_identified_and_rendered_force_at_rest() -> None:
     model = model_by_hand()
     soft = Plan(model, Scheme(structure="massless", coupling_stiffness=20.0))
     axes = Figure().subplots()
-    assert soft.plot(axes) is axes
+    assert plot(soft, axes) is axes
     identified, rendered = (np.asarray(line.get_ydata()) for line in axes.lines)
     assert np.abs(rendered - identified).max() == pytest.approx(soft.force_error.largest, rel=1e-12)
     assert axes.get_ylabel() == "force [N·m]"
     strokes = Figure().subplots()
-    Plan(keyswitch_by_hand(), Scheme(structure="direct", play_radius=1e-5)).plot(strokes)
+    plot(Plan(keyswitch_by_hand(), Scheme(structure="direct", play_radius=1e-5)), strokes)
     names = [str(line.get_label()) for line in strokes.lines]
     assert names == [
         "identified, press",

@@ -17,6 +17,7 @@ from palpate import DeviceProfile, InputError, Model, Plan, Scheme, load_model, 
 from palpate._core.rendering import structure_names
 from palpate.cli.main import main
 from palpate.planning import force_at, force_error, rig_for
+from palpate.plotting import plot
 
 KNOB = DeviceProfile(id="knob", coulomb_friction=0.02)
 # Certificates for this knob allow periods up to 0.1 s, so that a busy machine keeps this limit.
@@ -157,4 +158,4 @@ def test_a_plan_of_a_force_of_velocity_is_shown_and_drawn_at_rest() -> None:
     assert identified[0, 500] == model.predict([[position[500], 0.0]])[0]
     assert "<svg" in chosen._repr_html_()
     axes = Figure().subplots()
-    assert chosen.plot(axes) is axes
+    assert plot(chosen, axes) is axes

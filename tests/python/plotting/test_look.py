@@ -6,6 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from palpate import InputError, Recording
+from palpate.plotting import plot
 from palpate.plotting.look import MOST_POINTS, label, scale_for, strokes, thinned
 
 
@@ -60,8 +61,8 @@ def test_curves_on_the_same_axes_have_the_same_scale() -> None:
     axes = Figure().subplots()
     small = Recording.from_arrays([0.0, 0.01, 0.09], [0.0, 0.01, 0.09], units={"position": "m", "force": "N"})
     large = Recording.from_arrays([0.0, 0.1, 0.9], [0.0, 0.1, 0.9], units={"position": "m", "force": "N"})
-    small.plot(axes)
-    large.plot(axes)
+    plot(small, axes)
+    plot(large, axes)
     assert axes.get_xlabel() == "position [mm]"
     assert axes.get_ylabel() == "force [mN]"
     assert np.asarray(axes.lines[1].get_xdata())[-1] == 900.0
@@ -69,4 +70,4 @@ def test_curves_on_the_same_axes_have_the_same_scale() -> None:
         [0.0, 0.1, 0.9], [0.0, 0.1, 0.9], units={"position": "rad", "force": "N*m"}
     )
     with pytest.raises(InputError, match="ax already shows values in m, and these are in rad"):
-        torque.plot(axes)
+        plot(torque, axes)

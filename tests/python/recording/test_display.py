@@ -9,6 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from palpate import Recording, read_recording
+from palpate.plotting import plot
 from palpate.recording.sample import sample_recording
 
 N = 40
@@ -86,7 +87,7 @@ def test_a_frame_does_not_share_memory_with_its_recording() -> None:
 
 def test_plot_draws_on_the_given_axes_with_units() -> None:
     given = Figure().subplots()
-    axes = recordings()["everything"].plot(given)
+    axes = plot(recordings()["everything"], given)
     assert axes is given
     assert axes.get_xlabel() == "position [mm]"
     assert axes.get_ylabel() == "force [N]"

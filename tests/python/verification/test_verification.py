@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from imperfect import press_and_release
 from palpate import InputError, Model, Recording, identify, load_model, read_recording, verify
 from palpate.model import Fit
+from palpate.plotting import plot
 from palpate.recording import Source, sample_recording
 from palpate.recording.units import Unit
 from palpate.verification import compare
@@ -372,8 +373,8 @@ def test_plot_of_a_verification_draws_forces_or_residuals() -> None:
     recording = sample_recording(2, 2.0)
     found = verify(identify(sample_recording(1, 5.0)), recording)
     forces, residuals = Figure().subplots(2)
-    assert found.plot(forces) is forces
-    found.plot(residuals, residual=True)
+    assert plot(found, forces) is forces
+    plot(found, residuals, residual=True)
     assert forces.get_xlabel() == residuals.get_xlabel() == "position [rad]"
     assert (forces.get_ylabel(), residuals.get_ylabel()) == ("force [N·m]", "residual [mN·m]")
     drawn = 1e-3 * np.asarray(residuals.lines[0].get_ydata())
