@@ -6,7 +6,7 @@ with undo; `view` makes the HTML of the page, `charts` its charts; `server` list
 """
 
 from .server import serve
-from .session import Session
+from .session import Session, StoppedError
 from .state import Option, OptionTable, words_of
 
-__all__ = ["Option", "OptionTable", "Session", "serve", "words_of"]
+__all__ = ["Option", "OptionTable", "Session", "StoppedError", "serve", "words_of"]

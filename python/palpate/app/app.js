@@ -138,6 +138,7 @@
   async function pulse() {
     try {
       const { progress, running: now, ended: how, endings: count, at } = await (await fetch("pulse")).json();
+      element("stop-identification").hidden = !progress;
       if (progress) say(progress);
       if (now && at) { moveTo(...at); say("The device is running"); }
       if (count !== (endings ?? count)) { say(`The device has stopped: ${how}`); act("refresh"); }
@@ -166,6 +167,8 @@
     } else if ("stop" in button.dataset) {  // does not wait for other requests
       const { refused } = await (await fetch("stop", { method: "POST" })).json();
       if (refused) refuse(refused);
+    } else if ("stopIdentification" in button.dataset) {
+      await fetch("stop-identification", { method: "POST" });
     } else if (button.dataset.copy) {
       await navigator.clipboard.writeText(element(button.dataset.copy).textContent.trim());
       say("Copied");

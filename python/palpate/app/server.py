@@ -21,7 +21,7 @@ from urllib.parse import quote
 import click
 
 from ..errors import InputError
-from .session import File, Session, sentence_of
+from .session import File, Session, StoppedError, sentence_of
 from .view import View
 
 ADDRESS = "127.0.0.1"
@@ -119,7 +119,7 @@ class Server:
     def answer(self, work: Callable[[], None], known: Collection[str] = ()) -> dict[str, Any]:
         """Does some work and returns the parts of the page, without the charts that it knows.
 
-        A refusal of the work is one of the parts.
+        A refusal of the work is one of the parts. Work that the user stops leaves the state before it.
         """
         with self.session.lock:
             message = ""
@@ -127,7 +127,12 @@ class Server:
                 work()
             except (ValueError, click.ClickException, OSError) as error:
                 message = sentence_of(error)
-            return self.view.answer(known, message)
+            while True:
+                try:
+                    return self.view.answer(known, message)
+                except StoppedError as stopped:
+                    self.session.undo()
+                    message = str(stopped)
 
     def acted(self, body: bytes) -> dict[str, Any]:
         """Does the action in the body of a request and returns the parts of the page."""
@@ -145,6 +150,11 @@ class Server:
         except InputError as error:
             return {"refused": sentence_of(error)}
         return {"refused": ""}
+
+    def identification_stopped(self) -> dict[str, str]:
+        """Stops a running identification; the request that waits for it tells the page."""
+        self.session.command_line.stop_identification()
+        return {}
 
     def exported(self, kind: str) -> File:
         """Returns a file for the downloads of the browser."""
@@ -198,6 +208,8 @@ def _handler(server: Server) -> Any:
                 self.finish(await in_thread(lambda: server.added(name, body)))
             elif path == "stop":  # does not wait for other work
                 self.finish(await in_thread(server.stopped))
+            elif path == "stop-identification":
+                self.finish(server.identification_stopped())
             elif path == "start":
                 device = self.get_query_argument("device")
                 self.finish(await in_thread(lambda: server.answer(lambda: server.session.start(device))))

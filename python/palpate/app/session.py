@@ -38,6 +38,10 @@ RECORDINGS_CACHED = 8
 """Number of recordings that are kept; they can be large"""
 
 
+class StoppedError(Exception):
+    """The user stopped an identification. It has no result, so nothing is kept of it."""
+
+
 class CommandLine(Protocol):
     """The verbs of the command line: their options, and their work for these options."""
 
@@ -45,6 +49,9 @@ class CommandLine(Protocol):
     identify: OptionTable
     plan: OptionTable
     progress: str
+
+    def stop_identification(self) -> None:
+        """Makes a running identification raise `StoppedError`."""
 
     def read(self, file: str, options: Sequence[Option]) -> Recording:
         """Reads a recording as `palpate identify` does."""

@@ -16,7 +16,7 @@ from typing import Any
 
 import click
 
-from ..app import Option, OptionTable, Session, serve, words_of
+from ..app import Option, OptionTable, Session, StoppedError, serve, words_of
 from ..identification import identify as identify_model
 from ..identification.options import RESERVED_INPUTS, IdentifyOptions
 from ..identification.search.evidence import reporting_to
@@ -48,6 +48,11 @@ class CommandLine:
     plan = OptionTable(plan, _PLAN_NAMES)
     progress = ""
     """Progress of the running identification, as a sentence; empty if none runs"""
+    _to_stop = False
+
+    def stop_identification(self) -> None:
+        """Makes a running identification raise `StoppedError` before its next wavelet."""
+        self._to_stop = bool(self.progress)
 
     def read(self, file: str, options: Sequence[Option]) -> Recording:
         """Reads a recording as `palpate identify` does."""
@@ -64,13 +69,15 @@ class CommandLine:
         _require_unit_of_period(unit, recording.units["position"])
 
         def report(name: str, wavelets: int) -> None:
+            if self._to_stop:
+                raise StoppedError("The identification was stopped; the page is as before.")
             self.progress = f"Identifying: {name}, {wavelets} wavelets"
 
         try:
             with reporting_to(report):
                 return identify_model(recording, **settings)
         finally:
-            self.progress = ""
+            self.progress, self._to_stop = "", False
 
     def plan_of(self, model: Model, file: str, device: DeviceProfile, options: Sequence[Option]) -> Plan:
         """Plans a model as `palpate plan` does."""

@@ -18,6 +18,7 @@ import pytest
 from palpate.app.server import Server
 from palpate.app.session import Session
 from palpate.cli.app import CommandLine
+from palpate.recording.sample import sample_recording
 
 
 class Served:
@@ -151,3 +152,31 @@ def test_a_download_that_cannot_be_made_is_refused_with_a_sentence(served: Serve
     served.request("POST", "add?name=none.csv", b"position_m,force_N\n1,2\n")
     status, content, _ = served.request("GET", "file/header")
     assert (status, content.decode()) == (409, "there is no model yet: identify one")
+
+
+class Impatient(CommandLine):
+    """Stops an identification as soon as it reports its progress, a given number of times."""
+
+    stops = 1
+
+    def __setattr__(self, name: str, value: object) -> None:
+        super().__setattr__(name, value)
+        if name == "progress" and value and self.stops:
+            self.stops -= 1
+            self.stop_identification()
+
+
+def test_a_stopped_identification_leaves_the_page_as_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    sample_recording(seed=1, duration_s=3.0).write("knob.csv")
+    server = Server(Session(tmp_path, Impatient()), "token", "127.0.0.1:1")
+    server.added("knob.csv", Path("knob.csv").read_bytes())
+    before = server.session.state
+    identify = json.dumps({"action": "identify", "given": {}, "known": []}).encode()
+    stopped = server.acted(identify)["parts"]
+    assert "The identification was stopped" in stopped["message"]
+    assert server.session.state == before
+    assert server.session.command_line.progress == ""
+    assert "wavelets" in server.acted(identify)["parts"]["model"]
